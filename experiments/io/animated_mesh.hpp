@@ -1,0 +1,32 @@
+#pragma once
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace kbvh::io {
+
+/// A mesh and its keyframes as read from files or made by a generator, before it becomes a body of a scene.
+/// Positions are kept in double so that no file format loses digits here; a scene rounds them once.
+struct AnimatedMesh {
+  std::string name;
+  std::uint32_t vertex_count = 0;
+  std::vector<std::uint32_t> primitive_offsets{0};  ///< CSR, size primitives + 1
+  std::vector<std::uint32_t> primitive_vertices;    ///< vertex ids, concatenated
+  std::vector<double> keyframe_times;               ///< seconds, strictly increasing, at least one
+  std::vector<double> positions;                    ///< [keyframe][vertex][3]
+
+  // What the reader noticed and kept or mended (printed for the user, never an error).
+  std::size_t degenerate_primitives = 0;  ///< zero area or repeated vertex at the first keyframe; kept
+  std::size_t merged_keyframes = 0;       ///< equal times with equal positions, merged into one
+
+  std::size_t primitive_count() const { return primitive_offsets.size() - 1; }
+  bool moving() const { return keyframe_times.size() > 1; }
+};
+
+/// What is wrong with a file or a request, in one sentence with file, place and value.
+struct InputError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace kbvh::io
