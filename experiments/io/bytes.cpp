@@ -1,0 +1,94 @@
+#include "experiments/io/bytes.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <system_error>
+
+#include "experiments/io/animated_mesh.hpp"
+
+namespace kbvh::io {
+
+namespace fs = std::filesystem;
+
+void fail(const fs::path& file, std::string_view place, std::string_view what) {
+  std::string text = file.string();
+  text += ": ";
+  if (!place.empty()) {
+    text += place;
+    text += ": ";
+  }
+  text += what;
+  throw InputError(text);
+}
+
+std::string printable(std::string_view text) {
+  constexpr std::size_t longest = 40;
+  std::string out = "'";
+  for (char c : text.substr(0, longest)) out += (c >= 32 && c < 127) ? c : '?';
+  out += text.size() > longest ? "...'" : "'";
+  return out;
+}
+
+std::string text_of(double value) {
+  if (std::isnan(value)) return "nan";
+  char buffer[40];
+  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
+  return {buffer, end};
+}
+
+std::string read_file(const fs::path& file) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (!fs::exists(status)) fail(file, "", "no such file");
+  if (fs::is_directory(status)) fail(file, "", "is a folder where a file is expected");
+  if (!fs::is_regular_file(status)) fail(file, "", "is not a regular file");  // a pipe could block forever
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error) fail(file, "", "cannot be read: " + error.message());
+  if (size == 0) fail(file, "", "is empty (0 bytes)");
+  std::ifstream in(file, std::ios::binary);
+  if (!in) fail(file, "", "cannot be opened: " + std::system_category().message(errno));
+  std::string bytes(size, '\0');
+  in.read(bytes.data(), static_cast<std::streamsize>(size));
+  if (static_cast<std::uintmax_t>(in.gcount()) != size) {
+    fail(file, "",
+         "only " + std::to_string(in.gcount()) + " of " + std::to_string(size) + " bytes could be read");
+  }
+  return bytes;
+}
+
+void write_file_atomically(const fs::path& file, std::string_view bytes) {
+  std::string temporary = file.string() + ".XXXXXX";
+  const int descriptor = mkstemp(temporary.data());
+  if (descriptor < 0) fail(file, "", "cannot be written: " + std::system_category().message(errno));
+  const auto give_up = [&](int reason) {
+    unlink(temporary.c_str());
+    fail(file, "", "cannot be written: " + std::system_category().message(reason));
+  };
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t n = write(descriptor, bytes.data() + done, bytes.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) {
+      const int reason = errno;
+      close(descriptor);
+      give_up(reason);
+    }
+    done += static_cast<std::size_t>(n);
+  }
+  // mkstemp makes a private file; a result is as readable as any other file of the user.
+  const mode_t mask = umask(0);
+  umask(mask);
+  fchmod(descriptor, 0666 & ~mask);
+  // Without fsync a crash can leave the new name with no content, which is what the rename is meant to
+  // prevent.
+  if (fsync(descriptor) != 0 || close(descriptor) != 0) give_up(errno);
+  if (rename(temporary.c_str(), file.c_str()) != 0) give_up(errno);
+}
+
+}  // namespace kbvh::io

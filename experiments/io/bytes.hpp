@@ -1,0 +1,61 @@
+#pragma once
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace kbvh::io {
+
+/// Throws InputError with the one sentence "file: place: what" (place may be empty). Every complaint of the
+/// readers goes through here, so that they all look alike.
+[[noreturn]] void fail(const std::filesystem::path& file, std::string_view place, std::string_view what);
+
+/// A piece of a file made fit for a message: printable, in quotes, at most 40 characters.
+std::string printable(std::string_view text);
+
+/// The shortest text that reads back as the same double ("nan" and "inf" where it is not finite).
+std::string text_of(double value);
+
+/// All bytes of a regular file. Throws InputError if it is missing, not a regular file, empty or unreadable.
+std::string read_file(const std::filesystem::path& file);
+
+/// Writes a file under a temporary name beside it and renames it: whoever reads `file` sees all of it or
+/// nothing. Throws InputError if the folder is missing or not writable, or the disk is full.
+void write_file_atomically(const std::filesystem::path& file, std::string_view bytes);
+
+/// The number of type T at `at`, which needs no alignment, stored little-endian.
+template <class T>
+T load_little_endian(const char* at) {
+  unsigned char raw[sizeof(T)];
+  std::memcpy(raw, at, sizeof(T));
+  if constexpr (std::endian::native == std::endian::big) {
+    for (std::size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(raw[i], raw[sizeof(T) - 1 - i]);
+  }
+  T value;
+  std::memcpy(&value, raw, sizeof(T));
+  return value;
+}
+
+/// The same for a number stored big-endian.
+template <class T>
+T load_big_endian(const char* at) {
+  char raw[sizeof(T)];
+  for (std::size_t i = 0; i < sizeof(T); ++i) raw[i] = at[sizeof(T) - 1 - i];
+  return load_little_endian<T>(raw);
+}
+
+/// Appends a number, little-endian.
+template <class T>
+void append_little_endian(std::string& out, T value) {
+  char raw[sizeof(T)];
+  std::memcpy(raw, &value, sizeof(T));
+  if constexpr (std::endian::native == std::endian::big) {
+    for (std::size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(raw[i], raw[sizeof(T) - 1 - i]);
+  }
+  out.append(raw, sizeof(T));
+}
+
+}  // namespace kbvh::io

@@ -1,0 +1,24 @@
+#pragma once
+#include <filesystem>
+
+#include "experiments/io/animated_mesh.hpp"
+
+namespace kbvh::io {
+
+/// Reads a Wavefront OBJ file: its vertices in file order, every `f` as one primitive with all its vertices
+/// (polygons are not cut into triangles), one keyframe at time 0. Texture coordinates, normals, groups,
+/// materials, lines, points, vertex colours and weights are skipped. Indices may be negative (relative) or
+/// point forward.
+///
+/// This is a reader of our own, not tinyobjloader, because that one (2.0rc10) reads "nan", a missing or a
+/// misspelt coordinate as 0 without a word, drops faces of two vertices, wraps large indices, and rounds two
+/// thirds of 17-digit coordinates wrongly; here each coordinate is the double nearest to its text.
+///
+/// Throws InputError with the line. Does not call finish(). O(bytes).
+AnimatedMesh read_obj(const std::filesystem::path& file);
+
+/// Writes the first keyframe as OBJ; coordinates read back as the same doubles. Throws InputError if it
+/// cannot be written.
+void save_obj(const AnimatedMesh& mesh, const std::filesystem::path& file);
+
+}  // namespace kbvh::io
