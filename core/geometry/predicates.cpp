@@ -1,0 +1,139 @@
+#include "core/geometry/predicates.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <boost/multiprecision/cpp_int.hpp>
+#include <cstdint>
+#include <limits>
+
+namespace kbvh {
+namespace {
+
+__extension__ typedef __int128 Int128;
+
+using Int512 = boost::multiprecision::number<boost::multiprecision::cpp_int_backend<
+    512, 512, boost::multiprecision::signed_magnitude, boost::multiprecision::unchecked, void>>;
+using IntAny = boost::multiprecision::cpp_int;
+
+/// A finite double as mantissa * 2^exponent with an odd mantissa; zero has mantissa 0.
+struct Dyadic {
+  std::int64_t mantissa = 0;
+  int exponent = 0;
+};
+
+Dyadic to_dyadic(double x) {
+  const auto bits = std::bit_cast<std::uint64_t>(x);
+  const int biased = static_cast<int>((bits >> 52) & 0x7ff);
+  std::uint64_t mantissa = bits & 0xfffffffffffffULL;
+  if (biased != 0) mantissa |= 0x10000000000000ULL;
+  if (mantissa == 0) return {};
+  const int zeros = std::countr_zero(mantissa);
+  const auto magnitude = static_cast<std::int64_t>(mantissa >> zeros);
+  return {(bits >> 63) != 0 ? -magnitude : magnitude, std::max(biased, 1) - 1075 + zeros};
+}
+
+/// N doubles as integers over one power of two. A common factor does not change the sign of a determinant.
+template <int N>
+struct Scaled {
+  Dyadic values[N];
+  int lowest = std::numeric_limits<int>::max();
+  int width = 0;  // bits of the largest magnitude, once scaled by 2^-lowest
+
+  /// To be called when all values are set.
+  void measure() {
+    int top = std::numeric_limits<int>::min();
+    for (const Dyadic& value : values) {
+      if (value.mantissa == 0) continue;
+      const auto magnitude =
+          static_cast<std::uint64_t>(value.mantissa < 0 ? -value.mantissa : value.mantissa);
+      lowest = std::min(lowest, value.exponent);
+      top = std::max(top, value.exponent + static_cast<int>(std::bit_width(magnitude)));
+    }
+    width = top > lowest ? top - lowest : 0;
+  }
+
+  template <class Integer>
+  Integer get(int i) const {
+    if (values[i].mantissa == 0) return Integer(0);
+    // Multiplying rather than shifting where the type is built in: a left shift of a negative number is fine
+    // in C++20, and signed_magnitude integers shift their magnitude.
+    Integer result(values[i].mantissa);
+    result <<= values[i].exponent - lowest;
+    return result;
+  }
+};
+
+template <class Integer>
+int sign_of(const Integer& x) {
+  return x > 0 ? 1 : x < 0 ? -1 : 0;
+}
+
+template <class Integer>
+int orient3d_integer(const Scaled<12>& s) {
+  Integer v[12];
+  for (int i = 0; i < 12; ++i) v[i] = s.get<Integer>(i);
+  Integer e[9];
+  for (int i = 0; i < 9; ++i) e[i] = v[i + 3] - v[i % 3];
+  const Integer x = e[1] * e[5] - e[2] * e[4];
+  const Integer y = e[2] * e[3] - e[0] * e[5];
+  const Integer z = e[0] * e[4] - e[1] * e[3];
+  const Integer det = x * e[6] + y * e[7] + z * e[8];
+  return sign_of(det);
+}
+
+/// The same for coordinates of at most 60 bits: differences below 2^61, minors below 2^123 and the sums of
+/// the half products below 3 * 2^125, so that everything fits into 128 bits but the determinant, which is
+/// kept as high * 2^64 + low.
+int orient3d_narrow(const Scaled<12>& s) {
+  std::int64_t v[12];
+  for (int i = 0; i < 12; ++i) v[i] = s.get<std::int64_t>(i);
+  std::int64_t e[9];
+  for (int i = 0; i < 9; ++i) e[i] = v[i + 3] - v[i % 3];
+  const Int128 minors[3] = {Int128(e[1]) * e[5] - Int128(e[2]) * e[4],
+                            Int128(e[2]) * e[3] - Int128(e[0]) * e[5],
+                            Int128(e[0]) * e[4] - Int128(e[1]) * e[3]};
+  Int128 high = 0, low = 0;
+  for (int i = 0; i < 3; ++i) {
+    high += Int128(static_cast<std::int64_t>(minors[i] >> 64)) * e[6 + i];
+    low += Int128(static_cast<std::uint64_t>(minors[i])) * e[6 + i];
+  }
+  high += low >> 64;  // floor: the rest of low is in [0, 2^64)
+  if (high != 0) return sign_of(high);
+  return static_cast<std::uint64_t>(low) != 0 ? 1 : 0;
+}
+
+template <class Integer>
+int orient2d_integer(const Scaled<6>& s) {
+  Integer v[6];
+  for (int i = 0; i < 6; ++i) v[i] = s.get<Integer>(i);
+  const Integer bx = v[2] - v[0], by = v[3] - v[1], cx = v[4] - v[0], cy = v[5] - v[1];
+  const Integer left = bx * cy, right = by * cx;
+  return left > right ? 1 : left < right ? -1 : 0;
+}
+
+}  // namespace
+
+int orient3d_exact(const double* a, const double* b, const double* c, const double* d) {
+  Scaled<12> s;
+  const double* points[4] = {a, b, c, d};
+  for (int i = 0; i < 12; ++i) s.values[i] = to_dyadic(points[i / 3][i % 3]);
+  s.measure();
+  if (s.width <= 60) return orient3d_narrow(s);
+  // |det| < 6 * 2^(3 (width + 1)), which for 168 bits is below 2^510.
+  return s.width <= 168 ? orient3d_integer<Int512>(s) : orient3d_integer<IntAny>(s);
+}
+
+int orient2d_exact(const double* a, const double* b, const double* c, Projection p) {
+  Scaled<6> s;
+  const double* points[3] = {a, b, c};
+  for (int i = 0; i < 3; ++i) {
+    s.values[2 * i] = to_dyadic(points[i][p.u]);
+    s.values[2 * i + 1] = to_dyadic(points[i][p.v]);
+  }
+  s.measure();
+  // A product of two differences is below 2^(2 (width + 1)).
+  if (s.width <= 60) return orient2d_integer<Int128>(s);
+  return s.width <= 250 ? orient2d_integer<Int512>(s) : orient2d_integer<IntAny>(s);
+}
+
+}  // namespace kbvh
