@@ -1,0 +1,43 @@
+#include "core/counters.hpp"
+
+namespace kbvh {
+
+const char* name(Counter counter) {
+  switch (counter) {
+    case Counter::nodes_visited:
+      return "nodes_visited";
+    case Counter::values_written:
+      return "values_written";
+    case Counter::vertex_reads:
+      return "vertex_reads";
+    case Counter::positions_fetched:
+      return "positions_fetched";
+    case Counter::certificates_made:
+      return "certificates_made";
+    case Counter::certificates_failed:
+      return "certificates_failed";
+    case Counter::certificates_discarded:
+      return "certificates_discarded";
+    case Counter::internal_events:
+      return "internal_events";
+    case Counter::queue_operations:
+      return "queue_operations";
+    case Counter::queue_steps:
+      return "queue_steps";
+    case Counter::queue_peak:
+      return "queue_peak";
+    case Counter::box_tests:
+      return "box_tests";
+    case Counter::triangle_tests:
+      return "triangle_tests";
+    case Counter::triangle_tests_exact:
+      return "triangle_tests_exact";
+    case Counter::bytes:
+      return "bytes";
+    case Counter::count:
+      break;
+  }
+  return "?";
+}
+
+}  // namespace kbvh

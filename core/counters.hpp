@@ -1,0 +1,54 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace kbvh {
+
+/// What a strategy counts; one table for all of them, so that reports and theory checks can loop over it.
+enum class Counter : std::uint8_t {
+  nodes_visited,           ///< nodes whose bounds an update looked at
+  values_written,          ///< bound values stored (6 per AABB written; 1 per realiser changed)
+  vertex_reads,            ///< vertex positions read by updates
+  positions_fetched,       ///< positions a lazy strategy had evaluated on demand
+  certificates_made,       ///< certificates computed, with or without a failure inside the clip
+  certificates_failed,     ///< events processed
+  certificates_discarded,  ///< scheduled failures removed before they happened
+  internal_events,         ///< events that changed no bound
+  queue_operations,        ///< insert, erase, pop and re-key on the event queue
+  queue_steps,             ///< comparisons made by the queue
+  queue_peak,              ///< largest number of events scheduled at once (a maximum, not a sum)
+  box_tests,               ///< box-box overlap tests of the query, primitive pre-tests included
+  triangle_tests,          ///< exact triangle tests
+  triangle_tests_exact,    ///< of these, the ones the filter left to exact arithmetic
+  bytes,                   ///< memory held by the strategy's own structures, in bytes (a level, not a sum)
+  count
+};
+
+/// Name of a counter in result files.
+const char* name(Counter counter);
+
+/// The counter table of one strategy instance; cleared by `reset`.
+struct Counters {
+  std::array<std::uint64_t, std::size_t(Counter::count)> values{};
+  std::uint64_t& operator[](Counter c) { return values[std::size_t(c)]; }
+  std::uint64_t operator[](Counter c) const { return values[std::size_t(c)]; }
+};
+
+/// Counting policies: strategies are compiled with both; times come from the silent one.
+struct Counting {
+  Counters table;
+  void add(Counter c, std::uint64_t n = 1) { table[c] += n; }
+  void peak(Counter c, std::uint64_t n) {
+    if (n > table[c]) table[c] = n;
+  }
+  static constexpr bool enabled = true;
+};
+struct Silent {
+  Counters table;
+  void add(Counter, std::uint64_t = 1) {}
+  void peak(Counter, std::uint64_t) {}
+  static constexpr bool enabled = false;
+};
+
+}  // namespace kbvh

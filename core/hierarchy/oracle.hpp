@@ -1,0 +1,41 @@
+#pragma once
+#include <filesystem>
+#include <map>
+#include <memory>
+
+#include "core/pairs.hpp"
+
+namespace kbvh {
+
+/// All intersecting primitive pairs of the scene's body pairs at the playback's current time, sorted, by
+/// testing every pair exactly: no boxes, no sweep, nothing shared with any strategy but the triangle test.
+/// O(primitives^2).
+template <class S>
+std::vector<PrimitivePair> brute_force_pairs(const Scene<S>& scene, Playback<S>& playback);
+
+/// The same set by sort-and-sweep along the axis of largest extent and the exact test; itself verified
+/// against `brute_force_pairs`. O(n log n + overlaps on one axis).
+template <class S>
+std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playback);
+
+/// The true pairs at any time of a scene, computed once per (scene, scalar, t) and kept; optionally on disk,
+/// so that a later run of the same scene need not compute them again.
+template <class S>
+class Oracle {
+ public:
+  /// `cache_folder` empty: memory only. A damaged or foreign cache file is ignored and written anew.
+  explicit Oracle(const Scene<S>& scene, std::filesystem::path cache_folder = {});
+  ~Oracle();
+  /// Sorted pairs at the playback's current time; the playback must follow the scene's own plans.
+  const std::vector<PrimitivePair>& pairs(Playback<S>& playback);
+
+ private:
+  void load();
+  void save() const;
+  const Scene<S>* scene_;
+  std::filesystem::path file_;
+  std::map<double, std::vector<PrimitivePair>> known_;
+  bool grown_ = false;
+};
+
+}  // namespace kbvh

@@ -1,0 +1,94 @@
+#pragma once
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/motion/piece.hpp"
+#include "core/motion/round_positions.hpp"
+
+namespace kbvh {
+
+/// A vertex's plan of its own, from the moment `flight_plans_changed` gave it: straight lines through
+/// `times`/`positions` (after the starting knot, which is the stored position at the change), then
+/// `velocity` for ever. The common velocity field has no knots.
+template <class S>
+struct PlanChange {
+  std::uint32_t body = 0, vertex = 0;
+  std::vector<double> times;  ///< seconds, strictly increasing, later than the change
+  std::vector<S> positions;   ///< [times.size()][3]
+  S velocity[3] = {0, 0, 0};  ///< units per second, after the last knot
+};
+
+/// The flight plans of one body's vertices: exact piecewise-linear functions of the stored numbers (truth A)
+/// over keyframes at arbitrary times, with exceptions for vertices whose plan changed at run time.
+/// Before its first and after its last keyframe a body rests. Positions are A rounded correctly (truth B).
+/// Keyframes are shared between copies; plan changes belong to a copy.
+template <class S>
+class FlightPlans {
+ public:
+  FlightPlans() : FlightPlans(0, {0.0}, {}) {}
+  /// `positions` is [keyframe][vertex][3]. Throws std::invalid_argument naming what is wrong: no keyframe,
+  /// sizes that do not match, times not strictly increasing, values not finite or beyond the admissible
+  /// range.
+  FlightPlans(std::uint32_t vertex_count, std::vector<double> times, std::vector<S> positions);
+
+  std::uint32_t vertex_count() const { return vertex_count_; }
+  std::size_t keyframe_count() const { return keyframes_->times.size(); }
+  std::span<const double> keyframe_times() const { return keyframes_->times; }
+  /// Positions of keyframe k, [vertex][3]; own plans are not in them.
+  const S* keyframe(std::size_t k) const { return keyframes_->positions.data() + 3 * k * vertex_count_; }
+  bool moving() const { return keyframe_count() > 1 || !own_.empty(); }
+  bool has_own_plans() const { return !own_.empty(); }
+  bool has_own_plan(std::uint32_t vertex) const { return !own_.empty() && own_of_vertex_[vertex] != none; }
+
+  /// Writes the position of every vertex at t: out[3 * vertex + axis]. O(vertices).
+  void evaluate(double t, S* out, RoundingStats* stats = nullptr) const;
+  /// The same for the listed vertices only, into the same layout.
+  void evaluate(double t, std::span<const std::uint32_t> vertices, S* out,
+                RoundingStats* stats = nullptr) const;
+
+  /// Index k of the segment [times[k], times[k+1]) with t in it; 0 before the first, last index past the end.
+  std::size_t segment_at(double t) const;
+  /// The linear piece that holds at t and right after it. `t1` is where it ends (infinity: never).
+  Piece<S> piece_after(std::uint32_t vertex, int axis, double t) const;
+  /// The end of that piece, without building it.
+  double piece_end(std::uint32_t vertex, double t) const;
+
+  /// No vertex is faster than this on the segment that holds at t (units per second, rounded up); own plans
+  /// included. O(vertices) the first time a segment is asked for, O(own plans) after.
+  double speed_bound(double t) const;
+
+  /// Starts the vertex's new plan at t from its stored position at t (`position`, 3 scalars).
+  /// Throws std::invalid_argument on non-finite values, knots not after t, or an unknown vertex.
+  void change(double t, const PlanChange<S>& change, const S* position);
+
+  std::size_t bytes() const;
+
+ private:
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+  struct Keyframes {
+    std::vector<double> times;
+    std::vector<S> positions;
+  };
+  struct OwnPlan {
+    std::uint32_t vertex;
+    std::vector<double> times;  // first knot: the change itself
+    std::vector<S> positions;
+    S velocity[3];
+  };
+  Piece<S> own_piece(const OwnPlan& plan, int axis, double t) const;
+
+  std::uint32_t vertex_count_ = 0;
+  std::shared_ptr<const Keyframes> keyframes_;
+  std::vector<std::uint32_t> own_of_vertex_;
+  std::vector<OwnPlan> own_;
+  mutable std::size_t bounded_segment_ = std::numeric_limits<std::size_t>::max();
+  mutable double segment_speed_ = 0;
+};
+
+extern template class FlightPlans<float>;
+extern template class FlightPlans<double>;
+
+}  // namespace kbvh

@@ -1,0 +1,93 @@
+#pragma once
+#include "core/motion/playback.hpp"
+
+namespace kbvh {
+
+/// What a strategy knows of the future. What is not declared does not exist for it: the motion view that its
+/// constructor takes has no such member.
+enum class Foresight : std::uint8_t {
+  none,           ///< positions of the current frame only
+  step_bound,     ///< and a bound on how far any vertex moves until the next frame
+  next_keyframe,  ///< and the end of the current segment, with the positions there
+  whole_clip,     ///< and every flight plan to its end
+};
+
+/// Foresight::none. Positions are truth B at the current frame.
+template <class S>
+class SampledMotion {
+ public:
+  explicit SampledMotion(Playback<S>& playback) : playback_(&playback) {}
+  double time() const { return playback_->time(); }
+  /// Positions [vertex][3] of a body; readable up to one scalar past the end. Current for every vertex if the
+  /// strategy declares PositionUse::all, else only for vertices fetched at this frame.
+  const S* positions(std::uint32_t body) const { return playback_->positions(body); }
+  /// One position, evaluated now if it is not current: 3 scalars.
+  const S* position(std::uint32_t body, std::uint32_t vertex) const {
+    return playback_->position(body, vertex);
+  }
+  void fetch(std::uint32_t body, std::span<const std::uint32_t> vertices) const {
+    playback_->fetch(body, vertices);
+  }
+  bool all_current(std::uint32_t body) const { return playback_->all_current(body); }
+  /// How many positions were evaluated on demand since the playback was made.
+  std::uint64_t fetched() const { return playback_->fetched(); }
+
+ protected:
+  Playback<S>* playback_;
+};
+
+/// Foresight::step_bound.
+template <class S>
+class SteppedMotion : public SampledMotion<S> {
+ public:
+  using SampledMotion<S>::SampledMotion;
+  /// No vertex of the body moves faster than this (units per second, Euclidean, rounded up) between two
+  /// frames.
+  double speed_bound(std::uint32_t body) const {
+    return this->playback_->plans(body).speed_bound(this->time());
+  }
+};
+
+/// Foresight::next_keyframe.
+template <class S>
+class SegmentMotion : public SteppedMotion<S> {
+ public:
+  using SteppedMotion<S>::SteppedMotion;
+  /// The linear piece a coordinate is on now; it ends at `t1`.
+  Piece<S> piece(std::uint32_t body, std::uint32_t vertex, int axis) const {
+    return this->playback_->plans(body).piece_after(vertex, axis, this->time());
+  }
+};
+
+/// Foresight::whole_clip.
+template <class S>
+class ClipMotion : public SegmentMotion<S> {
+ public:
+  using SegmentMotion<S>::SegmentMotion;
+  const FlightPlans<S>& plans(std::uint32_t body) const { return this->playback_->plans(body); }
+};
+
+template <Foresight F, class S>
+struct MotionViewOf;
+template <class S>
+struct MotionViewOf<Foresight::none, S> {
+  using type = SampledMotion<S>;
+};
+template <class S>
+struct MotionViewOf<Foresight::step_bound, S> {
+  using type = SteppedMotion<S>;
+};
+template <class S>
+struct MotionViewOf<Foresight::next_keyframe, S> {
+  using type = SegmentMotion<S>;
+};
+template <class S>
+struct MotionViewOf<Foresight::whole_clip, S> {
+  using type = ClipMotion<S>;
+};
+
+/// The motion view of a declared foresight.
+template <Foresight F, class S>
+using MotionView = typename MotionViewOf<F, S>::type;
+
+}  // namespace kbvh

@@ -1,0 +1,39 @@
+#pragma once
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace kbvh {
+
+/// A parameter of a strategy as data. `allowed` lists the admissible words; empty: any finite number >=
+/// `minimum`.
+struct Parameter {
+  std::string name;
+  std::string default_value;
+  std::vector<std::string> allowed;
+  std::string meaning;
+  double minimum = 0;
+};
+
+/// What is wrong with a configuration: names the offending key and value and what would be admissible.
+struct ConfigError : std::invalid_argument {
+  using std::invalid_argument::invalid_argument;
+};
+
+/// Checked values of a strategy's parameters: every declared one is present.
+class Params {
+ public:
+  Params() = default;
+  /// Throws ConfigError on a key that is not declared or a value that is not admissible.
+  Params(const std::string& owner, const std::vector<Parameter>& declared,
+         const std::map<std::string, std::string>& given);
+  const std::string& word(const std::string& key) const { return values_.at(key); }
+  double number(const std::string& key) const { return std::stod(values_.at(key)); }
+  const std::map<std::string, std::string>& values() const { return values_; }
+
+ private:
+  std::map<std::string, std::string> values_;
+};
+
+}  // namespace kbvh

@@ -1,0 +1,115 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/geometry/box.hpp"
+#include "core/motion/flight_plans.hpp"
+
+namespace kbvh {
+
+/// What a body's primitives are; decides how a candidate pair is confirmed.
+enum class PrimitiveKind : std::uint8_t {
+  polygons,      ///< k >= 1 vertices, tested exactly as a fan of triangles
+  points,        ///< 1 vertex each; pairs are answered at candidate level (their boxes)
+  control_nets,  ///< k control points; conservative by the convex-hull property; candidate level
+};
+
+/// Primitives of one body as CSR lists: primitive p has vertices[offsets[p] .. offsets[p + 1]).
+struct Primitives {
+  PrimitiveKind kind = PrimitiveKind::polygons;
+  std::vector<std::uint32_t> offsets{0};
+  std::vector<std::uint32_t> vertices;
+
+  std::uint32_t count() const { return std::uint32_t(offsets.size() - 1); }
+  std::span<const std::uint32_t> operator[](std::uint32_t p) const {
+    return {vertices.data() + offsets[p], vertices.data() + offsets[p + 1]};
+  }
+  void add(std::span<const std::uint32_t> primitive) {
+    vertices.insert(vertices.end(), primitive.begin(), primitive.end());
+    offsets.push_back(std::uint32_t(vertices.size()));
+  }
+};
+
+/// One body: fixed connectivity and the flight plans of its vertices.
+template <class S>
+struct Body {
+  std::string name;
+  Primitives primitives;
+  FlightPlans<S> plans;
+};
+
+/// Which bodies are tested against each other; first < second.
+struct BodyPair {
+  std::uint32_t first, second;
+};
+
+/// All bodies of one experiment in one scalar.
+template <class S>
+struct Scene {
+  std::string name;
+  std::vector<Body<S>> bodies;
+  std::vector<BodyPair> pairs;  ///< body pairs a query answers; `all_pairs` by default
+
+  std::uint64_t primitive_count() const {
+    std::uint64_t total = 0;
+    for (const auto& body : bodies) total += body.primitives.count();
+    return total;
+  }
+  std::uint64_t vertex_count() const {
+    std::uint64_t total = 0;
+    for (const auto& body : bodies) total += body.plans.vertex_count();
+    return total;
+  }
+};
+
+/// Every unordered pair of different bodies of which at least one moves.
+template <class S>
+std::vector<BodyPair> all_pairs(const std::vector<Body<S>>& bodies) {
+  std::vector<BodyPair> pairs;
+  for (std::uint32_t a = 0; a < bodies.size(); ++a)
+    for (std::uint32_t b = a + 1; b < bodies.size(); ++b)
+      if (bodies[a].plans.moving() || bodies[b].plans.moving()) pairs.push_back({a, b});
+  if (pairs.empty())
+    for (std::uint32_t a = 0; a < bodies.size(); ++a)
+      for (std::uint32_t b = a + 1; b < bodies.size(); ++b) pairs.push_back({a, b});
+  return pairs;
+}
+
+/// Throws std::invalid_argument, naming body, primitive and value, if a primitive refers to a vertex that
+/// does not exist, has no vertex, or a body pair is out of range. Flight plans check themselves.
+template <class S>
+void validate(const Scene<S>& scene);
+
+/// A 64-bit hash of everything that decides results: connectivity, keyframes, scalar, pairs. Not of names.
+template <class S>
+std::uint64_t hash(const Scene<S>& scene);
+
+/// The times of a clip with `per_keyframe` (l >= 1) frames for each segment of the overlaid keyframe times of
+/// all bodies: t = T_i + (T_{i+1} - T_i) * j / l for j = 0..l-1, and the last keyframe. One time if nothing
+/// moves.
+template <class S>
+std::vector<double> frame_times(const Scene<S>& scene, std::uint32_t per_keyframe);
+
+/// The overlaid keyframe times of all bodies, strictly increasing.
+template <class S>
+std::vector<double> overlaid_keyframes(const Scene<S>& scene);
+
+/// Connectivity of a scene without its motion: what every strategy may know, whatever foresight it declares.
+template <class S>
+class SceneView {
+ public:
+  explicit SceneView(const Scene<S>& scene) : scene_(&scene) {}
+  std::uint32_t body_count() const { return std::uint32_t(scene_->bodies.size()); }
+  const Primitives& primitives(std::uint32_t body) const { return scene_->bodies[body].primitives; }
+  std::uint32_t vertex_count(std::uint32_t body) const { return scene_->bodies[body].plans.vertex_count(); }
+  std::span<const BodyPair> pairs() const { return scene_->pairs; }
+  /// False for a body that is known to stay where it is unless its plans are changed.
+  bool moving(std::uint32_t body) const { return scene_->bodies[body].plans.moving(); }
+
+ private:
+  const Scene<S>* scene_;
+};
+
+}  // namespace kbvh

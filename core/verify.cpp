@@ -1,0 +1,134 @@
+#include "core/verify.hpp"
+
+#include <algorithm>
+
+namespace kbvh {
+
+namespace {
+
+std::string text(const PrimitivePair& pair) {
+  return "(" + std::to_string(pair.body_a) + ":" + std::to_string(pair.primitive_a) + ", " +
+         std::to_string(pair.body_b) + ":" + std::to_string(pair.primitive_b) + ")";
+}
+
+template <class S>
+bool well_formed(const Scene<S>& scene, const PrimitivePair& pair) {
+  const std::uint32_t bodies = std::uint32_t(scene.bodies.size());
+  if (pair.body_a >= bodies || pair.body_b >= bodies || pair.body_a > pair.body_b) return false;
+  if (pair.body_a == pair.body_b && pair.primitive_a >= pair.primitive_b) return false;
+  return pair.primitive_a < scene.bodies[pair.body_a].primitives.count() &&
+         pair.primitive_b < scene.bodies[pair.body_b].primitives.count();
+}
+
+/// Sorts, counts and removes repetitions.
+std::uint64_t sort_unique(PairBuffer& pairs) {
+  std::sort(pairs.begin(), pairs.end());
+  const auto end = std::unique(pairs.begin(), pairs.end());
+  const auto repeated = std::uint64_t(pairs.end() - end);
+  pairs.erase(end, pairs.end());
+  return repeated;
+}
+
+PairBuffer difference(const PairBuffer& from, const PairBuffer& without) {
+  PairBuffer result;
+  std::set_difference(from.begin(), from.end(), without.begin(), without.end(), std::back_inserter(result));
+  return result;
+}
+
+template <class S>
+class FrameChecker {
+ public:
+  FrameChecker(Session<S>& session, Verification& result) : session_(session), result_(result) {}
+
+  /// Takes the answers by value: sorting must not disturb the buffers that strategies keep warm.
+  void check_pairs(PairBuffer candidates, PairBuffer confirmed, const PairBuffer& truth) {
+    const Info& info = session_.info();
+    ++result_.frames;
+    result_.pairs += truth.size();
+    result_.candidates += candidates.size();
+    for (const PrimitivePair& pair : candidates)
+      if (!well_formed(session_.scene(), pair)) {
+        ++result_.malformed;
+        violate("malformed pair " + text(pair));
+      }
+    const std::uint64_t repeated = sort_unique(candidates);
+    const std::uint64_t repeated_confirmed = sort_unique(confirmed);
+    result_.repeated += std::max(repeated, repeated_confirmed);
+    if (repeated || repeated_confirmed) violate("a pair was reported more than once");
+    const PairBuffer lost = difference(truth, candidates), missed = difference(truth, confirmed),
+                     extra = difference(confirmed, truth);
+    result_.missed_candidates += lost.size();
+    result_.missed += missed.size();
+    result_.extra += extra.size();
+    if (info.guarantee == Guarantee::approximate) return;
+    if (!lost.empty()) violate("pair " + text(lost[0]) + " is not among the candidates");
+    if (!missed.empty()) violate("pair " + text(missed[0]) + " is missed");
+    if (!extra.empty()) violate("pair " + text(extra[0]) + " is reported but does not intersect");
+  }
+
+  void check_bounds() {
+    const Info& info = session_.info();
+    for (std::uint32_t body = 0; body < session_.scene().bodies.size(); ++body) {
+      const auto view = session_.strategy().audit_view(body);
+      if (!view) continue;
+      result_.audited = true;
+      const Audit found =
+          audit(*view, session_.scene().bodies[body].primitives, session_.playback().positions(body));
+      result_.audit.add(found);
+      const std::string where = "body " + std::to_string(body) + ": ";
+      if (!found.topology_error.empty()) violate(where + found.topology_error);
+      if (info.guarantee != Guarantee::approximate && found.invalid) violate(where + found.first_fault);
+      if (info.tightness == Tightness::tight && found.not_tight)
+        violate(where + std::to_string(found.not_tight) + " boxes are not tight");
+    }
+  }
+
+ private:
+  void violate(const std::string& what) {
+    if (result_.first_violation.empty())
+      result_.first_violation = "t = " + std::to_string(session_.playback().time()) + ": " + what;
+  }
+  Session<S>& session_;
+  Verification& result_;
+};
+
+}  // namespace
+
+template <class S>
+Verification verify(Session<S>& session, std::span<const double> frames, Oracle<S>& oracle,
+                    const PlanScript<S>* script, const VerifyOptions& options) {
+  Verification result;
+  FrameChecker<S> checker(session, result);
+  PairBuffer pairs;
+  PhaseTimes ignored;
+  std::size_t step = 0;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    if (f == 0)
+      session.reset(frames[0]);
+    else
+      session.advance(frames[f], ignored);
+    const bool compared = f % options.every_nth_frame == 0 || f + 1 == frames.size();
+    pairs.clear();
+    session.strategy().candidates_at(frames[f], pairs, Budget{});
+    if (compared) {
+      const PairBuffer candidates = pairs;
+      session.strategy().confirm(frames[f], pairs);
+      // Only after the answer may positions be completed for the oracle and the audit.
+      session.playback().evaluate_all();
+      checker.check_pairs(
+          candidates, pairs,
+          script ? sweep_pairs(session.scene(), session.playback()) : oracle.pairs(session.playback()));
+      checker.check_bounds();
+    }
+    for (; script && step < script->steps.size() && script->steps[step].time <= frames[f]; ++step)
+      session.change_plans(script->steps[step].changes, ignored);
+  }
+  return result;
+}
+
+template Verification verify(Session<float>&, std::span<const double>, Oracle<float>&,
+                             const PlanScript<float>*, const VerifyOptions&);
+template Verification verify(Session<double>&, std::span<const double>, Oracle<double>&,
+                             const PlanScript<double>*, const VerifyOptions&);
+
+}  // namespace kbvh

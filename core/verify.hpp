@@ -1,0 +1,36 @@
+#pragma once
+#include "core/hierarchy/audit.hpp"
+#include "core/session.hpp"
+
+namespace kbvh {
+
+/// What a verified run of one contestant over a clip showed. Recorded with every measurement.
+struct Verification {
+  std::uint64_t frames = 0;             ///< frames compared with the oracle
+  std::uint64_t pairs = 0;              ///< true pairs, summed over frames
+  std::uint64_t candidates = 0;         ///< pairs before confirmation, summed
+  std::uint64_t missed_candidates = 0;  ///< true pairs that were not even candidates
+  std::uint64_t missed = 0, extra = 0;  ///< confirmed pairs against the oracle
+  std::uint64_t repeated = 0;           ///< pairs reported more than once in a frame
+  std::uint64_t malformed = 0;          ///< ids out of range or not canonical
+  Audit audit;                          ///< summed over frames and bodies
+  bool audited = false;                 ///< false for hierarchies that cannot be seen
+  std::string first_violation;  ///< of the declared guarantee or tightness: frame, what, value; or empty
+
+  /// The declared guarantee and tightness held in every frame.
+  bool holds() const { return first_violation.empty(); }
+};
+
+struct VerifyOptions {
+  std::uint64_t every_nth_frame = 1;  ///< compare and audit only these (and the last); the strategy sees all
+};
+
+/// Runs a contestant over the frames and compares each with the oracle: candidates contain the truth,
+/// confirmed pairs equal it, each pair once and canonical, boxes that were read are valid, and tight where
+/// that is declared. `session` must be fresh. With a script, truth is computed afresh, since plans then
+/// differ from the scene's.
+template <class S>
+Verification verify(Session<S>& session, std::span<const double> frames, Oracle<S>& oracle,
+                    const PlanScript<S>* script = nullptr, const VerifyOptions& options = {});
+
+}  // namespace kbvh
