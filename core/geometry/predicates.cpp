@@ -114,6 +114,9 @@ int orient2d_integer(const Scaled<6>& s) {
 }  // namespace
 
 int orient3d_exact(const double* a, const double* b, const double* c, const double* d) {
+  // What lies on an axis-aligned plane (floors, tables) is the most common coplanar input.
+  for (int axis = 0; axis < 3; ++axis)
+    if (a[axis] == b[axis] && a[axis] == c[axis] && a[axis] == d[axis]) return 0;
   Scaled<12> s;
   const double* points[4] = {a, b, c, d};
   for (int i = 0; i < 12; ++i) s.values[i] = to_dyadic(points[i / 3][i % 3]);
@@ -124,6 +127,8 @@ int orient3d_exact(const double* a, const double* b, const double* c, const doub
 }
 
 int orient2d_exact(const double* a, const double* b, const double* c, Projection p) {
+  for (int axis : {p.u, p.v})
+    if (a[axis] == b[axis] && a[axis] == c[axis]) return 0;
   Scaled<6> s;
   const double* points[3] = {a, b, c};
   for (int i = 0; i < 3; ++i) {

@@ -1,9 +1,13 @@
 #include "core/geometry/triangle_triangle.hpp"
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <utility>
+#include <cstddef>
 
 // Three stages, kept apart so that a batched filter can stand in for the first:
 //   1. signs:    on which sides of each triangle's plane the other's corners lie (filtered), rejecting most
@@ -28,58 +32,156 @@ Triangle load(const S* p0, const S* p1, const S* p2) {
 
 // ---- Signs ----------------------------------------------------------------------------------------------
 
-/// Values of orient3d(plane, corner i of the other triangle) and one bound on the error of all three.
-struct SideValues {
-  double value[3];
-  double bound;
+/// Two doubles that are computed together: SSE2 where it is (every x86-64), plain code elsewhere, and the
+/// same results in both.
+#if defined(__SSE2__)
+struct Lanes {
+  __m128d v;
+};
+inline Lanes lanes(double x, double y) {
+  return {_mm_set_pd(y, x)};
+}
+inline Lanes lanes(float x, float y) {
+  return {_mm_cvtps_pd(_mm_set_ps(0, 0, y, x))};
+}
+inline Lanes swapped(Lanes x) {
+  return {_mm_shuffle_pd(x.v, x.v, 1)};
+}
+inline Lanes operator+(Lanes x, Lanes y) {
+  return {_mm_add_pd(x.v, y.v)};
+}
+inline Lanes operator-(Lanes x, Lanes y) {
+  return {_mm_sub_pd(x.v, y.v)};
+}
+inline Lanes operator*(Lanes x, Lanes y) {
+  return {_mm_mul_pd(x.v, y.v)};
+}
+inline Lanes abs(Lanes x) {
+  return {_mm_andnot_pd(_mm_set1_pd(-0.0), x.v)};
+}
+inline Lanes max(Lanes x, Lanes y) {
+  return {_mm_max_pd(x.v, y.v)};
+}
+inline Lanes min(Lanes x, Lanes y) {
+  return {_mm_min_pd(x.v, y.v)};
+}
+/// Bit i is set where lane i of x is greater.
+inline int greater(Lanes x, Lanes y) {
+  return _mm_movemask_pd(_mm_cmpgt_pd(x.v, y.v));
+}
+#else
+struct Lanes {
+  double x, y;
+};
+inline Lanes lanes(double x, double y) {
+  return {x, y};
+}
+inline Lanes swapped(Lanes a) {
+  return {a.y, a.x};
+}
+inline Lanes operator+(Lanes a, Lanes b) {
+  return {a.x + b.x, a.y + b.y};
+}
+inline Lanes operator-(Lanes a, Lanes b) {
+  return {a.x - b.x, a.y - b.y};
+}
+inline Lanes operator*(Lanes a, Lanes b) {
+  return {a.x * b.x, a.y * b.y};
+}
+inline Lanes abs(Lanes a) {
+  return {std::fabs(a.x), std::fabs(a.y)};
+}
+inline Lanes max(Lanes a, Lanes b) {
+  return {std::max(a.x, b.x), std::max(a.y, b.y)};
+}
+inline Lanes min(Lanes a, Lanes b) {
+  return {std::min(a.x, b.x), std::min(a.y, b.y)};
+}
+inline int greater(Lanes a, Lanes b) {
+  return (a.x > b.x ? 1 : 0) + (a.y > b.y ? 2 : 0);
+}
+#endif
 
-  bool one_side() const {
-    const double low = std::min(std::min(value[0], value[1]), value[2]);
-    const double high = std::max(std::max(value[0], value[1]), value[2]);
-    return (low > bound) | (high < -bound);
+inline Lanes error_bound(Lanes permanent) {
+  return lanes(filter::relative3d, filter::relative3d) * permanent +
+         lanes(filter::absolute3d, filter::absolute3d);
+}
+
+struct LanePoint {
+  Lanes x, y, z;
+};
+inline LanePoint operator-(const LanePoint& p, const LanePoint& q) {
+  return {p.x - q.x, p.y - q.y, p.z - q.z};
+}
+
+/// A cross product and, for each of its components, the sum of the absolute products.
+struct Cross {
+  LanePoint value, magnitude;
+};
+inline Cross cross(const LanePoint& b, const LanePoint& c) {
+  const Lanes by_cz = b.y * c.z, bz_cy = b.z * c.y;
+  const Lanes bz_cx = b.z * c.x, bx_cz = b.x * c.z;
+  const Lanes bx_cy = b.x * c.y, by_cx = b.y * c.x;
+  return {{by_cz - bz_cy, bz_cx - bx_cz, bx_cy - by_cx},
+          {abs(by_cz) + abs(bz_cy), abs(bz_cx) + abs(bx_cz), abs(bx_cy) + abs(by_cx)}};
+}
+inline Lanes dot(const LanePoint& p, const LanePoint& q) {
+  return p.x * q.x + p.y * q.y + p.z * q.z;
+}
+
+/// orient3d(plane of the one triangle, corner i of the other), not yet rounded to a sign: a's plane and b's
+/// corners in lane 0, b's plane and a's corners in lane 1. One bound holds for the errors of a lane's three
+/// values (the operations are those of orient3d_filtered, the permanent is the largest of the three).
+struct SideValues {
+  Lanes value[3];
+  Lanes bound;
+  Lanes minus_bound;
+
+  /// Are all six signs known?
+  bool decided() const {
+    const Lanes smallest = min(min(abs(value[0]), abs(value[1])), abs(value[2]));
+    return greater(smallest, bound) == 3;
+  }
+
+  /// Is a triangle strictly on one side of the other's plane?
+  bool separate() const {
+    const Lanes low = min(min(value[0], value[1]), value[2]);
+    const Lanes high = max(max(value[0], value[1]), value[2]);
+    return (greater(low, bound) | greater(minus_bound, high)) != 0;
   }
 };
 
-/// The same operations as in orient3d_filtered, so the same error bounds hold.
-inline SideValues side_values(const Triangle& plane, const Triangle& other) {
-  const double* a = plane.corner[0];
-  const double* b = plane.corner[1];
-  const double* c = plane.corner[2];
-  const double bx = b[0] - a[0], by = b[1] - a[1], bz = b[2] - a[2];
-  const double cx = c[0] - a[0], cy = c[1] - a[1], cz = c[2] - a[2];
-  const double by_cz = by * cz, bz_cy = bz * cy;
-  const double bz_cx = bz * cx, bx_cz = bx * cz;
-  const double bx_cy = bx * cy, by_cx = by * cx;
-  const double nx = by_cz - bz_cy, ny = bz_cx - bx_cz, nz = bx_cy - by_cx;
-  SideValues result;
-  double wx = 0, wy = 0, wz = 0;
+template <class S>
+inline SideValues side_values(const S* const (&a)[3], const S* const (&b)[3]) {
+  LanePoint corner[3], other[3];
   for (int i = 0; i < 3; ++i) {
-    const double dx = other.corner[i][0] - a[0];
-    const double dy = other.corner[i][1] - a[1];
-    const double dz = other.corner[i][2] - a[2];
-    result.value[i] = nx * dx + ny * dy + nz * dz;
-    wx = std::max(wx, std::fabs(dx));
-    wy = std::max(wy, std::fabs(dy));
-    wz = std::max(wz, std::fabs(dz));
+    corner[i] = {lanes(a[i][0], b[i][0]), lanes(a[i][1], b[i][1]), lanes(a[i][2], b[i][2])};
+    other[i] = {swapped(corner[i].x), swapped(corner[i].y), swapped(corner[i].z)};
   }
-  const double permanent = (std::fabs(by_cz) + std::fabs(bz_cy)) * wx +
-                           (std::fabs(bz_cx) + std::fabs(bx_cz)) * wy +
-                           (std::fabs(bx_cy) + std::fabs(by_cx)) * wz;
-  result.bound = filter::relative3d * permanent + filter::absolute3d;
-  return result;
+  const Cross normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
+  const LanePoint d0 = other[0] - corner[0], d1 = other[1] - corner[0], d2 = other[2] - corner[0];
+  const LanePoint reach = {max(max(abs(d0.x), abs(d1.x)), abs(d2.x)),
+                           max(max(abs(d0.y), abs(d1.y)), abs(d2.y)),
+                           max(max(abs(d0.z), abs(d1.z)), abs(d2.z))};
+  const Lanes bound = error_bound(dot(normal.magnitude, reach));
+  return {
+      {dot(normal.value, d0), dot(normal.value, d1), dot(normal.value, d2)}, bound, lanes(0.0, 0.0) - bound};
 }
 
 /// Signs of the three corners of one triangle against the plane of the other.
 using Sides = std::array<int, 3>;
 
-inline Sides to_sides(const SideValues& values) {
-  return {sign_beyond(values.value[0], values.bound), sign_beyond(values.value[1], values.bound),
-          sign_beyond(values.value[2], values.bound)};
+/// The signs in one lane (0: of b's corners, 1: of a's).
+inline Sides to_sides(const SideValues& values, int lane) {
+  Sides sides{};
+  for (int i = 0; i < 3; ++i) {
+    const int positive = greater(values.value[i], values.bound) >> lane & 1;
+    const int negative = greater(values.minus_bound, values.value[i]) >> lane & 1;
+    sides[static_cast<std::size_t>(i)] = (positive | negative) != 0 ? positive - negative : undecided_sign;
+  }
+  return sides;
 }
 
-inline bool complete(const Sides& s) {
-  return (s[0] != undecided_sign) & (s[1] != undecided_sign) & (s[2] != undecided_sign);
-}
 inline bool all_equal(const Sides& s, int sign) {
   return s[0] == sign && s[1] == sign && s[2] == sign;
 }
@@ -103,8 +205,7 @@ struct Apex {
 
 /// Both edges at the apex cross the plane (in at least one point, and not along the edge). With a corner on
 /// each side and one in the plane, the positive one is taken.
-constexpr Apex find_apex(int s0, int s1, int s2) {
-  const int s[3] = {s0, s1, s2};
+constexpr Apex find_apex(const Sides& s) {
   for (int side : {1, -1})
     for (int i = 0; i < 3; ++i) {
       const int p = side * s[i], q = side * s[(i + 1) % 3], r = side * s[(i + 2) % 3];
@@ -114,41 +215,37 @@ constexpr Apex find_apex(int s0, int s1, int s2) {
   return {};
 }
 
-constexpr std::array<Apex, 27> make_apices() {
-  std::array<Apex, 27> table{};
-  for (int i = 0; i < 27; ++i)
-    table[static_cast<std::size_t>(i)] = find_apex(i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1);
+/// The apex for each set of corners on the positive side (bit i: corner i), the others being on the negative one.
+constexpr std::array<Apex, 8> strict_apices = [] {
+  std::array<Apex, 8> table{};
+  for (int i = 0; i < 8; ++i)
+    table[static_cast<std::size_t>(i)] = find_apex({(i & 1) * 2 - 1, (i >> 1 & 1) * 2 - 1, (i >> 2) * 2 - 1});
   return table;
-}
-constexpr std::array<Apex, 27> apices = make_apices();
+}();
 
-inline Apex apex_of(const Sides& s) {
-  return apices[static_cast<std::size_t>(9 * s[0] + 3 * s[1] + s[2] + 13)];
-}
-
-/// Do the triangles intersect, given the sides, where each triangle meets the plane of the other, neither
-/// lies in it and (so) both are proper? `edge_sign(p, q, r, s)` is the sign of orient3d.
+/// What is left to ask once the sides are known.
 ///
-/// Each triangle cuts an interval out of the line common to both planes; its ends are on the edges at the
-/// apex. With X on the edge a-a' and Y on b-b', and the line directed along normal(a) x normal(b),
-///   orient3d(a, a', b, b') = det(a' - a, Y - X, b' - b), and its sign is sign(Y - X) side(a) side(b).
+/// Where each triangle meets the plane of the other and neither lies in it, both are proper, and each cuts an
+/// interval out of the line common to both planes; its ends are on the edges at the apices p and q. With X on
+/// the edge p-p' and Y on q-q', and the line directed along normal(a) x normal(b),
+///   orient3d(p, p', q, q') = det(p' - p, Y - X, q' - q), and its sign is sign(Y - X) side(p) side(q).
 /// On side +1 the edge to the next corner ends the interval of a above, that of b below; on side -1
-/// conversely.
-template <class EdgeSign>
-bool intervals_overlap(const Triangle& a, const Sides& sides_a, const Triangle& b, const Sides& sides_b,
-                       EdgeSign&& edge_sign) {
+/// conversely. So with direction = side(p) side(q) the intervals overlap iff
+///   direction orient3d(p, p_low, q, q_high) >= 0 and direction orient3d(p, p_high, q, q_low) <= 0.
+template <class S>
+struct IntervalEnds {
+  const S *p, *p_low, *p_high;
+  const S *q, *q_low, *q_high;
+  int direction;
+};
+
+template <class S>
+inline IntervalEnds<S> interval_ends(const S* const (&a)[3], Apex p, const S* const (&b)[3], Apex q) {
   static constexpr int next[4] = {1, 2, 0, 1};
-  const Apex top_a = apex_of(sides_a), top_b = apex_of(sides_b);
-  const double* p = a.corner[top_a.corner];
-  const double* q = b.corner[top_b.corner];
-  const double* p_high = a.corner[next[top_a.corner]];
-  const double* p_low = a.corner[next[top_a.corner + 1]];
-  const double* q_low = b.corner[next[top_b.corner]];
-  const double* q_high = b.corner[next[top_b.corner + 1]];
-  if (top_a.side < 0) std::swap(p_low, p_high);
-  if (top_b.side < 0) std::swap(q_low, q_high);
-  const int direction = top_a.side * top_b.side;
-  return direction * edge_sign(p, p_low, q, q_high) >= 0 && direction * edge_sign(p, p_high, q, q_low) <= 0;
+  const int swap_a = p.side < 0 ? 1 : 0, swap_b = q.side < 0 ? 1 : 0;
+  return {a[p.corner],    a[next[p.corner + 1 - swap_a]], a[next[p.corner + swap_a]],
+          b[q.corner],    b[next[q.corner + swap_b]],     b[next[q.corner + 1 - swap_b]],
+          p.side * q.side};
 }
 
 // ---- Coplanar and degenerate input ----------------------------------------------------------------------
@@ -163,10 +260,12 @@ inline bool lexicographically_less(const double* p, const double* q) {
   return p[2] < q[2];
 }
 
-/// The axis whose dropping leaves a, b, c a proper triangle, or -1 if they are collinear.
+/// An axis whose dropping leaves a, b, c a proper triangle, or -1 if they are collinear.
 int proper_axis(const double* a, const double* b, const double* c) {
-  for (int axis = 2; axis >= 0; --axis)
-    if (orient2d(a, b, c, drop_axis(axis)) != 0) return axis;
+  for (int axis = 0; axis < 3; ++axis)
+    if (orient2d_filtered(a, b, c, drop_axis(axis)) != undecided_sign) return axis;
+  for (int axis = 0; axis < 3; ++axis)
+    if (orient2d_exact(a, b, c, drop_axis(axis)) != 0) return axis;
   return -1;
 }
 
@@ -279,16 +378,32 @@ inline Outcome outcome(bool intersects, bool exact) {
   return intersects ? Outcome::intersect : Outcome::separate;
 }
 
-/// From complete sides, whatever is left of them.
-Outcome finish(const Triangle& a, const Sides& sides_a, const Triangle& b, const Sides& sides_b, bool exact) {
-  const bool overlap = intervals_overlap(
-      a, sides_a, b, sides_b, [&exact](const double* p, const double* q, const double* r, const double* s) {
-        const int sign = orient3d_filtered(p, q, r, s);
-        if (sign != undecided_sign) return sign;
-        exact = true;
-        return orient3d_exact(p, q, r, s);
-      });
-  return outcome(overlap, exact);
+template <class S>
+[[gnu::noinline]] bool intervals_overlap_exactly(const IntervalEnds<S>& e) {
+  const auto sign = [](const S* k, const S* l, const S* m, const S* n) {
+    const double points[4][3] = {
+        {k[0], k[1], k[2]}, {l[0], l[1], l[2]}, {m[0], m[1], m[2]}, {n[0], n[1], n[2]}};
+    return orient3d(points[0], points[1], points[2], points[3]);
+  };
+  return e.direction * sign(e.p, e.p_low, e.q, e.q_high) >= 0 &&
+         e.direction * sign(e.p, e.p_high, e.q, e.q_low) <= 0;
+}
+
+/// From complete sides; `exact` says whether they took integers. Both orientations are computed in one go,
+/// with the sign of the second turned so that both have to be positive.
+template <class S>
+inline Outcome finish(const IntervalEnds<S>& e, bool exact) {
+  const auto pair = [](const S* x, const S* y) {
+    return LanePoint{lanes(x[0], y[0]), lanes(x[1], y[1]), lanes(x[2], y[2])};
+  };
+  const LanePoint p = pair(e.p, e.p), q = pair(e.q, e.q);
+  const Cross normal = cross(pair(e.p_low, e.p_high) - p, q - p);
+  const LanePoint d = pair(e.q_high, e.q_low) - p;
+  const Lanes value = lanes(double(e.direction), double(-e.direction)) * dot(normal.value, d);
+  const Lanes bound = error_bound(dot(normal.magnitude, {abs(d.x), abs(d.y), abs(d.z)}));
+  if (greater(value, bound) == 3) return outcome(true, exact);
+  if (greater(lanes(0.0, 0.0) - bound, value) != 0) return outcome(false, exact);
+  return outcome(intervals_overlap_exactly(e), true);
 }
 
 /// The filter left a side open: a corner is in or near the plane of the other triangle.
@@ -304,17 +419,25 @@ Outcome finish(const Triangle& a, const Sides& sides_a, const Triangle& b, const
   if (strictly_one_side(sides_a)) return Outcome::separate_exactly;
   // a is proper and b not all in its plane, so b is degenerate.
   if (all_equal(sides_a, 0)) return outcome(flat_intersect(a, b), true);
-  return finish(a, sides_a, b, sides_b, true);
+  const double* const corners_a[3] = {a.corner[0], a.corner[1], a.corner[2]};
+  const double* const corners_b[3] = {b.corner[0], b.corner[1], b.corner[2]};
+  return finish(interval_ends(corners_a, find_apex(sides_a), corners_b, find_apex(sides_b)), true);
 }
 
-inline Outcome decide(const Triangle& a, const Triangle& b) {
-  const SideValues values_b = side_values(a, b);
-  if (values_b.one_side()) return Outcome::separate;
-  const SideValues values_a = side_values(b, a);
-  if (values_a.one_side()) return Outcome::separate;
-  const Sides sides_b = to_sides(values_b), sides_a = to_sides(values_a);
-  if (!complete(sides_a) || !complete(sides_b)) return decide_open(a, sides_a, b, sides_b);
-  return finish(a, sides_a, b, sides_b, false);
+template <class S>
+inline Outcome decide(const S* const (&a)[3], const S* const (&b)[3]) {
+  const SideValues values = side_values(a, b);
+  if (values.separate()) return Outcome::separate;
+  if (!values.decided())
+    return decide_open(load(a[0], a[1], a[2]), to_sides(values, 1), load(b[0], b[1], b[2]), to_sides(values, 0));
+  const Lanes zero = lanes(0.0, 0.0);
+  const int p0 = greater(values.value[0], zero), p1 = greater(values.value[1], zero),
+            p2 = greater(values.value[2], zero);
+  const int positive_b = (p0 & 1) | (p1 & 1) << 1 | (p2 & 1) << 2;
+  const int positive_a = p0 >> 1 | (p1 & 2) | (p2 & 2) << 1;
+  return finish(interval_ends(a, strict_apices[static_cast<std::size_t>(positive_a)], b,
+                              strict_apices[static_cast<std::size_t>(positive_b)]),
+                false);
 }
 
 }  // namespace
@@ -322,7 +445,7 @@ inline Outcome decide(const Triangle& a, const Triangle& b) {
 template <class S>
 bool triangles_intersect(const S* a0, const S* a1, const S* a2, const S* b0, const S* b1, const S* b2,
                          TriangleTestStats* stats) {
-  const Outcome result = decide(load(a0, a1, a2), load(b0, b1, b2));
+  const Outcome result = decide<S>({a0, a1, a2}, {b0, b1, b2});
   if (stats != nullptr) {
     const bool exact = result == Outcome::separate_exactly || result == Outcome::intersect_exactly;
     stats->tests += 1;

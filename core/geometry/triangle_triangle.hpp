@@ -9,7 +9,7 @@ namespace kbvh {
 struct TriangleTestStats {
   std::uint64_t tests = 0;     ///< calls
   std::uint64_t filtered = 0;  ///< decided by floating-point filters and comparisons alone
-  std::uint64_t exact = 0;     ///< needed at least one sign from integer arithmetic
+  std::uint64_t exact = 0;  ///< came to the exact stage: coplanar, degenerate, or too close for the filters
 };
 
 /// Do two closed triangles share a point? Exact: the answer is that of real arithmetic on the given numbers,
