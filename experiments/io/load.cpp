@@ -1,39 +1,47 @@
 #include "experiments/io/load.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "experiments/io/bytes.hpp"
-#include "experiments/io/obj.hpp"
+#include "experiments/io/frames.hpp"
+#include "experiments/io/gltf.hpp"
 #include "experiments/io/pc2.hpp"
 #include "experiments/io/validate.hpp"
 
 namespace kbvh::io {
-namespace {
-
-namespace fs = std::filesystem;
-
-std::string lower_extension(const fs::path& file) {
-  std::string text = file.extension().string();
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  return text;
-}
-
-}  // namespace
 
 AnimatedMesh load_animated_mesh(const LoadRequest& request) {
   const double fps = request.frames_per_second;
   if (!std::isfinite(fps) || fps < 0) fail(request.mesh, "", "frames per second is " + text_of(fps));
   const std::string extension = lower_extension(request.mesh);
-  if (extension != ".obj") fail(request.mesh, "", "has the unknown extension " + printable(extension));
-  AnimatedMesh mesh = read_obj(request.mesh);
-  if (!request.motion.empty()) {
-    read_pc2(mesh, request.mesh, request.motion, fps);
-    finish(mesh, request.motion);
-  } else {
-    finish(mesh, request.mesh);
+  std::error_code error;
+  if (!std::filesystem::exists(request.mesh, error)) fail(request.mesh, "", "no such file or folder");
+  const bool is_folder = std::filesystem::is_directory(request.mesh, error);
+  const bool is_mesh = !is_folder && (extension == ".obj" || extension == ".ply");
+  const bool is_gltf = !is_folder && (extension == ".gltf" || extension == ".glb");
+  if (!is_folder && !is_mesh && !is_gltf) {
+    fail(
+        request.mesh, "",
+        "has the extension " + printable(extension) + ", not .obj, .ply, .gltf or .glb, and is not a folder");
   }
+  if (!request.motion.empty() && !is_mesh) {
+    fail(request.motion, "",
+         "a point cache goes with an .obj or .ply file, not with " + request.mesh.string());
+  }
+  if (!request.clip.empty() && !is_gltf) {
+    fail(request.mesh, "", "a clip (" + printable(request.clip) + ") can be chosen in glTF files only");
+  }
+  AnimatedMesh mesh = is_folder ? read_frames(request.mesh, fps)
+                      : is_gltf ? read_gltf(request.mesh, request.clip)
+                                : read_mesh_file(request.mesh);
+  if (!request.motion.empty()) {
+    if (lower_extension(request.motion) != ".pc2") {
+      fail(request.motion, "",
+           "has the extension " + printable(lower_extension(request.motion)) + ", not .pc2");
+    }
+    read_pc2(mesh, request.mesh, request.motion, fps);
+  }
+  finish(mesh, request.motion.empty() ? request.mesh : request.motion);
   return mesh;
 }
 

@@ -152,14 +152,24 @@ void merge_equal_times(AnimatedMesh& mesh, const std::filesystem::path& file) {
   mesh.positions.resize(kept * stride);
 }
 
+bool has_repetition(const std::uint32_t* vertices, std::size_t count) {
+  if (count <= 8) {
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t j = i + 1; j < count; ++j) {
+        if (vertices[i] == vertices[j]) return true;
+      }
+    }
+    return false;
+  }
+  std::vector<std::uint32_t> sorted(vertices, vertices + count);
+  std::sort(sorted.begin(), sorted.end());
+  return std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end();
+}
+
 }  // namespace
 
 bool is_degenerate(const std::uint32_t* vertices, std::size_t count, const double* positions) {
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t j = i + 1; j < count; ++j) {
-      if (vertices[i] == vertices[j]) return true;
-    }
-  }
+  if (has_repetition(vertices, count)) return true;
   const auto at = [&](std::size_t i) { return positions + std::size_t{3} * vertices[i]; };
   for (std::size_t i = 1; i + 1 < count; ++i) {
     const double *a = at(0), *b = at(i), *c = at(i + 1);
