@@ -21,11 +21,6 @@ void check_length(double value, const char* what) {
     throw io::InputError(std::string(what) + " is " + std::to_string(value) + ", must be in (0, 1e6)");
 }
 
-// Rounded to float, and without negative zeros (numeric policy).
-double stored(double value) {
-  return double(float(value)) + 0.0;
-}
-
 /// The f >= 1 for which per_square * f^2 is nearest to the request.
 std::uint32_t nearest_frequency(std::uint32_t triangles, std::uint32_t per_square) {
   const double ideal = double(triangles) / double(per_square);
@@ -45,7 +40,7 @@ io::AnimatedMesh triangle_mesh(const std::string& shape, std::vector<std::uint32
   for (std::size_t i = 0; i <= count; ++i) mesh.primitive_offsets[i] = std::uint32_t(3 * i);
   mesh.primitive_vertices = std::move(corners);
   mesh.keyframe_times = {0.0};
-  for (double& x : positions) x = stored(x);
+  for (double& x : positions) x = rounded_to_float(x);
   mesh.positions = std::move(positions);
   return mesh;
 }
@@ -121,7 +116,8 @@ io::AnimatedMesh with_motion(const io::AnimatedMesh& mesh, std::uint32_t keyfram
   for (std::uint32_t k = 0; k < keyframes; ++k)
     for (std::size_t i = 0; i < size; i += 3) {
       const Point p = place(k, mesh.positions[i], mesh.positions[i + 1], mesh.positions[i + 2]);
-      for (std::size_t axis = 0; axis < 3; ++axis) result.positions[k * size + i + axis] = stored(p[axis]);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        result.positions[k * size + i + axis] = rounded_to_float(p[axis]);
     }
   return result;
 }
@@ -139,6 +135,13 @@ double sine_of_turns(double turns) {
   double sum = 1.0;
   for (int n = 20; n >= 2; n -= 2) sum = 1.0 - square / double(n * (n + 1)) * sum;
   return a * sum;
+}
+
+double rounded_to_float(double value) {
+  // GCC 12.2's superword vectoriser drops conversions to float and back (at -O2 and -O3: values keep their
+  // double digits); what is volatile it must store. Adding zero makes a negative zero positive.
+  const volatile float single = float(value);
+  return double(single) + 0.0;
 }
 
 double cosine_of_turns(double turns) {
@@ -435,7 +438,8 @@ io::AnimatedMesh random_soup(std::uint32_t triangles, std::uint64_t seed, std::u
   const std::size_t row = std::size_t(mesh.vertex_count) * 3;
   mesh.positions.resize(row * keyframes);
   for (std::size_t i = row; i < mesh.positions.size(); ++i)
-    mesh.positions[i] = stored(mesh.positions[i - row] + 0.1 * size * noise.signed_unit(4 * row + i));
+    mesh.positions[i] =
+        rounded_to_float(mesh.positions[i - row] + 0.1 * size * noise.signed_unit(4 * row + i));
   return mesh;
 }
 

@@ -25,6 +25,10 @@ double sine_of_turns(double turns);
 /// cos(2 pi turns), see sine_of_turns.
 double cosine_of_turns(double turns);
 
+/// The float nearest to value, as a double, and never a negative zero. To be used instead of
+/// double(float(value)), which GCC 12.2 can miscompile.
+double rounded_to_float(double value);
+
 /// A stream of random numbers by counter (splitmix64): the n-th number of a seed needs no earlier one.
 class SeededNoise {
  public:

@@ -5,12 +5,13 @@
 #include <cmath>
 #include <cstdio>
 #include <numeric>
+#include <utility>
 
 namespace kbvh::scenes {
 namespace {
 
 /// Part of every cache key: to be raised by every change that can alter a bit of the result.
-constexpr int solver_version = 1;
+constexpr int solver_version = 2;
 
 constexpr double gravity = 9.81;
 
@@ -101,7 +102,7 @@ class ClothSolver {
     if (config_.substeps_per_keyframe > 0) return config_.substeps_per_keyframe;
     // One iteration per step leaves threads as stiff as mass / step^2: under the weight of half a metre of
     // cloth they stretch by about 5 (step / spacing)^2.
-    const double steps = 1.0 / (config_.keyframes_per_second * 0.05 * spacing_);
+    const double steps = 1.0 / (config_.keyframes_per_second * 0.03 * spacing_);
     return std::uint32_t(std::max(4.0, std::floor(steps) + 1.0));
   }
 
@@ -181,7 +182,7 @@ void ClothSolver::place() {
                       config_.table.top + config_.drop_height + slope_x * x + slope_y * y + uneven};
     }
   // Keyframes hold floats; the simulation starts from what they say.
-  for (Vec& p : x_) p = {double(float(p.x)), double(float(p.y)), double(float(p.z))};
+  for (Vec& p : x_) p = {rounded_to_float(p.x), rounded_to_float(p.y), rounded_to_float(p.z)};
 }
 
 void ClothSolver::step(double dt) {
@@ -413,9 +414,8 @@ std::vector<io::AnimatedMesh> simulate_tablecloth(const TableclothConfig& config
   ClothSolver solver(config, squares);
   for (std::uint32_t k = 0; k < config.keyframes; ++k) {
     if (k > 0) solver.advance_keyframe();
-    // Adding zero turns a negative zero into a positive one (numeric policy).
     for (const auto& p : solver.positions())
-      for (const double x : {p.x, p.y, p.z}) cloth.positions.push_back(double(float(x)) + 0.0);
+      for (const double x : {p.x, p.y, p.z}) cloth.positions.push_back(rounded_to_float(x));
     if (progress) progress(double(k + 1) / double(config.keyframes));
   }
   return bodies;

@@ -26,7 +26,7 @@ struct TableclothConfig {
   double area_density = 0.2;          ///< kg/m^2, cotton
   double stretch_stiffness = 4000.0;  ///< N/m along the threads
   double shear_stiffness = 400.0;     ///< N/m along the diagonals
-  double bending_rigidity = 4e-5;     ///< N m, per width of cloth; folds become wider as it grows
+  double bending_rigidity = 2e-5;     ///< N m, per width of cloth; folds become wider as it grows
   double air_drag = 3.0;              ///< 1/m: deceleration along the normal is air_drag x (normal speed)^2
   double viscosity = 0.004;           ///< m^2/s, smooths velocities within the cloth (inner friction)
   double friction = 0.5;              ///< Coulomb's coefficient, cloth on table and cloth on itself
