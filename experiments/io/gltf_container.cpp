@@ -109,7 +109,12 @@ std::string read_uri(const std::filesystem::path& file, const std::string& place
                 relative.string().find_first_of(":\\") != std::string::npos;
   for (const auto& part : relative) leaves = leaves || part == "..";
   if (leaves) fail(file, place, printable(uri) + " is not a file in or below the folder of the glTF file");
-  return read_file(file.parent_path() / relative);
+  std::error_code error;
+  const std::filesystem::path target = file.parent_path() / relative;
+  if (!std::filesystem::is_regular_file(target, error)) {
+    fail(file, place, printable(uri) + ": no such file beside the glTF file");
+  }
+  return read_file(target);
 }
 
 }  // namespace kbvh::io::gltf

@@ -365,9 +365,12 @@ class PlyReader {
     if (!(count >= 0) || count != std::floor(count)) {
       fail(file_, place_of(element, i), "the list " + property.name + " has the length " + text_of(count));
     }
+    if (count > 1e18)
+      fail(file_, place_of(element, i), "the list " + property.name + " has the length " + text_of(count));
     if (count > static_cast<double>((bytes_.size() - at_) / each)) {
       fail(file_, place_of(element, i),
-           "the list " + property.name + " has the length " + text_of(count) + ", but only " +
+           "the list " + property.name + " has the length " +
+               std::to_string(static_cast<std::uint64_t>(count)) + ", but only " +
                std::to_string(bytes_.size() - at_) + " bytes are left");
     }
     return static_cast<std::size_t>(count);
