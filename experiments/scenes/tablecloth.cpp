@@ -11,7 +11,7 @@ namespace kbvh::scenes {
 namespace {
 
 /// Part of every cache key: to be raised by every change that can alter a bit of the result.
-constexpr int solver_version = 2;
+constexpr int solver_version = 3;
 
 constexpr double gravity = 9.81;
 
@@ -102,7 +102,7 @@ class ClothSolver {
     if (config_.substeps_per_keyframe > 0) return config_.substeps_per_keyframe;
     // One iteration per step leaves threads as stiff as mass / step^2: under the weight of half a metre of
     // cloth they stretch by about 5 (step / spacing)^2.
-    const double steps = 1.0 / (config_.keyframes_per_second * 0.03 * spacing_);
+    const double steps = 1.0 / (config_.keyframes_per_second * 0.025 * spacing_);
     return std::uint32_t(std::max(4.0, std::floor(steps) + 1.0));
   }
 
