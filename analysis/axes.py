@@ -1,0 +1,168 @@
+"""Small helpers that figures share: log axes with readable ticks, labels that keep apart, key lists."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from enum import Enum
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
+from matplotlib.transforms import Affine2D, ScaledTranslation, Transform, offset_copy
+
+from colours import Look
+from text import significant
+
+FormatTick = Callable[[float], str]
+
+
+class KeyLines(Enum):
+    """Are contestants drawn as lines, so that a key has to show the line styles?"""
+
+    shown = "shown"
+    hidden = "hidden"
+
+
+def log_axis(axes: Axes, which: str, values: Sequence[float], tick: FormatTick = significant) -> None:
+    """A log axis over positive values with some room, and ticks at 1, 2, 5 if it spans little."""
+    low, high = min(values), max(values)
+    room = max((high / low) ** 0.06, 1.15)
+    low, high = low / room, high * room
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    (axes.set_xscale if which == "x" else axes.set_yscale)("log")
+    (axes.set_xlim if which == "x" else axes.set_ylim)(low, high)
+    span = high / low
+    if span < 4:
+        step = 10.0 ** math.floor(math.log10((high - low) / 3))
+        step *= next(m for m in (1, 2, 5, 10) if (high - low) / (step * m) <= 6)
+        axis.set_major_locator(FixedLocator(list(np.arange(math.ceil(low / step), high / step + 1e-9) * step)))
+    elif span < 300:
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if span < 60 else (1, 3), numticks=30))
+    else:
+        axis.set_major_locator(LogLocator(numticks=8))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: tick(float(f"{value:.6g}"))))
+    axis.set_minor_formatter(NullFormatter())
+    axis.set_minor_locator(NullLocator())
+    axes.grid(True, axis=which)
+
+
+def fixed_log_axis(axes: Axes, which: str, values: Sequence[float], tick: FormatTick) -> None:
+    """A log axis whose ticks are the measured values themselves, as far as they do not crowd."""
+    places = sorted(set(values))
+    kept: list[float] = []
+    whole = math.log(places[-1] / places[0]) or 1.0
+    for place in reversed(places):
+        if not kept or math.log(kept[-1] / place) / whole > 0.07:
+            kept.append(place)
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    (axes.set_xscale if which == "x" else axes.set_yscale)("log")
+    room = max((places[-1] / places[0]) ** 0.06, 1.05)
+    (axes.set_xlim if which == "x" else axes.set_ylim)(places[0] / room, places[-1] * room)
+    axis.set_major_locator(FixedLocator(kept))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))
+    axis.set_minor_locator(NullLocator())
+    axes.grid(True, axis=which)
+
+
+def zero_log_axis(axes: Axes, values: Sequence[float], tick: FormatTick) -> None:
+    """An x axis that is logarithmic but starts with a place for exact zeros, set apart by a broken line."""
+    positive = [value for value in values if value > 0]
+    first = math.floor(math.log10(min(positive)))
+    last = math.ceil(math.log10(max(positive)) + 1e-9)
+    last = max(last, first + 1)
+    threshold = 10.0**first
+    axes.set_xscale("symlog", linthresh=threshold, linscale=max(0.45, (last - first) * 0.22))
+    axes.set_xlim(-threshold * 0.45, max(positive) * 10 ** (0.12 * (last - first)))
+    step = max(1, math.ceil((last - first) / 5))
+    places = [0.0] + [10.0**power for power in range(first, last + 1, step)]
+    axes.xaxis.set_major_locator(FixedLocator([p for p in places if p <= axes.get_xlim()[1]]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.grid(True, axis="x")
+    axes.axvspan(-threshold * 0.45, threshold * 0.45, color="#F4F4F1", zorder=0, linewidth=0)
+
+
+def mark(axes: Axes, x: float, y: float, look: Look, size: float = 7.5, zorder: float = 3) -> None:
+    """One contestant's marker in data coordinates."""
+    axes.plot([x], [y], marker=look.marker, color=look.colour, markerfacecolor=look.face, markersize=size,
+              markeredgewidth=1.5, linestyle="none", zorder=zorder, clip_on=False)  # fmt: skip
+
+
+def contestants_on_y(axes: Axes, labels: Sequence[str], looks: Sequence[Look]) -> None:
+    """A row per contestant from top to bottom, named at the left with its marker."""
+    axes.set_yticks(range(len(labels)))
+    axes.set_yticklabels(labels)
+    axes.set_ylim(len(labels) - 0.4, -0.6)
+    axes.tick_params(axis="y", length=0, pad=19)
+    beside = offset_copy(axes.get_yaxis_transform(), axes.figure, x=-11, y=0, units="points")
+    for row, look in enumerate(looks):
+        axes.plot([0], [row], marker=look.marker, color=look.colour, markerfacecolor=look.face, markersize=6.5,
+                  markeredgewidth=1.4, linestyle="none", clip_on=False, transform=beside)  # fmt: skip
+
+
+def key(axes: Axes, entries: Sequence[tuple[str, Look]], lines: KeyLines) -> None:
+    """A list of contestants in axes of its own: marker, line style if they are drawn as lines, and name."""
+    axes.set_axis_off()
+    height = axes.figure.get_figheight() * 72 - 60
+    step = min(16.0, height / max(len(entries), 1))
+    for row, (label, look) in enumerate(entries):
+        at = offset_copy(axes.transAxes, axes.figure, x=0, y=-8 - row * step, units="points")
+        start = 26 if lines is KeyLines.shown else 8
+        if lines is KeyLines.shown:
+            left = offset_copy(at, axes.figure, x=2, units="points")
+            axes.add_line(_segment(axes, left, look))
+        middle = offset_copy(at, axes.figure, x=14 if lines is KeyLines.shown else 6, units="points")
+        axes.plot([0], [1], marker=look.marker, color=look.colour, markerfacecolor=look.face, markersize=6,
+                  markeredgewidth=1.4, linestyle="none", clip_on=False, transform=middle)  # fmt: skip
+        text_at = offset_copy(at, axes.figure, x=start + 8, units="points")
+        axes.text(0, 1, label, transform=text_at, va="center_baseline", fontsize=8.5, clip_on=False)
+
+
+def key_width(labels: Sequence[str]) -> float:
+    """Inches that a key of these names needs."""
+    return 0.6 + 0.074 * max(map(len, labels))
+
+
+def _segment(axes: Axes, left: Transform, look: Look) -> Line2D:
+    """24 points of a contestant's line, starting where `left` takes the top left of the axes."""
+    line = Line2D([0, 24], [0, 0], color=look.colour, linestyle=look.line, linewidth=1.6, clip_on=False)
+    inches = Affine2D().scale(1 / 72) + axes.figure.dpi_scale_trans
+    line.set_transform(inches + ScaledTranslation(0, 1, left))
+    return line
+
+
+def keep_labels_apart(axes: Axes, points: Sequence[tuple[float, float]], labels: Sequence[str]) -> None:
+    """Writes a short label beside each point where it covers neither markers nor other labels.
+
+    Call it once the axes' limits and place are final; a thin line leads to labels that had to move away.
+    """
+    at = axes.transData.transform(np.asarray(points, dtype=float))
+    scale = axes.figure.dpi / 72
+    taken = [(x - 5 * scale, y - 5 * scale, x + 5 * scale, y + 5 * scale) for x, y in at]
+    for (x, y), label in sorted(zip(at.tolist(), labels), key=lambda item: item[0]):
+        width, height = (2 + 5.4 * len(label)) * scale, 9 * scale
+        best: tuple[float, float, float] | None = None
+        for reach in (10, 15, 21, 28, 36, 46, 58):
+            for angle in (0, 40, -40, 90, -90, 140, -140, 180, 20, -20, 65, -65):
+                cx = x + (reach * math.cos(math.radians(angle))) * scale
+                cy = y + (reach * math.sin(math.radians(angle))) * scale
+                box = (cx - width / 2, cy - height / 2, cx + width / 2, cy + height / 2)
+                inside = axes.bbox.x0 < box[0] and axes.bbox.y0 < box[1] < box[3] < axes.bbox.y1
+                if inside and not any(_overlap(box, other) for other in taken):
+                    best = (cx, cy, reach)
+                    break
+            if best:
+                break
+        cx, cy, reach = best or (x + 10 * scale, y, 10)
+        taken.append((cx - width / 2, cy - height / 2, cx + width / 2, cy + height / 2))
+        offset = ((cx - x) / scale, (cy - y) / scale)
+        data = axes.transData.inverted().transform((x, y))
+        lead = {"arrowstyle": "-", "color": "#888888", "linewidth": 0.6, "shrinkA": 4, "shrinkB": 4} if reach > 12 else None
+        axes.annotate(label, data, xytext=offset, textcoords="offset points", ha="center", va="center",
+                      fontsize=7.5, color="#222222", arrowprops=lead, zorder=6)  # fmt: skip
+
+
+def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

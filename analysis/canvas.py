@@ -1,0 +1,71 @@
+"""Figures as files and as something a page can embed. What they show is decided in figures.py."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Optional
+
+import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+#: Text size and frame of every figure; set only while one is drawn, so that nothing global changes.
+STYLE: dict[str, object] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#555555",
+    "axes.axisbelow": True,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "xtick.color": "#333333",
+    "ytick.color": "#333333",
+    "grid.color": "#E3E3E3",
+    "grid.linewidth": 0.7,
+    "hatch.linewidth": 0.6,
+    "lines.linewidth": 1.6,
+    "figure.facecolor": "white",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "kbvh",
+    "pdf.fonttype": 42,
+}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A drawn figure of the report."""
+
+    name: str
+    title: str
+    reading: str  #: how to read it, two sentences
+    uri: str  #: the picture itself, as a data URI
+    width: int  #: in CSS pixels
+    height: int
+
+
+def picture(
+    folder: Path, name: str, title: str, reading: str, draw: Callable[[], Optional[Figure]]
+) -> Optional[Picture]:
+    """Draws a figure, writes it as PNG and PDF to `folder`, and embeds it as SVG; None if there is nothing to draw."""
+    with matplotlib.rc_context(STYLE):
+        figure = draw()
+        if figure is None:
+            return None
+        FigureCanvasAgg(figure)
+        folder.mkdir(parents=True, exist_ok=True)
+        figure.savefig(folder / f"{name}.png", dpi=160)
+        figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None, "Title": title})
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    width, height = figure.get_size_inches()
+    uri = "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+    return Picture(name, title, reading, uri, round(width * 96), round(height * 96))

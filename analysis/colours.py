@@ -1,0 +1,153 @@
+"""The one place that decides how a strategy looks: colour and marker by family, line style within it.
+
+Colours are Okabe and Ito's, told apart by colour-blind readers; markers differ per family so that
+nothing hangs on colour alone. Families that this file does not know (strategies from outside the
+project) get a free colour that depends on their name only, unless two of them would collide.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+#: family -> (colour, matplotlib marker)
+FAMILIES: dict[str, tuple[str, str]] = {
+    "refit": ("#0072B2", "o"),
+    "kinetic": ("#D55E00", "s"),
+    "rebuild": ("#009E73", "^"),
+    "oracle": ("#000000", "X"),
+    "fcl": ("#56B4E9", "D"),
+    "bullet": ("#E69F00", "v"),
+    "embree": ("#CC79A7", "P"),
+}
+
+#: What families that are not known choose from.
+FREE: tuple[tuple[str, str], ...] = (
+    ("#882255", "h"),
+    ("#8C7A00", "<"),
+    ("#44AA99", "p"),
+    ("#5D4A9C", ">"),
+    ("#7F7F7F", "d"),
+    ("#AA4499", "8"),
+    ("#117733", "*"),
+    ("#6B4C2A", "H"),
+)
+
+LINE_STYLES: tuple[object, ...] = ("-", (0, (5, 2)), (0, (1.2, 1.4)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
+
+#: How far a family's colour is mixed with white (> 0) or black (< 0) for its members, in turn.
+SHADES: tuple[float, ...] = (0.0, -0.35, 0.35, -0.6, 0.55)
+
+#: Phases of a frame, from light to dark so that they differ in grey, too; none is a family's colour.
+PHASES: dict[str, tuple[str, str]] = {
+    "motion": ("#E4E1DA", ""),
+    "update": ("#33415C", ""),
+    "plan_changes": ("#7D8597", "xxx"),
+    "traversal": ("#A9B4C9", ""),
+    "triangle_tests": ("#D3DAE6", "///"),
+}
+
+PHASE_NAMES: dict[str, str] = {
+    "motion": "motion evaluation",
+    "update": "update",
+    "plan_changes": "plan changes",
+    "traversal": "traversal",
+    "triangle_tests": "triangle tests",
+}
+
+
+@dataclass(frozen=True)
+class Look:
+    """How one contestant is drawn, in every figure and table."""
+
+    colour: str
+    marker: str
+    line: object
+    filled: bool
+
+    @property
+    def face(self) -> str:
+        """Colour inside the marker: open markers tell members of a family apart without colour."""
+        return self.colour if self.filled else "#FFFFFF"
+
+
+def families(names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Colour and marker of each family; the same for a name in every report, unless free ones collide."""
+    chosen = {name: FAMILIES[name] for name in names if name in FAMILIES}
+    taken: set[int] = set()
+    for name in sorted(set(names) - set(FAMILIES)):
+        slot = int.from_bytes(hashlib.sha256(name.encode()).digest()[:4], "big") % len(FREE)
+        for step in range(len(FREE)):
+            candidate = (slot + step) % len(FREE)
+            if candidate not in taken:
+                slot = candidate
+                break
+        taken.add(slot)
+        chosen[name] = FREE[slot]
+    return chosen
+
+
+def mix(colour: str, shade: float) -> str:
+    """`colour` (#RRGGBB) mixed with white (shade > 0) or black (shade < 0)."""
+    towards = 255 if shade > 0 else 0
+    channels = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return "#" + "".join(f"{round(c + (towards - c) * abs(shade)):02X}" for c in channels)
+
+
+def looks(contestants: Iterable[tuple[str, str, str]]) -> dict[str, Look]:
+    """Looks by contestant, from (contestant, strategy id, family).
+
+    Strategies of a family take shades and line styles in the order of their ids; configurations of
+    one strategy share its colour and differ by line style.
+    """
+    listed = list(contestants)
+    by_family = families([family for _, _, family in listed])
+    members: dict[str, list[str]] = {}
+    variants: dict[str, list[str]] = {}
+    for contestant, strategy, family in sorted(listed):
+        ids = members.setdefault(family, [])
+        if strategy not in ids:
+            ids.append(strategy)
+        configurations = variants.setdefault(strategy, [])
+        if contestant not in configurations:
+            configurations.append(contestant)
+    result: dict[str, Look] = {}
+    for contestant, strategy, family in listed:
+        colour, marker = by_family[family]
+        member = members[family].index(strategy)
+        variant = variants[strategy].index(contestant)
+        result[contestant] = Look(
+            colour=mix(colour, SHADES[member % len(SHADES)]),
+            marker=marker,
+            line=LINE_STYLES[(member + variant) % len(LINE_STYLES)],
+            filled=(member + variant) % 2 == 0,
+        )
+    return result
+
+
+#: Outlines of the markers in a box from -5 to 5, for symbols inside the page's text.
+_POLYGONS: dict[str, str] = {
+    "s": "-4,-4 4,-4 4,4 -4,4",
+    "^": "0,-5 5,4 -5,4",
+    "v": "0,5 5,-4 -5,-4",
+    "<": "-5,0 4,-5 4,5",
+    ">": "5,0 -4,-5 -4,5",
+    "D": "0,-5 5,0 0,5 -5,0",
+    "d": "0,-5 3,0 0,5 -3,0",
+    "p": "0,-5 4.8,-1.5 2.9,4 -2.9,4 -4.8,-1.5",
+    "h": "0,-5 4.3,-2.5 4.3,2.5 0,5 -4.3,2.5 -4.3,-2.5",
+    "H": "-5,0 -2.5,-4.3 2.5,-4.3 5,0 2.5,4.3 -2.5,4.3",
+    "8": "-2,-5 2,-5 5,-2 5,2 2,5 -2,5 -5,2 -5,-2",
+    "P": "-1.7,-5 1.7,-5 1.7,-1.7 5,-1.7 5,1.7 1.7,1.7 1.7,5 -1.7,5 -1.7,1.7 -5,1.7 -5,-1.7 -1.7,-1.7",
+    "X": "-5,-2.7 -2.7,-5 0,-2.3 2.7,-5 5,-2.7 2.3,0 5,2.7 2.7,5 0,2.3 -2.7,5 -5,2.7 -2.3,0",
+    "*": "0,-5 1.2,-1.6 4.8,-1.6 1.9,.6 3,4.1 0,2 -3,4.1 -1.9,.6 -4.8,-1.6 -1.2,-1.6",
+}
+
+
+def symbol(look: Look) -> str:
+    """The marker as a small inline SVG."""
+    paint = f'fill="{look.face}" stroke="{look.colour}" stroke-width="1.6"'
+    points = _POLYGONS.get(look.marker)
+    shape = f'<polygon points="{points}" {paint}/>' if points else f'<circle r="4.2" {paint}/>'
+    return f'<svg class="symbol" viewBox="-6.5 -6.5 13 13" width="13" height="13" aria-hidden="true">{shape}</svg>'

@@ -1,0 +1,326 @@
+"""What each figure shows: functions from data to axes. Each returns None where there is nothing to show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Optional
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from axes import (
+    KeyLines,
+    contestants_on_y,
+    fixed_log_axis,
+    keep_labels_apart,
+    key,
+    key_width,
+    log_axis,
+    mark,
+    zero_log_axis,
+)
+from colours import PHASE_NAMES, PHASES, Look
+from ratios import crossings, pareto_front
+from text import percent, significant, size
+
+WIDTH = 10.5  #: of every figure, in inches
+#: Bars longer than this many times the fastest are torn off, or the others could not be read.
+TORN = 12.0
+
+Looks = dict[str, Look]
+
+
+def _rows_figure(rows: int, legend: float = 0.0) -> Figure:
+    return Figure(figsize=(WIDTH, 0.9 + legend + 0.27 * rows), layout="constrained")
+
+
+def cost_split(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
+    """Stacked bars of the time per frame by phase, fastest on top."""
+    rows = group.sort_values("total_motion")
+    if rows.empty or not rows["total_motion"].max() > 0:
+        return None
+    figure = _rows_figure(len(rows), 0.3)
+    axes = figure.subplots()
+    draw_cost_split(axes, rows, looks)
+    return figure
+
+
+def draw_cost_split(axes: Axes, rows: pd.DataFrame, looks: Looks) -> None:
+    """`rows` from top to bottom; bars that would hide the others are torn and keep their number."""
+    contestants_on_y(axes, list(rows["label"]), [looks[c] for c in rows["contestant"]])
+    totals = rows[list(PHASES)].sum(axis=1).to_numpy()
+    limit = max(total for total in totals if total <= TORN * totals.min()) * 1.0
+    torn = totals > limit
+    if torn.any():
+        limit *= 1.12
+    left = np.zeros(len(rows))
+    shown = [phase for phase in PHASES if rows[phase].max() > 0]
+    for phase in shown:
+        colour, hatch = PHASES[phase]
+        ends = np.minimum(left + rows[phase].to_numpy(), limit)
+        axes.barh(range(len(rows)), ends - left, left=left, height=0.66, color=colour, hatch=hatch,
+                  edgecolor="#33415C" if hatch else "white", linewidth=0.4)  # fmt: skip
+        left = ends
+    for row, total in enumerate(totals):
+        end = limit if torn[row] else total
+        if torn[row]:
+            step = limit * 0.006
+            axes.plot([end - step, end + step, end - step, end + step], row + np.array([-0.4, -0.13, 0.13, 0.4]),
+                      color="white", linewidth=3, zorder=4)  # fmt: skip
+        axes.annotate(significant(total), (end, row), xytext=(7 if torn[row] else 4, 0), textcoords="offset points",
+                      va="center", fontsize=8, weight="bold" if torn[row] else "normal", color="#222222")  # fmt: skip
+    axes.set_xlim(0, limit * 1.09)
+    axes.set_xlabel("time per frame (ms)")
+    axes.grid(True, axis="x")
+    patches = [
+        Patch(facecolor=PHASES[p][0], hatch=PHASES[p][1], edgecolor="#33415C", linewidth=0.4, label=PHASE_NAMES[p])
+        for p in shown
+    ]
+    axes.legend(handles=patches, loc="lower left", bbox_to_anchor=(0, 1.0), ncol=len(patches), frameon=False,
+                borderaxespad=0.2, handlelength=1.6, columnspacing=1.6)  # fmt: skip
+
+
+def time_against_error(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
+    """Total time against looseness and false candidates, with Pareto fronts; errors of approximate ones apart."""
+    rows = group[group["total_motion"] > 0].sort_values("total_motion").reset_index(drop=True)
+    panels: list[tuple[str, str]] = []
+    if (rows["looseness"] > 0).any():
+        panels.append(("looseness", "looseness of the boxes"))
+    if (rows["false_candidates"] > 0).any():
+        panels.append(("false_candidates", "false candidates per true pair"))
+    wrong = rows[((rows["missed"] > 0) | (rows["extra"] > 0))]
+    protruding = rows[rows["protrusion"] > 0]
+    if len(rows) < 2 or not (panels or len(wrong) or len(protruding)):
+        return None
+    names = [f"{number + 1}  {label}" for number, label in enumerate(rows["label"])]
+    count = len(panels) + (1 if len(wrong) else 0) + (1 if len(protruding) else 0)
+    side = key_width(names)
+    figure = Figure(figsize=(WIDTH, max(3.9, 0.7 + 0.225 * len(rows))), layout="constrained")
+    grid = figure.add_gridspec(1, count + 1, width_ratios=[(WIDTH - side) / count] * count + [side])
+    drawn: list[tuple[Axes, list[tuple[float, float]], list[str]]] = []
+    for place in range(count):
+        axes = figure.add_subplot(grid[0, place])
+        if place < len(panels):
+            drawn.append((axes, *draw_error_panel(axes, rows, looks, *panels[place])))
+        elif place == len(panels) and len(wrong):
+            drawn.append((axes, *draw_wrong_pairs(axes, rows, looks)))
+        else:
+            drawn.append((axes, *draw_error_panel(axes, rows, looks, "protrusion", "protrusion (scene units)")))
+        if place == 0:
+            axes.set_ylabel("total time per frame (ms)")
+    key(figure.add_subplot(grid[0, count]), [(name, looks[c]) for name, c in zip(names, rows["contestant"])],
+        KeyLines.hidden)  # fmt: skip
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes, points, numbers in drawn:
+        keep_labels_apart(axes, points, numbers)
+    return figure
+
+
+def draw_error_panel(
+    axes: Axes, rows: pd.DataFrame, looks: Looks, column: str, label: str
+) -> tuple[list[tuple[float, float]], list[str]]:
+    """Time against one error that is 0 at best; returns the points with their numbers in the key."""
+    known = rows[rows[column].notna()]
+    tick = percent if column == "looseness" else significant
+    log_axis(axes, "y", list(rows["total_motion"]))
+    zero_log_axis(axes, list(known[column]), tick)
+    points = list(zip(known[column].astype(float), known["total_motion"].astype(float)))
+    front = [points[i] for i in pareto_front(points)]
+    if front:
+        right = axes.get_xlim()[1]
+        top = axes.get_ylim()[1]
+        axes.plot([front[0][0], *_stair_x(front, right)], [top, *_stair_y(front)], color="#777777", linewidth=1,
+                  linestyle=(0, (4, 2)), zorder=1)  # fmt: skip
+    for point, contestant in zip(points, known["contestant"]):
+        mark(axes, *point, looks[contestant])
+    axes.set_xlabel(label)
+    return points, [str(i + 1) for i in known.index]
+
+
+def _stair_x(front: Sequence[tuple[float, float]], right: float) -> list[float]:
+    return [front[0][0]] + [x for x, _ in front[1:] for _ in (0, 1)] + [right]
+
+
+def _stair_y(front: Sequence[tuple[float, float]]) -> list[float]:
+    return [y for _, y in front[:-1] for _ in (0, 1)] + [front[-1][1], front[-1][1]]
+
+
+def draw_wrong_pairs(axes: Axes, rows: pd.DataFrame, looks: Looks) -> tuple[list[tuple[float, float]], list[str]]:
+    """Time against the share of missed (filled) and extra (open) pairs of those that make mistakes."""
+    log_axis(axes, "y", list(rows["total_motion"]))
+    wrong = rows[(rows["missed"] > 0) | (rows["extra"] > 0)]
+    truth = np.maximum(wrong["pairs"], 1)
+    missed, extra = wrong["missed"] / truth, wrong["extra"] / truth
+    zero_log_axis(axes, [*missed, *extra], percent)
+    points: list[tuple[float, float]] = []
+    for m, e, y, contestant in zip(missed, extra, wrong["total_motion"], wrong["contestant"]):
+        look = looks[contestant]
+        axes.plot([m, e], [y, y], color=look.colour, linewidth=1.2, zorder=2)
+        for x, face in ((m, look.colour), (e, "white")):
+            axes.plot([x], [y], marker=look.marker, color=look.colour, markerfacecolor=face, markersize=7.5,
+                      markeredgewidth=1.5, zorder=3, clip_on=False)  # fmt: skip
+        points.append((max(m, e), y))
+    handles = [
+        Line2D([], [], marker="o", linestyle="none", color="#444444", markerfacecolor=face, label=label)
+        for face, label in (("#444444", "missed"), ("white", "extra"))
+    ]
+    axes.legend(handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncol=2, frameon=False, borderaxespad=0.1)
+    axes.set_xlabel("wrong pairs per true pair")
+    return points, [str(i + 1) for i in wrong.index]
+
+
+def _lines(
+    rows: pd.DataFrame, looks: Looks, x: str, panels: Sequence[tuple[str, str]], x_label: str
+) -> tuple[Figure, list[Axes]]:
+    """Panels of lines over `x` with one key at the right."""
+    last = rows.sort_values(x).groupby("contestant").tail(1).sort_values(panels[-1][0], ascending=False)
+    entries = [(label, looks[c]) for label, c in zip(last["label"], last["contestant"])]
+    side = key_width([label for label, _ in entries])
+    figure = Figure(figsize=(WIDTH, max(4.0, 0.7 + 0.225 * len(entries))), layout="constrained")
+    grid = figure.add_gridspec(1, len(panels) + 1, width_ratios=[(WIDTH - side) / len(panels)] * len(panels) + [side])
+    all_axes = []
+    for place, (column, title) in enumerate(panels):
+        axes = figure.add_subplot(grid[0, place])
+        positive = rows[rows[column] > 0]
+        fixed_log_axis(axes, "x", list(rows[x]), size if x == "primitives" else (lambda value: f"{value:g}"))
+        log_axis(axes, "y", list(positive[column]))
+        for contestant, line in positive.sort_values(x).groupby("contestant"):
+            look = looks[contestant]
+            axes.plot(line[x], line[column], linestyle=look.line, color=look.colour, marker=look.marker,
+                      markerfacecolor=look.face, markersize=5.5, markeredgewidth=1.3)  # fmt: skip
+        axes.set_title(title)
+        axes.set_xlabel(x_label)
+        all_axes.append(axes)
+    key(figure.add_subplot(grid[0, len(panels)]), entries, KeyLines.shown)
+    return figure, all_axes
+
+
+def over_frames_per_keyframe(rows: pd.DataFrame, looks: Looks) -> Optional[Figure]:
+    """Update and total time against l; where a line crosses the best refit is marked."""
+    if rows["l"].nunique() < 2:
+        return None
+    panels = [("updating", "update (ms per frame)"), ("total_motion", "total with motion (ms per frame)")]
+    figure, all_axes = _lines(rows, looks, "l", panels, "interpolated frames per keyframe, l")
+    found: list[tuple[Axes, list[tuple[float, float]], list[str]]] = []
+    for axes, (column, _) in zip(all_axes, panels):
+        best = best_refit_line(rows, column, "l")
+        if best is None:
+            continue
+        axes.plot(best.index, best, color="#0072B2", alpha=0.22, linewidth=7, solid_capstyle="round", zorder=1)
+        points: list[tuple[float, float]] = []
+        for _, line in rows[rows["family"] != "refit"].groupby("contestant"):
+            own = line.set_index("l")[column].sort_index()
+            shared = own.index.intersection(best.index)
+            if (own.loc[shared] > 0).all():
+                x = np.asarray(shared, dtype=float)
+                points += [(c.x, c.y) for c in crossings(x, own.loc[shared].to_numpy(), best.loc[shared].to_numpy())]
+        for point in points:
+            axes.plot(*point, marker="o", markersize=12, markerfacecolor="none", color="#222222", markeredgewidth=1.1)
+        found.append((axes, points, [f"l≈{x:.0f}" for x, _ in points]))
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes, points, labels in found:
+        if points:
+            keep_labels_apart(axes, points, labels)
+    return figure
+
+
+def best_refit_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Series]:
+    """The smallest time of any refit at each x."""
+    refits = rows[(rows["family"] == "refit") & (rows["guarantee"] != "approximate")]
+    best = refits.groupby(x)[column].min()
+    best = best[best > 0]
+    return best if len(best) else None
+
+
+def over_size(rows: pd.DataFrame, looks: Looks) -> Optional[Figure]:
+    """Update and total time against the number of primitives, with a slope of n to compare with."""
+    if rows["primitives"].nunique() < 2:
+        return None
+    panels = [("updating", "update (ms per frame)"), ("total_motion", "total with motion (ms per frame)")]
+    figure, all_axes = _lines(rows, looks, "primitives", panels, "primitives n")
+    for axes in all_axes:
+        _slope(axes)
+    return figure
+
+
+def _slope(axes: Axes) -> None:
+    """A thin line of slope n through the lower middle of the panel."""
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    a, b = x0 * (x1 / x0) ** 0.55, x0 * (x1 / x0) ** 0.92
+    low = y0 * (y1 / y0) ** 0.04
+    axes.plot([a, b], [low, low * b / a], color="#999999", linewidth=0.9, zorder=1)
+    axes.annotate("∝ n", (b, low * b / a), xytext=(3, 0), textcoords="offset points", fontsize=8, color="#777777",
+                  va="center")  # fmt: skip
+
+
+def counters(group: pd.DataFrame, over: pd.DataFrame, looks: Looks) -> Optional[Figure]:
+    """Events and written values per frame: lines over n where there are several sizes, else one mark each."""
+    wanted = [
+        ("certificates_failed_per_frame", "events per frame"),
+        ("values_written_per_frame", "bound values written per frame"),
+    ]
+    rows = over if over["primitives"].nunique() > 1 else group
+    panels = [(column, title) for column, title in wanted if (rows[column] > 0).any()]
+    if not panels:
+        return None
+    if rows["primitives"].nunique() > 1:
+        shown = rows[(rows[[column for column, _ in panels]] > 0).any(axis=1)]
+        figure, all_axes = _lines(shown, looks, "primitives", panels, "primitives n")
+        for axes in all_axes:
+            _slope(axes)
+        return figure
+    rows = rows[(rows[[column for column, _ in panels]] > 0).any(axis=1)]
+    rows = rows.sort_values(panels[-1][0], ascending=True)
+    figure = _rows_figure(len(rows), 0.25)
+    all_axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for place, (axes, (column, title)) in enumerate(zip(all_axes, panels)):
+        positive = rows[rows[column] > 0]
+        log_axis(axes, "x", list(positive[column]), size)
+        for row, (value, contestant) in enumerate(zip(rows[column], rows["contestant"])):
+            if value > 0:
+                axes.plot([axes.get_xlim()[0], value], [row, row], color="#CCCCCC", linewidth=1.2, zorder=1)
+                mark(axes, value, row, looks[contestant])
+                axes.annotate(size(value) if value >= 10 else significant(value, 2), (value, row), xytext=(7, 0),
+                              textcoords="offset points", va="center", fontsize=7.5)  # fmt: skip
+        low, high = axes.get_xlim()
+        axes.set_xlim(low, high * (high / low) ** 0.12)
+        axes.set_title(title)
+        if place == 0:
+            contestants_on_y(axes, list(rows["label"]), [looks[c] for c in rows["contestant"]])
+        else:
+            axes.tick_params(axis="y", length=0, labelleft=False)
+    return figure
+
+
+def latency(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
+    """Median, 99th percentile and worst frame of each contestant on a log scale."""
+    rows = group[(group["p50"] > 0) & (group["worst"] > 0)].sort_values("worst")
+    if rows.empty:
+        return None
+    figure = _rows_figure(len(rows), 0.3)
+    axes = figure.subplots()
+    contestants_on_y(axes, list(rows["label"]), [looks[c] for c in rows["contestant"]])
+    log_axis(axes, "x", [*rows["p50"], *rows["worst"]])
+    for row, (p50, p99, worst, contestant) in enumerate(zip(rows["p50"], rows["p99"], rows["worst"], rows["contestant"])):
+        colour = looks[contestant].colour
+        axes.plot([p50, worst], [row, row], color=colour, linewidth=1.6, zorder=2)
+        axes.plot([p50], [row], marker="o", markersize=6, color=colour, zorder=3)
+        if math.isfinite(p99):
+            axes.plot([p99], [row], marker="|", markersize=11, markeredgewidth=2, color=colour, zorder=3)
+        axes.plot([worst], [row], marker="X", markersize=7, color=colour, markerfacecolor="white", zorder=3)
+    handles = [
+        Line2D([], [], marker=marker, linestyle="none", color="#444444", markerfacecolor=face, label=label,
+               markeredgewidth=2 if marker == "|" else 1)
+        for marker, face, label in (("o", "#444444", "median frame"), ("|", "#444444", "99 % of frames are faster"),
+                                    ("X", "white", "worst frame"))
+    ]  # fmt: skip
+    axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), ncol=3, frameon=False, borderaxespad=0.2)
+    axes.set_xlabel("time of one frame (ms)")
+    return figure

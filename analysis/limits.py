@@ -1,0 +1,143 @@
+"""What a study cannot say, computed from its own data."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+import text
+from load import COUNTERS, Study
+
+NOISY = 0.1  #: spread of repetitions from which a run is called noisy
+
+
+def limits(study: Study) -> list[tuple[str, str]]:
+    """Pairs of a heading and one or two sentences."""
+    runs, timed = study.runs, study.timed
+    found = [_noise(timed), _origin(runs), _oracle(runs), _extent(runs), _machine(runs), _hidden(runs), _absent(study)]
+    if study.notes:
+        found.append(("Input", " ".join(study.notes)))
+    return [entry for entry in found if entry[1]]
+
+
+def _noise(timed: pd.DataFrame) -> tuple[str, str]:
+    if timed.empty:
+        return "Noise", "Nothing was timed."
+    single = int((timed["repetitions"] < 2).sum())
+    several = timed[timed["repetitions"] > 1]
+    words = []
+    if len(several):
+        spread = several["spread"].median()
+        worst = several.loc[several["spread"].idxmax()]
+        noisy = int((several["spread"] > NOISY).sum())
+        words.append(
+            f"Repetitions of one run differ by {text.percent(spread)} (median of largest minus smallest total) and by up to "
+            f"{text.percent(worst['spread'])} ({worst['label']}, {worst['scene']}, l = {worst['l']:g}); differences smaller "
+            "than that are not findings."
+        )
+        if noisy:
+            words.append(f"{noisy} of {text.plural(len(several), 'run')} spread by more than {text.percent(NOISY)}.")
+        fewest = int(several["repetitions"].min())
+        if fewest < 5:
+            words.append(f"Some runs have only {text.plural(fewest, 'repetition')}: their ranges are narrower than the truth.")
+    if single:
+        words.append(f"{text.plural(single, 'run')} of {len(timed)} had a single repetition and no estimate of noise.")
+    plain = timed[timed["kind"] == "run"]
+    if len(plain):
+        words.append(
+            f"{text.plural(len(plain), 'time')} {'comes' if len(plain) == 1 else 'come'} from plain runs, whose contestants "
+            "ran one after the other; `kbvh bench` interleaves them."
+        )
+    return "Noise", " ".join(words)
+
+
+def _origin(runs: pd.DataFrame) -> tuple[str, str]:
+    commits = [commit for commit in runs["commit"].unique() if commit]
+    words = []
+    if len(commits) > 1:
+        words.append(
+            f"The results come from {len(commits)} commits ({text.listing([c[:10] for c in commits])}); ratios are only made "
+            "inside one."
+        )
+    dirty = int(runs["dirty"].sum())
+    if dirty:
+        words.append(
+            f"{dirty} of {text.plural(len(runs), 'run')} came from a tree with uncommitted changes: the commit alone does not "
+            "reproduce them."
+        )
+    kinds = [kind for kind in runs["build_type"].unique() if kind and kind.lower() not in ("release", "relwithdebinfo")]
+    if kinds:
+        words.append(f"The build type was {text.listing(kinds)}, not Release: times are not comparable with others.")
+    return "Origin", " ".join(words)
+
+
+def _oracle(runs: pd.DataFrame) -> tuple[str, str]:
+    sampled = runs[runs["sampled_every"] > 1]
+    words = []
+    if len(sampled):
+        low, high = int(sampled["sampled_every"].min()), int(sampled["sampled_every"].max())
+        every = f"{low}th" if low == high else f"{low}th to {high}th"
+        words.append(
+            f"{text.plural(len(sampled), 'run')} of {len(runs)} {'was' if len(sampled) == 1 else 'were'} compared with the "
+            f"oracle on every {every} frame only; an error between these frames would go unseen, and missed and extra pairs "
+            "are counts of the sample."
+        )
+    else:
+        words.append("Every frame of every run was compared with the oracle.")
+    checked = int(runs["verified_frames"].fillna(0).sum())
+    words.append(f"{text.plural(checked, 'frame')} were compared in all.")
+    return "Verification", " ".join(words)
+
+
+def _extent(runs: pd.DataFrame) -> tuple[str, str]:
+    low, high = runs["primitives"].min(), runs["primitives"].max()
+    sizes = text.size(low) if low == high else f"{text.size(low)} to {text.size(high)}"
+    depths = sorted(runs["l"].unique())
+    scalars = sorted(runs["scalar"].unique())
+    words = [
+        f"{text.plural(runs['scene'].nunique(), 'scene')} with {sizes} primitives, l = "
+        f"{text.listing([f'{value:g}' for value in depths])}, in {text.listing(scalars)}: lines say nothing outside these "
+        "values."
+    ]
+    shorter = runs[runs["frames"] < 20]
+    if len(shorter):
+        words.append(
+            f"{text.plural(len(shorter), 'run')} had fewer than 20 frames; 99th percentile and worst frame say little there."
+        )
+    seeds = runs["seed"][runs["seed"] != ""].unique()
+    if len(seeds) == 1:
+        words.append(f"One seed only ({seeds[0]}): how results vary between scenes of one kind was not measured.")
+    return "Extent", " ".join(words)
+
+
+def _machine(runs: pd.DataFrame) -> tuple[str, str]:
+    machines = runs["machine"].nunique()
+    words = [f"{machines} machines; ratios are only made inside one." if machines > 1 else "One machine."]
+    words.append(
+        "Everything ran on one thread; scaling over cores, GPUs, energy and hardware counters (cache misses, mispredicted "
+        "branches) were not measured."
+    )
+    return "Machine", " ".join(words)
+
+
+def _hidden(runs: pd.DataFrame) -> tuple[str, str]:
+    hidden = sorted(runs[~runs["audited"]]["title"].unique())
+    if not hidden:
+        return "Hidden boxes", ""
+    return (
+        "Hidden boxes",
+        f"The boxes of {text.listing(hidden)} could not be seen, so protrusion and looseness are unknown there; pairs were "
+        "checked all the same.",
+    )
+
+
+def _absent(study: Study) -> tuple[str, str]:
+    timed = study.timed
+    words = []
+    counted = timed[[f"{name}_per_frame" for name in COUNTERS]].notna().any(axis=1)
+    if len(timed) and not counted.all():
+        words.append(f"{text.plural(int((~counted).sum()), 'run')} of {len(timed)} recorded no counters.")
+    if len(timed) and not (timed["family"] == "refit").any():
+        words.append("No refit was timed: there is nothing to compare with.")
+    if len(study.refused):
+        words.append(f"{text.plural(len(study.refused), 'contestant run')} got no time; the reason stands below its table.")
+    return "Not measured", " ".join(words)

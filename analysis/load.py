@@ -1,0 +1,321 @@
+"""Reads a folder's results.jsonl, checks it, and hands it on as tables. Never writes to it.
+
+The schema is documented in experiments/RESULTS.md. What a measurement cannot do without is refused
+with the line and the field if it is missing; anything else that is missing reads as unknown.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Optional
+
+import numpy as np
+import pandas as pd
+
+SCHEMA = 1
+FILE_NAME = "results.jsonl"
+PHASES = ("motion", "update", "traversal", "triangle_tests", "plan_changes")
+COUNTERS = (
+    "nodes_visited", "values_written", "vertex_reads", "positions_fetched", "certificates_made",
+    "certificates_failed", "certificates_discarded", "internal_events", "queue_operations", "queue_steps",
+    "queue_peak", "box_tests", "triangle_tests", "triangle_tests_exact",
+)  # fmt: skip
+#: Counters that are a level, not a sum over the clip.
+LEVELS = ("queue_peak",)
+GUARANTEES = ("exact", "candidate_superset", "approximate")
+
+
+class ResultError(Exception):
+    """A result file that cannot be used; the text is one sentence for the user."""
+
+
+@dataclass
+class Study:
+    """All that a report needs.
+
+    `runs` has one row per contestant and group (scene, scalar, interpolated frames, machine);
+    `repetitions` has one row per repetition with the mean time per frame of each phase in ms.
+    Both share the column `run`. `notes` are sentences about what was skipped.
+    """
+
+    source: Path
+    runs: pd.DataFrame
+    repetitions: pd.DataFrame
+    notes: list[str]
+
+    @property
+    def timed(self) -> pd.DataFrame:
+        """Runs with times: verified, not refused."""
+        return self.runs[self.runs["refused"] == ""]
+
+    @property
+    def refused(self) -> pd.DataFrame:
+        """Runs without times, each with its reason."""
+        return self.runs[self.runs["refused"] != ""]
+
+
+_MISSING = object()
+
+
+class _Record:
+    """One line, with its place in the file for messages."""
+
+    def __init__(self, data: dict[str, Any], place: str) -> None:
+        self.data = data
+        self.place = place
+
+    def get(self, path: str, default: Any = _MISSING) -> Any:
+        value: Any = self.data
+        for step in path.split("."):
+            value = value.get(step, _MISSING) if isinstance(value, dict) else _MISSING
+            if value is _MISSING:
+                break
+        if value is _MISSING or (value is None and default is not _MISSING):
+            if default is _MISSING:
+                raise ResultError(f"{self.place}: the field {path} is missing.")
+            return default
+        return value
+
+    def text(self, path: str, default: Any = _MISSING) -> str:
+        value = self.get(path, default)
+        if not isinstance(value, str):
+            raise ResultError(f"{self.place}: {path} should be a text, but is {json.dumps(value)}.")
+        return value
+
+    def number(self, path: str, default: Any = _MISSING) -> float:
+        value = self.get(path, default)
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ResultError(f"{self.place}: {path} should be a number, but is {json.dumps(value)}.")
+        return float(value)
+
+    def flag(self, path: str, default: Any = _MISSING) -> bool:
+        value = self.get(path, default)
+        if not isinstance(value, bool):
+            raise ResultError(f"{self.place}: {path} should be true or false, but is {json.dumps(value)}.")
+        return value
+
+
+def load(folder: Path) -> Study:
+    """Reads `folder`/results.jsonl. Raises ResultError."""
+    path = folder / FILE_NAME
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except FileNotFoundError:
+        raise ResultError(f"{path} does not exist: `kbvh run --out {folder}` writes it.") from None
+    except OSError as error:
+        raise ResultError(f"{path} cannot be read: {error.strerror}.") from None
+
+    notes: list[str] = []
+    rows: list[dict[str, Any]] = []
+    repetitions: list[dict[str, float]] = []
+    last = max((i for i, line in enumerate(lines) if line.strip()), default=-1)
+    for index, line in enumerate(lines):
+        if not line.strip():
+            continue
+        place = f"{path} line {index + 1}"
+        try:
+            data = json.loads(line)
+        except json.JSONDecodeError:
+            why = "it breaks off, as after an interrupted run" if index == last else "it is not JSON"
+            notes.append(f"Line {index + 1} of {FILE_NAME} was skipped: {why}.")
+            continue
+        if not isinstance(data, dict):
+            raise ResultError(f"{place}: a result is an object, but this is {line.strip()[:40]}.")
+        record = _Record(data, place)
+        schema = record.get("schema")
+        if schema != SCHEMA or isinstance(schema, bool):
+            raise ResultError(
+                f"{place}: schema {json.dumps(schema)} is not known to this report, which reads schema {SCHEMA}."
+            )
+        row = _row(record, index)
+        repetitions += _repetitions(record, index, row)
+        rows.append(row)
+    if not rows:
+        raise ResultError(f"{path} has no results yet: `kbvh run --out {folder}` adds some.")
+    runs = pd.DataFrame(rows)
+    runs["label"] = _labels(runs)
+    runs, dropped = _newest(runs)
+    if dropped:
+        notes.append(
+            f"{dropped} older measurement{'s' if dropped > 1 else ''} of the same configuration"
+            f" {'are' if dropped > 1 else 'is'} kept in the file, but not shown: the newest counts."
+        )
+    times = pd.DataFrame(repetitions, columns=["run", "repetition", *PHASES])
+    times = times[times["run"].isin(runs["run"])].reset_index(drop=True)
+    return Study(path, _with_times(runs, times), times, notes)
+
+
+def _row(record: _Record, index: int) -> dict[str, Any]:
+    """One record, flat."""
+    counters = record.get("counters", {})
+    params = record.get("strategy.params", {})
+    builder = record.get("strategy.builder", None)
+    if not isinstance(counters, dict) or not isinstance(params, dict) or not isinstance(builder, (dict, type(None))):
+        raise ResultError(f"{record.place}: counters, strategy.params and strategy.builder should be objects.")
+    guarantee = record.text("strategy.guarantee")
+    if guarantee not in GUARANTEES:
+        raise ResultError(
+            f"{record.place}: strategy.guarantee is {json.dumps(guarantee)}, but should be one of {', '.join(GUARANTEES)}."
+        )
+    machine = {
+        name: str(record.get(f"machine.{name}", ""))
+        for name in ("cpu", "cores", "memory_gb", "os", "compiler", "flags", "build_type", "simd")
+    }
+    if isinstance(record.get("machine.simd", ""), list):
+        machine["simd"] = ", ".join(map(str, record.get("machine.simd")))
+    holds = record.flag("verified.holds")
+    violation = record.text("verified.first_violation", "")
+    times = record.get("times", None)
+    refused = ""
+    if not holds:
+        refused = f"its declared guarantee or tightness is broken: {violation or 'no detail was recorded'}"
+    elif times is None:
+        refused = record.text("refused", "") or "no time was taken"
+    bodies = record.get("scene.bodies", [])
+    row: dict[str, Any] = {
+        "run": index,
+        "key": str(record.get("key", "")),
+        "kind": record.text("kind"),
+        "when": record.text("when", ""),
+        "commit": record.text("commit", ""),
+        "dirty": record.flag("dirty", False),
+        **machine,
+        "seed": str(record.get("seed", "")),
+        "scene": record.text("scene.name"),
+        "hash": str(record.get("scene.hash", "")),
+        "scalar": record.text("scene.scalar"),
+        "l": record.number("scene.per_keyframe"),
+        "keyframes": record.number("scene.keyframes", math.nan),
+        "frames": record.number("scene.frames", math.nan),
+        "primitives": record.number("scene.primitives"),
+        "bodies": bodies if isinstance(bodies, list) else [],
+        "id": record.text("strategy.id"),
+        "title": record.text("strategy.title", record.text("strategy.id")),
+        "family": record.text("strategy.family", "unknown"),
+        "guarantee": guarantee,
+        "tightness": record.text("strategy.tightness", ""),
+        "foresight": record.text("strategy.foresight", ""),
+        "citation": record.text("strategy.citation", ""),
+        "own_scalar": record.text("strategy.own_scalar", ""),
+        "params": params,
+        "builder": builder,
+        "holds": holds,
+        "violation": violation,
+        "audited": record.flag("verified.audited", False),
+        "refused": refused,
+        "sampled_every": record.number("verified.sampled_every", 1),
+        "p50": record.number("times.total_p50", math.nan),
+        "p99": record.number("times.total_p99", math.nan),
+        "worst": record.number("times.total_worst", math.nan),
+        "build_ms": record.number("times.build_ms", math.nan),
+        "bytes": record.number("bytes", math.nan),
+    }
+    for name in ("frames", "pairs", "candidates", "missed_candidates", "missed", "extra", "repeated", "malformed",
+                 "protrusion", "looseness", "invalid", "not_tight"):  # fmt: skip
+        row["verified_frames" if name == "frames" else name] = record.number(f"verified.{name}", math.nan)
+    if not row["audited"]:  # a hierarchy that cannot be seen has no measured boxes, whatever was recorded
+        row["protrusion"] = row["looseness"] = math.nan
+    for name in COUNTERS:
+        total = record.number(f"counters.{name}", math.nan)
+        row[f"{name}_per_frame"] = total if name in LEVELS or not row["frames"] > 0 else total / row["frames"]
+    row["contestant"] = _identity(row["id"], params, builder)
+    row["machine"] = " · ".join(machine[name] for name in ("cpu", "os", "compiler", "flags", "build_type", "simd"))
+    row["group"] = json.dumps([row["scene"], row["hash"], row["primitives"], row["scalar"], row["l"], row["machine"]])
+    return row
+
+
+def _repetitions(record: _Record, index: int, row: dict[str, Any]) -> list[dict[str, float]]:
+    """The repetitions of a record that was not refused."""
+    if row["refused"]:
+        return []
+    unit = record.text("times.unit", "ms")
+    if unit != "ms":
+        raise ResultError(f'{record.place}: times are in "{unit}", but this report reads ms.')
+    listed = record.get("times.repetitions")
+    if not isinstance(listed, list) or not listed:
+        raise ResultError(f"{record.place}: times.repetitions should be a list with at least one entry.")
+    result = []
+    for number, entry in enumerate(listed):
+        one = _Record(entry if isinstance(entry, dict) else {}, f"{record.place}, repetition {number + 1}")
+        values = {name: one.number(name, 0.0 if name == "plan_changes" else _MISSING) for name in PHASES}
+        for name, value in values.items():
+            if not (math.isfinite(value) and value >= 0):
+                raise ResultError(f"{one.place}: {name} is {value}, which is not a time.")
+        result.append({"run": index, "repetition": number, **values})
+    return result
+
+
+def _identity(strategy: str, params: dict[str, Any], builder: Optional[dict[str, Any]]) -> str:
+    """A text that is equal for equal configurations of a strategy."""
+    return strategy + json.dumps([params, builder], sort_keys=True)
+
+
+def _labels(runs: pd.DataFrame) -> pd.Series:
+    """Titles, followed by what tells configurations of one strategy apart, and by nothing else."""
+    labels: dict[str, str] = {}
+    for _, rows in runs.groupby("id"):
+        unique = rows.drop_duplicates("contestant")
+        facts = [_facts(row.params, row.builder) for row in unique.itertuples()]
+        names = sorted({name for fact in facts for name in fact})
+        varying = [name for name in names if len({fact.get(name, "") for fact in facts}) > 1]
+        for row, fact in zip(unique.itertuples(), facts):
+            told = ", ".join(f"{name} {fact[name]}" for name in varying if fact.get(name, "") != "")
+            labels[row.contestant] = f"{row.title} ({told})" if told else row.title
+    for title, same in runs.drop_duplicates("contestant").groupby(lambda i: labels[runs.at[i, "contestant"]]):
+        if same["id"].nunique() > 1:  # two strategies with one title would share a line in a legend
+            for row in same.itertuples():
+                labels[row.contestant] = f"{title} [{row.id}]"
+    return runs["contestant"].map(labels)
+
+
+def _facts(params: dict[str, Any], builder: Optional[dict[str, Any]]) -> dict[str, str]:
+    facts = {name: str(value) for name, value in params.items()}
+    for name, value in (builder or {}).items():
+        facts[{"leaf_size": "leaf", "method": "builder"}.get(name, name)] = str(value)
+    return facts
+
+
+def _newest(runs: pd.DataFrame) -> tuple[pd.DataFrame, int]:
+    """One run per configuration, the newest; but a plain run does not replace a benchmark of the same commit.
+
+    Refusals replace and are replaced by age alone: an older time must not hide a newer failure.
+    """
+    kept: dict[tuple[str, str], Any] = {}
+    for row in runs.itertuples():
+        old = kept.get((row.group, row.contestant))
+        weaker = (
+            old is not None
+            and old.kind == "bench" != row.kind
+            and not old.refused
+            and not row.refused
+            and old.commit == row.commit
+        )
+        if not weaker:
+            kept[(row.group, row.contestant)] = row
+    newest = runs[runs["run"].isin({row.run for row in kept.values()})]
+    return newest.reset_index(drop=True), len(runs) - len(newest)
+
+
+def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
+    """Adds the medians over repetitions of each phase and of the sums, in ms per frame, and their spread."""
+    sums = times.assign(
+        query=times["traversal"] + times["triangle_tests"],
+        updating=times["update"] + times["plan_changes"],
+        total=times["update"] + times["plan_changes"] + times["traversal"] + times["triangle_tests"],
+        total_motion=times[list(PHASES)].sum(axis=1),
+    )
+    names = [*PHASES, "query", "updating", "total", "total_motion"]
+    grouped = sums.groupby("run")
+    medians = grouped[names].median()
+    extremes = grouped["total_motion"].agg(["min", "max", "count"])
+    medians["spread"] = (extremes["max"] - extremes["min"]) / medians["total_motion"].where(medians["total_motion"] > 0)
+    medians["repetitions"] = extremes["count"]
+    joined = runs.merge(medians, how="left", left_on="run", right_index=True)
+    joined["repetitions"] = joined["repetitions"].fillna(0).astype(int)
+    joined["false_candidates"] = (joined["candidates"] - joined["pairs"] + joined["missed_candidates"].fillna(0)) / np.maximum(
+        joined["pairs"], 1
+    )
+    return joined

@@ -1,0 +1,126 @@
+"""How much faster than the best refit, where lines cross, and who is on the Pareto front."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+import pandas as pd
+
+from load import PHASES, Study
+
+#: Which phases a ratio is about.
+SCOPES: dict[str, tuple[str, ...]] = {
+    "with_motion": PHASES,
+    "without_motion": tuple(name for name in PHASES if name != "motion"),
+    "update": ("update", "plan_changes"),
+}
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Reference time over own time: above 1 is faster than the reference.
+
+    `low` and `high` are the extremes over repetitions if `paired` (repetition i against repetition i,
+    which ran next to each other), else the extremes that any two repetitions could give.
+    """
+
+    middle: float
+    low: float
+    high: float
+    paired: bool
+    reference: int
+
+
+def times_of(study: Study, run: int, scope: str) -> np.ndarray:
+    """Time per frame in ms of each repetition of a run, over the phases of a scope."""
+    rows = study.repetitions[study.repetitions["run"] == run].sort_values("repetition")
+    return rows[list(SCOPES[scope])].sum(axis=1).to_numpy(dtype=float)
+
+
+def best_refit(study: Study, group: pd.DataFrame, scope: str) -> Optional[int]:
+    """The run of the fastest verified refit of a group, by the median over repetitions; None without one."""
+    refits = group[(group["family"] == "refit") & (group["guarantee"] != "approximate") & (group["refused"] == "")]
+    medians = {int(run): float(np.median(times_of(study, int(run), scope))) for run in refits["run"]}
+    return min(medians, key=lambda run: (medians[run], run)) if medians else None
+
+
+def ratio(study: Study, run: int, reference: int, scope: str) -> Optional[Ratio]:
+    """How many times faster `run` is than `reference`; None where one of them has no time."""
+    own = times_of(study, run, scope)
+    other = times_of(study, reference, scope)
+    if not len(own) or not len(other) or own.min() <= 0:
+        return None
+    kinds = study.runs.set_index("run")["kind"]
+    if len(own) == len(other) and kinds[run] == kinds[reference]:
+        quotients = other / own
+        return Ratio(float(np.median(quotients)), float(quotients.min()), float(quotients.max()), True, reference)
+    return Ratio(
+        float(np.median(other) / np.median(own)),
+        float(other.min() / own.max()),
+        float(other.max() / own.min()),
+        False,
+        reference,
+    )
+
+
+def ratios(study: Study, scope: str) -> dict[int, Ratio]:
+    """Ratios of all timed runs to the best refit of the same group, commit and state of the tree."""
+    result: dict[int, Ratio] = {}
+    for _, group in study.timed.groupby(["group", "commit", "dirty"]):
+        reference = best_refit(study, group, scope)
+        if reference is None:
+            continue
+        for run in group["run"]:
+            one = ratio(study, int(run), reference, scope)
+            if one is not None:
+                result[int(run)] = one
+    return result
+
+
+def pareto_front(points: list[tuple[float, float]]) -> list[int]:
+    """Indices of the points that no other beats in both coordinates (smaller is better), by first coordinate.
+
+    Of equal points, the first is kept; points with a coordinate that is not finite never belong.
+    """
+    usable = [i for i, (x, y) in enumerate(points) if math.isfinite(x) and math.isfinite(y)]
+    front: list[int] = []
+    best = math.inf
+    for i in sorted(usable, key=lambda i: (points[i][0], points[i][1], i)):
+        if points[i][1] < best:
+            front.append(i)
+            best = points[i][1]
+    return front
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where a line meets the reference: at `x`, from then on `faster` or not."""
+
+    x: float
+    y: float
+    faster: bool
+
+
+def crossings(x: np.ndarray, own: np.ndarray, reference: np.ndarray) -> list[Crossing]:
+    """Break-even points between measured ones, on log-log straight lines; never outside what was measured."""
+    result: list[Crossing] = []
+    gap = np.log(own) - np.log(reference)
+    for i in range(len(x) - 1):
+        if gap[i] * gap[i + 1] < 0:
+            share = gap[i] / (gap[i] - gap[i + 1])
+            at = math.exp(math.log(x[i]) + share * (math.log(x[i + 1]) - math.log(x[i])))
+            level = math.exp(math.log(own[i]) + share * (math.log(own[i + 1]) - math.log(own[i])))
+            result.append(Crossing(at, level, bool(gap[i + 1] < 0)))
+    return result
+
+
+def break_even(x: np.ndarray, own: np.ndarray, reference: np.ndarray) -> str:
+    """The crossings in words."""
+    found = crossings(x, own, reference)
+    if not found:
+        faster = bool(np.median(own / reference) < 1)
+        return "faster throughout" if faster else "slower throughout"
+    return ", ".join(f"{'faster' if c.faster else 'slower'} from l ≈ {c.x:.0f}" for c in found)

@@ -1,0 +1,315 @@
+"""Turns a folder of results into report.html and figures/.
+
+usage: report.py RESULTS_DIR [--title TEXT] [--figures main|all] [--print]
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Optional
+
+import pandas as pd
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+import figures
+import tables
+import text
+from canvas import Picture, picture
+from colours import Look, looks, symbol
+from limits import limits
+from load import ResultError, Study, load
+
+TEMPLATES = Path(__file__).resolve().parent / "templates"
+
+
+@dataclass
+class Section:
+    """All about one scene."""
+
+    title: str
+    anchor: str
+    bodies: list[dict[str, str]]
+    groups: list[tables.Group]
+    pictures: list[Picture] = field(default_factory=list)
+    break_even: list[tuple[str, str, str, str]] = field(default_factory=list)
+
+
+def main(arguments: Optional[list[str]] = None) -> int:
+    """The command; returns its exit code: 0, or 2 for results that cannot be used."""
+    parser = argparse.ArgumentParser(
+        prog="report.py",
+        description="Turns RESULTS_DIR/results.jsonl into RESULTS_DIR/report.html and RESULTS_DIR/figures/.",
+        epilog="example: report.py results --title 'My cloth'",
+    )
+    parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
+    parser.add_argument("--title", default="BVH update strategies, measured", help="heading of the report")
+    parser.add_argument(
+        "--figures", choices=("main", "all"), default="main",
+        help="figures of one group per scene (default), or of every group",
+    )  # fmt: skip
+    parser.add_argument("--print", dest="printed", action="store_true", help="also print the tables as text")
+    options = parser.parse_args(arguments)
+    try:
+        study = load(options.folder)
+        page = write(study, options.folder, options.title, options.figures)
+    except ResultError as error:
+        print(f"report: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"report: {error.filename} cannot be written: {error.strerror}.", file=sys.stderr)
+        return 2
+    for note in study.notes:
+        print(f"report: {note}", file=sys.stderr)
+    if options.printed:
+        for scene, group in plain_groups(study):
+            print(tables.plain(scene, group) + "\n")
+    print(page)
+    return 0
+
+
+def plain_groups(study: Study) -> list[tuple[str, tables.Group]]:
+    """Groups with the name of their scene."""
+    ordered = study.runs.sort_values(["scene", "primitives", "scalar", "l", "machine"], kind="stable")
+    scenes = [rows["scene"].iloc[0] for _, rows in ordered.groupby("group", sort=False)]
+    return list(zip(scenes, tables.groups(study, tables.Ratios(study))))
+
+
+def write(study: Study, folder: Path, title: str, which: str = "main") -> Path:
+    """Writes the report and its figures; returns the page's path."""
+    all_ratios = tables.Ratios(study)
+    groups = tables.groups(study, all_ratios)
+    unique = study.runs.drop_duplicates("contestant")
+    all_looks = looks(zip(unique["contestant"], unique["id"], unique["family"]))
+    page = render(
+        title=title,
+        study=study,
+        machine=_machine(study),
+        made=_made(study),
+        glance=tables.glance(study, all_ratios, groups),
+        sections=_sections(study, groups, all_looks, folder / "figures", which),
+        strategies=_strategies(study),
+        limits=limits(study),
+        symbols={contestant: Markup(symbol(look)) for contestant, look in all_looks.items()},
+    )
+    path = folder / "report.html"
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
+def render(**values: object) -> str:
+    """The page as a text; everything that comes from results is escaped."""
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template("report.html.j2").render(**values)
+
+
+def _sections(
+    study: Study, groups: list[tables.Group], all_looks: dict[str, Look], folder: Path, which: str
+) -> list[Section]:
+    ordered = study.runs.sort_values(["scene", "primitives", "scalar", "l", "machine"], kind="stable")
+    of_group = dict(zip(ordered["group"].unique(), groups))
+    result = []
+    for number, (scene, rows) in enumerate(ordered.groupby("scene", sort=False)):
+        mine = [of_group[group] for group in rows["group"].unique()]
+        section = Section(str(scene), f"scene-{number + 1}", _bodies(rows), mine)
+        timed = rows[rows["refused"] == ""]
+        slug = re.sub(r"[^a-z0-9]+", "-", str(scene).lower()).strip("-") or f"scene-{number + 1}"
+        if len(timed):
+            head = headline(timed)
+            section.pictures += _group_pictures(timed[timed["group"] == head], timed, all_looks, folder, slug)
+            if which == "all":
+                for other in timed["group"].unique():
+                    if other != head:
+                        name = f"{slug}-{of_group[other].anchor}"
+                        section.pictures += _group_pictures(
+                            timed[timed["group"] == other], timed[:0], all_looks, folder, name
+                        )
+            over, section.break_even = _trends(timed, head, all_looks, folder, slug)
+            section.pictures += over
+        result.append(section)
+    return result
+
+
+def headline(timed: pd.DataFrame) -> str:
+    """The group that figures of one group show: the largest, in float if there is one, at the middle l."""
+    rows = timed[timed["primitives"] == timed["primitives"].max()]
+    if (rows["scalar"] == "float").any():
+        rows = rows[rows["scalar"] == "float"]
+    depths = sorted(rows["l"].unique())
+    rows = rows[rows["l"] == depths[(len(depths) - 1) // 2]]
+    return str(rows["group"].iloc[0])
+
+
+def fastest_configurations(rows: pd.DataFrame) -> pd.DataFrame:
+    """Of each strategy only the configuration that is the fastest on average, so that lines stay readable."""
+    chosen = []
+    for _, same in rows.groupby("id"):
+        covered = same.groupby("contestant")["group"].nunique()
+        complete = same[same["contestant"].isin(covered[covered == covered.max()].index)]
+        chosen.append(complete.groupby("contestant")["total_motion"].mean().idxmin())
+    return rows[rows["contestant"].isin(chosen)]
+
+
+def _place(row: pd.Series) -> str:
+    return f"{row['scene']}, {text.size(row['primitives'])} primitives, {row['scalar']}, l = {row['l']:g}"
+
+
+def _group_pictures(
+    group: pd.DataFrame, timed: pd.DataFrame, all_looks: dict[str, Look], folder: Path, slug: str
+) -> list[Picture]:
+    """Cost split, time against error, counters and latency of one group."""
+    first = group.iloc[0]
+    place = _place(first)
+    sizes = fastest_configurations(
+        timed[(timed["scalar"] == first["scalar"]) & (timed["l"] == first["l"]) & (timed["machine"] == first["machine"])]
+    ) if len(timed) else timed  # fmt: skip
+    made = [
+        picture(
+            folder, f"{slug}-cost", f"Where the time goes: {place}",
+            "Each bar is the mean time of one frame, split into its phases; the shorter, the better, and the fastest is on "
+            "top. A bar with a white zigzag at its end is longer than the picture: its number tells how long.",
+            lambda: figures.cost_split(group, all_looks),
+        ),
+        picture(
+            folder, f"{slug}-error", f"Time against error: {place}",
+            "Lower is faster, further left is more exact, and the grey strip holds those with no error at all. Nothing beats "
+            "the strategies on the dashed line in both at once; whatever lies above and right of it is beaten by one of them.",
+            lambda: figures.time_against_error(group, all_looks),
+        ),
+        picture(
+            folder, f"{slug}-counters", f"Work that does not depend on the machine: {place}",
+            "Event-driven strategies write a bound only when an event changes it, a refit writes all of them in every frame: "
+            "compare the written values first. Then look at the events, since each costs far more time than a written value.",
+            lambda: figures.counters(group, sizes, all_looks),
+        ),
+        picture(
+            folder, f"{slug}-latency", f"Even or jerky: {place}",
+            "The dot is the median frame, the bar the time that 99 % of frames stay below, the cross the worst one. A long "
+            "line means that work is saved up for a few frames, which shows as a stutter even if the mean is good.",
+            lambda: figures.latency(group, all_looks),
+        ),
+    ]  # fmt: skip
+    return [one for one in made if one is not None]
+
+
+def _trends(
+    timed: pd.DataFrame, head: str, all_looks: dict[str, Look], folder: Path, slug: str
+) -> tuple[list[Picture], list[tuple[str, str, str, str]]]:
+    """Lines over l and over n, through the headline group."""
+    first = timed[timed["group"] == head].iloc[0]
+    same = timed[(timed["scalar"] == first["scalar"]) & (timed["machine"] == first["machine"])]
+    depths = fastest_configurations(same[same["primitives"] == first["primitives"]])
+    sizes = fastest_configurations(same[same["l"] == first["l"]])
+    where = f"{first['scene']}, {first['scalar']}"
+    made = [
+        picture(
+            folder, f"{slug}-l", f"Frames per keyframe: {where}, {text.size(first['primitives'])} primitives",
+            "The number of events depends on the keyframes only, so strategies that work at events gain as more frames are "
+            "interpolated between two of them, while a refit (the broad blue band is the best one) pays for every frame. A "
+            "ring marks the break-even point, from which on the falling line wins.",
+            lambda: figures.over_frames_per_keyframe(depths, all_looks),
+        ),
+        picture(
+            folder, f"{slug}-n", f"Size: {where}, l = {first['l']:g}",
+            "Both axes are logarithmic, so a cost proportional to n is a straight line as steep as the thin grey one. A "
+            "steeper line grows faster than the scene; parallel lines differ by a constant factor at every size.",
+            lambda: figures.over_size(sizes, all_looks),
+        ),
+    ]  # fmt: skip
+    return [one for one in made if one is not None], tables.break_even(depths) if depths["l"].nunique() > 1 else []
+
+
+def _bodies(rows: pd.DataFrame) -> list[dict[str, str]]:
+    """Facts on the bodies of a scene, at each size once."""
+    result = []
+    for _, first in rows.drop_duplicates("hash").iterrows():
+        for body in first["bodies"]:
+            if isinstance(body, dict):
+                degenerate = body.get("degenerate") or 0
+                result.append(
+                    {
+                        "name": str(body.get("name", "?")),
+                        "primitives": text.count(body.get("primitives")),
+                        "vertices": text.count(body.get("vertices")),
+                        "keyframes": text.count(body.get("keyframes")),
+                        "motion": "moves" if body.get("moving") else "rests",
+                        "degenerate": text.count(degenerate),
+                    }
+                )
+    unique: list[dict[str, str]] = []
+    for one in result:
+        if one not in unique:
+            unique.append(one)
+    return unique
+
+
+def _values(column: pd.Series, shorten: Optional[int] = None) -> str:
+    values = [str(value)[:shorten] for value in column.unique() if str(value)]
+    return ", ".join(values) if values else "not recorded"
+
+
+def _machine(study: Study) -> list[tuple[str, str]]:
+    """What the study ran on, as pairs of a name and a value."""
+    runs = study.runs
+    memory = _values(runs["memory_gb"])
+    return [
+        ("Processor", f"{_values(runs['cpu'])}; {_values(runs['cores'])} cores, of which 1 was used"),
+        ("Memory", memory if memory == "not recorded" else f"{memory} GB"),
+        ("System", _values(runs["os"])),
+        ("Compiler", f"{_values(runs['compiler'])}, {_values(runs['build_type'])}"),
+        ("Flags", _values(runs["flags"])),
+        ("Vector instructions", _values(runs["simd"])),
+    ]
+
+
+def _made(study: Study) -> list[tuple[str, str]]:
+    """How the study was made."""
+    runs, timed = study.runs, study.timed
+    when = sorted(value for value in runs["when"].unique() if value)
+    dirty = runs[runs["dirty"]]
+    state = "clean tree" if dirty.empty else "with uncommitted changes" if len(dirty) == len(runs) else "partly with uncommitted changes"
+    repetitions = sorted(timed["repetitions"].unique())
+    span = "" if not repetitions else text.listing([str(n) for n in repetitions])
+    every = int(runs["sampled_every"].max())
+    return [
+        ("Commit", f"{_values(runs['commit'], 12)} ({state})"),
+        ("When", "not recorded" if not when else when[0] if when[0] == when[-1] else f"{when[0]} to {when[-1]}"),
+        ("Seeds", _values(runs["seed"])),
+        ("Runs", f"{text.plural(len(timed), 'timed run')} in {text.plural(runs['group'].nunique(), 'group')}"
+                 + (f", {span} repetitions each" if span else "")
+                 + (f"; {len(study.refused)} refused" if len(study.refused) else "")),
+        ("Verified", f"{text.count(runs['verified_frames'].sum())} frames against the oracle before any time was taken"
+                     + ("" if every <= 1 else f" (long clips on a sample, at most every {every}th frame)")),
+    ]  # fmt: skip
+
+
+def _strategies(study: Study) -> list[dict[str, object]]:
+    """What each contestant is, once."""
+    unique = study.runs.drop_duplicates("contestant").sort_values(["family", "label"])
+    result = []
+    for row in unique.itertuples():
+        facts = {**row.params, **(row.builder or {})}
+        result.append(
+            {
+                "contestant": row.contestant,
+                "label": row.label,
+                "id": row.id,
+                "family": row.family,
+                "guarantee": tables.GUARANTEE_NAMES[row.guarantee],
+                "tightness": row.tightness or text.MISSING,
+                "foresight": row.foresight.replace("_", " ") or text.MISSING,
+                "settings": ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in facts.items()) or text.MISSING,
+                "citation": row.citation or text.MISSING,
+            }
+        )
+    return result
+
+
+if __name__ == "__main__":
+    sys.exit(main())

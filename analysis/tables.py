@@ -1,0 +1,262 @@
+"""Tables of the report as rows of finished texts, for the page and for the terminal alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Optional
+
+import pandas as pd
+
+import ratios
+import text
+from load import Study
+from ratios import Ratio
+
+GUARANTEE_NAMES = {"exact": "exact", "candidate_superset": "superset", "approximate": "approximate"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One contestant of one group."""
+
+    contestant: str
+    label: str
+    note: str
+    guarantee: str
+    motion: str
+    update: str
+    query: str
+    total: str
+    ratio: str
+    ratio_without_motion: str
+    missed: str
+    extra: str
+    protrusion: str
+    looseness: str
+    memory: str
+    reference: bool
+    wrong: bool
+    faster: Optional[bool]
+
+
+@dataclass(frozen=True)
+class Group:
+    """All contestants of one scene, scalar and number of interpolated frames, on one machine."""
+
+    title: str
+    anchor: str
+    facts: str
+    rows: list[Row]
+    refused: list[tuple[str, str, str]]  #: contestant, label, reason
+    notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Glance:
+    """One group in a line: the best refit, and the fastest contestants that are none."""
+
+    anchor: str
+    scene: str
+    primitives: str
+    scalar: str
+    l: str
+    refit: str
+    refit_contestant: str
+    refit_time: str
+    exact: str
+    exact_contestant: str
+    exact_ratio: str
+    exact_faster: Optional[bool]
+    approximate: str
+    approximate_contestant: str
+    approximate_ratio: str
+
+
+class Ratios:
+    """Ratios to the best refit of a study, computed once."""
+
+    def __init__(self, study: Study) -> None:
+        self.with_motion = ratios.ratios(study, "with_motion")
+        self.without_motion = ratios.ratios(study, "without_motion")
+
+
+def groups(study: Study, all_ratios: Ratios) -> list[Group]:
+    """Every group, by scene, size, scalar and l."""
+    ordered = study.runs.sort_values(["scene", "primitives", "scalar", "l", "machine"], kind="stable")
+    several_machines = ordered["machine"].nunique() > 1
+    result = []
+    for number, (_, rows) in enumerate(ordered.groupby("group", sort=False)):
+        first = rows.iloc[0]
+        title = f"{text.size(first['primitives'])} primitives, {first['scalar']}, l = {first['l']:g}"
+        facts = _facts(first, several_machines)
+        timed = rows[rows["refused"] == ""].sort_values("total_motion", kind="stable")
+        refused = [
+            (row.contestant, row.label, row.refused) for row in rows[rows["refused"] != ""].itertuples()
+        ]  # fmt: skip
+        made = [_row(row, all_ratios) for row in timed.itertuples()]
+        result.append(Group(title, anchor(number), facts, made, refused, _notes(study, timed, all_ratios)))
+    return result
+
+
+def anchor(number: int) -> str:
+    """The fragment of a group's table in the page."""
+    return f"group-{number + 1}"
+
+
+def _facts(first: pd.Series, several_machines: bool) -> str:
+    parts = [text.plural(int(first["primitives"]), "primitive")]
+    if first["frames"] == first["frames"]:
+        parts.append(text.plural(int(first["frames"]), "frame"))
+    if first["keyframes"] == first["keyframes"]:
+        parts.append(text.plural(int(first["keyframes"]), "keyframe"))
+    if first["hash"]:
+        parts.append(f"scene {first['hash'][:12]}")
+    if several_machines:
+        parts.append(first["machine"])
+    return ", ".join(parts)
+
+
+def _row(row: object, all_ratios: Ratios) -> Row:
+    run = row.run
+    with_motion, without = all_ratios.with_motion.get(run), all_ratios.without_motion.get(run)
+    own = row.own_scalar
+    return Row(
+        contestant=row.contestant,
+        label=row.label,
+        note=f"computes in {own}" if own and own != row.scalar else "",
+        guarantee=GUARANTEE_NAMES[row.guarantee],
+        motion=text.milliseconds(row.motion),
+        update=text.milliseconds(row.updating),
+        query=text.milliseconds(row.query),
+        total=text.milliseconds(row.total_motion),
+        ratio=shown_ratio(with_motion),
+        ratio_without_motion=shown_ratio(without),
+        missed=text.count(row.missed),
+        extra=text.count(row.extra),
+        protrusion=text.significant(row.protrusion, 2),
+        looseness=text.percent(row.looseness),
+        memory=text.memory(row.bytes),
+        reference=with_motion is not None and with_motion.reference == run,
+        wrong=row.missed > 0 or row.extra > 0 or row.protrusion > 0,
+        faster=None if with_motion is None or with_motion.reference == run else _faster(with_motion),
+    )
+
+
+def _faster(one: Ratio) -> Optional[bool]:
+    """True or False where all repetitions agree; None where they do not."""
+    if one.low > 1:
+        return True
+    return False if one.high < 1 else None
+
+
+def shown_ratio(one: Optional[Ratio]) -> str:
+    """A ratio with its range over repetitions; ~ where repetitions could not be paired."""
+    if one is None:
+        return text.MISSING
+    return ("" if one.paired else "~\u2009") + text.interval(one.middle, one.low, one.high)
+
+
+def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
+    notes = []
+    used = {r.reference for r in (*all_ratios.with_motion.values(), *all_ratios.without_motion.values())}
+    with_motion = [run for run in timed["run"] if run in used and all_ratios.with_motion[run].reference == run]
+    without = [run for run in timed["run"] if run in used and all_ratios.without_motion[run].reference == run]
+    names = study.runs.set_index("run")["label"]
+    if len(timed) and not with_motion:
+        notes.append("No refit was timed here, so there are no ratios.")
+    elif set(with_motion) != set(without):
+        notes.append(
+            f"The best refit is {text.listing([names[r] for r in with_motion])} with motion evaluation and "
+            f"{text.listing([names[r] for r in without])} without it."
+        )
+    lost = [row.label for row in timed.itertuples() if row.run not in all_ratios.with_motion]
+    if with_motion and lost:
+        notes.append(f"No ratio for {text.listing(lost)}: measured at another commit than any refit here.")
+    if any(not all_ratios.with_motion[run].paired for run in timed["run"] if run in all_ratios.with_motion):
+        notes.append("~ marks ratios whose repetitions could not be paired; their range is the widest possible.")
+    sampled = sorted({int(every) for every in timed["sampled_every"] if every > 1})
+    if sampled:
+        notes.append(f"Verified on every {text.listing([str(s) for s in sampled])}th frame and the last.")
+    return notes
+
+
+def glance(study: Study, all_ratios: Ratios, shown: list[Group]) -> list[Glance]:
+    """The whole study, a line per group; groups without a refit are left out."""
+    result = []
+    ordered = study.runs.sort_values(["scene", "primitives", "scalar", "l", "machine"], kind="stable")
+    for group, (_, rows) in zip(shown, ordered.groupby("group", sort=False)):
+        timed = rows[rows["refused"] == ""].sort_values("total_motion")
+        references = [r for r in timed["run"] if getattr(all_ratios.with_motion.get(r), "reference", None) == r]
+        if not references:
+            continue
+        reference = timed[timed["run"] == references[-1]].iloc[0]
+        others = timed[timed["family"] != "refit"]
+        exact = _first(others[others["guarantee"] != "approximate"])
+        loose = _first(others[others["guarantee"] == "approximate"])
+        exact_ratio = all_ratios.with_motion.get(exact["run"]) if exact is not None else None
+        loose_ratio = all_ratios.with_motion.get(loose["run"]) if loose is not None else None
+        result.append(
+            Glance(
+                anchor=group.anchor,
+                scene=reference["scene"],
+                primitives=text.size(reference["primitives"]),
+                scalar=reference["scalar"],
+                l=f"{reference['l']:g}",
+                refit=reference["label"],
+                refit_contestant=reference["contestant"],
+                refit_time=text.milliseconds(reference["total_motion"]),
+                exact="" if exact is None else exact["label"],
+                exact_contestant="" if exact is None else exact["contestant"],
+                exact_ratio=shown_ratio(exact_ratio),
+                exact_faster=None if exact_ratio is None else _faster(exact_ratio),
+                approximate="" if loose is None else loose["label"],
+                approximate_contestant="" if loose is None else loose["contestant"],
+                approximate_ratio=shown_ratio(loose_ratio),
+            )
+        )
+    return result
+
+
+def _first(rows: pd.DataFrame) -> Optional[pd.Series]:
+    return rows.iloc[0] if len(rows) else None
+
+
+def break_even(rows: pd.DataFrame) -> list[tuple[str, str, str, str]]:
+    """Contestant, label, and in words where it becomes faster than the best refit: update, total."""
+    from figures import best_refit_line
+
+    result = []
+    lines = {column: best_refit_line(rows, column, "l") for column in ("updating", "total_motion")}
+    for contestant, line in rows[rows["family"] != "refit"].groupby("contestant"):
+        words = []
+        for column, best in lines.items():
+            own = line.set_index("l")[column].sort_index()
+            shared = own.index.intersection(best.index) if best is not None else own.index[:0]
+            usable = len(shared) > 1 and (own.loc[shared] > 0).all()
+            words.append(
+                ratios.break_even(shared.to_numpy(dtype=float), own.loc[shared].to_numpy(), best.loc[shared].to_numpy())
+                if usable and best is not None
+                else text.MISSING
+            )
+        result.append((str(contestant), str(line["label"].iloc[0]), words[0], words[1]))
+    return sorted(result, key=lambda entry: entry[1])
+
+
+PLAIN_COLUMNS = ("strategy", "guarantee", "motion", "update", "query", "total", "ratio", "w/o motion", "missed",
+                 "extra", "protrusion", "looseness", "memory")  # fmt: skip
+
+
+def plain(scene: str, group: Group) -> str:
+    """A group as text for a terminal."""
+    cells = [PLAIN_COLUMNS] + [
+        (row.label, row.guarantee, row.motion, row.update, row.query, row.total, row.ratio, row.ratio_without_motion,
+         row.missed, row.extra, row.protrusion, row.looseness, row.memory)
+        for row in group.rows
+    ]  # fmt: skip
+    cells = [tuple(cell.replace("\u202f", " ").replace("\u00a0", " ") for cell in row) for row in cells]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(PLAIN_COLUMNS))]
+    lines = [f"{scene}: {group.title}; times in ms per frame, ratio to the best refit (above 1 is faster)"]
+    for row in cells:
+        lines.append("  ".join(c.ljust(w) if i < 2 else c.rjust(w) for i, (c, w) in enumerate(zip(row, widths))).rstrip())
+    lines += [f"  refused: {label}: {reason}" for _, label, reason in group.refused]
+    return "\n".join(lines)

@@ -1,0 +1,98 @@
+"""Numbers as people read them: few significant digits, units, and never a false zero."""
+
+from __future__ import annotations
+
+import math
+from typing import Optional
+
+MISSING = "–"
+
+
+def known(value: Optional[float]) -> bool:
+    """True for a finite number; False for None, NaN and infinities."""
+    return value is not None and not isinstance(value, str) and math.isfinite(value)
+
+
+def significant(value: Optional[float], digits: int = 3) -> str:
+    """`value` with so many significant digits; an exact 0 is "0", and nothing else is."""
+    if value is None or not known(value):
+        return MISSING
+    if value == 0:
+        return "0"
+    exponent = math.floor(math.log10(abs(value)))
+    if exponent < -4 or exponent >= 7:
+        return scientific(value, max(digits - 1, 1))
+    rounded = round(value, digits - 1 - exponent)
+    decimals = max(digits - 1 - math.floor(math.log10(abs(rounded))), 0)
+    return f"{rounded:,.{decimals}f}".replace(",", "\u202f")
+
+
+def scientific(value: float, digits: int = 2) -> str:
+    """`value` as 1.2×10⁻⁷."""
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    superscript = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{mantissa}×10{superscript}"
+
+
+def milliseconds(value: Optional[float]) -> str:
+    """A time in ms, without the unit, for columns that name it."""
+    return significant(value, 3)
+
+
+def count(value: Optional[float]) -> str:
+    """A whole number with thin spaces between thousands."""
+    if value is None or not known(value):
+        return MISSING
+    return f"{int(value):,}".replace(",", "\u202f")
+
+
+def size(value: Optional[float]) -> str:
+    """A number of primitives as 16k or 1.2M."""
+    if value is None or not known(value):
+        return MISSING
+    if value >= 999_500:
+        return f"{significant(value / 1e6, 3 if value >= 1e8 else 2)}M"
+    if value >= 9_950:
+        return f"{value / 1e3:.0f}k"
+    if value >= 1_000:
+        return f"{value / 1e3:.1f}".rstrip("0").rstrip(".") + "k"
+    return f"{value:.0f}"
+
+
+def memory(value: Optional[float]) -> str:
+    """Bytes as B, kB or MB (powers of ten)."""
+    if value is None or not known(value):
+        return MISSING
+    for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if value >= scale:
+            return f"{significant(value / scale)}\u00a0{unit}"
+    return f"{value:.0f}\u00a0B"
+
+
+def percent(value: Optional[float]) -> str:
+    """A share (0.012) as 1.2 %."""
+    if value is None or not known(value):
+        return MISSING
+    return f"{significant(value * 100, 2)}\u00a0%"
+
+
+def interval(middle: Optional[float], low: Optional[float], high: Optional[float]) -> str:
+    """A number with the range of its repetitions: 2.41 (2.38–2.45)."""
+    if middle is None or not known(middle):
+        return MISSING
+    if low is None or high is None or not (known(low) and known(high)) or low == high:
+        return significant(middle)
+    return f"{significant(middle)} ({significant(low)}–{significant(high)})"
+
+
+def plural(number: int, singular: str, many: Optional[str] = None) -> str:
+    """`1 frame`, `3 frames`."""
+    word = singular if number == 1 else (many or singular + "s")
+    return f"{count(number)} {word}"
+
+
+def listing(words: list[str]) -> str:
+    """`a, b and c`."""
+    if len(words) < 2:
+        return "".join(words)
+    return ", ".join(words[:-1]) + " and " + words[-1]
