@@ -32,6 +32,16 @@ Dyadic to_dyadic(double x) {
   return {(bits >> 63) != 0 ? -magnitude : magnitude, std::max(biased, 1) - 1075 + zeros};
 }
 
+template <class Integer>
+inline void shift_left(Integer& x, int bits) {
+  x <<= bits;
+}
+/// Kept out of line: inlined into the determinants at -O3 it makes GCC 12 warn of overflows that there are
+/// not.
+[[gnu::noinline]] void shift_left(IntAny& x, int bits) {
+  x <<= bits;
+}
+
 /// N doubles as integers over one power of two. A common factor does not change the sign of a determinant.
 template <int N>
 struct Scaled {
@@ -55,10 +65,9 @@ struct Scaled {
   template <class Integer>
   Integer get(int i) const {
     if (values[i].mantissa == 0) return Integer(0);
-    // Multiplying rather than shifting where the type is built in: a left shift of a negative number is fine
-    // in C++20, and signed_magnitude integers shift their magnitude.
+    // A left shift of a negative number multiplies it: C++20 says so, and signed_magnitude integers too.
     Integer result(values[i].mantissa);
-    result <<= values[i].exponent - lowest;
+    shift_left(result, values[i].exponent - lowest);
     return result;
   }
 };

@@ -190,7 +190,7 @@ inline bool strictly_one_side(const Sides& s) {
 }
 
 void complete_exactly(Sides& sides, const Triangle& plane, const Triangle& other) {
-  for (int i = 0; i < 3; ++i)
+  for (std::size_t i = 0; i < 3; ++i)
     if (sides[i] == undecided_sign)
       sides[i] = orient3d_exact(plane.corner[0], plane.corner[1], plane.corner[2], other.corner[i]);
 }
@@ -207,7 +207,7 @@ struct Apex {
 /// each side and one in the plane, the positive one is taken.
 constexpr Apex find_apex(const Sides& s) {
   for (int side : {1, -1})
-    for (int i = 0; i < 3; ++i) {
+    for (std::size_t i = 0; i < 3; ++i) {
       const int p = side * s[i], q = side * s[(i + 1) % 3], r = side * s[(i + 2) % 3];
       const bool apart = (p > 0 && q <= 0 && r <= 0) || (p == 0 && q < 0 && r < 0);
       if (apart) return {static_cast<signed char>(i), static_cast<signed char>(side)};
@@ -215,7 +215,8 @@ constexpr Apex find_apex(const Sides& s) {
   return {};
 }
 
-/// The apex for each set of corners on the positive side (bit i: corner i), the others being on the negative one.
+/// The apex for each set of corners on the positive side (bit i: corner i), the others being on the negative
+/// one.
 constexpr std::array<Apex, 8> strict_apices = [] {
   std::array<Apex, 8> table{};
   for (int i = 0; i < 8; ++i)
@@ -429,7 +430,8 @@ inline Outcome decide(const S* const (&a)[3], const S* const (&b)[3]) {
   const SideValues values = side_values(a, b);
   if (values.separate()) return Outcome::separate;
   if (!values.decided())
-    return decide_open(load(a[0], a[1], a[2]), to_sides(values, 1), load(b[0], b[1], b[2]), to_sides(values, 0));
+    return decide_open(load(a[0], a[1], a[2]), to_sides(values, 1), load(b[0], b[1], b[2]),
+                       to_sides(values, 0));
   const Lanes zero = lanes(0.0, 0.0);
   const int p0 = greater(values.value[0], zero), p1 = greater(values.value[1], zero),
             p2 = greater(values.value[2], zero);

@@ -468,13 +468,17 @@ std::array<Point<double>, 4> near_plane(Random& random, int gap) {
     for (std::size_t axis = 0; axis < 3; ++axis)
       p[3][axis] = p[0][axis] + s * (p[1][axis] - p[0][axis]) + t * (p[2][axis] - p[0][axis]);
   }
+  if (uniform(random, 0, 2) == 0) {
+    const double s = real(random);  // nearly collinear, for orient2d
+    for (std::size_t axis = 0; axis < 3; ++axis) p[2][axis] = p[0][axis] + s * (p[1][axis] - p[0][axis]);
+  }
   if (uniform(random, 0, 3) == 0) p[3][0] = std::nextafter(p[3][0], 10.0);
   return p;
 }
 
 TEST(Predicates, SignsAreExact) {
   Random random(8);
-  int undecided = 0;
+  int undecided = 0, undecided2d = 0;
   for (const int gap : {0, 2, 20, 45, 200, 330})
     for (int i = 0; i < 3000; ++i) {
       const auto p = near_plane(random, gap);
@@ -492,9 +496,11 @@ TEST(Predicates, SignsAreExact) {
         const Projection axes = drop_axis(axis);
         ASSERT_EQ(orient2d_exact(a, b, c, axes), rational_orient2d(p.data(), axes));
         ASSERT_EQ(orient2d(a, b, c, axes), rational_orient2d(p.data(), axes));
+        undecided2d += orient2d_filtered(a, b, c, axes) == undecided_sign;
       }
     }
   EXPECT_GT(undecided, 1000);
+  EXPECT_GT(undecided2d, 1000);
 }
 
 /// Where every product underflows to zero the filter must not answer zero, nor anything else.
