@@ -1,0 +1,322 @@
+// FCL 0.7 (Pan et al. 2012) as contestants: its BVHModel<AABB> and its mesh traversal, in float and in
+// double.
+//
+// How it is driven, and why:
+// - Frames come through beginReplaceModel / endReplaceModel(refit, bottomup). begin/endUpdateModel would fit
+//   boxes to the previous and the current frame together: right for continuous, wrong for discrete tests.
+// - The traversal node is driven directly. fcl::collide() copies both models on every call.
+// - leafTesting only collects primitive ids; kbvh's exact test then confirms them, as for everybody else.
+//   `fcl_*_own_verdict` confirm with FCL's separating-axis test in floating point instead, which is why they
+//   are approximate. They do so after the traversal, not within it, so that the two phases are timed apart.
+// - Splitter and fitter are shared between copies of a model, so each body's model is made on its own.
+// - FCL knows triangles only, one per leaf. A primitive of fewer vertices is a degenerate triangle; one of
+// more
+//   is handed over as the triangle (lower, upper, first vertex) over two vertices that follow the body's own.
+//   That triangle has the polygon's box, so leaves are primitives, points and control nets are answered, too,
+//   and no pair is reported twice. It favours FCL over fanning polygons, which would need more leaves.
+// - FCL's AABB overlap is closed and its boxes are unions of vertices: tight, to the last bit.
+// - FCL recurses, in its mean-split tree as in its traversal: depth is bounded by the primitives, not by log
+// n.
+// - The float version cannot take double scenes: rounding positions would lose pairs.
+#include <fcl/geometry/bvh/BVH_model.h>
+#include <fcl/math/bv/AABB.h>
+#include <fcl/math/bv/utility.h>  // BVHModel uses its fit() without including it
+#include <fcl/narrowphase/detail/traversal/collision/intersect.h>
+#include <fcl/narrowphase/detail/traversal/collision/mesh_collision_traversal_node.h>
+#include <fcl/narrowphase/detail/traversal/collision_node.h>
+
+#include <algorithm>
+#include <array>
+
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+enum class Mode : std::uint8_t { bottom_up, top_down, rebuild };
+enum class Verdict : std::uint8_t { kbvh, own };
+
+/// FCL's simultaneous traversal of two models, with leaves that are collected instead of tested.
+template <class Own>
+class LeafCollector final : public fcl::detail::MeshCollisionTraversalNode<fcl::AABB<Own>> {
+ public:
+  BodyPair bodies{};
+  PairBuffer* out = nullptr;
+
+  void leafTesting(int leaf_a, int leaf_b) const override {
+    out->push_back({bodies.first, std::uint32_t(this->model1->getBV(leaf_a).primitiveId()), bodies.second,
+                    std::uint32_t(this->model2->getBV(leaf_b).primitiveId())});
+  }
+};
+
+template <class Own, Mode mode, Verdict verdict, class S, class Count>
+class Fcl final : public Strategy<S> {
+  static_assert(sizeof(Own) >= sizeof(S), "rounding positions would lose pairs");
+  using Model = fcl::BVHModel<fcl::AABB<Own>>;
+  using Vector = fcl::Vector3<Own>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+
+  Fcl(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*none*/,
+      const Params& /*params*/)
+      : Strategy<S>(scene, motion), bodies_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+      for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
+      build(body);
+    }
+    for (const BodyPair& pair : scene.pairs()) {
+      if (!bodies_[pair.first].model || !bodies_[pair.second].model) continue;
+      auto node = std::make_unique<LeafCollector<Own>>();
+      fcl::Transform3<Own> here = fcl::Transform3<Own>::Identity();
+      if (!fcl::detail::initialize(*node, *bodies_[pair.first].model, here, *bodies_[pair.second].model, here,
+                                   fcl::CollisionRequest<Own>(), result_))
+        throw std::runtime_error("FCL refuses to traverse bodies " + std::to_string(pair.first) + " and " +
+                                 std::to_string(pair.second));
+      node->bodies = pair;
+      node->enable_statistics = Count::enabled;
+      collectors_.push_back(std::move(node));
+    }
+  }
+
+  void reset(double t) override {
+    this->clear_triangle_stats();
+    time_ = t;
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
+    count_.table = {};
+  }
+
+  void advance(double t) override {
+    if (t < time_)
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
+                                  std::to_string(t));
+    time_ = t;
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
+      if (bodies_[body].moves) update(body);
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+    for (const auto& node : collectors_) {
+      node->out = &out;
+      node->num_bv_tests = 0;
+      fcl::detail::collide<Own>(node.get());
+      count_.add(Counter::box_tests, std::uint64_t(node->num_bv_tests));
+    }
+    return {};
+  }
+
+  void confirm(double t, PairBuffer& pairs) override {
+    if constexpr (verdict == Verdict::kbvh)
+      Strategy<S>::confirm(t, pairs);
+    else
+      std::erase_if(pairs, [&](const PrimitivePair& pair) { return !own_verdict(pair); });
+  }
+
+  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> changes) override {
+    for (const auto& change : changes) bodies_[change.body].moves = true;
+  }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    AuditView view;
+    const Model* model = bodies_[body].model.get();
+    if (model == nullptr) return view;
+    // FCL numbers siblings next to each other and after their parent, just as a topology does.
+    const auto size = std::uint32_t(model->getNumBVs());
+    view.topology.parents.assign(size, 0);
+    view.topology.depths.assign(size, 0);
+    for (std::uint32_t i = 0; i < size; ++i) {
+      const auto& node = model->getBV(int(i));
+      Box<double> box;
+      for (int axis = 0; axis < 3; ++axis) {
+        box.lower[axis] = double(node.bv.min_[axis]);
+        box.upper[axis] = double(node.bv.max_[axis]);
+      }
+      view.boxes.push_back(box);
+      if (node.isLeaf()) {
+        view.topology.nodes.push_back(TopologyNode::leaf(std::uint32_t(view.topology.primitives.size()), 1));
+        view.topology.primitives.push_back(std::uint32_t(node.primitiveId()));
+        continue;
+      }
+      const auto child = std::uint32_t(node.leftChild());
+      view.topology.nodes.push_back(TopologyNode::inner(child, 2));
+      for (std::uint32_t k = child; k < child + 2; ++k) {
+        view.topology.parents[k] = i;
+        view.topology.depths[k] = std::uint8_t(std::min(255, view.topology.depths[i] + 1));
+      }
+    }
+    return view;
+  }
+
+  /// What FCL allocates for its arrays; its own memUsage() returns a status code instead.
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const BodyState& state : bodies_) {
+      if (!state.model) continue;
+      const auto triangles = std::size_t(state.model->num_tris);
+      total += sizeof(Model) +
+               (2 * triangles - 1) * (sizeof(fcl::BVNode<fcl::AABB<Own>>) + sizeof(unsigned)) +
+               triangles * sizeof(fcl::Triangle) + std::size_t(state.model->num_vertices) * sizeof(Vector) +
+               state.polygons.size() * sizeof(std::uint32_t);
+    }
+    return total;
+  }
+
+ private:
+  struct BodyState {
+    std::unique_ptr<Model> model;         // none for a body without primitives: FCL refuses empty models
+    std::vector<std::uint32_t> polygons;  // primitives of more than 3 vertices
+    std::uint64_t fitted_vertices = 0;    // vertex reads of a refit
+    bool moves = false;
+  };
+
+  static Vector vector(const S* p) { return Vector(Own(p[0]), Own(p[1]), Own(p[2])); }
+
+  template <class Add>
+  void for_each_vertex(std::uint32_t body, Add&& add) const {
+    const S* positions = this->sampled_.positions(body);
+    const std::uint32_t count = this->scene_.vertex_count(body);
+    for (std::uint32_t v = 0; v < count; ++v) add(vector(positions + std::size_t(3) * v));
+    for (std::uint32_t polygon : bodies_[body].polygons) {
+      const Box<S> box = primitive_box(this->scene_.primitives(body)[polygon], positions);
+      add(vector(box.lower));
+      add(vector(box.upper));
+    }
+  }
+
+  void build(std::uint32_t body) {
+    BodyState& state = bodies_[body];
+    state.moves = this->scene_.moving(body);
+    const Primitives& primitives = this->scene_.primitives(body);
+    if (primitives.count() == 0) return;
+    std::vector<fcl::Triangle> triangles;
+    triangles.reserve(primitives.count());
+    std::uint32_t next = this->scene_.vertex_count(body);
+    for (std::uint32_t p = 0; p < primitives.count(); ++p) {
+      const auto v = primitives[p];
+      if (v.size() <= 3) {
+        triangles.emplace_back(v[0], v[v.size() / 2], v.back());
+      } else {
+        triangles.emplace_back(next, next + 1, v[0]);
+        next += 2;
+        state.polygons.push_back(p);
+      }
+    }
+    std::vector<Vector> vertices;
+    vertices.reserve(next);
+    for_each_vertex(body, [&](const Vector& p) { vertices.push_back(p); });
+    state.model = std::make_unique<Model>();
+    Model& model = *state.model;
+    check(model.beginModel(int(triangles.size()), int(vertices.size())), body);
+    check(model.addSubModel(vertices, triangles), body);
+    check(model.endModel(), body);
+    state.fitted_vertices = mode == Mode::bottom_up ? 3 * triangles.size() : vertices_below_nodes(model);
+  }
+
+  void update(std::uint32_t body) {
+    BodyState& state = bodies_[body];
+    if (!state.model) return;
+    Model& model = *state.model;
+    check(model.beginReplaceModel(), body);
+    for_each_vertex(body, [&](const Vector& p) { model.replaceVertex(p); });
+    check(model.endReplaceModel(mode != Mode::rebuild, mode == Mode::bottom_up), body);
+    if constexpr (Count::enabled) {
+      // A rebuild reads what lies below a node to fit its box, to find its mean, and to divide it.
+      const auto nodes = std::uint64_t(model.getNumBVs());
+      if (mode == Mode::rebuild) state.fitted_vertices = 3 * vertices_below_nodes(model);
+      count_.add(Counter::nodes_visited, nodes);
+      count_.add(Counter::values_written, 6 * nodes);
+      count_.add(Counter::vertex_reads, state.fitted_vertices);
+    }
+  }
+
+  static std::uint64_t vertices_below_nodes(const Model& model) {
+    std::uint64_t total = 0;
+    for (int i = 0; i < model.getNumBVs(); ++i) total += 3 * std::uint64_t(model.getBV(i).num_primitives);
+    return total;
+  }
+
+  static void check(int status, std::uint32_t body) {
+    if (status != fcl::BVH_OK)
+      throw std::runtime_error("FCL refuses body " + std::to_string(body) + " with status " +
+                               std::to_string(status));
+  }
+
+  /// FCL's triangle test; polygons as fans, of which FCL would only compare triangles whose boxes overlap.
+  bool own_verdict(const PrimitivePair& pair) {
+    const Primitives& primitives_a = this->scene_.primitives(pair.body_a);
+    const Primitives& primitives_b = this->scene_.primitives(pair.body_b);
+    if (primitives_a.kind != PrimitiveKind::polygons || primitives_b.kind != PrimitiveKind::polygons)
+      return true;
+    const auto a = primitives_a[pair.primitive_a], b = primitives_b[pair.primitive_b];
+    const auto fan = [](std::span<const std::uint32_t> p) { return p.size() < 3 ? 1 : p.size() - 2; };
+    for (std::size_t i = 0; i < fan(a); ++i)
+      for (std::size_t j = 0; j < fan(b); ++j) {
+        const auto p = fan_triangle(pair.body_a, a, i), q = fan_triangle(pair.body_b, b, j);
+        if (!fcl::AABB<Own>(p[0], p[1], p[2]).overlap(fcl::AABB<Own>(q[0], q[1], q[2]))) continue;
+        ++this->triangle_stats_.tests;
+        if (fcl::detail::Intersect<Own>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2])) return true;
+      }
+    return false;
+  }
+
+  std::array<Vector, 3> fan_triangle(std::uint32_t body, std::span<const std::uint32_t> polygon,
+                                     std::size_t i) const {
+    const S* positions = this->sampled_.positions(body);
+    const auto corner = [&](std::size_t k) {
+      return vector(positions + std::size_t(3) * polygon[std::min(k, polygon.size() - 1)]);
+    };
+    return {corner(0), corner(i + 1), corner(i + 2)};
+  }
+
+  std::vector<BodyState> bodies_;
+  fcl::CollisionResult<Own> result_;  // stays empty: no leaf is tested by FCL
+  std::vector<std::unique_ptr<LeafCollector<Own>>> collectors_;
+  Count count_;
+  double time_ = 0;
+
+ protected:
+  Counters counted() const override { return count_.table; }
+};
+
+template <class Own, Mode mode, Verdict verdict = Verdict::kbvh>
+struct Bind {
+  template <class S, class Count>
+  using Type = Fcl<Own, mode, verdict, S, Count>;
+};
+
+template <class Own, Mode mode, Verdict verdict = Verdict::kbvh>
+StrategyEntry entry(const std::string& name, const std::string& title) {
+  constexpr bool single = std::is_same_v<Own, float>;
+  constexpr Scalars scalars = single ? Scalars::float_only : Scalars::both;
+  Info info;
+  info.own_scalar = single ? "float" : "double";
+  info.id = "fcl_" + info.own_scalar + "_" + name;
+  info.title = "FCL " + info.own_scalar + ", " + title;
+  info.family = "fcl";
+  info.citation = "Pan, Chitta & Manocha 2012 (FCL 0.7)";
+  info.tightness = Tightness::tight;
+  info.guarantee = verdict == Verdict::own ? Guarantee::approximate : Guarantee::candidate_superset;
+  info.positions = PositionUse::all;
+  info.can.restructures = mode == Mode::rebuild;
+  info.can.plan_changes = true;
+  info.topology.own = true;
+  return make_entry<Bind<Own, mode, verdict>::template Type, scalars>(std::move(info));
+}
+
+template <class Own>
+void append(std::vector<StrategyEntry>& entries) {
+  entries.push_back(entry<Own, Mode::bottom_up>("bottom_up", "bottom-up refit"));
+  entries.push_back(entry<Own, Mode::top_down>("top_down", "top-down refit"));
+  entries.push_back(entry<Own, Mode::rebuild>("rebuild", "rebuild"));
+  entries.push_back(entry<Own, Mode::bottom_up, Verdict::own>("own_verdict", "bottom-up refit, own test"));
+}
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(fcl) {
+  std::vector<kbvh::StrategyEntry> entries;
+  kbvh::append<float>(entries);
+  kbvh::append<double>(entries);
+  return entries;
+}

@@ -1,0 +1,129 @@
+// The contestants from other libraries keep what they declare, on scenes that are awkward for them.
+#include <gtest/gtest.h>
+
+#include "core/verify.hpp"
+#include "scenes.hpp"
+
+namespace {
+using namespace kbvh;
+
+bool is_peer(const Info& info) {
+  return info.family == "fcl" || info.family == "bullet" || info.family == "embree";
+}
+
+/// Every combination of words that the parameters admit.
+std::vector<std::map<std::string, std::string>> settings(const Info& info) {
+  std::vector<std::map<std::string, std::string>> all{{}};
+  for (const Parameter& parameter : info.parameters) {
+    std::vector<std::map<std::string, std::string>> more;
+    for (const auto& one : all)
+      for (const std::string& word : parameter.allowed) {
+        more.push_back(one);
+        more.back()[parameter.name] = word;
+      }
+    if (!more.empty()) all = std::move(more);
+  }
+  return all;
+}
+
+std::string describe(const Info& info, const std::map<std::string, std::string>& params) {
+  std::string text = info.id;
+  for (const auto& [key, value] : params) text += " " + key + "=" + value;
+  return text;
+}
+
+template <class S, class Check>
+void for_each_peer(Check&& check) {
+  for (const StrategyEntry& entry : registry())
+    if (is_peer(entry.info) && entry.factory<S>() != nullptr)
+      for (const auto& params : settings(entry.info)) check(Contestant{&entry, params, {}});
+}
+
+template <class S>
+void keeps_guarantee(std::uint32_t frames_per_keyframe) {
+  for (const Scene<S>& scene : adapters_test::awkward_scenes<S>()) {
+    Oracle<S> oracle(scene);
+    const auto frames = frame_times(scene, frames_per_keyframe);
+    for_each_peer<S>([&](const Contestant& contestant) {
+      SCOPED_TRACE(describe(contestant.entry->info, contestant.params) + " on '" + scene.name + "'");
+      Session<S> session(scene, contestant, CountingPolicy::counting);
+      const Verification found = verify<S>(session, frames, oracle);
+      EXPECT_TRUE(found.holds()) << found.first_violation;
+      EXPECT_EQ(found.missed_candidates, 0u);
+      EXPECT_EQ(found.audit.protrusion, 0);
+      EXPECT_GT(session.strategy().bytes(), 0u);
+      std::printf("%-28s %-24s pairs %6llu candidates %8llu missed %llu extra %llu looseness %.4f%s\n",
+                  describe(contestant.entry->info, contestant.params).c_str(), scene.name.c_str(),
+                  (unsigned long long)found.pairs, (unsigned long long)found.candidates,
+                  (unsigned long long)found.missed, (unsigned long long)found.extra, found.audit.looseness(),
+                  found.audited ? "" : " (not audited)");
+    });
+  }
+}
+
+TEST(Peers, KeepTheirGuaranteeInFloat) {
+  keeps_guarantee<float>(3);
+}
+TEST(Peers, KeepTheirGuaranteeInDouble) {
+  keeps_guarantee<double>(3);
+}
+
+TEST(Peers, RefuseToGoBackInTime) {
+  const auto scene = adapters_test::awkward_scenes<float>()[0];
+  for_each_peer<float>([&](const Contestant& contestant) {
+    SCOPED_TRACE(contestant.entry->info.id);
+    Session<float> session(scene, contestant, CountingPolicy::silent);
+    PhaseTimes times;
+    session.reset(1);
+    session.advance(2, times);
+    EXPECT_THROW(session.advance(1.5, times), std::invalid_argument);
+    session.reset(0);  // starting over is what may go back
+    EXPECT_NO_THROW(session.advance(.5, times));
+  });
+}
+
+TEST(Peers, FollowPlanChangesOfBodiesAtRest) {
+  auto scene = adapters_test::scene<float>(
+      "rest", {adapters_test::grid<float>(4, .25f, 3, {0, 0}), adapters_test::grid<float>(4, .25f, 3, {1})});
+  PlanScript<float> script;
+  script.steps.push_back({.25, {}});
+  for (std::uint32_t v = 0; v < 25; ++v) {
+    PlanChange<float> change;
+    change.body = 1;
+    change.vertex = v;
+    change.velocity[2] = -2;
+    script.steps[0].changes.push_back(change);
+  }
+  std::vector<double> frames{0, .25, .5, .75, 1};
+  for_each_peer<float>([&](const Contestant& contestant) {
+    SCOPED_TRACE(contestant.entry->info.id);
+    Session<float> session(scene, contestant, CountingPolicy::counting);
+    Oracle<float> oracle(scene);
+    const Verification found = verify<float>(session, frames, oracle, &script);
+    EXPECT_TRUE(found.holds()) << found.first_violation;
+    EXPECT_GT(found.pairs, 0u);
+  });
+}
+
+TEST(Peers, AnswerTheSameAfterStartingOver) {
+  const auto scene = adapters_test::awkward_scenes<float>()[1];
+  for_each_peer<float>([&](const Contestant& contestant) {
+    SCOPED_TRACE(contestant.entry->info.id);
+    Session<float> session(scene, contestant, CountingPolicy::counting);
+    PhaseTimes times;
+    PairBuffer first, second;
+    session.reset(0);
+    session.advance(1.5, times);
+    session.query(first, times);
+    session.advance(3, times);
+    session.reset(0);
+    session.advance(1.5, times);
+    session.query(second, times);
+    std::sort(first.begin(), first.end());
+    std::sort(second.begin(), second.end());
+    EXPECT_EQ(first, second);
+    EXPECT_FALSE(first.empty());
+  });
+}
+
+}  // namespace
