@@ -1,8 +1,10 @@
 #include "core/motion/round_positions.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -28,7 +30,7 @@ bool usable(double x) {
   return x == 0 || (std::fabs(x) >= 0x1p-250 && std::fabs(x) <= 0x1p250);
 }
 
-void complete(TimeFraction& f) {
+void complete(TimeFraction& f, PieceKind kind) {
   const auto [wh, wl] = f.elapsed;
   const auto [dh, dl] = f.duration;
   f.in_range = usable(wh) && usable(wl) && usable(dl);
@@ -40,6 +42,12 @@ void complete(TimeFraction& f) {
   const double second = rest / dh;
   f.ratio = two_sum(first, second);
   f.ratio_exact = f.single && wh == back.hi && back.lo == 0;
+  // Short: 24 bits, so products with floats are exact in double; in a chord 1 - ratio is then exact or not
+  // short.
+  f.rest = kind == PieceKind::chord ? 1 - f.ratio.hi : 1.0;
+  const bool rest_exact = kind == PieceKind::ray || 1 - f.rest == f.ratio.hi;
+  const auto is_short = [](double x) { return x == static_cast<double>(static_cast<float>(x)); };
+  f.short_ratio = f.ratio_exact && rest_exact && is_short(f.ratio.hi) && is_short(f.rest);
   f.elapsed_halves = split_halves(wh);
   f.duration_halves = split_halves(dh);
   f.ratio_halves = split_halves(f.ratio.hi);
@@ -52,7 +60,7 @@ TimeFraction chord_fraction(double t0, double t1, double t) {
   // The unit of time does not matter; a power of two takes everything near 1 exactly (or complete() says no).
   const int scale = -std::ilogb(f.duration.hi);
   for (double* x : {&f.elapsed.hi, &f.elapsed.lo, &f.duration.hi, &f.duration.lo}) *x = std::ldexp(*x, scale);
-  complete(f);
+  complete(f, PieceKind::chord);
   return f;
 }
 
@@ -60,7 +68,7 @@ TimeFraction ray_fraction(double t0, double t) {
   TimeFraction f;
   f.elapsed = two_diff(t, t0);
   f.duration = {1, 0};
-  complete(f);
+  complete(f, PieceKind::ray);
   return f;
 }
 
@@ -132,44 +140,27 @@ template <PieceKind kind, class S>
 void round_block(const S* x0, const S* x1, const TimeFraction& f, const Times& times, S* out,
                  RoundingStats& stats) {
   alignas(64) S result[kBlock];
-  alignas(64) Mask<S> undecided[kBlock];
   std::uint16_t list[kBlock + kGroup];
-  first_stage<kind>(x0, x1, f, result, undecided);
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < kBlock; i += kGroup) {
-    Mask<S> any = 0;
-    for (std::size_t k = 0; k < kGroup; ++k) any |= undecided[i + k];
-    if (any == 0) continue;
-    for (std::size_t k = 0; k < kGroup; ++k) {
-      list[count] = static_cast<std::uint16_t>(i + k);
-      count += static_cast<std::size_t>(undecided[i + k]);
-    }
-  }
+  const std::size_t count = first_stage<kind>(x0, x1, f, result, list);
   stats.second_stage += count;
-  if constexpr (std::is_same_v<S, float>) {
-    if (f.single) {
-      for (std::size_t k = 0; k < kGroup; ++k) list[count + k] = count > 0 ? list[0] : std::uint16_t{0};
-      for (std::size_t i = 0; i < count; i += kGroup) {
-        S group0[kGroup], group1[kGroup], chosen[kGroup];
-        Mask<S> hard[kGroup];
-        for (std::size_t k = 0; k < kGroup; ++k) {
-          group0[k] = x0[list[i + k]];
-          group1[k] = x1[list[i + k]];
-        }
-        second_stage<kind>(group0, group1, f, chosen, hard);
-        for (std::size_t k = 0; k < kGroup && i + k < count; ++k) {
-          const std::size_t j = list[i + k];
-          result[j] = hard[k] == 0 ? chosen[k] : round_one<kind>(x0[j], x1[j], f, times, stats);
-        }
+  const bool second_helps = std::is_same_v<S, float> ? f.single : f.ratio_exact;
+  for (std::size_t k = 0; k < kGroup; ++k) list[count + k] = 0;
+  for (std::size_t i = 0; i < count; i += kGroup) {
+    alignas(64) S group0[kGroup], group1[kGroup], chosen[kGroup];
+    alignas(64) Mask<S> hard[kGroup];
+    if (second_helps) {
+      for (std::size_t k = 0; k < kGroup; ++k) {
+        group0[k] = x0[list[i + k]];
+        group1[k] = x1[list[i + k]];
       }
-      count = 0;
+      second_stage<kind>(group0, group1, f, chosen, hard);
+    }
+    for (std::size_t k = 0; k < kGroup && i + k < count; ++k) {
+      const std::size_t j = list[i + k];
+      result[j] = second_helps && hard[k] == 0 ? chosen[k] : round_one<kind>(x0[j], x1[j], f, times, stats);
     }
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t j = list[i];
-    result[j] = round_one<kind>(x0[j], x1[j], f, times, stats);
-  }
-  std::copy(result, result + kBlock, out);
+  std::memcpy(out, result, sizeof result);
 }
 
 template <PieceKind kind, class S>
