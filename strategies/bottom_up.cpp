@@ -34,6 +34,7 @@ KBVH_STRATEGY(bottom_up) {
       .title = "bottom-up refit",
       .family = "refit",
       .citation = "van den Bergen 1997; Z&W 2006, s.2",
+      .can = {.plan_changes = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 4}},
   })};
 }

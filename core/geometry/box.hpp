@@ -37,6 +37,17 @@ struct Box {
   bool operator==(const Box&) const = default;
 };
 
+/// The same box in double, exactly.
+template <class S>
+inline Box<double> to_double(const Box<S>& box) {
+  Box<double> result;
+  for (int axis = 0; axis < 3; ++axis) {
+    result.lower[axis] = box.lower[axis];
+    result.upper[axis] = box.upper[axis];
+  }
+  return result;
+}
+
 /// Contact counts: boxes that share a single point overlap (design, numeric policy).
 template <class S>
 inline bool overlap(const Box<S>& a, const Box<S>& b) {

@@ -61,12 +61,8 @@ void refit_bottom_up(StoredHierarchy<S>& hierarchy, const S* positions) {
 template <class S>
 AuditView stored_audit_view(const Topology& topology, std::span<const Box<S>> boxes) {
   AuditView view{topology, {}, {}};
-  view.boxes.resize(boxes.size());
-  for (std::size_t i = 0; i < boxes.size(); ++i)
-    for (int axis = 0; axis < 3; ++axis) {
-      view.boxes[i].lower[axis] = boxes[i].lower[axis];
-      view.boxes[i].upper[axis] = boxes[i].upper[axis];
-    }
+  view.boxes.reserve(boxes.size());
+  for (const Box<S>& box : boxes) view.boxes.push_back(to_double(box));
   return view;
 }
 

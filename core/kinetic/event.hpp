@@ -1,0 +1,202 @@
+#pragma once
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include "core/motion/exact_piece.hpp"
+#include "core/motion/flight_plans.hpp"
+
+namespace kbvh {
+
+/// One of the six sides of a box: 2 * axis + (0 lower, 1 upper).
+using Side = std::uint32_t;
+inline int axis_of(Side side) { return int(side >> 1); }
+inline bool is_upper(Side side) { return (side & 1) != 0; }
+
+/// A scheduled certificate failure: `loser` will overtake `winner` on one side. The exact time is a root of the two
+/// linear pieces that hold from `begin` on; the doubles only bound and approximate it: the time lies in
+/// [begin, end), within `error` of `hint`.
+struct Event {
+  double hint = 0, error = 0, begin = 0, end = 0;
+  std::uint32_t winner = 0, loser = 0;
+  std::uint32_t slot = 0;   ///< which certificate: unique in the whole queue
+  std::uint16_t body = 0;
+  std::uint8_t side = 0;
+  std::uint8_t depth = 0;   ///< of the node; deeper events of one instant come first
+};
+static_assert(sizeof(Event) == 48);
+
+/// An instant at which certificates are computed: a frame's or change's double, or the exact time of an event.
+template <class S>
+struct Instant {
+  double begin;                          ///< not after the instant
+  double end;                            ///< after the instant, or equal to begin if the instant is begin itself
+  const Crossing<S>* exact = nullptr;    ///< the event's exact time; null: the instant is `begin`
+
+  static Instant at(double t) { return {t, t, nullptr}; }
+};
+
+/// Decides everything about event times on the exact flight plans (truth A): order, whether an event is due, and
+/// failure times. Event order is exact time, then deeper node, then slot (design, numeric policy).
+template <class S>
+class EventClock {
+ public:
+  explicit EventClock(std::vector<const FlightPlans<S>*> plans) : plans_(std::move(plans)) {}
+
+  const FlightPlans<S>& plans(std::uint32_t body) const { return *plans_[body]; }
+
+  /// The two pieces whose crossing is the event.
+  Crossing<S> crossing(const Event& event) const {
+    if (!own_.empty()) {
+      const auto own = own_.find(event.slot);
+      if (own != own_.end()) return own->second;
+    }
+    return keyframed_crossing(event);
+  }
+
+  /// Strict weak order of events in a queue.
+  bool earlier(const Event& a, const Event& b) const {
+    const int order = compare_times(a, b);
+    if (order != 0) return order < 0;
+    if (a.depth != b.depth) return a.depth > b.depth;
+    return a.slot < b.slot;
+  }
+
+  /// Sign of (a's time - b's time), exact.
+  int compare_times(const Event& a, const Event& b) const {
+    if (a.end <= b.begin) return -1;
+    if (b.end <= a.begin) return 1;
+    const double error = a.error + b.error;
+    if (a.hint + error < b.hint) return -1;
+    if (b.hint + error < a.hint) return 1;
+    return compare_crossings(crossing(a), crossing(b));
+  }
+
+  /// Does the event happen at or before t?
+  bool due(const Event& event, double t) const {
+    if (event.end <= t) return true;
+    if (event.begin > t) return false;
+    if (event.hint + event.error < t) return true;
+    if (event.hint - event.error > t) return false;
+    return compare_crossing_to(crossing(event), t) <= 0;
+  }
+
+  /// The first time from `now` on at which `loser` gets strictly ahead of `winner` on the event's side, who is not
+  /// behind now (Z&W Algorithm 3 with its errata: walk the segments forward, each with its own end points; in a
+  /// bounded segment the end points decide, on an unbounded one the slopes). Fills hint, error, begin and end of
+  /// `event` (its winner, loser, side, body and slot are given) and returns true, or false: never. `own` gets the
+  /// crossing if a plan of its own takes part, for `remember`.
+  bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own) const {
+    own.reset();
+    const FlightPlans<S>& plan = *plans_[event.body];
+    if (plan.has_own_plan(event.winner) || plan.has_own_plan(event.loser)) return first_own_failure(event, now, own);
+    const auto times = plan.keyframe_times();
+    const int axis = axis_of(event.side);
+    const std::size_t w = std::size_t(3) * event.winner + std::size_t(axis);
+    const std::size_t l = std::size_t(3) * event.loser + std::size_t(axis);
+    const double sign = is_upper(event.side) ? 1.0 : -1.0;
+    std::size_t k = plan.segment_at(now.begin);
+    // An event between plans of their own may lie keyframes after the begin of its pieces.
+    while (now.exact != nullptr && k + 1 < times.size() && times[k + 1] < now.end &&
+           compare_crossing_to(*now.exact, times[k + 1]) >= 0)
+      ++k;
+    for (; k + 1 < times.size(); ++k) {
+      const double ahead = sign * (double(plan.keyframe(k + 1)[l]) - double(plan.keyframe(k + 1)[w]));
+      if (!(ahead > 0)) continue;
+      const double behind = sign * (double(plan.keyframe(k)[w]) - double(plan.keyframe(k)[l]));
+      const double length = times[k + 1] - times[k];
+      event.begin = times[k];
+      event.end = times[k + 1];
+      event.hint = event.begin + length * (behind / (behind + ahead));
+      // Differences, sum, quotient, product and final sum are each off by at most one rounding.
+      event.error = 16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(event.begin), std::abs(event.end));
+      return true;
+    }
+    return false;
+  }
+
+  /// Sign of (challenger's value - winner's value) at an instant given by a double, seen from the side: > 0 means ahead.
+  int compare_values(std::uint32_t body, Side side, std::uint32_t challenger, std::uint32_t winner, double t) const {
+    const FlightPlans<S>& plan = *plans_[body];
+    const int axis = axis_of(side);
+    const int sign = compare_at(plan.piece_after(challenger, axis, t), plan.piece_after(winner, axis, t), t);
+    return is_upper(side) ? sign : -sign;
+  }
+
+  /// Of two failures of the same certificate: does `a` come first? Of several that overtake at one instant the fastest
+  /// counts as first, for it stays ahead: no second change at once.
+  bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& own_a, const Event& b,
+                       const std::optional<Crossing<S>>& own_b) const {
+    if (!own_a && !own_b) {
+      if (a.end <= b.begin || a.hint + a.error + b.error < b.hint) return true;
+      if (b.end <= a.begin || b.hint + a.error + b.error < a.hint) return false;
+    }
+    const Crossing<S> x = own_a ? *own_a : keyframed_crossing(a), y = own_b ? *own_b : keyframed_crossing(b);
+    const int order = compare_crossings(x, y);
+    if (order != 0) return order < 0;
+    const int faster = compare_slopes(x.loser, y.loser);
+    return is_upper(a.side) ? faster > 0 : faster < 0;
+  }
+
+  /// Keeps the crossing of the event that is about to be scheduled in a slot; nothing: forgets the one before.
+  /// No event of that slot may be in a queue meanwhile.
+  void remember(std::uint32_t slot, const std::optional<Crossing<S>>& own) {
+    if (own) own_.insert_or_assign(slot, *own);
+    else if (!own_.empty()) own_.erase(slot);
+  }
+  void clear() { own_.clear(); }
+
+ private:
+  Crossing<S> keyframed_crossing(const Event& event) const {
+    return {keyframed_piece(event, event.winner), keyframed_piece(event, event.loser)};
+  }
+  Piece<S> keyframed_piece(const Event& event, std::uint32_t vertex) const {
+    // Read from the keyframes themselves: they stay what they are when a vertex gets a plan of its own.
+    const FlightPlans<S>& plan = *plans_[event.body];
+    const std::size_t k = plan.segment_at(event.begin);
+    const std::size_t at = std::size_t(3) * vertex + std::size_t(axis_of(event.side));
+    return {event.begin, event.end, plan.keyframe(k)[at], plan.keyframe(k + 1)[at], PieceKind::chord};
+  }
+
+  /// The piece that holds at the instant and right after it.
+  Piece<S> piece_at(std::uint32_t body, std::uint32_t vertex, int axis, const Instant<S>& now) const {
+    Piece<S> piece = plans_[body]->piece_after(vertex, axis, now.begin);
+    while (now.exact != nullptr && piece.t1 < now.end && compare_crossing_to(*now.exact, piece.t1) >= 0)
+      piece = plans_[body]->piece_after(vertex, axis, piece.t1);
+    return piece;
+  }
+
+  bool first_own_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own) const {
+    const int axis = axis_of(event.side);
+    Piece<S> winner = piece_at(event.body, event.winner, axis, now);
+    Piece<S> loser = piece_at(event.body, event.loser, axis, now);
+    double begin = now.begin;
+    for (;;) {
+      const double end = std::min(winner.t1, loser.t1);
+      const int ahead = std::isinf(end) ? compare_slopes(loser, winner) : compare_at(loser, winner, end);
+      if ((is_upper(event.side) ? ahead : -ahead) > 0) {
+        const Crossing<S> crossing{winner, loser};
+        const TimeEstimate estimate = crossing_estimate(crossing);
+        if (!std::isfinite(estimate.time)) return false;  // beyond any time that can be asked for
+        event.begin = std::max(begin, std::max(winner.t0, loser.t0));
+        event.end = end;
+        event.hint = estimate.time;
+        event.error = estimate.error;
+        own = crossing;
+        return true;
+      }
+      if (std::isinf(end)) return false;
+      if (winner.t1 <= end) winner = plans_[event.body]->piece_after(event.winner, axis, end);
+      if (loser.t1 <= end) loser = plans_[event.body]->piece_after(event.loser, axis, end);
+      begin = end;
+    }
+  }
+
+  std::vector<const FlightPlans<S>*> plans_;
+  std::unordered_map<std::uint32_t, Crossing<S>> own_;  ///< by slot: crossings that involve a plan of its own
+};
+
+}  // namespace kbvh

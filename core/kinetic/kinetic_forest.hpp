@@ -1,0 +1,81 @@
+#pragma once
+#include <vector>
+
+#include "core/kinetic/event_queue.hpp"
+#include "core/kinetic/kinetic_aabb_tree.hpp"
+#include "core/strategy.hpp"
+
+namespace kbvh {
+
+/// The kinetic AABB trees of all bodies of a scene on one event queue.
+template <class S, class Queue, class Count, class Observer = NoObserver>
+class KineticForest {
+ public:
+  using Tree = KineticAabbTree<S, Queue, Count, Observer>;
+
+  KineticForest(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, Count& count,
+                Observer observer = {})
+      : clock_(plans_of(scene, motion)), queue_(clock_, slots_of(topologies)), count_(&count) {
+    std::uint32_t first_slot = 0;
+    trees_.reserve(topologies.size());
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+      const std::uint32_t slots = Tree::slot_count(topologies[body]);
+      trees_.emplace_back(std::move(topologies[body]), scene.primitives(body), std::uint16_t(body), first_slot, clock_,
+                          queue_, count, observer);
+      first_slot += slots;
+    }
+  }
+  KineticForest(const KineticForest&) = delete;  // trees point to the clock and the queue
+  KineticForest& operator=(const KineticForest&) = delete;
+
+  /// Starts over at t.
+  void reset(double t) {
+    queue_.clear();
+    clock_.clear();
+    for (Tree& tree : trees_) tree.initialise(t);
+  }
+  /// Handles every event up to and including t (Z&W Algorithm 1).
+  void advance(double t) {
+    while (due(t)) handle_next();
+  }
+  bool due(double t) const { return !queue_.empty() && clock_.due(queue_.top(), t); }
+  /// Takes the first event off the queue and handles it.
+  void handle_next() {
+    const Event event = queue_.top();
+    queue_.pop();
+    count_->add(Counter::queue_operations);
+    trees_[event.body].handle(event);
+  }
+
+  Tree& tree(std::uint32_t body) { return trees_[body]; }
+  const Tree& tree(std::uint32_t body) const { return trees_[body]; }
+  EventClock<S>& clock() { return clock_; }
+  Queue& queue() { return queue_; }
+  const Queue& queue() const { return queue_; }
+  std::size_t bytes() const {
+    std::size_t total = queue_.bytes();
+    for (const Tree& tree : trees_) total += tree.bytes();
+    return total;
+  }
+
+ private:
+  static std::vector<const FlightPlans<S>*> plans_of(const SceneView<S>& scene, const ClipMotion<S>& motion) {
+    std::vector<const FlightPlans<S>*> plans;
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) plans.push_back(&motion.plans(body));
+    return plans;
+  }
+  static std::uint32_t slots_of(const Topologies& topologies) {
+    std::uint64_t slots = 0;
+    for (const Topology& topology : topologies) slots += std::uint64_t(6) * topology.size();
+    if (slots > std::numeric_limits<std::uint32_t>::max())
+      throw std::length_error(std::to_string(slots) + " certificates are more than a queue can number");
+    return std::uint32_t(slots);
+  }
+
+  EventClock<S> clock_;
+  Queue queue_;
+  Count* count_;
+  std::vector<Tree> trees_;
+};
+
+}  // namespace kbvh

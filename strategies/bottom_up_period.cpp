@@ -1,0 +1,153 @@
+// What the paper's authors would have compared with in 2006: a pointer-linked binary tree, one polygon per leaf, updated
+// and traversed by recursion (Z&W 2006, s.2 and Algorithm 2). It is kept as it was on purpose: the ratio between this and
+// the best refit is what the paper's speed-ups have to be read against.
+
+#include <memory>
+
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S>
+struct PeriodNode {
+  Box<S> box;
+  PeriodNode* left = nullptr;
+  PeriodNode* right = nullptr;
+  std::uint32_t primitive = 0;
+  std::uint32_t id = 0;  // in the topology it was made from
+
+  bool is_leaf() const { return left == nullptr; }
+};
+
+template <class S, class Count>
+class BottomUpPeriod final : public Strategy<S> {
+  using Node = PeriodNode<S>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  BottomUpPeriod(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params& /*params*/)
+      : Strategy<S>(scene, motion), topologies_(std::move(topologies)) {
+    for (const Topology& topology : topologies_) roots_.push_back(topology.empty() ? nullptr : link(topology, 0));
+  }
+
+  void reset(double t) override {
+    this->clear_triangle_stats();
+    time_ = t;
+    for (std::uint32_t body = 0; body < roots_.size(); ++body) update(body);
+    count_.table = {};
+  }
+
+  void advance(double t) override {
+    if (t < time_)
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " + std::to_string(t));
+    time_ = t;
+    for (std::uint32_t body = 0; body < roots_.size(); ++body)
+      if (this->scene_.moving(body) || plans_changed_) update(body);
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
+    for (const BodyPair& pair : this->scene_.pairs())
+      if (roots_[pair.first] != nullptr && roots_[pair.second] != nullptr)
+        check(*roots_[pair.first], *roots_[pair.second], pair, out);
+    return {};
+  }
+
+  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override { plans_changed_ = true; }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    AuditView view{topologies_[body], std::vector<Box<double>>(topologies_[body].size()), {}};
+    for (const auto& node : nodes_of(body)) view.boxes[node->id] = to_double(node->box);
+    return view;
+  }
+
+  std::size_t bytes() const override { return nodes_.size() * (sizeof(Node) + sizeof(void*)); }
+
+ protected:
+  Counters counted() const override { return count_.table; }
+
+ private:
+  /// Nodes are allocated one by one in the order of the recursion, as `new Node` in a recursive build does.
+  Node* link(const Topology& topology, std::uint32_t id) {
+    nodes_.push_back(std::make_unique<Node>());
+    Node* node = nodes_.back().get();
+    node->id = id;
+    const TopologyNode source = topology.nodes[id];
+    if (source.is_leaf()) {
+      node->primitive = topology.primitives[source.first()];
+    } else {
+      node->left = link(topology, source.first());
+      node->right = link(topology, source.first() + 1);
+    }
+    return node;
+  }
+
+  std::span<const std::unique_ptr<Node>> nodes_of(std::uint32_t body) const {
+    std::size_t begin = 0;
+    for (std::uint32_t before = 0; before < body; ++before) begin += topologies_[before].size();
+    return {nodes_.data() + begin, topologies_[body].size()};
+  }
+
+  void update(std::uint32_t body) {
+    if (roots_[body] == nullptr) return;
+    refit(*roots_[body], this->scene_.primitives(body), this->sampled_.positions(body));
+  }
+
+  void refit(Node& node, const Primitives& primitives, const S* positions) {
+    count_.add(Counter::nodes_visited);
+    count_.add(Counter::values_written, 6);
+    node.box = Box<S>{};
+    if (node.is_leaf()) {
+      for (std::uint32_t v : primitives[node.primitive]) node.box.extend(positions + std::size_t(3) * v);
+      count_.add(Counter::vertex_reads, primitives[node.primitive].size());
+      return;
+    }
+    refit(*node.left, primitives, positions);
+    refit(*node.right, primitives, positions);
+    node.box.extend(node.left->box);
+    node.box.extend(node.right->box);
+  }
+
+  /// Algorithm 2 of the paper, with the case of a leaf against an inner node that it leaves out.
+  void check(const Node& a, const Node& b, const BodyPair& pair, PairBuffer& out) {
+    count_.add(Counter::box_tests);
+    if (!overlap(a.box, b.box)) return;
+    if (a.is_leaf() && b.is_leaf()) {
+      out.push_back({pair.first, a.primitive, pair.second, b.primitive});
+    } else if (a.is_leaf()) {
+      check(a, *b.left, pair, out);
+      check(a, *b.right, pair, out);
+    } else if (b.is_leaf()) {
+      check(*a.left, b, pair, out);
+      check(*a.right, b, pair, out);
+    } else {
+      check(*a.left, *b.left, pair, out);
+      check(*a.left, *b.right, pair, out);
+      check(*a.right, *b.left, pair, out);
+      check(*a.right, *b.right, pair, out);
+    }
+  }
+
+  Topologies topologies_;
+  std::vector<std::unique_ptr<Node>> nodes_;
+  std::vector<Node*> roots_;
+  Count count_;
+  double time_ = 0;
+  bool plans_changed_ = false;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(bottom_up_period) {
+  using namespace kbvh;
+  return {make_entry<BottomUpPeriod>({
+      .id = "bottom_up_period",
+      .title = "bottom-up refit, 2006 style",
+      .family = "period",
+      .citation = "Z&W 2006, s.2 and Algorithm 2",
+      .can = {.plan_changes = true},
+      .topology = {.widths = {2}, .max_leaf_size = 1,
+                   .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+  })};
+}

@@ -1,0 +1,92 @@
+// No hierarchy: the box of every primitive against the box of every other. What any structure has to beat.
+
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class Count>
+class BruteForce final : public Strategy<S> {
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  BruteForce(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*topologies*/, const Params& /*params*/)
+      : Strategy<S>(scene, motion), boxes_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) boxes_[body].resize(scene.primitives(body).count());
+  }
+
+  void reset(double t) override {
+    this->clear_triangle_stats();
+    time_ = t;
+    update();
+    count_.table = {};
+  }
+
+  void advance(double t) override {
+    if (t < time_)
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " + std::to_string(t));
+    time_ = t;
+    update();
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+    QueryStatus status;
+    for (const BodyPair& pair : this->scene_.pairs()) {
+      const auto &a = boxes_[pair.first], &b = boxes_[pair.second];
+      std::uint64_t tests = 0;
+      for (std::uint32_t i = 0; i < a.size(); ++i) {
+        if (tests >= budget.box_tests) {
+          status.pending += a.size() - i;
+          break;
+        }
+        for (std::uint32_t j = 0; j < b.size(); ++j)
+          if (overlap(a[i], b[j])) out.push_back({pair.first, i, pair.second, j});
+        tests += b.size();
+      }
+      count_.add(Counter::box_tests, tests);
+    }
+    return status;
+  }
+
+  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}
+
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const auto& boxes : boxes_) total += boxes.size() * sizeof(Box<S>);
+    return total;
+  }
+
+ protected:
+  Counters counted() const override { return count_.table; }
+
+ private:
+  void update() {
+    for (std::uint32_t body = 0; body < boxes_.size(); ++body) {
+      const Primitives& primitives = this->scene_.primitives(body);
+      for (std::uint32_t p = 0; p < primitives.count(); ++p)
+        boxes_[body][p] = primitive_box(primitives[p], this->sampled_.positions(body));
+      count_.add(Counter::values_written, std::uint64_t(6) * primitives.count());
+      count_.add(Counter::vertex_reads, primitives.vertices.size());
+    }
+  }
+
+  std::vector<std::vector<Box<S>>> boxes_;
+  Count count_;
+  double time_ = 0;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(brute_force) {
+  using namespace kbvh;
+  return {make_entry<BruteForce>({
+      .id = "brute_force",
+      .title = "brute force",
+      .family = "oracle",
+      .citation = "all pairs",
+      .tightness = Tightness::none,
+      .can = {.plan_changes = true, .time_budget = true},
+      .topology = {.own = true},
+      .max_primitive_pairs = 100'000'000,
+  })};
+}

@@ -1,0 +1,54 @@
+// A new topology for every frame: the most that an update can cost, and the best boxes a query can get.
+// Building allocates; that is part of what this strategy costs.
+
+#include "core/hierarchy/stored_hierarchy.hpp"
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class Count>
+class Rebuild final : public StoredHierarchyStrategy<S, Count> {
+  using Base = StoredHierarchyStrategy<S, Count>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  Rebuild(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params& params)
+      : Base(scene, motion, std::move(topologies), params) {
+    config_.method = build_method(params.word("method"));
+    for (const auto& hierarchy : this->hierarchies_) {
+      config_.width = hierarchy.topology.width;
+      config_.leaf_size = hierarchy.topology.leaf_size;
+    }
+  }
+
+ private:
+  void update(std::uint32_t body) override {
+    const Primitives& primitives = this->scene_.primitives(body);
+    const auto boxes = primitive_boxes(primitives, this->sampled_.positions(body));
+    auto& hierarchy = this->hierarchies_[body];
+    hierarchy.assign(build_topology<S>(boxes, config_), primitives);
+    this->refit(body);
+    this->count_.add(Counter::nodes_visited, hierarchy.topology.size());
+    this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology.size());
+    this->count_.add(Counter::vertex_reads, primitives.vertices.size() + hierarchy.leaf_vertices.vertices.size());
+  }
+
+  BuilderConfig config_;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(rebuild) {
+  using namespace kbvh;
+  return {make_entry<Rebuild>({
+      .id = "rebuild",
+      .title = "rebuild",
+      .family = "rebuild",
+      .citation = "van den Bergen 1997 (as the alternative to refitting)",
+      .can = {.restructures = true, .plan_changes = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 4}},
+      .parameters = {{"method", "median", {"median", "sah", "morton"}, "how the new topology is built"}},
+  })};
+}

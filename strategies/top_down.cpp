@@ -1,0 +1,75 @@
+// Top-down refit: every node's box straight from the vertices below it, parents before children. It reads each vertex
+// once per level, which is what makes it the slower refit; it is the building block of refits on demand (van den Bergen
+// 1998, Larsson & Akenine-Moeller 2001).
+
+#include "core/hierarchy/stored_hierarchy.hpp"
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class Count>
+class TopDown final : public StoredHierarchyStrategy<S, Count> {
+  using Base = StoredHierarchyStrategy<S, Count>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  TopDown(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params& params)
+      : Base(scene, motion, std::move(topologies), params) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      ranges_.push_back(primitive_ranges(this->hierarchies_[body].topology));
+  }
+
+ private:
+  /// Entries of the topology's primitive list below each node: contiguous, since leaves are laid out left to right.
+  struct Range {
+    std::uint32_t begin, end;
+  };
+
+  void update(std::uint32_t body) override {
+    auto& hierarchy = this->hierarchies_[body];
+    const S* positions = this->sampled_.positions(body);
+    const Primitives& primitives = this->scene_.primitives(body);
+    std::uint64_t reads = 0;
+    for (std::uint32_t node = 0; node < hierarchy.topology.size(); ++node) {
+      Box<S> box;
+      const Range range = ranges_[body][node];
+      for (std::uint32_t i = range.begin; i < range.end; ++i) {
+        const auto vertices = primitives[hierarchy.topology.primitives[i]];
+        reads += vertices.size();
+        for (std::uint32_t v : vertices) box.extend(positions + std::size_t(3) * v);
+      }
+      hierarchy.boxes[node] = box;
+    }
+    this->count_.add(Counter::nodes_visited, hierarchy.topology.size());
+    this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology.size());
+    this->count_.add(Counter::vertex_reads, reads);
+  }
+
+  static std::vector<Range> primitive_ranges(const Topology& topology) {
+    std::vector<Range> ranges(topology.size());
+    for (std::uint32_t i = topology.size(); i-- > 0;) {
+      const TopologyNode node = topology.nodes[i];
+      ranges[i] = node.is_leaf() ? Range{node.first(), node.first() + node.count()}
+                                 : Range{ranges[node.first()].begin, ranges[node.first() + node.count() - 1].end};
+    }
+    return ranges;
+  }
+
+  std::vector<std::vector<Range>> ranges_;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(top_down) {
+  using namespace kbvh;
+  return {make_entry<TopDown>({
+      .id = "top_down",
+      .title = "top-down refit",
+      .family = "refit",
+      .citation = "van den Bergen 1998; Larsson & Akenine-Möller 2001",
+      .can = {.plan_changes = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 4}},
+  })};
+}

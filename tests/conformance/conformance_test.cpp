@@ -1,0 +1,117 @@
+// Every registered strategy and adapter over every synthetic scene, against the brute-force oracle. Loops over the
+// registry: a strategy that is added is tested with no edit here.
+
+#include <gtest/gtest.h>
+
+#include "tests/conformance/check.hpp"
+
+namespace kbvh::test {
+namespace {
+
+void expect_conforms(const std::string& violation, const std::string& where) {
+  if (violation.rfind("skipped", 0) == 0) return;
+  EXPECT_EQ(violation, "") << where;
+}
+
+class Conformance : public testing::TestWithParam<std::tuple<std::string, std::string>> {};
+
+TEST_P(Conformance, KeepsItsGuaranteeOnEveryFrame) {
+  const auto& [id, scene_name] = GetParam();
+  const StrategyEntry& entry = find_strategy(id);
+  const BuilderConfig builder = entry.info.topology.preferred;
+  for (std::uint32_t l : {1u, 7u, 30u}) {
+    const std::string where = id + " on " + scene_name + ", l = " + std::to_string(l);
+    expect_conforms(check(entry, synthetic_scene<float>(scene_name, l), l, {}, builder), where + ", float");
+    expect_conforms(check(entry, synthetic_scene<double>(scene_name, l), l, {}, builder), where + ", double");
+  }
+}
+
+std::vector<std::string> strategy_ids() {
+  std::vector<std::string> ids;
+  for (const StrategyEntry& entry : registry()) ids.push_back(entry.info.id);
+  return ids;
+}
+
+INSTANTIATE_TEST_SUITE_P(Registry, Conformance,
+                         testing::Combine(testing::ValuesIn(strategy_ids()), testing::ValuesIn(synthetic_scene_names())),
+                         [](const auto& test) { return std::get<0>(test.param) + "_on_" + std::get<1>(test.param); });
+
+class Configurations : public testing::TestWithParam<std::string> {};
+
+// Every admissible topology (method x width x leaf size) and every word of every parameter.
+TEST_P(Configurations, AllConform) {
+  const StrategyEntry& entry = find_strategy(GetParam());
+  const auto sweep = [&](const std::string& scene_name, const auto& run) {
+    if (entry.info.topology.own) return;
+    for (BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
+      for (std::uint32_t width : entry.info.topology.widths)
+        for (std::uint32_t leaf = entry.info.topology.min_leaf_size; leaf <= entry.info.topology.max_leaf_size;
+             leaf += leaf < 4 ? 1 : 4)
+          run({.method = method, .width = width, .leaf_size = leaf},
+              scene_name + ", " + name(method) + ", width " + std::to_string(width) + ", leaf " + std::to_string(leaf));
+  };
+  for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes"}) {
+    const auto in_float = synthetic_scene<float>(scene_name, 7);
+    const auto in_double = synthetic_scene<double>(scene_name, 7);
+    sweep(scene_name, [&](const BuilderConfig& builder, const std::string& where) {
+      expect_conforms(check(entry, in_float, 7, {}, builder), GetParam() + " on " + where + ", float");
+      expect_conforms(check(entry, in_double, 7, {}, builder), GetParam() + " on " + where + ", double");
+    });
+    for (const Parameter& parameter : entry.info.parameters)
+      for (const std::string& word : parameter.allowed)
+        expect_conforms(check(entry, in_float, 7, {{parameter.name, word}}, entry.info.topology.preferred),
+                        GetParam() + " on " + scene_name + " with " + parameter.name + "=" + word);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Registry, Configurations, testing::ValuesIn(strategy_ids()),
+                         [](const auto& test) { return test.param; });
+
+TEST(Registry, DescribesEveryStrategy) {
+  EXPECT_GE(registry().size(), 1u);
+  for (const StrategyEntry& entry : registry()) {
+    EXPECT_FALSE(entry.info.title.empty()) << entry.info.id;
+    EXPECT_FALSE(entry.info.family.empty()) << entry.info.id;
+    EXPECT_FALSE(entry.info.citation.empty()) << entry.info.id;
+    EXPECT_TRUE(entry.info.has_float || entry.info.has_double) << entry.info.id;
+    for (const Parameter& parameter : entry.info.parameters) {
+      EXPECT_FALSE(parameter.meaning.empty()) << entry.info.id << "." << parameter.name;
+      EXPECT_NO_THROW(Params(entry.info.id, entry.info.parameters, {{parameter.name, parameter.default_value}}));
+    }
+  }
+}
+
+TEST(Registry, RejectsWhatItDoesNotKnow) {
+  EXPECT_THROW(find_strategy("no_such_strategy"), ConfigError);
+  const StrategyEntry& entry = registry().front();
+  EXPECT_THROW(Params(entry.info.id, entry.info.parameters, {{"no_such_parameter", "1"}}), ConfigError);
+}
+
+// The driver's promises that hold for every strategy: time does not run backwards, and `reset` starts over.
+TEST_P(Configurations, TimeRunsForwardAndResetStartsOver) {
+  const StrategyEntry& entry = find_strategy(GetParam());
+  const auto run = [&](const auto& test) {
+    using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
+    if (entry.factory<S>() == nullptr) return;
+    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    PhaseTimes times;
+    PairBuffer first, again;
+    session.reset(0);
+    session.advance(1, times);
+    session.query(first, times);
+    session.advance(3, times);
+    session.query(again, times);
+    EXPECT_THROW(session.advance(2, times), std::invalid_argument) << GetParam();
+    session.reset(0);
+    session.advance(1, times);
+    session.query(again, times);
+    std::sort(first.begin(), first.end());
+    std::sort(again.begin(), again.end());
+    EXPECT_EQ(first, again) << GetParam();
+  };
+  run(synthetic_scene<float>("sheets"));
+  run(synthetic_scene<double>("sheets"));
+}
+
+}  // namespace
+}  // namespace kbvh::test

@@ -1,0 +1,246 @@
+#include "tests/support/synthetic_scenes.hpp"
+
+#include <functional>
+#include <stdexcept>
+
+namespace kbvh::test {
+
+namespace {
+
+/// Everything a body needs, in double, before it is rounded to the scene's scalar.
+struct RawBody {
+  Primitives primitives;
+  std::uint32_t vertex_count = 0;
+  std::vector<double> times{0.0};
+  std::vector<double> positions;
+};
+
+RawBody soup(std::uint32_t triangles, std::uint64_t seed, std::uint32_t keyframes, double size, double travel) {
+  Random random(seed);
+  RawBody body;
+  body.vertex_count = 3 * triangles;
+  for (std::uint32_t p = 0; p < triangles; ++p) {
+    const std::uint32_t corners[3] = {3 * p, 3 * p + 1, 3 * p + 2};
+    body.primitives.add(corners);
+    double centre[3] = {random.unit(), random.unit(), random.unit()};
+    for (int corner = 0; corner < 3; ++corner)
+      for (double c : centre) body.positions.push_back(c + size * random.unit());
+  }
+  body.times.clear();
+  for (std::uint32_t k = 0; k < keyframes; ++k) body.times.push_back(0.25 * k);
+  for (std::uint32_t k = 1; k < keyframes; ++k)
+    for (std::size_t i = 0; i < std::size_t(3) * body.vertex_count; ++i)
+      body.positions.push_back(body.positions[body.positions.size() - std::size_t(3) * body.vertex_count] +
+                               travel * random.unit());
+  return body;
+}
+
+/// A connected sheet of 2 (n-1)^2 triangles whose vertices follow `move(vertex x, y, keyframe, axis)`.
+RawBody sheet(std::uint32_t n, std::uint32_t keyframes, const std::function<double(int, int, int, int)>& move) {
+  RawBody body;
+  body.vertex_count = n * n;
+  for (std::uint32_t y = 0; y + 1 < n; ++y)
+    for (std::uint32_t x = 0; x + 1 < n; ++x) {
+      const std::uint32_t v = y * n + x;
+      const std::uint32_t lower[3] = {v, v + 1, v + n}, upper[3] = {v + 1, v + n + 1, v + n};
+      body.primitives.add(lower);
+      body.primitives.add(upper);
+    }
+  body.times.clear();
+  for (std::uint32_t k = 0; k < keyframes; ++k) {
+    body.times.push_back(k);
+    for (std::uint32_t y = 0; y < n; ++y)
+      for (std::uint32_t x = 0; x < n; ++x)
+        for (int axis = 0; axis < 3; ++axis) body.positions.push_back(move(int(x), int(y), int(k), axis));
+  }
+  return body;
+}
+
+void transform(RawBody& body, double scale, double offset) {
+  for (double& x : body.positions) x = x * scale + offset;
+}
+
+/// Cuts `primitives` into k-gons of changing size over the same vertices.
+void make_polygons(RawBody& body, std::uint32_t smallest, std::uint32_t largest, PrimitiveKind kind) {
+  Primitives polygons;
+  polygons.kind = kind;
+  std::uint32_t at = 0, size = smallest;
+  std::vector<std::uint32_t> corners;
+  while (at < body.vertex_count) {
+    corners.clear();
+    for (std::uint32_t i = 0; i < size && at < body.vertex_count; ++i) corners.push_back(at++);
+    polygons.add(corners);
+    size = size == largest ? smallest : size + 1;
+  }
+  body.primitives = polygons;
+}
+
+struct RawScene {
+  std::vector<RawBody> bodies;
+  bool script = false;
+};
+
+RawScene raw_scene(const std::string& name) {
+  const auto wave = [](double lift) {
+    return [lift](int x, int y, int k, int axis) {
+      if (axis == 0) return 0.1 * x + 0.01 * ((x * 7 + y * 3 + k * 5) % 11);
+      if (axis == 1) return 0.1 * y + 0.01 * ((x * 5 + y * 2 + k * 3) % 7);
+      return lift + 0.07 * ((x * 3 + y * 5 + k * 4) % 9) - 0.05 * k;
+    };
+  };
+  if (name == "soups") return {{soup(150, 1, 5, 0.2, 0.3), soup(120, 2, 5, 0.2, 0.3)}, false};
+  if (name == "sheets") return {{sheet(10, 6, wave(0.3)), sheet(8, 6, wave(0.0))}, false};
+  if (name == "static_obstacle") return {{sheet(10, 6, wave(0.2)), soup(60, 3, 1, 0.2, 0)}, false};
+  if (name == "nothing_moves") return {{soup(80, 4, 1, 0.3, 0), soup(80, 5, 1, 0.3, 0)}, false};
+  if (name == "four_bodies_own_keyframes") {
+    RawScene scene{{soup(60, 6, 4, 0.3, 0.3), soup(50, 7, 3, 0.3, 0.3), soup(40, 8, 1, 0.3, 0), soup(30, 9, 2, 0.3, 0.5)}, false};
+    scene.bodies[1].times = {0.1, 0.30000000000000004, 2.0};
+    scene.bodies[3].times = {-0.5, 0.25};
+    return scene;
+  }
+  if (name == "one_triangle_and_none") {
+    RawScene scene{{soup(1, 10, 3, 0.5, 0.5), soup(40, 11, 3, 0.5, 0.5), RawBody{}}, false};
+    return scene;
+  }
+  // Integer coordinates: vertices coincide for whole segments, cross at one instant, touch without crossing.
+  if (name == "integer_ties") {
+    const auto grid = [](int shift) {
+      return [shift](int x, int y, int k, int axis) {
+        if (axis == 0) return double((x + k * (y % 3)) % 4 + shift);
+        if (axis == 1) return double((y + k) % 3);
+        return double((x * y + k * shift) % 3);
+      };
+    };
+    return {{sheet(8, 5, grid(0)), sheet(7, 5, grid(1))}, false};
+  }
+  // Mirrored in the plane x = 1 between two keyframes: every pair of vertices crosses at the same instant.
+  if (name == "all_cross_at_once")
+    return {{sheet(9, 3, [](int x, int y, int k, int axis) {
+               if (axis == 0) return k % 2 == 0 ? 0.25 * x : 2.0 - 0.25 * x;
+               return axis == 1 ? 0.25 * y : 0.125 * ((x + y) % 3);
+             }),
+             soup(50, 12, 3, 0.4, 0.2)},
+            false};
+  if (name == "pure_translation_far")
+    return {{sheet(10, 4, [](int x, int y, int k, int axis) {
+               const double at[3] = {0.125 * x, 0.125 * y, 0.0625 * ((x * 3 + y) % 5)};
+               return 1e6 + at[axis] + (axis == 2 ? 0.0 : 0.5 * k);
+             }),
+             sheet(10, 4, [](int x, int y, int, int axis) {
+               const double at[3] = {0.15 * x, 0.15 * y, 0.0625 * ((x + y * 2) % 6)};
+               return 1e6 + at[axis];
+             })},
+            false};
+  if (name == "tiny") {
+    RawScene scene{{soup(80, 13, 4, 0.3, 0.3), soup(80, 14, 4, 0.3, 0.3)}, false};
+    for (RawBody& body : scene.bodies) transform(body, 1e-30, 0);
+    return scene;
+  }
+  if (name == "huge") {
+    RawScene scene{{soup(80, 15, 4, 0.3, 0.3), soup(80, 16, 4, 0.3, 0.3)}, false};
+    for (RawBody& body : scene.bodies) transform(body, 1e29, 0);
+    return scene;
+  }
+  if (name == "keyframes_a_millionth_apart") {
+    RawScene scene{{soup(80, 17, 6, 0.3, 0.3), soup(60, 18, 6, 0.3, 0.3)}, false};
+    scene.bodies[0].times = {0, 1, 1.000001, 1.000002, 5, 5.000001};
+    scene.bodies[1].times = {0, 1.0000005, 1.000001, 3, 5, 5.0000005};
+    return scene;
+  }
+  if (name == "degenerate_triangles") {
+    RawScene scene{{soup(90, 19, 4, 0.4, 0.3), soup(90, 20, 4, 0.4, 0.3)}, false};
+    for (RawBody& body : scene.bodies)
+      for (std::size_t k = 0; k < body.times.size(); ++k)
+        for (std::uint32_t p = 0; p < body.primitives.count(); p += 3)
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            double* corner = body.positions.data() + 3 * (k * body.vertex_count + 3 * p) + axis;
+            if (p % 2 == 0) corner[6] = corner[0];
+            else corner[3] = corner[6] = corner[0];
+          }
+    return scene;
+  }
+  if (name == "polygons") {
+    RawScene scene{{soup(90, 21, 4, 0.4, 0.3), soup(70, 22, 4, 0.4, 0.3)}, false};
+    make_polygons(scene.bodies[0], 1, 6, PrimitiveKind::polygons);
+    make_polygons(scene.bodies[1], 3, 5, PrimitiveKind::polygons);
+    return scene;
+  }
+  if (name == "points_against_nets") {
+    RawScene scene{{soup(90, 23, 4, 0.4, 0.3), soup(70, 24, 4, 0.4, 0.3)}, false};
+    make_polygons(scene.bodies[0], 1, 1, PrimitiveKind::points);
+    make_polygons(scene.bodies[1], 9, 16, PrimitiveKind::control_nets);
+    return scene;
+  }
+  if (name == "plan_changes") return {{soup(70, 25, 5, 0.3, 0.3), soup(60, 26, 5, 0.3, 0.3)}, true};
+  if (name == "plan_changes_ties") {
+    RawScene scene = raw_scene("integer_ties");
+    scene.script = true;
+    return scene;
+  }
+  throw std::invalid_argument("no synthetic scene '" + name + "'");
+}
+
+/// Changes at the first frame, at keyframes and in between; several at once; some with knots, some for ever, some that
+/// stop; the same vertex repeatedly.
+template <class S>
+PlanScript<S> make_script(const Scene<S>& scene, std::uint32_t frames_per_keyframe) {
+  Random random(77);
+  PlanScript<S> script;
+  const std::vector<double> frames = frame_times(scene, frames_per_keyframe);
+  for (std::size_t f = 0; f + 1 < frames.size(); f += 1 + random.below(3)) {
+    typename PlanScript<S>::Step step{frames[f], {}};
+    const std::uint32_t changes = 1 + random.below(12);
+    for (std::uint32_t i = 0; i < changes; ++i) {
+      PlanChange<S> change;
+      change.body = random.below(std::uint32_t(scene.bodies.size()));
+      change.vertex = random.below(scene.bodies[change.body].plans.vertex_count());
+      bool again = false;
+      for (const auto& other : step.changes) again = again || (other.body == change.body && other.vertex == change.vertex);
+      if (again) continue;
+      const std::uint32_t kind = random.below(4);
+      if (kind != 0)
+        for (S& v : change.velocity) v = S(0.5 * random.unit());
+      if (kind >= 2)
+        for (std::uint32_t k = 1; k <= 2; ++k) {
+          change.times.push_back(frames[f] + 0.2 * k);
+          for (int axis = 0; axis < 3; ++axis)
+            change.positions.push_back(kind == 2 ? S(random.unit()) : S(random.below(4)));
+        }
+      step.changes.push_back(change);
+    }
+    script.steps.push_back(step);
+  }
+  return script;
+}
+
+}  // namespace
+
+const std::vector<std::string>& synthetic_scene_names() {
+  static const std::vector<std::string> names{
+      "soups", "sheets", "static_obstacle", "nothing_moves", "four_bodies_own_keyframes", "one_triangle_and_none",
+      "integer_ties", "all_cross_at_once", "pure_translation_far", "tiny", "huge", "keyframes_a_millionth_apart",
+      "degenerate_triangles", "polygons", "points_against_nets", "plan_changes", "plan_changes_ties"};
+  return names;
+}
+
+template <class S>
+TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_keyframe) {
+  const RawScene raw = raw_scene(name);
+  TestScene<S> result;
+  result.scene.name = name;
+  for (std::size_t b = 0; b < raw.bodies.size(); ++b) {
+    const RawBody& body = raw.bodies[b];
+    std::vector<S> positions(body.positions.begin(), body.positions.end());
+    result.scene.bodies.push_back({"body" + std::to_string(b), body.primitives,
+                                   FlightPlans<S>(body.vertex_count, body.times, std::move(positions))});
+  }
+  result.scene.pairs = all_pairs(result.scene.bodies);
+  validate(result.scene);
+  if (raw.script) result.script = make_script(result.scene, frames_per_keyframe);
+  return result;
+}
+
+template TestScene<float> synthetic_scene(const std::string&, std::uint32_t);
+template TestScene<double> synthetic_scene(const std::string&, std::uint32_t);
+
+}  // namespace kbvh::test
