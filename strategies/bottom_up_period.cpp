@@ -1,6 +1,6 @@
-// What the paper's authors would have compared with in 2006: a pointer-linked binary tree, one polygon per leaf, updated
-// and traversed by recursion (Z&W 2006, s.2 and Algorithm 2). It is kept as it was on purpose: the ratio between this and
-// the best refit is what the paper's speed-ups have to be read against.
+// What the paper's authors would have compared with in 2006: a pointer-linked binary tree, one polygon per
+// leaf, updated and traversed by recursion (Z&W 2006, s.2 and Algorithm 2). It is kept as it was on purpose:
+// the ratio between this and the best refit is what the paper's speed-ups have to be read against.
 
 #include <memory>
 
@@ -26,9 +26,11 @@ class BottomUpPeriod final : public Strategy<S> {
 
  public:
   static constexpr Foresight foresight = Foresight::none;
-  BottomUpPeriod(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params& /*params*/)
+  BottomUpPeriod(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
+                 const Params& /*params*/)
       : Strategy<S>(scene, motion), topologies_(std::move(topologies)) {
-    for (const Topology& topology : topologies_) roots_.push_back(topology.empty() ? nullptr : link(topology, 0));
+    for (const Topology& topology : topologies_)
+      roots_.push_back(topology.empty() ? nullptr : link(topology, 0));
   }
 
   void reset(double t) override {
@@ -40,7 +42,8 @@ class BottomUpPeriod final : public Strategy<S> {
 
   void advance(double t) override {
     if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " + std::to_string(t));
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
+                                  std::to_string(t));
     time_ = t;
     for (std::uint32_t body = 0; body < roots_.size(); ++body)
       if (this->scene_.moving(body) || plans_changed_) update(body);
@@ -53,7 +56,9 @@ class BottomUpPeriod final : public Strategy<S> {
     return {};
   }
 
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override { plans_changed_ = true; }
+  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+    plans_changed_ = true;
+  }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     AuditView view{topologies_[body], std::vector<Box<double>>(topologies_[body].size()), {}};
@@ -147,7 +152,8 @@ KBVH_STRATEGY(bottom_up_period) {
       .family = "period",
       .citation = "Z&W 2006, s.2 and Algorithm 2",
       .can = {.plan_changes = true},
-      .topology = {.widths = {2}, .max_leaf_size = 1,
+      .topology = {.widths = {2},
+                   .max_leaf_size = 1,
                    .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
   })};
 }

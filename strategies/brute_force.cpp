@@ -9,9 +9,11 @@ template <class S, class Count>
 class BruteForce final : public Strategy<S> {
  public:
   static constexpr Foresight foresight = Foresight::none;
-  BruteForce(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*topologies*/, const Params& /*params*/)
+  BruteForce(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*topologies*/,
+             const Params& /*params*/)
       : Strategy<S>(scene, motion), boxes_(scene.body_count()) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) boxes_[body].resize(scene.primitives(body).count());
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      boxes_[body].resize(scene.primitives(body).count());
   }
 
   void reset(double t) override {
@@ -23,7 +25,8 @@ class BruteForce final : public Strategy<S> {
 
   void advance(double t) override {
     if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " + std::to_string(t));
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
+                                  std::to_string(t));
     time_ = t;
     update();
   }

@@ -1,4 +1,5 @@
-// The kinetic AABB tree (Z&W 2006, s.4), with the errata of the reproduction: tight at every time, updated at events only.
+// The kinetic AABB tree (Z&W 2006, s.4), with the errata of the reproduction: tight at every time, updated at
+// events only.
 
 #include <variant>
 
@@ -14,13 +15,16 @@ class KineticAabb final : public Strategy<S> {
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
 
-  KineticAabb(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params& params)
+  KineticAabb(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+              const Params& params)
       : Strategy<S>(scene, motion) {
     for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
     if (params.word("queue") == AvlQueue<S>::name)
-      forest_ = std::make_unique<KineticForest<S, AvlQueue<S>, Count>>(scene, motion, std::move(topologies), count_);
+      forest_ = std::make_unique<KineticForest<S, AvlQueue<S>, Count>>(scene, motion, std::move(topologies),
+                                                                       count_);
     else
-      forest_ = std::make_unique<KineticForest<S, BinaryHeapQueue<S>, Count>>(scene, motion, std::move(topologies), count_);
+      forest_ = std::make_unique<KineticForest<S, BinaryHeapQueue<S>, Count>>(scene, motion,
+                                                                              std::move(topologies), count_);
   }
 
   void reset(double t) override {
@@ -36,7 +40,8 @@ class KineticAabb final : public Strategy<S> {
 
   void advance(double t) override {
     if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " + std::to_string(t));
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
+                                  std::to_string(t));
     time_ = t;
     on_forest([&](auto& forest) { forest.advance(t); });
     new_frame();
@@ -47,11 +52,12 @@ class KineticAabb final : public Strategy<S> {
     on_forest([&](auto& forest) {
       for (const BodyPair& pair : this->scene_.pairs()) {
         const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
-        LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second, b.topology(), count_,
-                                   out);
+        LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
+                                   b.topology(), count_, out);
         RealiserBoxes<S> boxes_a(a.realisers(0), this->sampled_, pair.first, caches_[pair.first]);
         RealiserBoxes<S> boxes_b(b.realisers(0), this->sampled_, pair.second, caches_[pair.second]);
-        status.pending += traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack_, count_, budget, leaves).pending;
+        status.pending +=
+            traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack_, count_, budget, leaves).pending;
       }
     });
     return status;
@@ -59,8 +65,8 @@ class KineticAabb final : public Strategy<S> {
 
   void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
     if (t != time_)
-      throw std::invalid_argument("plans changed at t = " + std::to_string(t) + ", but the hierarchy stands at " +
-                                  std::to_string(time_));
+      throw std::invalid_argument("plans changed at t = " + std::to_string(t) +
+                                  ", but the hierarchy stands at " + std::to_string(time_));
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
       changed_.clear();
       for (const PlanChange<S>& change : changes)
@@ -97,7 +103,8 @@ class KineticAabb final : public Strategy<S> {
   Counters counted() const override {
     Counters table = count_.table;
     if constexpr (Count::enabled) {
-      table[Counter::queue_steps] = on_forest([](auto& forest) { return forest.queue().steps(); }) - first_step_;
+      table[Counter::queue_steps] =
+          on_forest([](auto& forest) { return forest.queue().steps(); }) - first_step_;
       table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
     }
     return table;
@@ -113,7 +120,8 @@ class KineticAabb final : public Strategy<S> {
   }
 
   Count count_;
-  std::variant<std::unique_ptr<KineticForest<S, AvlQueue<S>, Count>>, std::unique_ptr<KineticForest<S, BinaryHeapQueue<S>, Count>>>
+  std::variant<std::unique_ptr<KineticForest<S, AvlQueue<S>, Count>>,
+               std::unique_ptr<KineticForest<S, BinaryHeapQueue<S>, Count>>>
       forest_;
   std::vector<BoxCache<S>> caches_;
   std::vector<NodePair> stack_;
@@ -135,6 +143,9 @@ KBVH_STRATEGY(kinetic_aabb) {
       .positions = PositionUse::fetched,
       .can = {.event_driven = true, .continuous = true, .plan_changes = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
-      .parameters = {{"queue", "avl", {"avl", "binary_heap"}, "event queue: the paper's AVL tree, or an indexed binary heap"}},
+      .parameters = {{"queue",
+                      "avl",
+                      {"avl", "binary_heap"},
+                      "event queue: the paper's AVL tree, or an indexed binary heap"}},
   })};
 }

@@ -13,7 +13,8 @@ class Rebuild final : public StoredHierarchyStrategy<S, Count> {
 
  public:
   static constexpr Foresight foresight = Foresight::none;
-  Rebuild(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params& params)
+  Rebuild(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
+          const Params& params)
       : Base(scene, motion, std::move(topologies), params) {
     config_.method = build_method(params.word("method"));
     for (const auto& hierarchy : this->hierarchies_) {
@@ -31,7 +32,8 @@ class Rebuild final : public StoredHierarchyStrategy<S, Count> {
     this->refit(body);
     this->count_.add(Counter::nodes_visited, hierarchy.topology.size());
     this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology.size());
-    this->count_.add(Counter::vertex_reads, primitives.vertices.size() + hierarchy.leaf_vertices.vertices.size());
+    this->count_.add(Counter::vertex_reads,
+                     primitives.vertices.size() + hierarchy.leaf_vertices.vertices.size());
   }
 
   BuilderConfig config_;

@@ -1,6 +1,6 @@
-// Top-down refit: every node's box straight from the vertices below it, parents before children. It reads each vertex
-// once per level, which is what makes it the slower refit; it is the building block of refits on demand (van den Bergen
-// 1998, Larsson & Akenine-Moeller 2001).
+// Top-down refit: every node's box straight from the vertices below it, parents before children. It reads
+// each vertex once per level, which is what makes it the slower refit; it is the building block of refits on
+// demand (van den Bergen 1998, Larsson & Akenine-Moeller 2001).
 
 #include "core/hierarchy/stored_hierarchy.hpp"
 #include "core/registry.hpp"
@@ -14,14 +14,16 @@ class TopDown final : public StoredHierarchyStrategy<S, Count> {
 
  public:
   static constexpr Foresight foresight = Foresight::none;
-  TopDown(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params& params)
+  TopDown(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
+          const Params& params)
       : Base(scene, motion, std::move(topologies), params) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       ranges_.push_back(primitive_ranges(this->hierarchies_[body].topology));
   }
 
  private:
-  /// Entries of the topology's primitive list below each node: contiguous, since leaves are laid out left to right.
+  /// Entries of the topology's primitive list below each node: contiguous, since leaves are laid out left to
+  /// right.
   struct Range {
     std::uint32_t begin, end;
   };
@@ -50,8 +52,9 @@ class TopDown final : public StoredHierarchyStrategy<S, Count> {
     std::vector<Range> ranges(topology.size());
     for (std::uint32_t i = topology.size(); i-- > 0;) {
       const TopologyNode node = topology.nodes[i];
-      ranges[i] = node.is_leaf() ? Range{node.first(), node.first() + node.count()}
-                                 : Range{ranges[node.first()].begin, ranges[node.first() + node.count() - 1].end};
+      ranges[i] = node.is_leaf()
+                      ? Range{node.first(), node.first() + node.count()}
+                      : Range{ranges[node.first()].begin, ranges[node.first() + node.count() - 1].end};
     }
     return ranges;
   }

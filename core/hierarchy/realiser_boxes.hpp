@@ -7,7 +7,8 @@
 
 namespace kbvh {
 
-/// The box whose sides are realised by six vertices: [lower x, upper x, lower y, ...]. Fetches their positions.
+/// The box whose sides are realised by six vertices: [lower x, upper x, lower y, ...]. Fetches their
+/// positions.
 template <class S>
 Box<S> box_of_realisers(const std::uint32_t* realisers, const SampledMotion<S>& motion, std::uint32_t body) {
   Box<S> box;
@@ -48,7 +49,8 @@ template <class S>
 class RealiserBoxes {
  public:
   /// `realisers` is [node][6].
-  RealiserBoxes(const std::uint32_t* realisers, const SampledMotion<S>& motion, std::uint32_t body, BoxCache<S>& cache)
+  RealiserBoxes(const std::uint32_t* realisers, const SampledMotion<S>& motion, std::uint32_t body,
+                BoxCache<S>& cache)
       : realisers_(realisers), motion_(&motion), body_(body), cache_(&cache) {}
   void ensure(std::uint32_t node) {
     if (!cache_->current(node))

@@ -13,34 +13,39 @@ namespace kbvh {
 
 /// One of the six sides of a box: 2 * axis + (0 lower, 1 upper).
 using Side = std::uint32_t;
-inline int axis_of(Side side) { return int(side >> 1); }
-inline bool is_upper(Side side) { return (side & 1) != 0; }
+inline int axis_of(Side side) {
+  return int(side >> 1);
+}
+inline bool is_upper(Side side) {
+  return (side & 1) != 0;
+}
 
-/// A scheduled certificate failure: `loser` will overtake `winner` on one side. The exact time is a root of the two
-/// linear pieces that hold from `begin` on; the doubles only bound and approximate it: the time lies in
-/// [begin, end), within `error` of `hint`.
+/// A scheduled certificate failure: `loser` will overtake `winner` on one side. The exact time is a root of
+/// the two linear pieces that hold from `begin` on; the doubles only bound and approximate it: the time lies
+/// in [begin, end), within `error` of `hint`.
 struct Event {
   double hint = 0, error = 0, begin = 0, end = 0;
   std::uint32_t winner = 0, loser = 0;
-  std::uint32_t slot = 0;   ///< which certificate: unique in the whole queue
+  std::uint32_t slot = 0;  ///< which certificate: unique in the whole queue
   std::uint16_t body = 0;
   std::uint8_t side = 0;
-  std::uint8_t depth = 0;   ///< of the node; deeper events of one instant come first
+  std::uint8_t depth = 0;  ///< of the node; deeper events of one instant come first
 };
 static_assert(sizeof(Event) == 48);
 
-/// An instant at which certificates are computed: a frame's or change's double, or the exact time of an event.
+/// An instant at which certificates are computed: a frame's or change's double, or the exact time of an
+/// event.
 template <class S>
 struct Instant {
-  double begin;                          ///< not after the instant
-  double end;                            ///< after the instant, or equal to begin if the instant is begin itself
-  const Crossing<S>* exact = nullptr;    ///< the event's exact time; null: the instant is `begin`
+  double begin;  ///< not after the instant
+  double end;    ///< after the instant, or equal to begin if the instant is begin itself
+  const Crossing<S>* exact = nullptr;  ///< the event's exact time; null: the instant is `begin`
 
   static Instant at(double t) { return {t, t, nullptr}; }
 };
 
-/// Decides everything about event times on the exact flight plans (truth A): order, whether an event is due, and
-/// failure times. Event order is exact time, then deeper node, then slot (design, numeric policy).
+/// Decides everything about event times on the exact flight plans (truth A): order, whether an event is due,
+/// and failure times. Event order is exact time, then deeper node, then slot (design, numeric policy).
 template <class S>
 class EventClock {
  public:
@@ -84,15 +89,16 @@ class EventClock {
     return compare_crossing_to(crossing(event), t) <= 0;
   }
 
-  /// The first time from `now` on at which `loser` gets strictly ahead of `winner` on the event's side, who is not
-  /// behind now (Z&W Algorithm 3 with its errata: walk the segments forward, each with its own end points; in a
-  /// bounded segment the end points decide, on an unbounded one the slopes). Fills hint, error, begin and end of
-  /// `event` (its winner, loser, side, body and slot are given) and returns true, or false: never. `own` gets the
-  /// crossing if a plan of its own takes part, for `remember`.
+  /// The first time from `now` on at which `loser` gets strictly ahead of `winner` on the event's side, who
+  /// is not behind now (Z&W Algorithm 3 with its errata: walk the segments forward, each with its own end
+  /// points; in a bounded segment the end points decide, on an unbounded one the slopes). Fills hint, error,
+  /// begin and end of `event` (its winner, loser, side, body and slot are given) and returns true, or false:
+  /// never. `own` gets the crossing if a plan of its own takes part, for `remember`.
   bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own) const {
     own.reset();
     const FlightPlans<S>& plan = *plans_[event.body];
-    if (plan.has_own_plan(event.winner) || plan.has_own_plan(event.loser)) return first_own_failure(event, now, own);
+    if (plan.has_own_plan(event.winner) || plan.has_own_plan(event.loser))
+      return first_own_failure(event, now, own);
     const auto times = plan.keyframe_times();
     const int axis = axis_of(event.side);
     const std::size_t w = std::size_t(3) * event.winner + std::size_t(axis);
@@ -112,22 +118,25 @@ class EventClock {
       event.end = times[k + 1];
       event.hint = event.begin + length * (behind / (behind + ahead));
       // Differences, sum, quotient, product and final sum are each off by at most one rounding.
-      event.error = 16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(event.begin), std::abs(event.end));
+      event.error =
+          16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(event.begin), std::abs(event.end));
       return true;
     }
     return false;
   }
 
-  /// Sign of (challenger's value - winner's value) at an instant given by a double, seen from the side: > 0 means ahead.
-  int compare_values(std::uint32_t body, Side side, std::uint32_t challenger, std::uint32_t winner, double t) const {
+  /// Sign of (challenger's value - winner's value) at an instant given by a double, seen from the side: > 0
+  /// means ahead.
+  int compare_values(std::uint32_t body, Side side, std::uint32_t challenger, std::uint32_t winner,
+                     double t) const {
     const FlightPlans<S>& plan = *plans_[body];
     const int axis = axis_of(side);
     const int sign = compare_at(plan.piece_after(challenger, axis, t), plan.piece_after(winner, axis, t), t);
     return is_upper(side) ? sign : -sign;
   }
 
-  /// Of two failures of the same certificate: does `a` come first? Of several that overtake at one instant the fastest
-  /// counts as first, for it stays ahead: no second change at once.
+  /// Of two failures of the same certificate: does `a` come first? Of several that overtake at one instant
+  /// the fastest counts as first, for it stays ahead: no second change at once.
   bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& own_a, const Event& b,
                        const std::optional<Crossing<S>>& own_b) const {
     if (!own_a && !own_b) {
@@ -141,11 +150,13 @@ class EventClock {
     return is_upper(a.side) ? faster > 0 : faster < 0;
   }
 
-  /// Keeps the crossing of the event that is about to be scheduled in a slot; nothing: forgets the one before.
-  /// No event of that slot may be in a queue meanwhile.
+  /// Keeps the crossing of the event that is about to be scheduled in a slot; nothing: forgets the one
+  /// before. No event of that slot may be in a queue meanwhile.
   void remember(std::uint32_t slot, const std::optional<Crossing<S>>& own) {
-    if (own) own_.insert_or_assign(slot, *own);
-    else if (!own_.empty()) own_.erase(slot);
+    if (own)
+      own_.insert_or_assign(slot, *own);
+    else if (!own_.empty())
+      own_.erase(slot);
   }
   void clear() { own_.clear(); }
 

@@ -76,7 +76,8 @@ template <class S>
 class BinaryHeapQueue {
  public:
   static constexpr const char* name = "binary_heap";
-  BinaryHeapQueue(const EventClock<S>& clock, std::uint32_t slots) : clock_(&clock), events_(slots), place_(slots, none) {
+  BinaryHeapQueue(const EventClock<S>& clock, std::uint32_t slots)
+      : clock_(&clock), events_(slots), place_(slots, none) {
     heap_.reserve(slots);
   }
 

@@ -12,32 +12,44 @@ namespace kbvh {
 /// Change notices for a kinetic tree that nobody watches.
 struct NoObserver {
   template <class S>
-  void realiser_changed(std::uint32_t /*body*/, std::uint32_t /*node*/, Side /*side*/, std::uint32_t /*old_vertex*/,
-                        std::uint32_t /*new_vertex*/, const Instant<S>& /*now*/) {}
+  void realiser_changed(std::uint32_t /*body*/, std::uint32_t /*node*/, Side /*side*/,
+                        std::uint32_t /*old_vertex*/, std::uint32_t /*new_vertex*/,
+                        const Instant<S>& /*now*/) {}
 };
 
 /// The kinetic AABB tree of one body (Z&W s.4): per node and side the vertex that realises the bound, and one
-/// certificate that it does; the earliest failure of each certificate is scheduled in a queue that several structures
-/// may share. Any width and leaf size: a leaf's certificate is the earliest overtaker among its unique vertices, an
-/// inner node's the earliest among its other children's realisers.
+/// certificate that it does; the earliest failure of each certificate is scheduled in a queue that several
+/// structures may share. Any width and leaf size: a leaf's certificate is the earliest overtaker among its
+/// unique vertices, an inner node's the earliest among its other children's realisers.
 ///
-/// Slots of the queue are first_slot + 6 * node + side. Observer::realiser_changed(body, node, side, old, new, instant)
-/// is called at every change of a bound's realiser, deeper nodes first.
+/// Slots of the queue are first_slot + 6 * node + side. Observer::realiser_changed(body, node, side, old,
+/// new, instant) is called at every change of a bound's realiser, deeper nodes first.
 template <class S, class Queue, class Count, class Observer = NoObserver>
 class KineticAabbTree {
  public:
-  KineticAabbTree(Topology topology, const Primitives& primitives, std::uint16_t body, std::uint32_t first_slot,
-                  EventClock<S>& clock, Queue& queue, Count& count, Observer observer = {})
-      : topology_(std::move(topology)), leaf_vertices_(unique_leaf_vertices(topology_, primitives)), body_(body),
-        first_slot_(first_slot), clock_(&clock), queue_(&queue), count_(&count), observer_(observer),
+  KineticAabbTree(Topology topology, const Primitives& primitives, std::uint16_t body,
+                  std::uint32_t first_slot, EventClock<S>& clock, Queue& queue, Count& count,
+                  Observer observer = {})
+      : topology_(std::move(topology)),
+        leaf_vertices_(unique_leaf_vertices(topology_, primitives)),
+        body_(body),
+        first_slot_(first_slot),
+        clock_(&clock),
+        queue_(&queue),
+        count_(&count),
+        observer_(observer),
         realisers_(std::size_t(6) * topology_.size(), 0) {}
 
   static std::uint32_t slot_count(const Topology& topology) { return 6 * topology.size(); }
   std::uint32_t first_slot() const { return first_slot_; }
   const Topology& topology() const { return topology_; }
   const LeafVertices& leaf_vertices() const { return leaf_vertices_; }
-  std::uint32_t realiser(std::uint32_t node, Side side) const { return realisers_[std::size_t(6) * node + side]; }
-  const std::uint32_t* realisers(std::uint32_t node) const { return realisers_.data() + std::size_t(6) * node; }
+  std::uint32_t realiser(std::uint32_t node, Side side) const {
+    return realisers_[std::size_t(6) * node + side];
+  }
+  const std::uint32_t* realisers(std::uint32_t node) const {
+    return realisers_.data() + std::size_t(6) * node;
+  }
 
   /// Finds every realiser at t and schedules every certificate. O(nodes log nodes + vertices of leaves).
   void initialise(double t) {
@@ -49,8 +61,8 @@ class KineticAabbTree {
       }
   }
 
-  /// Handles a failure that was popped from the queue: the loser takes over, here and in every ancestor that the winner
-  /// realises (leaf and tree events, Z&W s.4). O(depth) certificates.
+  /// Handles a failure that was popped from the queue: the loser takes over, here and in every ancestor that
+  /// the winner realises (leaf and tree events, Z&W s.4). O(depth) certificates.
   void handle(const Event& event) {
     KBVH_ASSERT(event.body == body_);
     const Crossing<S> crossing = clock_->crossing(event);
@@ -70,8 +82,8 @@ class KineticAabbTree {
     certify(node, side, now);  // one of its challengers has changed
   }
 
-  /// The plans of `vertices` (ascending, unique) changed at t, each from its stored position: rechecks every certificate
-  /// that they, or realisers that change in consequence, take part in.
+  /// The plans of `vertices` (ascending, unique) changed at t, each from its stored position: rechecks every
+  /// certificate that they, or realisers that change in consequence, take part in.
   void plans_changed(double t, std::span<const std::uint32_t> vertices) {
     const auto now = Instant<S>::at(t);
     index_leaves();
@@ -87,7 +99,9 @@ class KineticAabbTree {
     ++mark_;
     // Children have larger ids than their parents: descending order is bottom-up.
     std::sort(affected_.begin(), affected_.end(), std::greater<>());
-    const auto changed = [&](std::uint32_t v) { return std::binary_search(vertices.begin(), vertices.end(), v); };
+    const auto changed = [&](std::uint32_t v) {
+      return std::binary_search(vertices.begin(), vertices.end(), v);
+    };
     for (std::uint32_t node : affected_)
       for (Side side = 0; side < 6; ++side) {
         const std::uint32_t old = realiser(node, side);
@@ -112,8 +126,10 @@ class KineticAabbTree {
 
   std::size_t bytes() const {
     return topology_.bytes() + realisers_.size() * sizeof(std::uint32_t) +
-           (leaf_vertices_.offsets.size() + leaf_vertices_.vertices.size() + leaf_offsets_.size() + leaves_.size() +
-            marked_.size()) * sizeof(std::uint32_t) + moved_.size();
+           (leaf_vertices_.offsets.size() + leaf_vertices_.vertices.size() + leaf_offsets_.size() +
+            leaves_.size() + marked_.size()) *
+               sizeof(std::uint32_t) +
+           moved_.size();
   }
 
  private:
@@ -136,7 +152,8 @@ class KineticAabbTree {
     count_->add(Counter::vertex_reads, n);
     for (std::uint32_t i = 0; i < n; ++i) {
       const std::uint32_t challenger = candidate(node, side, i);
-      if (challenger != best && clock_->compare_values(body_, side, challenger, best, t) > 0) best = challenger;
+      if (challenger != best && clock_->compare_values(body_, side, challenger, best, t) > 0)
+        best = challenger;
     }
     return best;
   }

@@ -20,8 +20,8 @@ class KineticForest {
     trees_.reserve(topologies.size());
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const std::uint32_t slots = Tree::slot_count(topologies[body]);
-      trees_.emplace_back(std::move(topologies[body]), scene.primitives(body), std::uint16_t(body), first_slot, clock_,
-                          queue_, count, observer);
+      trees_.emplace_back(std::move(topologies[body]), scene.primitives(body), std::uint16_t(body),
+                          first_slot, clock_, queue_, count, observer);
       first_slot += slots;
     }
   }

@@ -4,8 +4,8 @@
 
 namespace kbvh::test {
 
-/// Runs one contestant over one scene and returns the first violation, or an empty text. "skipped: ..." says that the
-/// contestant does not take part (scalar, capability, size) and why.
+/// Runs one contestant over one scene and returns the first violation, or an empty text. "skipped: ..." says
+/// that the contestant does not take part (scalar, capability, size) and why.
 template <class S>
 std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uint32_t frames_per_keyframe,
                   const std::map<std::string, std::string>& params, const BuilderConfig& builder,
@@ -15,7 +15,8 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
   if (entry.info.max_primitive_pairs != 0)
     for (const BodyPair& pair : test.scene.pairs)
       if (std::uint64_t(test.scene.bodies[pair.first].primitives.count()) *
-              test.scene.bodies[pair.second].primitives.count() > entry.info.max_primitive_pairs)
+              test.scene.bodies[pair.second].primitives.count() >
+          entry.info.max_primitive_pairs)
         return "skipped: too large for it";
   if (entry.info.topology.own && !entry.info.own_scalar.empty())
     for (const auto& body : test.scene.bodies)
@@ -23,10 +24,11 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
   const std::vector<double> frames = frame_times(test.scene, frames_per_keyframe);
   Session<S> session(test.scene, {&entry, params, builder}, CountingPolicy::counting);
   Oracle<S> oracle(test.scene);
-  const Verification result =
-      verify(session, std::span<const double>(frames), oracle, test.script.steps.empty() ? nullptr : &test.script, options);
+  const Verification result = verify(session, std::span<const double>(frames), oracle,
+                                     test.script.steps.empty() ? nullptr : &test.script, options);
   if (!result.holds()) return result.first_violation;
-  if (result.audited && result.audit.protrusion != 0) return "protrusion " + std::to_string(result.audit.protrusion);
+  if (result.audited && result.audit.protrusion != 0)
+    return "protrusion " + std::to_string(result.audit.protrusion);
   return {};
 }
 

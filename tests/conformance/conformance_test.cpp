@@ -1,5 +1,5 @@
-// Every registered strategy and adapter over every synthetic scene, against the brute-force oracle. Loops over the
-// registry: a strategy that is added is tested with no edit here.
+// Every registered strategy and adapter over every synthetic scene, against the brute-force oracle. Loops
+// over the registry: a strategy that is added is tested with no edit here.
 
 #include <gtest/gtest.h>
 
@@ -33,8 +33,11 @@ std::vector<std::string> strategy_ids() {
 }
 
 INSTANTIATE_TEST_SUITE_P(Registry, Conformance,
-                         testing::Combine(testing::ValuesIn(strategy_ids()), testing::ValuesIn(synthetic_scene_names())),
-                         [](const auto& test) { return std::get<0>(test.param) + "_on_" + std::get<1>(test.param); });
+                         testing::Combine(testing::ValuesIn(strategy_ids()),
+                                          testing::ValuesIn(synthetic_scene_names())),
+                         [](const auto& test) {
+                           return std::get<0>(test.param) + "_on_" + std::get<1>(test.param);
+                         });
 
 class Configurations : public testing::TestWithParam<std::string> {};
 
@@ -45,10 +48,11 @@ TEST_P(Configurations, AllConform) {
     if (entry.info.topology.own) return;
     for (BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
       for (std::uint32_t width : entry.info.topology.widths)
-        for (std::uint32_t leaf = entry.info.topology.min_leaf_size; leaf <= entry.info.topology.max_leaf_size;
-             leaf += leaf < 4 ? 1 : 4)
-          run({.method = method, .width = width, .leaf_size = leaf},
-              scene_name + ", " + name(method) + ", width " + std::to_string(width) + ", leaf " + std::to_string(leaf));
+        for (std::uint32_t leaf = entry.info.topology.min_leaf_size;
+             leaf <= entry.info.topology.max_leaf_size; leaf += leaf < 4 ? 1 : 4)
+          run({.method = method, .width = width, .leaf_size = leaf}, scene_name + ", " + name(method) +
+                                                                         ", width " + std::to_string(width) +
+                                                                         ", leaf " + std::to_string(leaf));
   };
   for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes"}) {
     const auto in_float = synthetic_scene<float>(scene_name, 7);
@@ -76,7 +80,8 @@ TEST(Registry, DescribesEveryStrategy) {
     EXPECT_TRUE(entry.info.has_float || entry.info.has_double) << entry.info.id;
     for (const Parameter& parameter : entry.info.parameters) {
       EXPECT_FALSE(parameter.meaning.empty()) << entry.info.id << "." << parameter.name;
-      EXPECT_NO_THROW(Params(entry.info.id, entry.info.parameters, {{parameter.name, parameter.default_value}}));
+      EXPECT_NO_THROW(
+          Params(entry.info.id, entry.info.parameters, {{parameter.name, parameter.default_value}}));
     }
   }
 }

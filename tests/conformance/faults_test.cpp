@@ -1,5 +1,5 @@
-// The conformance suite can fail: strategies with one seeded fault each are caught by the very check that the registered
-// strategies pass.
+// The conformance suite can fail: strategies with one seeded fault each are caught by the very check that the
+// registered strategies pass.
 
 #include <gtest/gtest.h>
 
@@ -15,14 +15,14 @@ namespace {
 
 enum class Fault {
   none,
-  one_ulp,         // one box too small by one unit in the last place, on one side
-  dropped_child,   // an inner box that forgets its last child
-  stale_frame,     // one frame is not refitted
-  swapped_axis,    // y and z of one box exchanged
-  repeated_pair,   // the first pair is reported twice
-  lost_pair,       // the last pair is not reported
-  too_loose,       // a valid box, but not tight, though tight is declared
-  wrong_order,     // pairs reported with the bodies exchanged
+  one_ulp,        // one box too small by one unit in the last place, on one side
+  dropped_child,  // an inner box that forgets its last child
+  stale_frame,    // one frame is not refitted
+  swapped_axis,   // y and z of one box exchanged
+  repeated_pair,  // the first pair is reported twice
+  lost_pair,      // the last pair is not reported
+  too_loose,      // a valid box, but not tight, though tight is declared
+  wrong_order,    // pairs reported with the bodies exchanged
 };
 
 template <class S, class Count, Fault fault>
@@ -67,15 +67,24 @@ class FaultyRefit : public StoredHierarchyStrategy<S, Count> {
   std::uint64_t frame_ = 0;
 };
 
-template <class S, class C> using Sound = FaultyRefit<S, C, Fault::none>;
-template <class S, class C> using OneUlp = FaultyRefit<S, C, Fault::one_ulp>;
-template <class S, class C> using DroppedChild = FaultyRefit<S, C, Fault::dropped_child>;
-template <class S, class C> using StaleFrame = FaultyRefit<S, C, Fault::stale_frame>;
-template <class S, class C> using SwappedAxis = FaultyRefit<S, C, Fault::swapped_axis>;
-template <class S, class C> using RepeatedPair = FaultyRefit<S, C, Fault::repeated_pair>;
-template <class S, class C> using LostPair = FaultyRefit<S, C, Fault::lost_pair>;
-template <class S, class C> using TooLoose = FaultyRefit<S, C, Fault::too_loose>;
-template <class S, class C> using WrongOrder = FaultyRefit<S, C, Fault::wrong_order>;
+template <class S, class C>
+using Sound = FaultyRefit<S, C, Fault::none>;
+template <class S, class C>
+using OneUlp = FaultyRefit<S, C, Fault::one_ulp>;
+template <class S, class C>
+using DroppedChild = FaultyRefit<S, C, Fault::dropped_child>;
+template <class S, class C>
+using StaleFrame = FaultyRefit<S, C, Fault::stale_frame>;
+template <class S, class C>
+using SwappedAxis = FaultyRefit<S, C, Fault::swapped_axis>;
+template <class S, class C>
+using RepeatedPair = FaultyRefit<S, C, Fault::repeated_pair>;
+template <class S, class C>
+using LostPair = FaultyRefit<S, C, Fault::lost_pair>;
+template <class S, class C>
+using TooLoose = FaultyRefit<S, C, Fault::too_loose>;
+template <class S, class C>
+using WrongOrder = FaultyRefit<S, C, Fault::wrong_order>;
 
 /// A kinetic tree that loses one event: it leaves the queue and nobody handles it.
 template <class S, class Count>
@@ -87,14 +96,17 @@ class LostEvent : public Strategy<S> {
   void reset(double t) override { forest_.reset(t); }
   void advance(double t) override {
     while (forest_.due(t))
-      if (++events_ == 20) forest_.queue().pop();
-      else forest_.handle_next();
+      if (++events_ == 20)
+        forest_.queue().pop();
+      else
+        forest_.handle_next();
   }
   QueryStatus candidates_at(double, PairBuffer& out, const Budget& budget) override {
     for (const BodyPair& pair : this->scene_.pairs()) {
       const auto &a = forest_.tree(pair.first), &b = forest_.tree(pair.second);
       BoxCache<S> cache_a(a.topology().size()), cache_b(b.topology().size());
-      LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second, b.topology(), count_, out);
+      LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
+                                 b.topology(), count_, out);
       RealiserBoxes<S> boxes_a(a.realisers(0), this->sampled_, pair.first, cache_a);
       RealiserBoxes<S> boxes_b(b.realisers(0), this->sampled_, pair.second, cache_b);
       traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack_, count_, budget, leaves);
@@ -104,7 +116,8 @@ class LostEvent : public Strategy<S> {
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     AuditView view{forest_.tree(body).topology(), {}, {}};
     for (std::uint32_t node = 0; node < view.topology.size(); ++node)
-      view.boxes.push_back(to_double(box_of_realisers(forest_.tree(body).realisers(node), this->sampled_, body)));
+      view.boxes.push_back(
+          to_double(box_of_realisers(forest_.tree(body).realisers(node), this->sampled_, body)));
     return view;
   }
   std::size_t bytes() const override { return forest_.bytes(); }
@@ -136,16 +149,36 @@ void expect_caught(const std::string& violations, const std::string& expected) {
   EXPECT_NE(violations.substr(bar + 1).find(expected), std::string::npos) << "in double: " << violations;
 }
 
-TEST(Faults, SoundRefitPasses) { EXPECT_EQ(violation<Sound>("sound"), "|"); }
-TEST(Faults, OneUlpTooSmall) { expect_caught(violation<OneUlp>("one_ulp"), "protrudes"); }
-TEST(Faults, DroppedChild) { expect_caught(violation<DroppedChild>("dropped_child"), "t = "); }
-TEST(Faults, StaleFrame) { expect_caught(violation<StaleFrame>("stale_frame"), "protrudes"); }
-TEST(Faults, SwappedAxis) { expect_caught(violation<SwappedAxis>("swapped_axis"), "protrudes"); }
-TEST(Faults, RepeatedPair) { expect_caught(violation<RepeatedPair>("repeated_pair"), "more than once"); }
-TEST(Faults, LostPair) { expect_caught(violation<LostPair>("lost_pair"), "not among the candidates"); }
-TEST(Faults, TooLooseThoughDeclaredTight) { expect_caught(violation<TooLoose>("too_loose"), "not tight"); }
-TEST(Faults, BodiesExchanged) { expect_caught(violation<WrongOrder>("wrong_order"), "malformed"); }
-TEST(Faults, LostEvent) { expect_caught(violation<LostEvent>("lost_event"), "protrudes"); }
+TEST(Faults, SoundRefitPasses) {
+  EXPECT_EQ(violation<Sound>("sound"), "|");
+}
+TEST(Faults, OneUlpTooSmall) {
+  expect_caught(violation<OneUlp>("one_ulp"), "protrudes");
+}
+TEST(Faults, DroppedChild) {
+  expect_caught(violation<DroppedChild>("dropped_child"), "t = ");
+}
+TEST(Faults, StaleFrame) {
+  expect_caught(violation<StaleFrame>("stale_frame"), "protrudes");
+}
+TEST(Faults, SwappedAxis) {
+  expect_caught(violation<SwappedAxis>("swapped_axis"), "protrudes");
+}
+TEST(Faults, RepeatedPair) {
+  expect_caught(violation<RepeatedPair>("repeated_pair"), "more than once");
+}
+TEST(Faults, LostPair) {
+  expect_caught(violation<LostPair>("lost_pair"), "not among the candidates");
+}
+TEST(Faults, TooLooseThoughDeclaredTight) {
+  expect_caught(violation<TooLoose>("too_loose"), "not tight");
+}
+TEST(Faults, BodiesExchanged) {
+  expect_caught(violation<WrongOrder>("wrong_order"), "malformed");
+}
+TEST(Faults, LostEvent) {
+  expect_caught(violation<LostEvent>("lost_event"), "protrudes");
+}
 
 }  // namespace
 }  // namespace kbvh::test

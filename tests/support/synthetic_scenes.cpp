@@ -15,7 +15,8 @@ struct RawBody {
   std::vector<double> positions;
 };
 
-RawBody soup(std::uint32_t triangles, std::uint64_t seed, std::uint32_t keyframes, double size, double travel) {
+RawBody soup(std::uint32_t triangles, std::uint64_t seed, std::uint32_t keyframes, double size,
+             double travel) {
   Random random(seed);
   RawBody body;
   body.vertex_count = 3 * triangles;
@@ -36,7 +37,8 @@ RawBody soup(std::uint32_t triangles, std::uint64_t seed, std::uint32_t keyframe
 }
 
 /// A connected sheet of 2 (n-1)^2 triangles whose vertices follow `move(vertex x, y, keyframe, axis)`.
-RawBody sheet(std::uint32_t n, std::uint32_t keyframes, const std::function<double(int, int, int, int)>& move) {
+RawBody sheet(std::uint32_t n, std::uint32_t keyframes,
+              const std::function<double(int, int, int, int)>& move) {
   RawBody body;
   body.vertex_count = n * n;
   for (std::uint32_t y = 0; y + 1 < n; ++y)
@@ -93,7 +95,9 @@ RawScene raw_scene(const std::string& name) {
   if (name == "static_obstacle") return {{sheet(10, 6, wave(0.2)), soup(60, 3, 1, 0.2, 0)}, false};
   if (name == "nothing_moves") return {{soup(80, 4, 1, 0.3, 0), soup(80, 5, 1, 0.3, 0)}, false};
   if (name == "four_bodies_own_keyframes") {
-    RawScene scene{{soup(60, 6, 4, 0.3, 0.3), soup(50, 7, 3, 0.3, 0.3), soup(40, 8, 1, 0.3, 0), soup(30, 9, 2, 0.3, 0.5)}, false};
+    RawScene scene{{soup(60, 6, 4, 0.3, 0.3), soup(50, 7, 3, 0.3, 0.3), soup(40, 8, 1, 0.3, 0),
+                    soup(30, 9, 2, 0.3, 0.5)},
+                   false};
     scene.bodies[1].times = {0.1, 0.30000000000000004, 2.0};
     scene.bodies[3].times = {-0.5, 0.25};
     return scene;
@@ -115,21 +119,24 @@ RawScene raw_scene(const std::string& name) {
   }
   // Mirrored in the plane x = 1 between two keyframes: every pair of vertices crosses at the same instant.
   if (name == "all_cross_at_once")
-    return {{sheet(9, 3, [](int x, int y, int k, int axis) {
-               if (axis == 0) return k % 2 == 0 ? 0.25 * x : 2.0 - 0.25 * x;
-               return axis == 1 ? 0.25 * y : 0.125 * ((x + y) % 3);
-             }),
+    return {{sheet(9, 3,
+                   [](int x, int y, int k, int axis) {
+                     if (axis == 0) return k % 2 == 0 ? 0.25 * x : 2.0 - 0.25 * x;
+                     return axis == 1 ? 0.25 * y : 0.125 * ((x + y) % 3);
+                   }),
              soup(50, 12, 3, 0.4, 0.2)},
             false};
   if (name == "pure_translation_far")
-    return {{sheet(10, 4, [](int x, int y, int k, int axis) {
-               const double at[3] = {0.125 * x, 0.125 * y, 0.0625 * ((x * 3 + y) % 5)};
-               return 1e6 + at[axis] + (axis == 2 ? 0.0 : 0.5 * k);
-             }),
-             sheet(10, 4, [](int x, int y, int, int axis) {
-               const double at[3] = {0.15 * x, 0.15 * y, 0.0625 * ((x + y * 2) % 6)};
-               return 1e6 + at[axis];
-             })},
+    return {{sheet(10, 4,
+                   [](int x, int y, int k, int axis) {
+                     const double at[3] = {0.125 * x, 0.125 * y, 0.0625 * ((x * 3 + y) % 5)};
+                     return 1e6 + at[axis] + (axis == 2 ? 0.0 : 0.5 * k);
+                   }),
+             sheet(10, 4,
+                   [](int x, int y, int, int axis) {
+                     const double at[3] = {0.15 * x, 0.15 * y, 0.0625 * ((x + y * 2) % 6)};
+                     return 1e6 + at[axis];
+                   })},
             false};
   if (name == "tiny") {
     RawScene scene{{soup(80, 13, 4, 0.3, 0.3), soup(80, 14, 4, 0.3, 0.3)}, false};
@@ -154,8 +161,10 @@ RawScene raw_scene(const std::string& name) {
         for (std::uint32_t p = 0; p < body.primitives.count(); p += 3)
           for (std::size_t axis = 0; axis < 3; ++axis) {
             double* corner = body.positions.data() + 3 * (k * body.vertex_count + 3 * p) + axis;
-            if (p % 2 == 0) corner[6] = corner[0];
-            else corner[3] = corner[6] = corner[0];
+            if (p % 2 == 0)
+              corner[6] = corner[0];
+            else
+              corner[3] = corner[6] = corner[0];
           }
     return scene;
   }
@@ -180,8 +189,8 @@ RawScene raw_scene(const std::string& name) {
   throw std::invalid_argument("no synthetic scene '" + name + "'");
 }
 
-/// Changes at the first frame, at keyframes and in between; several at once; some with knots, some for ever, some that
-/// stop; the same vertex repeatedly.
+/// Changes at the first frame, at keyframes and in between; several at once; some with knots, some for ever,
+/// some that stop; the same vertex repeatedly.
 template <class S>
 PlanScript<S> make_script(const Scene<S>& scene, std::uint32_t frames_per_keyframe) {
   Random random(77);
@@ -195,7 +204,8 @@ PlanScript<S> make_script(const Scene<S>& scene, std::uint32_t frames_per_keyfra
       change.body = random.below(std::uint32_t(scene.bodies.size()));
       change.vertex = random.below(scene.bodies[change.body].plans.vertex_count());
       bool again = false;
-      for (const auto& other : step.changes) again = again || (other.body == change.body && other.vertex == change.vertex);
+      for (const auto& other : step.changes)
+        again = again || (other.body == change.body && other.vertex == change.vertex);
       if (again) continue;
       const std::uint32_t kind = random.below(4);
       if (kind != 0)
@@ -216,10 +226,23 @@ PlanScript<S> make_script(const Scene<S>& scene, std::uint32_t frames_per_keyfra
 }  // namespace
 
 const std::vector<std::string>& synthetic_scene_names() {
-  static const std::vector<std::string> names{
-      "soups", "sheets", "static_obstacle", "nothing_moves", "four_bodies_own_keyframes", "one_triangle_and_none",
-      "integer_ties", "all_cross_at_once", "pure_translation_far", "tiny", "huge", "keyframes_a_millionth_apart",
-      "degenerate_triangles", "polygons", "points_against_nets", "plan_changes", "plan_changes_ties"};
+  static const std::vector<std::string> names{"soups",
+                                              "sheets",
+                                              "static_obstacle",
+                                              "nothing_moves",
+                                              "four_bodies_own_keyframes",
+                                              "one_triangle_and_none",
+                                              "integer_ties",
+                                              "all_cross_at_once",
+                                              "pure_translation_far",
+                                              "tiny",
+                                              "huge",
+                                              "keyframes_a_millionth_apart",
+                                              "degenerate_triangles",
+                                              "polygons",
+                                              "points_against_nets",
+                                              "plan_changes",
+                                              "plan_changes_ties"};
   return names;
 }
 

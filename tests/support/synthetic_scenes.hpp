@@ -6,8 +6,8 @@
 
 namespace kbvh::test {
 
-/// A small scene made by formula, with an optional script of plan changes; its keyframes are short enough for the
-/// brute-force oracle.
+/// A small scene made by formula, with an optional script of plan changes; its keyframes are short enough for
+/// the brute-force oracle.
 template <class S>
 struct TestScene {
   Scene<S> scene;
@@ -17,7 +17,8 @@ struct TestScene {
 /// Names of all synthetic scenes, each aimed at one thing that goes wrong in practice.
 const std::vector<std::string>& synthetic_scene_names();
 
-/// Makes one by name; deterministic. `frames_per_keyframe` places the script's changes at frames, keyframes and events.
+/// Makes one by name; deterministic. `frames_per_keyframe` places the script's changes at frames, keyframes
+/// and events.
 template <class S>
 TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_keyframe = 1);
 
