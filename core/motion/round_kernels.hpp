@@ -34,6 +34,7 @@ using Doubles [[gnu::vector_size(kLanes * 8)]] = double;
 using Floats [[gnu::vector_size(kLanes * 4)]] = float;
 using Longs [[gnu::vector_size(kLanes * 8)]] = std::int64_t;
 using Ints [[gnu::vector_size(kLanes * 4)]] = std::int32_t;
+using Unsigned [[gnu::vector_size(kLanes * 4)]] = std::uint32_t;
 
 /// Values per block; blocks are padded.
 constexpr std::size_t kBlock = 256;
@@ -169,8 +170,9 @@ template <PieceKind kind, RatioLength length_of_ratio>
 }
 
 /// Maps floats to integers in the same order, neighbours to neighbours, both zeros to 0.
-[[gnu::always_inline]] inline Ints ordinal(Ints bits) {
-  return bits < 0 ? std::numeric_limits<std::int32_t>::min() - bits : bits;
+[[gnu::always_inline]] inline Unsigned ordinal(Ints bits) {
+  const Unsigned size = reinterpret_cast<Unsigned>(bits) & 0x7fffffffU;  // unsigned: differences may wrap
+  return bits < 0 ? -size : size;
 }
 
 /// Stage 2 for float: decides kGroup undecided values by the exact sign of value - midpoint, that is, of
@@ -199,7 +201,7 @@ template <PieceKind kind>
     store(out + at, (take_lower ? lower : upper) + 0.0F);
     const Ints inexact =
         __builtin_convertvector((dx.lo != 0.0) | (dm.lo != 0.0) | (absolute(midpoint) >= 0x1p127), Ints);
-    store(hard + at, inexact | (ordinal(upper_bits) - ordinal(lower_bits) != 1));
+    store(hard + at, inexact | (ordinal(upper_bits) - ordinal(lower_bits) != 1U));
   }
 }
 
