@@ -1,0 +1,587 @@
+// Bullet 3.24 (Coumans) as contestants: its quantised triangle-mesh hierarchy, and its dynamic tree.
+//
+// bullet_bvh: btOptimizedBvh with quantisation, kept up to date by refit().
+// - Without quantisation refit() silently does nothing, so it is always quantised.
+// - refit() enlarges the bounds in which it quantises by 1.0, whatever the unit: a mesh of a few centimetres
+// is
+//   then a handful of cells wide, and returns thousands of false pairs. By default the mesh's own scaling
+//   (setScaling) is therefore a power of two, which is exact, that makes the scene 32768 to 65536 units wide.
+//   `scale=none` shows what happens to those who do not know.
+// - All bodies are quantised in one grid, so that cells of different bodies can be compared. Quantisation is
+//   monotone, lower bounds go to even and upper ones to odd cells, so boxes that touch have cells that
+//   overlap: no pair is lost. The grid has a slack of 1/8, and is laid anew, with all bodies, when the scene
+//   leaves it or shrinks to a quarter of it. Finding the scene's bounds is part of the update.
+// - Bullet's own query is a box against a tree (reportAabbOverlappingNodex): `query=primitives` asks one for
+// each
+//   primitive of the smaller body. Its walk of two trees is not open to users, so the default `query=trees`
+//   descends both of Bullet's node arrays here, which is faster; the overlap test is Bullet's.
+// - A primitive index has 21 bits.
+//
+// bullet_dbvt: btDbvt with one leaf per primitive, tree by optimizeTopDown(), queries by collideTT.
+// - Bullet updates it leaf by leaf (`update=leaves`): each leaf is removed and inserted again, which also
+// changes
+//   the tree. The default `update=refit` recomputes the volumes of all nodes instead, children first, by
+//   Bullet's Merge; that loop is not in Bullet, but an order of magnitude faster. Boxes are tight either way.
+// - The tree is first built by insertion: identical boxes make a list of it before it is optimised.
+//
+// Both are float, as Debian's Bullet, and take float scenes only; both know triangles only or boxes. A
+// primitive of more than 3 vertices is given to btOptimizedBvh as the triangle (lower, upper, first vertex),
+// which has the polygon's box.
+#include <BulletCollision/BroadphaseCollision/btDbvt.h>
+#include <BulletCollision/CollisionShapes/btOptimizedBvh.h>
+#include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
+#include <LinearMath/btAabbUtil2.h>
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#include "core/registry.hpp"
+
+#ifdef BT_USE_DOUBLE_PRECISION
+#error "this adapter is for Bullet in float"
+#endif
+
+namespace kbvh {
+namespace {
+
+btVector3 vector(const float* p) {
+  return btVector3(p[0], p[1], p[2]);
+}
+
+/// Lays a binary tree out as an audit wants it: siblings next to each other and after their parent.
+/// `children(node)` is a pair of handles, `primitive(node)` a primitive id or -1 for inner nodes.
+template <class Handle, class Primitive, class Children, class BoxOf>
+AuditView breadth_first(Handle root, const Primitive& primitive, const Children& children, const BoxOf& box) {
+  AuditView view;
+  std::vector<Handle> handles{root};
+  view.topology.parents.push_back(0);
+  view.topology.depths.push_back(0);
+  for (std::uint32_t i = 0; i < handles.size(); ++i) {
+    const Handle node = handles[i];
+    view.boxes.push_back(box(node));
+    if (const int id = primitive(node); id >= 0) {
+      view.topology.nodes.push_back(TopologyNode::leaf(std::uint32_t(view.topology.primitives.size()), 1));
+      view.topology.primitives.push_back(std::uint32_t(id));
+      continue;
+    }
+    view.topology.nodes.push_back(TopologyNode::inner(std::uint32_t(handles.size()), 2));
+    const auto [left, right] = children(node);
+    for (const Handle child : {left, right}) {
+      handles.push_back(child);
+      view.topology.parents.push_back(i);
+      view.topology.depths.push_back(std::uint8_t(std::min(255, view.topology.depths[i] + 1)));
+    }
+  }
+  return view;
+}
+
+/// What both have in common: which bodies move, and that time does not run backwards.
+template <class Count>
+class Bullet : public Strategy<float> {
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+
+  Bullet(const SceneView<float>& scene, const SampledMotion<float>& motion)
+      : Strategy<float>(scene, motion), moves_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+      moves_[body] = scene.moving(body);
+      for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
+    }
+  }
+
+  void reset(double t) final {
+    this->clear_triangle_stats();
+    time_ = t;
+    update_all();
+    count_.table = {};
+  }
+
+  void advance(double t) final {
+    if (t < time_)
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
+                                  std::to_string(t));
+    time_ = t;
+    update_moving();
+  }
+
+  void flight_plans_changed(double /*t*/, std::span<const PlanChange<float>> changes) final {
+    for (const auto& change : changes) moves_[change.body] = true;
+  }
+
+ protected:
+  virtual void update_all() = 0;
+  virtual void update_moving() = 0;
+  Counters counted() const final { return count_.table; }
+  void count_refit(std::uint64_t primitives) {
+    count_.add(Counter::nodes_visited, 2 * primitives - 1);
+    count_.add(Counter::values_written, 6 * (2 * primitives - 1));
+    count_.add(Counter::vertex_reads, 3 * primitives);
+  }
+
+  std::vector<std::uint8_t> moves_;
+  Count count_;
+  double time_ = 0;
+};
+
+/// Collects what one box overlaps in a quantised tree.
+class BoxHits final : public btNodeOverlapCallback {
+ public:
+  PrimitivePair pair{};
+  bool tree_is_first = false;
+  PairBuffer* out = nullptr;
+
+  void processNode(int /*part*/, int primitive) override {
+    (tree_is_first ? pair.primitive_a : pair.primitive_b) = std::uint32_t(primitive);
+    out->push_back(pair);
+  }
+};
+
+template <class S, class Count>
+class BulletBvh final : public Bullet<Count> {
+  static_assert(std::is_same_v<S, float>);
+
+ public:
+  BulletBvh(const SceneView<float>& scene, const SampledMotion<float>& motion, Topologies /*none*/,
+            const Params& params)
+      : Bullet<Count>(scene, motion),
+        scaled_(params.word("scale") == "fit"),
+        trees_(params.word("query") == "trees"),
+        bodies_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) make_mesh(body);
+    lay_grid();
+    for (BodyState& state : bodies_) {
+      if (!state.mesh) continue;
+      state.mesh->setScaling(btVector3(scale_, scale_, scale_));
+      state.bvh = std::make_unique<btOptimizedBvh>();
+      state.bvh->build(state.mesh.get(), true, grid_lower(), grid_upper());
+    }
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+    for (const BodyPair& pair : this->scene_.pairs()) {
+      if (!bodies_[pair.first].bvh || !bodies_[pair.second].bvh) continue;
+      if (trees_)
+        descend(pair, out);
+      else
+        ask_for_each_primitive(pair, out);
+    }
+    return {};
+  }
+
+  /// The box of a node is everything that the query cannot tell from its cells.
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    const BodyState& state = bodies_[body];
+    if (!state.bvh) return AuditView{};
+    const btQuantizedBvhNode* nodes = &state.bvh->getQuantizedNodeArray()[0];
+    const Grid grid(*state.bvh, scale_);
+    return breadth_first(
+        nodes,
+        [](const btQuantizedBvhNode* node) { return node->isLeafNode() ? node->getTriangleIndex() : -1; },
+        [](const btQuantizedBvhNode* node) {
+          return std::pair{node + 1, right_child(node)};
+        },
+        [&](const btQuantizedBvhNode* node) { return grid.box(*node); });
+  }
+
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const BodyState& state : bodies_) {
+      if (!state.bvh) continue;
+      total += sizeof(btOptimizedBvh) + std::size_t(state.bvh->getQuantizedNodeArray().capacity()) * 16 +
+               std::size_t(state.bvh->getSubtreeInfoArray().capacity()) * sizeof(btBvhSubtreeInfo) +
+               state.indices.size() * sizeof(int) + state.vertices.size() * sizeof(float) +
+               state.polygons.size() * sizeof(std::uint32_t);
+    }
+    return total;
+  }
+
+ private:
+  struct BodyState {
+    std::vector<int> indices;             // 3 per primitive
+    std::vector<std::uint32_t> polygons;  // primitives of more than 3 vertices
+    std::vector<float> vertices;          // the body's, then lower and upper of each polygon; none: no copy
+    std::unique_ptr<btTriangleIndexVertexArray> mesh;
+    std::unique_ptr<btOptimizedBvh> bvh;  // none for a body without primitives
+    Box<float> box;
+  };
+
+  /// The quantisation of a tree, found by asking it: cell = (x - origin) * cells_per_unit, in scaled units.
+  class Grid {
+   public:
+    Grid(const btOptimizedBvh& bvh, double scale) : scale_(scale) {
+      const unsigned short zero[3] = {0, 0, 0};
+      const btVector3 origin = bvh.unQuantize(zero);
+      // Access to the protected quantisation through what derives from it, for reading only.
+      struct Reader : btOptimizedBvh {
+        static btVector3 of(const btOptimizedBvh& tree) { return tree.*(&Reader::m_bvhQuantization); }
+      };
+      const btVector3 cells = Reader::of(bvh);
+      for (int axis = 0; axis < 3; ++axis) {
+        origin_[axis] = double(origin[axis]);
+        cells_[axis] = double(cells[axis]);
+      }
+    }
+    Box<double> box(const btQuantizedBvhNode& node) const {
+      Box<double> box;
+      for (int axis = 0; axis < 3; ++axis) {
+        // A coordinate's cell comes of two roundings in float: up to 65535 * 2^-23 of a cell.
+        box.lower[axis] = (origin_[axis] + (node.m_quantizedAabbMin[axis] - .01) / cells_[axis]) / scale_;
+        box.upper[axis] = (origin_[axis] + (node.m_quantizedAabbMax[axis] + .01) / cells_[axis]) / scale_;
+      }
+      return box;
+    }
+
+   private:
+    double origin_[3], cells_[3], scale_;
+  };
+
+  static const btQuantizedBvhNode* right_child(const btQuantizedBvhNode* node) {
+    const btQuantizedBvhNode* left = node + 1;
+    return left + (left->isLeafNode() ? 1 : left->getEscapeIndex());
+  }
+  static bool cells_overlap(const btQuantizedBvhNode& a, const btQuantizedBvhNode& b) {
+    return testQuantizedAabbAgainstQuantizedAabb(a.m_quantizedAabbMin, a.m_quantizedAabbMax,
+                                                 b.m_quantizedAabbMin, b.m_quantizedAabbMax) != 0;
+  }
+
+  void make_mesh(std::uint32_t body) {
+    const Primitives& primitives = this->scene_.primitives(body);
+    if (primitives.count() == 0) return;
+    if (primitives.count() >= (1u << 21))
+      throw ConfigError("bullet_bvh takes fewer than 2097152 primitives in a body; body " +
+                        std::to_string(body) + " has " + std::to_string(primitives.count()));
+    BodyState& state = bodies_[body];
+    int next = int(this->scene_.vertex_count(body));
+    for (std::uint32_t p = 0; p < primitives.count(); ++p) {
+      const auto v = primitives[p];
+      if (v.size() <= 3) {
+        state.indices.insert(state.indices.end(), {int(v[0]), int(v[v.size() / 2]), int(v.back())});
+      } else {
+        state.indices.insert(state.indices.end(), {next, next + 1, int(v[0])});
+        state.polygons.push_back(p);
+        next += 2;
+      }
+    }
+    if (!state.polygons.empty()) state.vertices.resize(std::size_t(3) * std::size_t(next));
+    btIndexedMesh mesh;
+    mesh.m_numTriangles = int(primitives.count());
+    mesh.m_triangleIndexBase = reinterpret_cast<const unsigned char*>(state.indices.data());
+    mesh.m_triangleIndexStride = 3 * sizeof(int);
+    mesh.m_numVertices = next;
+    mesh.m_vertexStride = 3 * sizeof(float);
+    mesh.m_vertexType = PHY_FLOAT;
+    state.mesh = std::make_unique<btTriangleIndexVertexArray>();
+    state.mesh->addIndexedMesh(mesh, PHY_INTEGER);
+    read_vertices(body);
+  }
+
+  /// Shows the current vertices to Bullet, and finds their box.
+  void read_vertices(std::uint32_t body) {
+    BodyState& state = bodies_[body];
+    const float* positions = this->sampled_.positions(body);
+    const std::size_t count = this->scene_.vertex_count(body);
+    using Lanes = Eigen::Array4f;
+    Lanes lower = Eigen::Map<const Lanes>(positions), upper = lower;
+    for (std::size_t v = 1; v < count; ++v) {
+      const Lanes p = Eigen::Map<const Lanes>(positions + 3 * v);
+      lower = lower.min(p);
+      upper = upper.max(p);
+    }
+    std::copy_n(lower.data(), 3, state.box.lower);
+    std::copy_n(upper.data(), 3, state.box.upper);
+    const float* shown = positions;
+    if (!state.polygons.empty()) {
+      float* next = std::copy_n(positions, 3 * count, state.vertices.data());
+      for (std::uint32_t polygon : state.polygons) {
+        const Box<float> box = primitive_box(this->scene_.primitives(body)[polygon], positions);
+        next = std::copy_n(box.lower, 3, next);
+        next = std::copy_n(box.upper, 3, next);
+      }
+      shown = state.vertices.data();
+    }
+    state.mesh->getIndexedMeshArray()[0].m_vertexBase = reinterpret_cast<const unsigned char*>(shown);
+  }
+
+  void update_all() override {
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
+      if (bodies_[body].mesh) read_vertices(body);
+    lay_grid();
+    for (BodyState& state : bodies_) refit(state);
+  }
+
+  void update_moving() override {
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
+      if (this->moves_[body] && bodies_[body].mesh) read_vertices(body);
+    if (!grid_fits()) {
+      lay_grid();
+      for (BodyState& state : bodies_) refit(state);
+      return;
+    }
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
+      if (this->moves_[body]) refit(bodies_[body]);
+  }
+
+  void refit(BodyState& state) {
+    if (!state.mesh) return;
+    state.mesh->setScaling(btVector3(scale_, scale_, scale_));
+    state.bvh->refit(state.mesh.get(), grid_lower(), grid_upper());
+    this->count_refit(state.indices.size() / 3);
+  }
+
+  Box<float> scene_box() const {
+    Box<float> box;
+    for (const BodyState& state : bodies_) box.extend(state.box);
+    return box;
+  }
+  static double extent(const Box<float>& box) {
+    double largest = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      largest = std::max(largest, double(box.upper[axis]) - double(box.lower[axis]));
+    return largest;
+  }
+
+  bool grid_fits() const {
+    const Box<float> box = scene_box();
+    return box.empty() || (grid_.contains(box) && (extent(box) >= .25 * laid_extent_));
+  }
+
+  void lay_grid() {
+    const Box<float> box = scene_box();
+    if (box.empty()) return;
+    laid_extent_ = extent(box);
+    double largest = 0, furthest = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double lower = box.lower[axis], upper = box.upper[axis];
+      furthest = std::max({furthest, std::abs(lower), std::abs(upper)});
+      // Never flat, and never below what float can tell apart at this distance from the origin.
+      const double slack = (upper - lower) / 8 + laid_extent_ / 1024 +
+                           std::max(std::abs(lower), std::abs(upper)) * 0x1p-20 +
+                           std::numeric_limits<float>::min();
+      grid_.lower[axis] = float(lower - slack);
+      grid_.upper[axis] = float(upper + slack);
+      largest = std::max(largest, upper - lower + 2 * slack);
+    }
+    if (!scaled_) return;
+    // Bullet starts its boxes at 1e18, so nothing may come near that; and the scale itself has to be a float.
+    const int wanted = 15 - std::ilogb(largest), limit = 57 - std::ilogb(std::max(furthest, largest));
+    scale_ = std::ldexp(1.f, std::clamp(std::min(wanted, limit), -120, 120));
+  }
+  btVector3 grid_lower() const { return vector(grid_.lower) * scale_; }
+  btVector3 grid_upper() const { return vector(grid_.upper) * scale_; }
+
+  void descend(const BodyPair& pair, PairBuffer& out) {
+    const btQuantizedBvhNode* a = &bodies_[pair.first].bvh->getQuantizedNodeArray()[0];
+    const btQuantizedBvhNode* b = &bodies_[pair.second].bvh->getQuantizedNodeArray()[0];
+    std::uint64_t tests = 1;
+    stack_.clear();
+    if (cells_overlap(*a, *b)) stack_.push_back({a, b});
+    while (!stack_.empty()) {
+      const auto [x, y] = stack_.back();
+      stack_.pop_back();
+      const bool leaf_x = x->isLeafNode(), leaf_y = y->isLeafNode();
+      if (leaf_x && leaf_y) {
+        out.push_back({pair.first, std::uint32_t(x->getTriangleIndex()), pair.second,
+                       std::uint32_t(y->getTriangleIndex())});
+        continue;
+      }
+      const btQuantizedBvhNode* xs[2] = {leaf_x ? x : x + 1, leaf_x ? nullptr : right_child(x)};
+      const btQuantizedBvhNode* ys[2] = {leaf_y ? y : y + 1, leaf_y ? nullptr : right_child(y)};
+      for (int i = 0; i < 2 - leaf_x; ++i)
+        for (int j = 0; j < 2 - leaf_y; ++j)
+          if (cells_overlap(*xs[i], *ys[j])) stack_.push_back({xs[i], ys[j]});
+      tests += std::uint64_t(2 - leaf_x) * std::uint64_t(2 - leaf_y);
+    }
+    this->count_.add(Counter::box_tests, tests);
+  }
+
+  void ask_for_each_primitive(const BodyPair& pair, PairBuffer& out) {
+    const bool tree_is_first =
+        this->scene_.primitives(pair.first).count() > this->scene_.primitives(pair.second).count();
+    const std::uint32_t asker = tree_is_first ? pair.second : pair.first;
+    const BodyState& tree = bodies_[tree_is_first ? pair.first : pair.second];
+    const Primitives& primitives = this->scene_.primitives(asker);
+    const float* positions = this->sampled_.positions(asker);
+    hits_.out = &out;
+    hits_.tree_is_first = tree_is_first;
+    for (std::uint32_t p = 0; p < primitives.count(); ++p) {
+      const Box<float> box = primitive_box(primitives[p], positions);
+      if (!overlap(box, tree.box)) continue;
+      hits_.pair = {pair.first, p, pair.second, p};
+      tree.bvh->reportAabbOverlappingNodex(&hits_, vector(box.lower) * scale_, vector(box.upper) * scale_);
+    }
+  }
+
+  bool scaled_, trees_;
+  float scale_ = 1;
+  Box<float> grid_;         // in scene units
+  double laid_extent_ = 0;  // of the scene, when the grid was laid
+  std::vector<BodyState> bodies_;
+  std::vector<std::pair<const btQuantizedBvhNode*, const btQuantizedBvhNode*>> stack_;
+  BoxHits hits_;
+};
+
+/// Collects overlapping leaves of two dynamic trees.
+class LeafHits final : public btDbvt::ICollide {
+ public:
+  BodyPair bodies{};
+  PairBuffer* out = nullptr;
+
+  using btDbvt::ICollide::Process;
+  void Process(const btDbvtNode* a, const btDbvtNode* b) override {
+    out->push_back({bodies.first, std::uint32_t(a->dataAsInt), bodies.second, std::uint32_t(b->dataAsInt)});
+  }
+};
+
+template <class S, class Count>
+class BulletDbvt final : public Bullet<Count> {
+  static_assert(std::is_same_v<S, float>);
+
+ public:
+  BulletDbvt(const SceneView<float>& scene, const SampledMotion<float>& motion, Topologies /*none*/,
+             const Params& params)
+      : Bullet<Count>(scene, motion), refits_(params.word("update") == "refit"), bodies_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) build(body);
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+    hits_.out = &out;
+    for (const BodyPair& pair : this->scene_.pairs()) {
+      hits_.bodies = pair;
+      // As collideTT, with a stack that stays allocated.
+      bodies_[pair.first].tree.collideTTpersistentStack(bodies_[pair.first].tree.m_root,
+                                                        bodies_[pair.second].tree.m_root, hits_);
+    }
+    return {};
+  }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    const btDbvtNode* root = bodies_[body].tree.m_root;
+    if (root == nullptr) return AuditView{};
+    return breadth_first(
+        root, [](const btDbvtNode* node) { return node->isleaf() ? node->dataAsInt : -1; },
+        [](const btDbvtNode* node) {
+          return std::pair<const btDbvtNode*, const btDbvtNode*>(node->childs[0], node->childs[1]);
+        },
+        [](const btDbvtNode* node) {
+          Box<double> box;
+          for (int axis = 0; axis < 3; ++axis) {
+            box.lower[axis] = double(node->volume.Mins()[axis]);
+            box.upper[axis] = double(node->volume.Maxs()[axis]);
+          }
+          return box;
+        });
+  }
+
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const BodyState& state : bodies_) {
+      const auto leaves = std::size_t(state.tree.m_leaves);
+      total += sizeof(btDbvt) + (leaves == 0 ? 0 : 2 * leaves - 1) * sizeof(btDbvtNode) +
+               state.nodes.size() * sizeof(btDbvtNode*);
+    }
+    return total;
+  }
+
+ private:
+  struct BodyState {
+    btDbvt tree;
+    std::vector<btDbvtNode*> nodes;  // refit: all, children before parents; else leaves by primitive
+  };
+
+  btDbvtVolume volume(std::uint32_t body, int primitive) const {
+    const Box<float> box = primitive_box(this->scene_.primitives(body)[std::uint32_t(primitive)],
+                                         this->sampled_.positions(body));
+    return btDbvtVolume::FromMM(vector(box.lower), vector(box.upper));
+  }
+
+  void build(std::uint32_t body) {
+    BodyState& state = bodies_[body];
+    const int count = int(this->scene_.primitives(body).count());
+    for (int p = 0; p < count; ++p) {
+      btDbvtNode* leaf = state.tree.insert(volume(body, p), nullptr);
+      leaf->dataAsInt = p;
+      if (!refits_) state.nodes.push_back(leaf);
+    }
+    state.tree.optimizeTopDown();
+    if (!refits_ || state.tree.m_root == nullptr) return;
+    state.nodes.push_back(state.tree.m_root);
+    for (std::size_t i = 0; i < state.nodes.size(); ++i)
+      if (state.nodes[i]->isinternal())
+        state.nodes.insert(state.nodes.end(), {state.nodes[i]->childs[0], state.nodes[i]->childs[1]});
+    std::reverse(state.nodes.begin(), state.nodes.end());
+  }
+
+  void update(std::uint32_t body) {
+    BodyState& state = bodies_[body];
+    if (state.nodes.empty()) return;
+    if (refits_) {
+      for (btDbvtNode* node : state.nodes) {
+        if (node->isleaf())
+          node->volume = volume(body, node->dataAsInt);
+        else
+          Merge(node->childs[0]->volume, node->childs[1]->volume, node->volume);
+      }
+      this->count_refit(this->scene_.primitives(body).count());
+      return;
+    }
+    for (std::size_t p = 0; p < state.nodes.size(); ++p) {
+      btDbvtVolume box = volume(body, int(p));
+      state.tree.update(state.nodes[p], box);
+    }
+    this->count_.add(Counter::vertex_reads, 3 * state.nodes.size());
+  }
+  void update_all() override {
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
+  }
+  void update_moving() override {
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
+      if (this->moves_[body]) update(body);
+  }
+
+  bool refits_;
+  std::vector<BodyState> bodies_;
+  LeafHits hits_;
+};
+
+Info bullet_info(const char* id, const char* title) {
+  Info info;
+  info.id = id;
+  info.title = title;
+  info.family = "bullet";
+  info.citation = "Coumans, Bullet 3.24";
+  info.guarantee = Guarantee::candidate_superset;
+  info.positions = PositionUse::all;
+  info.can.plan_changes = true;
+  info.topology.own = true;
+  info.own_scalar = "float";
+  return info;
+}
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(bullet) {
+  using namespace kbvh;
+  Info bvh = bullet_info("bullet_bvh", "Bullet quantised BVH, refit");
+  bvh.tightness = Tightness::conservative;
+  bvh.parameters.push_back({"query",
+                            "trees",
+                            {"trees", "primitives"},
+                            "descend both trees, or ask Bullet for each primitive of the smaller body",
+                            0});
+  bvh.parameters.push_back({"scale",
+                            "fit",
+                            {"fit", "none"},
+                            "scale the scene so that Bullet's margin of 1.0 is small, or leave it",
+                            0});
+  Info dbvt = bullet_info("bullet_dbvt", "Bullet dynamic tree");
+  dbvt.tightness = Tightness::tight;
+  dbvt.can.restructures = true;  // with update=leaves
+  dbvt.parameters.push_back(
+      {"update", "refit", {"refit", "leaves"}, "recompute all nodes, or btDbvt::update leaf by leaf", 0});
+  std::vector<StrategyEntry> entries;
+  entries.push_back(make_entry<BulletBvh, Scalars::float_only>(std::move(bvh)));
+  entries.push_back(make_entry<BulletDbvt, Scalars::float_only>(std::move(dbvt)));
+  return entries;
+}
