@@ -1,0 +1,27 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "experiments/scene_spec.hpp"
+
+namespace kbvh::test {
+
+/// $KBVH_DATA, or ../shared/data beside the repository.
+std::filesystem::path data_folder();
+
+/// A scene of real or simulated meshes: where it comes from is in the name.
+struct RealScene {
+  std::string name;
+  bool needs_data = false;
+};
+/// The tablecloth with its table; each sequence cut by a sphere; two sequences overlapping; the scenes of
+/// several bodies.
+std::vector<RealScene> real_scenes();
+
+/// Loads one. `keyframes` 0: all; otherwise that many from the middle of the clip. Large scenes are left out
+/// (no bodies) if `most_triangles` is exceeded.
+experiments::LoadedScene load_real_scene(const std::string& name, std::size_t keyframes,
+                                         std::size_t most_triangles);
+
+}  // namespace kbvh::test

@@ -1,0 +1,257 @@
+// Topologies, builders, renumbering, oracle, audit, flight plans and playback, each alone.
+
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+#include <cmath>
+#include <limits>
+
+#include "core/hierarchy/audit.hpp"
+#include "core/hierarchy/oracle.hpp"
+#include "core/hierarchy/renumber.hpp"
+#include "core/registry.hpp"
+#include "tests/support/synthetic_scenes.hpp"
+
+namespace kbvh::test {
+namespace {
+
+template <class S>
+std::vector<S> positions_at(const FlightPlans<S>& plans, double t) {
+  std::vector<S> positions(std::size_t(3) * plans.vertex_count());
+  plans.evaluate(t, positions.data());
+  return positions;
+}
+
+TEST(Builders, MakeSoundTopologiesOfEveryShape) {
+  for (const std::string& name : synthetic_scene_names()) {
+    const Scene<float> scene = synthetic_scene<float>(name).scene;
+    for (const auto& body : scene.bodies) {
+      const auto positions = positions_at(body.plans, 0.0);
+      const auto boxes = primitive_boxes(body.primitives, positions.data());
+      for (BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
+        for (std::uint32_t width : {2u, 4u, 8u})
+          for (std::uint32_t leaf = 1; leaf <= 16; ++leaf) {
+            const Topology topology =
+                build_topology<float>(boxes, {.method = method, .width = width, .leaf_size = leaf});
+            EXPECT_EQ(check_topology(topology, body.primitives.count()), "")
+                << name << " " << kbvh::name(method) << " width " << width << " leaf " << leaf;
+            if (method == BuildMethod::median && leaf >= 2) {
+              EXPECT_TRUE(topology.perfect || topology.empty())
+                  << name << " width " << width << " leaf " << leaf;
+            }
+          }
+    }
+  }
+}
+
+TEST(Builders, RefuseWhatIsNotAdmissible) {
+  const std::vector<Box<float>> boxes(3);
+  EXPECT_THROW(build_topology<float>(boxes, {.width = 3}), std::invalid_argument);
+  EXPECT_THROW(build_topology<float>(boxes, {.leaf_size = 0}), std::invalid_argument);
+  EXPECT_THROW(build_topology<float>(boxes, {.leaf_size = 17}), std::invalid_argument);
+  EXPECT_THROW(build_method("best"), std::invalid_argument);
+}
+
+TEST(Topology, CheckFindsBrokenInvariants) {
+  const auto test = synthetic_scene<float>("soups");
+  const Primitives& primitives = test.scene.bodies[0].primitives;
+  const auto positions = positions_at(test.scene.bodies[0].plans, 0.0);
+  const Topology sound =
+      build_topology<float>(primitive_boxes(primitives, positions.data()), {.leaf_size = 2});
+  ASSERT_EQ(check_topology(sound, primitives.count()), "");
+  Topology broken = sound;
+  broken.primitives[3] = broken.primitives[4];
+  EXPECT_NE(check_topology(broken, primitives.count()), "");
+  broken = sound;
+  broken.nodes[0] = TopologyNode::inner(1, 1);
+  EXPECT_NE(check_topology(broken, primitives.count()), "");
+  broken = sound;
+  broken.parents.back() = 0;
+  EXPECT_NE(check_topology(broken, primitives.count()), "");
+  broken = sound;
+  broken.nodes[1] = broken.nodes[2];
+  EXPECT_NE(check_topology(broken, primitives.count()), "");
+}
+
+TEST(Oracle, SweepEqualsBruteForceEverywhere) {
+  const auto compare = [](const auto& scene) {
+    using S = std::remove_cvref_t<decltype(scene.bodies[0].plans.keyframe(0)[0])>;
+    Playback<S> playback(scene);
+    std::size_t pairs = 0;
+    for (double t : frame_times(scene, 3)) {
+      playback.seek(t);
+      const auto brute = brute_force_pairs(scene, playback);
+      EXPECT_EQ(brute, sweep_pairs(scene, playback)) << scene.name << " at " << t;
+      pairs += brute.size();
+    }
+    return pairs;
+  };
+  std::size_t pairs = 0;
+  for (const std::string& name : synthetic_scene_names()) {
+    pairs += compare(synthetic_scene<float>(name).scene);
+    pairs += compare(synthetic_scene<double>(name).scene);
+  }
+  EXPECT_GT(pairs, 10000u) << "the scenes no longer collide";
+}
+
+TEST(Oracle, CacheOnDiskIsUsedAndDamageIsIgnored) {
+  const auto test = synthetic_scene<float>("soups");
+  const auto folder = std::filesystem::temp_directory_path() / ("kbvh-oracle-" + std::to_string(::getpid()));
+  Playback<float> playback(test.scene);
+  std::vector<PrimitivePair> truth;
+  { truth = Oracle<float>(test.scene, folder).pairs(playback); }
+  ASSERT_FALSE(truth.empty());
+  ASSERT_FALSE(std::filesystem::is_empty(folder));
+  const auto file = std::filesystem::directory_iterator(folder)->path();
+  EXPECT_EQ(Oracle<float>(test.scene, folder).pairs(playback), truth);
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  EXPECT_EQ(Oracle<float>(test.scene, folder).pairs(playback), truth);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Renumber, KeepsGeometryAndOrdersMemory) {
+  for (const std::string name :
+       {"sheets", "polygons", "four_bodies_own_keyframes", "one_triangle_and_none"}) {
+    const Scene<float> scene = synthetic_scene<float>(name).scene;
+    const auto renumbered = renumber_in_leaf_order(scene, {.leaf_size = 4});
+    validate(renumbered.scene);
+    Playback<float> before(scene), after(renumbered.scene);
+    for (double t : frame_times(scene, 2)) {
+      before.seek(t);
+      after.seek(t);
+      auto pairs = brute_force_pairs(renumbered.scene, after);
+      for (PrimitivePair& pair : pairs) {
+        pair.primitive_a = renumbered.old_primitive[pair.body_a][pair.primitive_a];
+        pair.primitive_b = renumbered.old_primitive[pair.body_b][pair.primitive_b];
+      }
+      std::sort(pairs.begin(), pairs.end());
+      EXPECT_EQ(pairs, brute_force_pairs(scene, before)) << name << " at " << t;
+    }
+  }
+}
+
+TEST(FlightPlans, RestBeforeAndAfterTheClip) {
+  const FlightPlans<float> plans(1, {1.0, 3.0}, {0, 0, 0, 4, 8, -2});
+  EXPECT_EQ(positions_at(plans, 0.0), (std::vector<float>{0, 0, 0}));
+  EXPECT_EQ(positions_at(plans, 1.5), (std::vector<float>{1, 2, -0.5f}));
+  EXPECT_EQ(positions_at(plans, 9.0), (std::vector<float>{4, 8, -2}));
+  EXPECT_EQ(plans.segment_at(2.0), 0u);
+  EXPECT_EQ(plans.segment_at(3.0), 1u);
+}
+
+TEST(FlightPlans, RefuseBadInputNamingIt) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto message = [](auto make) -> std::string {
+    try {
+      make();
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "nothing thrown";
+  };
+  EXPECT_NE(message([&] {
+              FlightPlans<float>(1, {0.0}, {0, nan, 0});
+            }).find("vertex 0, axis y"),
+            std::string::npos);
+  EXPECT_NE(message([&] {
+              FlightPlans<float>(1, {0.0, 0.0}, {0, 0, 0, 0, 0, 0});
+            }).find("increase"),
+            std::string::npos);
+  EXPECT_NE(message([&] { FlightPlans<float>(2, {0.0}, {0, 0, 0}); }).find("expected 6"), std::string::npos);
+  EXPECT_NE(message([&] {
+              FlightPlans<float>(1, {0.0}, {0, 2e30f, 0});
+            }).find("admissible"),
+            std::string::npos);
+  EXPECT_NE(message([&] { FlightPlans<float>(0, {}, {}); }).find("keyframe"), std::string::npos);
+}
+
+TEST(FlightPlans, HoldNoNegativeZero) {
+  const FlightPlans<float> plans(1, {0.0, 1.0}, {-0.0f, 1, -1, -0.0f, -1, 1});
+  for (double t : {0.0, 0.25, 0.5, 1.0, 2.0})
+    for (float x : positions_at(plans, t)) EXPECT_FALSE(x == 0 && std::signbit(x)) << "at " << t;
+}
+
+TEST(Playback, LazyPositionsEqualEagerOnes) {
+  const Scene<double> scene = synthetic_scene<double>("soups").scene;
+  Playback<double> lazy(scene), eager(scene);
+  Random random(5);
+  for (double t : frame_times(scene, 4)) {
+    lazy.seek(t);
+    eager.seek(t);
+    eager.evaluate_all();
+    for (int i = 0; i < 50; ++i) {
+      const std::uint32_t v = random.below(scene.bodies[0].plans.vertex_count());
+      for (int axis = 0; axis < 3; ++axis)
+        EXPECT_EQ(lazy.position(0, v)[axis], eager.positions(0)[3 * v + std::uint32_t(axis)]);
+    }
+  }
+  EXPECT_GT(lazy.fetched(), 0u);
+  EXPECT_EQ(eager.fetched(), 0u);
+}
+
+TEST(Playback, PlanChangesAreAllOrNothing) {
+  const Scene<float> scene = synthetic_scene<float>("soups").scene;
+  Playback<float> playback(scene);
+  playback.seek(0.3);
+  PlanChange<float> good, bad;
+  good.vertex = 1;
+  good.velocity[0] = 2;
+  bad.vertex = 2;
+  bad.velocity[1] = std::numeric_limits<float>::infinity();
+  const std::vector<PlanChange<float>> changes{good, bad};
+  EXPECT_THROW(playback.change_plans(0.3, changes), std::invalid_argument);
+  EXPECT_FALSE(playback.plans(0).has_own_plans());
+  EXPECT_THROW(playback.change_plans(0.2, {&good, 1}), std::invalid_argument) << "the past";
+  playback.change_plans(0.3, {&good, 1});
+  const float start = playback.position(0, 1)[0];
+  playback.seek(1.3);
+  EXPECT_FLOAT_EQ(playback.position(0, 1)[0], start + 2);
+}
+
+TEST(Scene, FrameTimesOverlayTheBodies) {
+  const Scene<float> scene = synthetic_scene<float>("four_bodies_own_keyframes").scene;
+  const auto keyframes = overlaid_keyframes(scene);
+  EXPECT_EQ(keyframes.front(), -0.5);
+  EXPECT_EQ(keyframes.back(), 2.0);
+  const auto frames = frame_times(scene, 10);
+  EXPECT_EQ(frames.size(), (keyframes.size() - 1) * 10 + 1);
+  EXPECT_TRUE(std::is_sorted(frames.begin(), frames.end()));
+  EXPECT_THROW(frame_times(scene, 0), std::invalid_argument);
+}
+
+TEST(Scene, HashSeesEveryNumber) {
+  auto test = synthetic_scene<float>("soups");
+  const std::uint64_t before = hash(test.scene);
+  EXPECT_EQ(hash(synthetic_scene<float>("soups").scene), before);
+  EXPECT_NE(hash(synthetic_scene<double>("soups").scene), before);
+  test.scene.bodies[0].primitives.vertices[5] ^= 1;
+  EXPECT_NE(hash(test.scene), before);
+}
+
+TEST(Audit, MeasuresProtrusionAndLooseness) {
+  const auto test = synthetic_scene<double>("soups");
+  const auto& body = test.scene.bodies[0];
+  const auto positions = positions_at(body.plans, 0.0);
+  AuditView view;
+  view.topology =
+      build_topology<double>(primitive_boxes(body.primitives, positions.data()), {.leaf_size = 4});
+  view.boxes = tight_boxes(view.topology, body.primitives, positions.data());
+  Audit clean = audit(view, body.primitives, positions.data());
+  EXPECT_EQ(clean.invalid, 0u);
+  EXPECT_EQ(clean.not_tight, 0u);
+  EXPECT_EQ(clean.protrusion, 0);
+  EXPECT_EQ(clean.looseness(), 0);
+  view.boxes[2].upper[1] -= 0.125;
+  view.boxes[3].lower[0] -= 0.5;
+  const Audit found = audit(view, body.primitives, positions.data());
+  EXPECT_EQ(found.invalid, 1u);
+  EXPECT_EQ(found.not_tight, 2u);
+  EXPECT_DOUBLE_EQ(found.protrusion, 0.125);
+  EXPECT_NE(found.first_fault.find("node 2"), std::string::npos);
+  view.stale.assign(view.topology.size(), 0);
+  view.stale[2] = 1;
+  EXPECT_EQ(audit(view, body.primitives, positions.data()).invalid, 0u);
+}
+
+}  // namespace
+}  // namespace kbvh::test
