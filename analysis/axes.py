@@ -13,7 +13,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullForma
 from matplotlib.transforms import Affine2D, ScaledTranslation, Transform, offset_copy
 
 from colours import Look
-from text import significant
+from text import tick as plain_tick
 
 FormatTick = Callable[[float], str]
 
@@ -25,7 +25,7 @@ class KeyLines(Enum):
     hidden = "hidden"
 
 
-def log_axis(axes: Axes, which: str, values: Sequence[float], tick: FormatTick = significant) -> None:
+def log_axis(axes: Axes, which: str, values: Sequence[float], tick: FormatTick = plain_tick) -> None:
     """A log axis over positive values with some room, and ticks at 1, 2, 5 if it spans little."""
     low, high = min(values), max(values)
     room = max((high / low) ** 0.06, 1.15)
@@ -67,14 +67,17 @@ def fixed_log_axis(axes: Axes, which: str, values: Sequence[float], tick: Format
 
 
 def zero_log_axis(axes: Axes, values: Sequence[float], tick: FormatTick) -> None:
-    """An x axis that is logarithmic but starts with a place for exact zeros, set apart by a broken line."""
+    """A logarithmic x axis with a grey strip for exact zeros at its left; without zeros, a plain one."""
     positive = [value for value in values if value > 0]
+    if len(positive) == len(values):
+        log_axis(axes, "x", values, tick)
+        return
     first = math.floor(math.log10(min(positive)))
     last = math.ceil(math.log10(max(positive)) + 1e-9)
     last = max(last, first + 1)
     threshold = 10.0**first
     axes.set_xscale("symlog", linthresh=threshold, linscale=max(0.45, (last - first) * 0.22))
-    axes.set_xlim(-threshold * 0.45, max(positive) * 10 ** (0.12 * (last - first)))
+    axes.set_xlim(-threshold * 0.45, max(positive) * max(2.2, 10 ** (0.12 * (last - first))))
     step = max(1, math.ceil((last - first) / 5))
     places = [0.0] + [10.0**power for power in range(first, last + 1, step)]
     axes.xaxis.set_major_locator(FixedLocator([p for p in places if p <= axes.get_xlim()[1]]))
@@ -109,11 +112,11 @@ def key(axes: Axes, entries: Sequence[tuple[str, Look]], lines: KeyLines) -> Non
     step = min(16.0, height / max(len(entries), 1))
     for row, (label, look) in enumerate(entries):
         at = offset_copy(axes.transAxes, axes.figure, x=0, y=-8 - row * step, units="points")
-        start = 26 if lines is KeyLines.shown else 8
+        start = 36 if lines is KeyLines.shown else 8
         if lines is KeyLines.shown:
             left = offset_copy(at, axes.figure, x=2, units="points")
             axes.add_line(_segment(axes, left, look))
-        middle = offset_copy(at, axes.figure, x=14 if lines is KeyLines.shown else 6, units="points")
+        middle = offset_copy(at, axes.figure, x=19 if lines is KeyLines.shown else 6, units="points")
         axes.plot([0], [1], marker=look.marker, color=look.colour, markerfacecolor=look.face, markersize=6,
                   markeredgewidth=1.4, linestyle="none", clip_on=False, transform=middle)  # fmt: skip
         text_at = offset_copy(at, axes.figure, x=start + 8, units="points")
@@ -122,12 +125,12 @@ def key(axes: Axes, entries: Sequence[tuple[str, Look]], lines: KeyLines) -> Non
 
 def key_width(labels: Sequence[str]) -> float:
     """Inches that a key of these names needs."""
-    return 0.6 + 0.074 * max(map(len, labels))
+    return 0.75 + 0.074 * max(map(len, labels))
 
 
 def _segment(axes: Axes, left: Transform, look: Look) -> Line2D:
-    """24 points of a contestant's line, starting where `left` takes the top left of the axes."""
-    line = Line2D([0, 24], [0, 0], color=look.colour, linestyle=look.line, linewidth=1.6, clip_on=False)
+    """34 points of a contestant's line, starting where `left` takes the top left of the axes."""
+    line = Line2D([0, 34], [0, 0], color=look.colour, linestyle=look.line, linewidth=1.6, clip_on=False)
     inches = Affine2D().scale(1 / 72) + axes.figure.dpi_scale_trans
     line.set_transform(inches + ScaledTranslation(0, 1, left))
     return line
@@ -142,12 +145,13 @@ def keep_labels_apart(axes: Axes, points: Sequence[tuple[float, float]], labels:
     scale = axes.figure.dpi / 72
     taken = [(x - 5 * scale, y - 5 * scale, x + 5 * scale, y + 5 * scale) for x, y in at]
     for (x, y), label in sorted(zip(at.tolist(), labels), key=lambda item: item[0]):
-        width, height = (2 + 5.4 * len(label)) * scale, 9 * scale
+        width, height = (2 + 5.2 * len(label)) * scale, 9 * scale
         best: tuple[float, float, float] | None = None
         for reach in (10, 15, 21, 28, 36, 46, 58):
             for angle in (0, 40, -40, 90, -90, 140, -140, 180, 20, -20, 65, -65):
-                cx = x + (reach * math.cos(math.radians(angle))) * scale
-                cy = y + (reach * math.sin(math.radians(angle))) * scale
+                across, up = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+                cx = x + across * ((reach - 4) * scale + width / 2)
+                cy = y + up * reach * scale
                 box = (cx - width / 2, cy - height / 2, cx + width / 2, cy + height / 2)
                 inside = axes.bbox.x0 < box[0] and axes.bbox.y0 < box[1] < box[3] < axes.bbox.y1
                 if inside and not any(_overlap(box, other) for other in taken):
@@ -155,13 +159,14 @@ def keep_labels_apart(axes: Axes, points: Sequence[tuple[float, float]], labels:
                     break
             if best:
                 break
-        cx, cy, reach = best or (x + 10 * scale, y, 10)
+        cx, cy, reach = best or (x + 6 * scale + width / 2, y, 10)
         taken.append((cx - width / 2, cy - height / 2, cx + width / 2, cy + height / 2))
         offset = ((cx - x) / scale, (cy - y) / scale)
         data = axes.transData.inverted().transform((x, y))
         lead = {"arrowstyle": "-", "color": "#888888", "linewidth": 0.6, "shrinkA": 4, "shrinkB": 4} if reach > 12 else None
         axes.annotate(label, data, xytext=offset, textcoords="offset points", ha="center", va="center",
-                      fontsize=7.5, color="#222222", arrowprops=lead, zorder=6)  # fmt: skip
+                      fontsize=7.5, color="#222222", arrowprops=lead, zorder=6,
+                      bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.8})  # fmt: skip
 
 
 def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:

@@ -61,6 +61,8 @@ def picture(
         if figure is None:
             return None
         FigureCanvasAgg(figure)
+        figure.draw_without_rendering()  # lays it out once, not once per format
+        figure.set_layout_engine("none")
         folder.mkdir(parents=True, exist_ok=True)
         figure.savefig(folder / f"{name}.png", dpi=160)
         figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None, "Title": title})

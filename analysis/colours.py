@@ -41,7 +41,7 @@ SHADES: tuple[float, ...] = (0.0, -0.35, 0.35, -0.6, 0.55)
 
 #: Phases of a frame, from light to dark so that they differ in grey, too; none is a family's colour.
 PHASES: dict[str, tuple[str, str]] = {
-    "motion": ("#E4E1DA", ""),
+    "motion": ("#C9C2B2", ""),
     "update": ("#33415C", ""),
     "plan_changes": ("#7D8597", "xxx"),
     "traversal": ("#A9B4C9", ""),

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from axes import (
     KeyLines,
@@ -26,7 +27,7 @@ from axes import (
 )
 from colours import PHASE_NAMES, PHASES, Look
 from ratios import crossings, pareto_front
-from text import percent, significant, size
+from text import percent_tick, significant, size, tick
 
 WIDTH = 10.5  #: of every figure, in inches
 #: Bars longer than this many times the fastest are torn off, or the others could not be read.
@@ -100,21 +101,23 @@ def time_against_error(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
     names = [f"{number + 1}  {label}" for number, label in enumerate(rows["label"])]
     count = len(panels) + (1 if len(wrong) else 0) + (1 if len(protruding) else 0)
     side = key_width(names)
-    figure = Figure(figsize=(WIDTH, max(3.9, 0.7 + 0.225 * len(rows))), layout="constrained")
-    grid = figure.add_gridspec(1, count + 1, width_ratios=[(WIDTH - side) / count] * count + [side])
+    deep = 2 if count > 2 else 1
+    figure = Figure(figsize=(WIDTH, max(3.6 * deep, 0.7 + 0.225 * len(rows))), layout="constrained")
+    across = min(count, 2)
+    grid = figure.add_gridspec(deep, across + 1, width_ratios=[(WIDTH - side) / across] * across + [side])
     drawn: list[tuple[Axes, list[tuple[float, float]], list[str]]] = []
     for place in range(count):
-        axes = figure.add_subplot(grid[0, place])
+        axes = figure.add_subplot(grid[place // 2, place % 2])
         if place < len(panels):
             drawn.append((axes, *draw_error_panel(axes, rows, looks, *panels[place])))
         elif place == len(panels) and len(wrong):
             drawn.append((axes, *draw_wrong_pairs(axes, rows, looks)))
         else:
             drawn.append((axes, *draw_error_panel(axes, rows, looks, "protrusion", "protrusion (scene units)")))
-        if place == 0:
+        if place % 2 == 0:
             axes.set_ylabel("total time per frame (ms)")
-    key(figure.add_subplot(grid[0, count]), [(name, looks[c]) for name, c in zip(names, rows["contestant"])],
-        KeyLines.hidden)  # fmt: skip
+    entries = [(name, looks[c]) for name, c in zip(names, rows["contestant"])]
+    key(figure.add_subplot(grid[:, across]), entries, KeyLines.hidden)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axes, points, numbers in drawn:
@@ -127,9 +130,9 @@ def draw_error_panel(
 ) -> tuple[list[tuple[float, float]], list[str]]:
     """Time against one error that is 0 at best; returns the points with their numbers in the key."""
     known = rows[rows[column].notna()]
-    tick = percent if column == "looseness" else significant
+    format_tick = percent_tick if column == "looseness" else tick
     log_axis(axes, "y", list(rows["total_motion"]))
-    zero_log_axis(axes, list(known[column]), tick)
+    zero_log_axis(axes, list(known[column]), format_tick)
     points = list(zip(known[column].astype(float), known["total_motion"].astype(float)))
     front = [points[i] for i in pareto_front(points)]
     if front:
@@ -157,7 +160,7 @@ def draw_wrong_pairs(axes: Axes, rows: pd.DataFrame, looks: Looks) -> tuple[list
     wrong = rows[(rows["missed"] > 0) | (rows["extra"] > 0)]
     truth = np.maximum(wrong["pairs"], 1)
     missed, extra = wrong["missed"] / truth, wrong["extra"] / truth
-    zero_log_axis(axes, [*missed, *extra], percent)
+    zero_log_axis(axes, [*missed, *extra], percent_tick)
     points: list[tuple[float, float]] = []
     for m, e, y, contestant in zip(missed, extra, wrong["total_motion"], wrong["contestant"]):
         look = looks[contestant]
@@ -261,42 +264,51 @@ def _slope(axes: Axes) -> None:
 
 
 def counters(group: pd.DataFrame, over: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Events and written values per frame: lines over n where there are several sizes, else one mark each."""
+    """Events and written values per frame of event-driven strategies and refits.
+
+    Lines over n where `over` has several sizes; else bars for `group`. None without events.
+    """
+    several = over["primitives"].nunique() > 1
+    rows = over if several else group
+    rows = rows[(rows["certificates_failed_per_frame"] > 0) | (rows["family"] == "refit")]
     wanted = [
         ("certificates_failed_per_frame", "events per frame"),
         ("values_written_per_frame", "bound values written per frame"),
     ]
-    rows = over if over["primitives"].nunique() > 1 else group
     panels = [(column, title) for column, title in wanted if (rows[column] > 0).any()]
-    if not panels:
+    if not (rows["certificates_failed_per_frame"] > 0).any():
         return None
-    if rows["primitives"].nunique() > 1:
-        shown = rows[(rows[[column for column, _ in panels]] > 0).any(axis=1)]
-        figure, all_axes = _lines(shown, looks, "primitives", panels, "primitives n")
+    if several:
+        figure, all_axes = _lines(rows, looks, "primitives", panels, "primitives n")
         for axes in all_axes:
             _slope(axes)
         return figure
-    rows = rows[(rows[[column for column, _ in panels]] > 0).any(axis=1)]
     rows = rows.sort_values(panels[-1][0], ascending=True)
     figure = _rows_figure(len(rows), 0.25)
     all_axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
-    for place, (axes, (column, title)) in enumerate(zip(all_axes, panels)):
-        positive = rows[rows[column] > 0]
-        log_axis(axes, "x", list(positive[column]), size)
-        for row, (value, contestant) in enumerate(zip(rows[column], rows["contestant"])):
-            if value > 0:
-                axes.plot([axes.get_xlim()[0], value], [row, row], color="#CCCCCC", linewidth=1.2, zorder=1)
-                mark(axes, value, row, looks[contestant])
-                axes.annotate(size(value) if value >= 10 else significant(value, 2), (value, row), xytext=(7, 0),
-                              textcoords="offset points", va="center", fontsize=7.5)  # fmt: skip
-        low, high = axes.get_xlim()
-        axes.set_xlim(low, high * (high / low) ** 0.12)
+    for axes, (column, title) in zip(all_axes, panels):
+        draw_counter(axes, rows, looks, column)
         axes.set_title(title)
-        if place == 0:
-            contestants_on_y(axes, list(rows["label"]), [looks[c] for c in rows["contestant"]])
-        else:
-            axes.tick_params(axis="y", length=0, labelleft=False)
+    contestants_on_y(all_axes[0], list(rows["label"]), [looks[c] for c in rows["contestant"]])
+    for axes in all_axes[1:]:
+        axes.tick_params(axis="y", length=0, labelleft=False)
     return figure
+
+
+def draw_counter(axes: Axes, rows: pd.DataFrame, looks: Looks, column: str) -> None:
+    """A bar per contestant from zero, with its number; nothing for those that do not count this."""
+    for row, (value, contestant) in enumerate(zip(rows[column], rows["contestant"])):
+        if not value > 0:
+            continue
+        look = looks[contestant]
+        axes.barh([row], [value], height=0.6, color=look.colour if look.filled else "white", edgecolor=look.colour,
+                  linewidth=1.2)  # fmt: skip
+        axes.annotate(size(value) if value >= 10 else significant(value, 2), (value, row), xytext=(4, 0),
+                      textcoords="offset points", va="center", fontsize=8)  # fmt: skip
+    axes.set_xlim(0, rows[column].max() * 1.15)
+    axes.xaxis.set_major_locator(MaxNLocator(5))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))
+    axes.grid(True, axis="x")
 
 
 def latency(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
@@ -322,5 +334,5 @@ def latency(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
                                     ("X", "white", "worst frame"))
     ]  # fmt: skip
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), ncol=3, frameon=False, borderaxespad=0.2)
-    axes.set_xlabel("time of one frame (ms)")
+    axes.set_xlabel("update and query of one frame (ms)")
     return figure

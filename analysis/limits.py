@@ -41,11 +41,11 @@ def _noise(timed: pd.DataFrame) -> tuple[str, str]:
             words.append(f"Some runs have only {text.plural(fewest, 'repetition')}: their ranges are narrower than the truth.")
     if single:
         words.append(f"{text.plural(single, 'run')} of {len(timed)} had a single repetition and no estimate of noise.")
-    plain = timed[timed["kind"] == "run"]
-    if len(plain):
+    sessions = timed.groupby("group")["session"].nunique()
+    if (sessions > 1).any():
         words.append(
-            f"{text.plural(len(plain), 'time')} {'comes' if len(plain) == 1 else 'come'} from plain runs, whose contestants "
-            "ran one after the other; `kbvh bench` interleaves them."
+            f"In {text.plural(int((sessions > 1).sum()), 'table')} of {len(sessions)} the times come from several sessions, "
+            "between which the machine may have changed; ratios across them are marked ~."
         )
     return "Noise", " ".join(words)
 
@@ -75,7 +75,7 @@ def _oracle(runs: pd.DataFrame) -> tuple[str, str]:
     words = []
     if len(sampled):
         low, high = int(sampled["sampled_every"].min()), int(sampled["sampled_every"].max())
-        every = f"{low}th" if low == high else f"{low}th to {high}th"
+        every = text.ordinal(low) if low == high else f"{text.ordinal(low)} to {text.ordinal(high)}"
         words.append(
             f"{text.plural(len(sampled), 'run')} of {len(runs)} {'was' if len(sampled) == 1 else 'were'} compared with the "
             f"oracle on every {every} frame only; an error between these frames would go unseen, and missed and extra pairs "

@@ -46,6 +46,14 @@ class Study:
     repetitions: pd.DataFrame
     notes: list[str]
 
+    def groups(self) -> list[pd.DataFrame]:
+        """The runs of each group, in the order of a report: scenes as in the file, then size, scalar and l."""
+        first = self.runs.groupby("scene")["run"].transform("min")
+        ordered = self.runs.assign(first=first, doubles=self.runs["scalar"] != "float").sort_values(
+            ["first", "primitives", "doubles", "scalar", "l", "group", "run"], kind="stable"
+        )
+        return [rows.drop(columns=["first", "doubles"]) for _, rows in ordered.groupby("group", sort=False)]
+
     @property
     def timed(self) -> pd.DataFrame:
         """Runs with times: verified, not refused."""
@@ -178,13 +186,15 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
     row: dict[str, Any] = {
         "run": index,
         "key": str(record.get("key", "")),
+        "session": str(record.get("run", "")),
         "kind": record.text("kind"),
         "when": record.text("when", ""),
         "commit": record.text("commit", ""),
         "dirty": record.flag("dirty", False),
         **machine,
         "seed": str(record.get("seed", "")),
-        "scene": record.text("scene.name"),
+        "scene": _family(record.text("scene.name"), bodies),
+        "scene_name": record.text("scene.name"),
         "hash": str(record.get("scene.hash", "")),
         "scalar": record.text("scene.scalar"),
         "l": record.number("scene.per_keyframe"),
@@ -223,8 +233,20 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         row[f"{name}_per_frame"] = total if name in LEVELS or not row["frames"] > 0 else total / row["frames"]
     row["contestant"] = _identity(row["id"], params, builder)
     row["machine"] = " · ".join(machine[name] for name in ("cpu", "os", "compiler", "flags", "build_type", "simd"))
-    row["group"] = json.dumps([row["scene"], row["hash"], row["primitives"], row["scalar"], row["l"], row["machine"]])
+    row["group"] = json.dumps(
+        [row["scene_name"], row["hash"], row["primitives"], row["scalar"], row["l"], str(row["frames"]), row["machine"]]
+    )
     return row
+
+
+def _family(name: str, bodies: Any) -> str:
+    """A scene's name without the numbers of primitives in it, so that its sizes belong together.
+
+    `tablecloth-2048-200` is `tablecloth` if its bodies have 2048 and 200 primitives.
+    """
+    counts = {str(body.get("primitives")) for body in bodies if isinstance(body, dict)} if isinstance(bodies, list) else set()
+    head, *rest = name.split("-")
+    return "-".join([head, *(part for part in rest if part not in counts)])
 
 
 def _repetitions(record: _Record, index: int, row: dict[str, Any]) -> list[dict[str, float]]:
@@ -262,7 +284,7 @@ def _labels(runs: pd.DataFrame) -> pd.Series:
         names = sorted({name for fact in facts for name in fact})
         varying = [name for name in names if len({fact.get(name, "") for fact in facts}) > 1]
         for row, fact in zip(unique.itertuples(), facts):
-            told = ", ".join(f"{name} {fact[name]}" for name in varying if fact.get(name, "") != "")
+            told = ", ".join(f"{name} {fact[name]}".replace("_", " ") for name in varying if fact.get(name, "") != "")
             labels[row.contestant] = f"{row.title} ({told})" if told else row.title
     for title, same in runs.drop_duplicates("contestant").groupby(lambda i: labels[runs.at[i, "contestant"]]):
         if same["id"].nunique() > 1:  # two strategies with one title would share a line in a legend
@@ -279,23 +301,8 @@ def _facts(params: dict[str, Any], builder: Optional[dict[str, Any]]) -> dict[st
 
 
 def _newest(runs: pd.DataFrame) -> tuple[pd.DataFrame, int]:
-    """One run per configuration, the newest; but a plain run does not replace a benchmark of the same commit.
-
-    Refusals replace and are replaced by age alone: an older time must not hide a newer failure.
-    """
-    kept: dict[tuple[str, str], Any] = {}
-    for row in runs.itertuples():
-        old = kept.get((row.group, row.contestant))
-        weaker = (
-            old is not None
-            and old.kind == "bench" != row.kind
-            and not old.refused
-            and not row.refused
-            and old.commit == row.commit
-        )
-        if not weaker:
-            kept[(row.group, row.contestant)] = row
-    newest = runs[runs["run"].isin({row.run for row in kept.values()})]
+    """One run per configuration, the newest: an older time must not hide a newer failure."""
+    newest = runs.drop_duplicates(["group", "contestant"], keep="last")
     return newest.reset_index(drop=True), len(runs) - len(newest)
 
 

@@ -23,8 +23,8 @@ SCOPES: dict[str, tuple[str, ...]] = {
 class Ratio:
     """Reference time over own time: above 1 is faster than the reference.
 
-    `low` and `high` are the extremes over repetitions if `paired` (repetition i against repetition i,
-    which ran next to each other), else the extremes that any two repetitions could give.
+    `low` and `high` are the extremes over repetitions if `paired` (repetition i against repetition i of
+    the same session, which ran next to each other), else the extremes that any two repetitions could give.
     """
 
     middle: float
@@ -53,8 +53,8 @@ def ratio(study: Study, run: int, reference: int, scope: str) -> Optional[Ratio]
     other = times_of(study, reference, scope)
     if not len(own) or not len(other) or own.min() <= 0:
         return None
-    kinds = study.runs.set_index("run")["kind"]
-    if len(own) == len(other) and kinds[run] == kinds[reference]:
+    sessions = study.runs.set_index("run")["session"]
+    if len(own) == len(other) and sessions[run] == sessions[reference]:
         quotients = other / own
         return Ratio(float(np.median(quotients)), float(quotients.min()), float(quotients.max()), True, reference)
     return Ratio(
@@ -105,15 +105,23 @@ class Crossing:
 
 
 def crossings(x: np.ndarray, own: np.ndarray, reference: np.ndarray) -> list[Crossing]:
-    """Break-even points between measured ones, on log-log straight lines; never outside what was measured."""
+    """Break-even points between measured ones, on log-log straight lines; never outside what was measured.
+
+    Measured points where both are equal count only if the sides differ before and after.
+    """
     result: list[Crossing] = []
     gap = np.log(own) - np.log(reference)
-    for i in range(len(x) - 1):
-        if gap[i] * gap[i + 1] < 0:
-            share = gap[i] / (gap[i] - gap[i + 1])
-            at = math.exp(math.log(x[i]) + share * (math.log(x[i + 1]) - math.log(x[i])))
-            level = math.exp(math.log(own[i]) + share * (math.log(own[i + 1]) - math.log(own[i])))
-            result.append(Crossing(at, level, bool(gap[i + 1] < 0)))
+    unequal = np.flatnonzero(gap)
+    for i, j in zip(unequal[:-1], unequal[1:]):
+        if gap[i] * gap[j] > 0:
+            continue
+        if j > i + 1:  # equal in between: the first of these points is the break-even
+            result.append(Crossing(float(x[i + 1]), float(own[i + 1]), bool(gap[j] < 0)))
+            continue
+        share = gap[i] / (gap[i] - gap[j])
+        at = math.exp(math.log(x[i]) + share * (math.log(x[j]) - math.log(x[i])))
+        level = math.exp(math.log(own[i]) + share * (math.log(own[j]) - math.log(own[i])))
+        result.append(Crossing(at, level, bool(gap[j] < 0)))
     return result
 
 
@@ -121,6 +129,8 @@ def break_even(x: np.ndarray, own: np.ndarray, reference: np.ndarray) -> str:
     """The crossings in words."""
     found = crossings(x, own, reference)
     if not found:
-        faster = bool(np.median(own / reference) < 1)
-        return "faster throughout" if faster else "slower throughout"
+        sides = own - reference
+        if not np.any(sides):
+            return "as fast throughout"
+        return "faster throughout" if sides[np.flatnonzero(sides)[0]] < 0 else "slower throughout"
     return ", ".join(f"{'faster' if c.faster else 'slower'} from l ≈ {c.x:.0f}" for c in found)

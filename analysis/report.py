@@ -1,6 +1,6 @@
 """Turns a folder of results into report.html and figures/.
 
-usage: report.py RESULTS_DIR [--title TEXT] [--figures main|all] [--print]
+usage: report.py RESULTS_DIR [--title TEXT] [--figures main|all|none] [--print]
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ class Section:
     title: str
     anchor: str
     bodies: list[dict[str, str]]
+    sizes: str  #: of the smaller versions of the scene
     groups: list[tables.Group]
     pictures: list[Picture] = field(default_factory=list)
     break_even: list[tuple[str, str, str, str]] = field(default_factory=list)
@@ -49,8 +50,8 @@ def main(arguments: Optional[list[str]] = None) -> int:
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
     parser.add_argument("--title", default="BVH update strategies, measured", help="heading of the report")
     parser.add_argument(
-        "--figures", choices=("main", "all"), default="main",
-        help="figures of one group per scene (default), or of every group",
+        "--figures", choices=("main", "all", "none"), default="main",
+        help="figures of one group per scene (default), of every group, or none",
     )  # fmt: skip
     parser.add_argument("--print", dest="printed", action="store_true", help="also print the tables as text")
     options = parser.parse_args(arguments)
@@ -74,8 +75,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
 
 def plain_groups(study: Study) -> list[tuple[str, tables.Group]]:
     """Groups with the name of their scene."""
-    ordered = study.runs.sort_values(["scene", "primitives", "scalar", "l", "machine"], kind="stable")
-    scenes = [rows["scene"].iloc[0] for _, rows in ordered.groupby("group", sort=False)]
+    scenes = [rows["scene_name"].iloc[0] for rows in study.groups()]
     return list(zip(scenes, tables.groups(study, tables.Ratios(study))))
 
 
@@ -112,15 +112,17 @@ def render(**values: object) -> str:
 def _sections(
     study: Study, groups: list[tables.Group], all_looks: dict[str, Look], folder: Path, which: str
 ) -> list[Section]:
-    ordered = study.runs.sort_values(["scene", "primitives", "scalar", "l", "machine"], kind="stable")
+    ordered = pd.concat(study.groups())
     of_group = dict(zip(ordered["group"].unique(), groups))
     result = []
     for number, (scene, rows) in enumerate(ordered.groupby("scene", sort=False)):
         mine = [of_group[group] for group in rows["group"].unique()]
-        section = Section(str(scene), f"scene-{number + 1}", _bodies(rows), mine)
+        smaller = sorted(rows["primitives"].unique())[:-1]
+        sizes = text.listing([text.size(value) for value in smaller])
+        section = Section(str(scene), f"scene-{number + 1}", _bodies(rows), sizes, mine)
         timed = rows[rows["refused"] == ""]
         slug = re.sub(r"[^a-z0-9]+", "-", str(scene).lower()).strip("-") or f"scene-{number + 1}"
-        if len(timed):
+        if len(timed) and which != "none":
             head = headline(timed)
             section.pictures += _group_pictures(timed[timed["group"] == head], timed, all_looks, folder, slug)
             if which == "all":
@@ -168,6 +170,7 @@ def _group_pictures(
     place = _place(first)
     sizes = fastest_configurations(
         timed[(timed["scalar"] == first["scalar"]) & (timed["l"] == first["l"]) & (timed["machine"] == first["machine"])]
+        .drop_duplicates(["contestant", "primitives"], keep="last")
     ) if len(timed) else timed  # fmt: skip
     made = [
         picture(
@@ -184,14 +187,14 @@ def _group_pictures(
         ),
         picture(
             folder, f"{slug}-counters", f"Work that does not depend on the machine: {place}",
-            "Event-driven strategies write a bound only when an event changes it, a refit writes all of them in every frame: "
-            "compare the written values first. Then look at the events, since each costs far more time than a written value.",
+            "An event-driven strategy writes a bound only when an event changes it, while a refit writes all of them in every "
+            "frame: that is the work it saves. What it pays are the events, each of which costs more time than writing a value.",
             lambda: figures.counters(group, sizes, all_looks),
         ),
         picture(
             folder, f"{slug}-latency", f"Even or jerky: {place}",
-            "The dot is the median frame, the bar the time that 99 % of frames stay below, the cross the worst one. A long "
-            "line means that work is saved up for a few frames, which shows as a stutter even if the mean is good.",
+            "The dot is the median frame, the bar the time that 99 % of frames stay within, the cross the worst one; motion "
+            "evaluation is not included. A long line means that work is saved up for a few frames, which shows as a stutter even if the mean is good.",
             lambda: figures.latency(group, all_looks),
         ),
     ]  # fmt: skip
@@ -204,6 +207,7 @@ def _trends(
     """Lines over l and over n, through the headline group."""
     first = timed[timed["group"] == head].iloc[0]
     same = timed[(timed["scalar"] == first["scalar"]) & (timed["machine"] == first["machine"])]
+    same = same.drop_duplicates(["contestant", "primitives", "l"], keep="last")
     depths = fastest_configurations(same[same["primitives"] == first["primitives"]])
     sizes = fastest_configurations(same[same["l"] == first["l"]])
     where = f"{first['scene']}, {first['scalar']}"
@@ -226,27 +230,20 @@ def _trends(
 
 
 def _bodies(rows: pd.DataFrame) -> list[dict[str, str]]:
-    """Facts on the bodies of a scene, at each size once."""
-    result = []
-    for _, first in rows.drop_duplicates("hash").iterrows():
-        for body in first["bodies"]:
-            if isinstance(body, dict):
-                degenerate = body.get("degenerate") or 0
-                result.append(
-                    {
-                        "name": str(body.get("name", "?")),
-                        "primitives": text.count(body.get("primitives")),
-                        "vertices": text.count(body.get("vertices")),
-                        "keyframes": text.count(body.get("keyframes")),
-                        "motion": "moves" if body.get("moving") else "rests",
-                        "degenerate": text.count(degenerate),
-                    }
-                )
-    unique: list[dict[str, str]] = []
-    for one in result:
-        if one not in unique:
-            unique.append(one)
-    return unique
+    """Facts on the bodies of a scene, at its largest size."""
+    largest = rows.loc[rows["primitives"].idxmax()]
+    return [
+        {
+            "name": str(body.get("name", "?")),
+            "primitives": text.count(body.get("primitives")),
+            "vertices": text.count(body.get("vertices")),
+            "keyframes": text.count(body.get("keyframes")),
+            "motion": "moves" if body.get("moving") else "rests",
+            "degenerate": text.count(body.get("degenerate") or 0),
+        }
+        for body in largest["bodies"]
+        if isinstance(body, dict)
+    ]
 
 
 def _values(column: pd.Series, shorten: Optional[int] = None) -> str:
@@ -285,7 +282,7 @@ def _made(study: Study) -> list[tuple[str, str]]:
                  + (f", {span} repetitions each" if span else "")
                  + (f"; {len(study.refused)} refused" if len(study.refused) else "")),
         ("Verified", f"{text.count(runs['verified_frames'].sum())} frames against the oracle before any time was taken"
-                     + ("" if every <= 1 else f" (long clips on a sample, at most every {every}th frame)")),
+                     + ("" if every <= 1 else f" (long clips on a sample: every {text.ordinal(every)} frame at the least)")),
     ]  # fmt: skip
 
 

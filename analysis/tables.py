@@ -16,6 +16,17 @@ GUARANTEE_NAMES = {"exact": "exact", "candidate_superset": "superset", "approxim
 
 
 @dataclass(frozen=True)
+class Shown:
+    """A ratio as text: the median over repetitions and their range, which is empty for a single one."""
+
+    middle: str
+    range: str
+
+    def __str__(self) -> str:
+        return f"{self.middle} {self.range}".rstrip()
+
+
+@dataclass(frozen=True)
 class Row:
     """One contestant of one group."""
 
@@ -27,8 +38,8 @@ class Row:
     update: str
     query: str
     total: str
-    ratio: str
-    ratio_without_motion: str
+    ratio: "Shown"
+    ratio_without_motion: "Shown"
     missed: str
     extra: str
     protrusion: str
@@ -65,11 +76,11 @@ class Glance:
     refit_time: str
     exact: str
     exact_contestant: str
-    exact_ratio: str
+    exact_ratio: "Shown"
     exact_faster: Optional[bool]
     approximate: str
     approximate_contestant: str
-    approximate_ratio: str
+    approximate_ratio: "Shown"
 
 
 class Ratios:
@@ -82,10 +93,9 @@ class Ratios:
 
 def groups(study: Study, all_ratios: Ratios) -> list[Group]:
     """Every group, by scene, size, scalar and l."""
-    ordered = study.runs.sort_values(["scene", "primitives", "scalar", "l", "machine"], kind="stable")
-    several_machines = ordered["machine"].nunique() > 1
+    several_machines = study.runs["machine"].nunique() > 1
     result = []
-    for number, (_, rows) in enumerate(ordered.groupby("group", sort=False)):
+    for number, rows in enumerate(study.groups()):
         first = rows.iloc[0]
         title = f"{text.size(first['primitives'])} primitives, {first['scalar']}, l = {first['l']:g}"
         facts = _facts(first, several_machines)
@@ -104,13 +114,13 @@ def anchor(number: int) -> str:
 
 
 def _facts(first: pd.Series, several_machines: bool) -> str:
-    parts = [text.plural(int(first["primitives"]), "primitive")]
+    parts = [first["scene_name"], text.plural(int(first["primitives"]), "primitive")]
     if first["frames"] == first["frames"]:
         parts.append(text.plural(int(first["frames"]), "frame"))
     if first["keyframes"] == first["keyframes"]:
         parts.append(text.plural(int(first["keyframes"]), "keyframe"))
     if first["hash"]:
-        parts.append(f"scene {first['hash'][:12]}")
+        parts.append(f"hash {first['hash'][:12]}")
     if several_machines:
         parts.append(first["machine"])
     return ", ".join(parts)
@@ -149,11 +159,13 @@ def _faster(one: Ratio) -> Optional[bool]:
     return False if one.high < 1 else None
 
 
-def shown_ratio(one: Optional[Ratio]) -> str:
+def shown_ratio(one: Optional[Ratio]) -> Shown:
     """A ratio with its range over repetitions; ~ where repetitions could not be paired."""
     if one is None:
-        return text.MISSING
-    return ("" if one.paired else "~\u2009") + text.interval(one.middle, one.low, one.high)
+        return Shown(text.MISSING, "")
+    low, high = text.factor(one.low), text.factor(one.high)
+    middle = ("" if one.paired else "~\u2009") + text.factor(one.middle)
+    return Shown(middle, "" if one.low == one.high else f"({low}–{high})")
 
 
 def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
@@ -176,15 +188,14 @@ def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
         notes.append("~ marks ratios whose repetitions could not be paired; their range is the widest possible.")
     sampled = sorted({int(every) for every in timed["sampled_every"] if every > 1})
     if sampled:
-        notes.append(f"Verified on every {text.listing([str(s) for s in sampled])}th frame and the last.")
+        notes.append(f"Verified on every {text.listing([text.ordinal(s) for s in sampled])} frame and the last.")
     return notes
 
 
 def glance(study: Study, all_ratios: Ratios, shown: list[Group]) -> list[Glance]:
     """The whole study, a line per group; groups without a refit are left out."""
     result = []
-    ordered = study.runs.sort_values(["scene", "primitives", "scalar", "l", "machine"], kind="stable")
-    for group, (_, rows) in zip(shown, ordered.groupby("group", sort=False)):
+    for group, rows in zip(shown, study.groups()):
         timed = rows[rows["refused"] == ""].sort_values("total_motion")
         references = [r for r in timed["run"] if getattr(all_ratios.with_motion.get(r), "reference", None) == r]
         if not references:
@@ -253,7 +264,7 @@ def plain(scene: str, group: Group) -> str:
          row.missed, row.extra, row.protrusion, row.looseness, row.memory)
         for row in group.rows
     ]  # fmt: skip
-    cells = [tuple(cell.replace("\u202f", " ").replace("\u00a0", " ") for cell in row) for row in cells]
+    cells = [tuple(str(cell).replace("\u202f", " ").replace("\u00a0", " ") for cell in row) for row in cells]
     widths = [max(len(row[i]) for row in cells) for i in range(len(PLAIN_COLUMNS))]
     lines = [f"{scene}: {group.title}; times in ms per frame, ratio to the best refit (above 1 is faster)"]
     for row in cells:

@@ -21,7 +21,7 @@ def significant(value: Optional[float], digits: int = 3) -> str:
         return "0"
     exponent = math.floor(math.log10(abs(value)))
     if exponent < -4 or exponent >= 7:
-        return scientific(value, max(digits - 1, 1))
+        return scientific(value, digits)
     rounded = round(value, digits - 1 - exponent)
     decimals = max(digits - 1 - math.floor(math.log10(abs(rounded))), 0)
     return f"{rounded:,.{decimals}f}".replace(",", "\u202f")
@@ -32,6 +32,26 @@ def scientific(value: float, digits: int = 2) -> str:
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     superscript = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{mantissa}×10{superscript}"
+
+
+def tick(value: float) -> str:
+    """A number beside an axis: no zeros that say nothing."""
+    if value == 0 or 1e-4 <= abs(value) < 1e6:
+        plain = f"{value:,.4f}".rstrip("0").rstrip(".") if abs(value) < 1e3 else f"{value:,.0f}"
+        return plain.replace(",", "\u202f")
+    return scientific(value, 2).replace(".0×", "×").removeprefix("1×")
+
+
+def percent_tick(value: float) -> str:
+    """A share beside an axis, as a percentage."""
+    return tick(float(f"{value * 100:.6g}")) + ("" if value == 0 else "\u2009%")
+
+
+def ordinal(number: int) -> str:
+    """`3rd`, `10th`."""
+    if number % 100 in (11, 12, 13):
+        return f"{number}th"
+    return f"{number}" + {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
 
 
 def milliseconds(value: Optional[float]) -> str:
@@ -76,13 +96,11 @@ def percent(value: Optional[float]) -> str:
     return f"{significant(value * 100, 2)}\u00a0%"
 
 
-def interval(middle: Optional[float], low: Optional[float], high: Optional[float]) -> str:
-    """A number with the range of its repetitions: 2.41 (2.38–2.45)."""
-    if middle is None or not known(middle):
-        return MISSING
-    if low is None or high is None or not (known(low) and known(high)) or low == high:
-        return significant(middle)
-    return f"{significant(middle)} ({significant(low)}–{significant(high)})"
+def factor(value: Optional[float]) -> str:
+    """A ratio: two decimals around 1, three digits elsewhere."""
+    if value is not None and known(value) and 0.1 <= value < 1:
+        return f"{value:.2f}"
+    return significant(value, 3 if value is None or value >= 1 else 2)
 
 
 def plural(number: int, singular: str, many: Optional[str] = None) -> str:

@@ -1,0 +1,69 @@
+"""Colours, markers and number formats."""
+
+from __future__ import annotations
+
+import unittest
+
+import paths  # noqa: F401  (finds the modules under test)
+
+import colours
+import text
+
+
+class TestLooks(unittest.TestCase):
+    def test_known_families_have_distinct_colours_and_markers(self) -> None:
+        every = [*colours.FAMILIES.values(), *colours.FREE]
+        self.assertEqual(len({colour for colour, _ in every}), len(every))
+        self.assertEqual(len({marker for _, marker in every}), len(every))
+
+    def test_unknown_families_get_a_colour_that_depends_on_the_name(self) -> None:
+        alone = colours.families(["mine"])["mine"]
+        self.assertEqual(colours.families(["refit", "mine", "kinetic"])["mine"], alone)
+        self.assertIn(alone, colours.FREE)
+
+    def test_unknown_families_never_collide_while_there_are_free_ones(self) -> None:
+        names = [f"family {i}" for i in range(len(colours.FREE))]
+        self.assertEqual(len(set(colours.families(names).values())), len(names))
+
+    def test_order_does_not_matter(self) -> None:
+        listed = [("a1", "a", "refit"), ("a2", "a", "refit"), ("b", "b", "refit"), ("x", "x", "new")]
+        self.assertEqual(colours.looks(listed), colours.looks(listed[::-1]))
+
+    def test_members_of_a_family_differ(self) -> None:
+        looks = colours.looks([("a1", "a", "refit"), ("a2", "a", "refit"), ("b", "b", "refit")])
+        self.assertEqual(len({(look.colour, str(look.line), look.filled) for look in looks.values()}), 3)
+        self.assertEqual(looks["a1"].colour, looks["a2"].colour)
+        self.assertEqual({look.marker for look in looks.values()}, {"o"})
+
+    def test_every_marker_has_a_symbol_for_the_page(self) -> None:
+        for colour, marker in [*colours.FAMILIES.values(), *colours.FREE]:
+            shape = colours.symbol(colours.Look(colour, marker, "-", True))
+            self.assertIn("<circle" if marker == "o" else "<polygon", shape)
+
+
+class TestText(unittest.TestCase):
+    def test_significant(self) -> None:
+        for value, expected in ((0, "0"), (0.012345, "0.0123"), (1.0, "1.00"), (9.999, "10.0"), (123.4, "123"),
+                                (12345, "12\u202f300"), (3.14e-7, "3.14×10⁻⁷"), (float("nan"), "–"), (None, "–")):  # fmt: skip
+            self.assertEqual(text.significant(value), expected)
+
+    def test_small_is_never_shown_as_zero(self) -> None:
+        self.assertNotEqual(text.significant(1e-300), "0")
+        self.assertNotEqual(text.percent(1e-9), "0\u00a0%")
+
+    def test_sizes_and_memory(self) -> None:
+        self.assertEqual([text.size(n) for n in (999, 1500, 2000, 16000, 579_000, 1_200_000)],
+                         ["999", "1.5k", "2k", "16k", "579k", "1.2M"])  # fmt: skip
+        self.assertEqual(text.memory(1_536_000), "1.54\u00a0MB")
+        self.assertEqual(text.memory(12), "12\u00a0B")
+
+    def test_ordinals(self) -> None:
+        self.assertEqual([text.ordinal(n) for n in (2, 3, 10, 11, 21, 112)], ["2nd", "3rd", "10th", "11th", "21st", "112th"])
+
+    def test_ticks(self) -> None:
+        self.assertEqual([text.tick(v) for v in (0, 0.5, 2, 2000, 1e-5, 0.0002)], ["0", "0.5", "2", "2\u202f000", "10⁻⁵", "0.0002"])
+        self.assertEqual(text.percent_tick(0.001), "0.1\u2009%")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,125 @@
+"""Ratios, break-even points and Pareto fronts against values worked out by hand."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Any
+
+import paths  # noqa: F401  (finds the modules under test)
+import synthetic
+
+import load
+import numpy as np
+import ratios
+
+
+def line(strategy: str, family: str, motion: list[float], update: list[float], **other: Any) -> dict[str, Any]:
+    """A result with given motion and update times per repetition, and nothing else that takes time."""
+    result = synthetic.record(dict(id=strategy, title=strategy, family=family, query=1.0), "s", 2000, "float", 10)
+    result["times"]["repetitions"] = [
+        {"motion": m, "update": u, "traversal": 0.0, "triangle_tests": 0.0, "plan_changes": 0.0}
+        for m, u in zip(motion, update)
+    ]
+    result.update({name: value for name, value in other.items() if name != "guarantee"})
+    result["strategy"]["guarantee"] = other.get("guarantee", "exact")
+    return result
+
+
+def ratios_of(lines: list[dict[str, Any]], scope: str) -> dict[str, ratios.Ratio]:
+    with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as folder:
+        study = load.load(synthetic.write(Path(folder), lines))
+    ids = study.runs.set_index("run")["id"]
+    return {ids[run]: one for run, one in ratios.ratios(study, scope).items()}
+
+
+class TestRatios(unittest.TestCase):
+    def test_paired_over_repetitions(self) -> None:
+        lines = [line("a", "refit", [1, 1, 1], [3, 5, 7]), line("k", "kinetic", [1, 1, 1], [1, 1, 3])]
+        with_motion = ratios_of(lines, "with_motion")["k"]
+        self.assertTrue(with_motion.paired)
+        # (4/2, 6/2, 8/4) and (3/1, 5/1, 7/3)
+        self.assertEqual((with_motion.middle, with_motion.low, with_motion.high), (2.0, 2.0, 3.0))
+        without = ratios_of(lines, "without_motion")["k"]
+        self.assertEqual((without.middle, without.low, without.high), (3.0, 7 / 3, 5.0))
+
+    def test_best_refit_is_the_reference_and_has_ratio_one(self) -> None:
+        lines = [line("slow", "refit", [0, 0], [9, 9]), line("fast", "refit", [0, 0], [3, 3]), line("r", "rebuild", [0, 0], [6, 6])]
+        found = ratios_of(lines, "with_motion")
+        self.assertEqual({name: one.middle for name, one in found.items()}, {"slow": 1 / 3, "fast": 1.0, "r": 0.5})
+
+    def test_reference_may_differ_with_and_without_motion(self) -> None:
+        fetching, plain = line("fetching", "refit", [0], [4]), line("plain", "refit", [3], [2])
+        self.assertEqual(ratios_of([fetching, plain], "with_motion")["fetching"].middle, 1.0)
+        self.assertEqual(ratios_of([fetching, plain], "without_motion")["plain"].middle, 1.0)
+
+    def test_other_libraries_and_approximate_refits_are_no_reference(self) -> None:
+        lines = [line("f", "fcl", [0], [1]), line("sloppy", "refit", [0], [1], guarantee="approximate"), line("a", "refit", [0], [2])]
+        self.assertEqual(ratios_of(lines, "with_motion")["f"].middle, 2.0)
+
+    def test_unequal_repetitions_or_sessions_are_not_paired(self) -> None:
+        uneven = [line("a", "refit", [0, 0, 0], [2, 4, 6]), line("k", "kinetic", [0, 0], [1, 2])]
+        found = ratios_of(uneven, "with_motion")["k"]
+        self.assertFalse(found.paired)
+        self.assertEqual((found.middle, found.low, found.high), (4 / 1.5, 1.0, 6.0))
+        apart = [line("a", "refit", [0, 0], [2, 4]), line("k", "kinetic", [0, 0], [1, 2], run="session 2")]
+        self.assertFalse(ratios_of(apart, "with_motion")["k"].paired)
+
+    def test_never_across_commits_or_machines(self) -> None:
+        for change in ({"commit": "another"}, {"dirty": True}, {"machine": dict(synthetic.MACHINE, cpu="another")}):
+            lines = [line("a", "refit", [0], [2]), line("k", "kinetic", [0], [1], **change)]
+            self.assertNotIn("k", ratios_of(lines, "with_motion"))
+
+    def test_plan_changes_count_as_update(self) -> None:
+        lines = [line("a", "refit", [0], [4]), line("k", "kinetic", [0], [1])]
+        lines[1]["times"]["repetitions"][0]["plan_changes"] = 1.0
+        self.assertEqual(ratios_of(lines, "update")["k"].middle, 2.0)
+
+
+class TestPareto(unittest.TestCase):
+    def test_front(self) -> None:
+        points = [(0.0, 5.0), (1.0, 3.0), (1.0, 4.0), (2.0, 3.0), (3.0, 1.0), (4.0, 2.0)]
+        self.assertEqual(ratios.pareto_front(points), [0, 1, 4])
+
+    def test_one_point_dominates(self) -> None:
+        self.assertEqual(ratios.pareto_front([(1, 1), (0, 0), (2, 0)]), [1])
+
+    def test_equal_points_and_unknown_values(self) -> None:
+        self.assertEqual(ratios.pareto_front([(math.nan, 0), (1, 1), (1, 1), (0, math.inf)]), [1])
+        self.assertEqual(ratios.pareto_front([]), [])
+
+    def test_agrees_with_the_definition_on_random_points(self) -> None:
+        rng = np.random.default_rng(1)
+        for _ in range(50):
+            points = [tuple(map(float, p)) for p in rng.integers(0, 8, size=(20, 2))]
+            front = {points[i] for i in ratios.pareto_front(points)}
+            defined = {p for p in points if not any(q != p and q[0] <= p[0] and q[1] <= p[1] for q in points)}
+            self.assertEqual(front, defined)
+
+
+class TestBreakEven(unittest.TestCase):
+    def test_crossing_on_log_log_lines(self) -> None:
+        x = np.array([1.0, 10.0, 100.0])
+        found = ratios.crossings(x, 10.0 / x, np.array([0.5, 0.5, 0.5]))
+        self.assertEqual(len(found), 1)
+        self.assertAlmostEqual(found[0].x, 20.0)
+        self.assertAlmostEqual(found[0].y, 0.5)
+        self.assertTrue(found[0].faster)
+
+    def test_crossing_at_a_measured_point(self) -> None:
+        x = np.array([1.0, 10.0, 100.0])
+        found = ratios.crossings(x, np.array([4.0, 2.0, 1.0]), np.array([2.0, 2.0, 2.0]))
+        self.assertEqual([(round(c.x, 6), c.faster) for c in found], [(10.0, True)])
+
+    def test_words(self) -> None:
+        x, one = np.array([1.0, 10.0, 100.0]), np.ones(3)
+        self.assertEqual(ratios.break_even(x, 0.5 * one, one), "faster throughout")
+        self.assertEqual(ratios.break_even(x, 2 * one, one), "slower throughout")
+        self.assertEqual(ratios.break_even(x, one, one), "as fast throughout")
+        self.assertEqual(ratios.break_even(x, 20 / x, one), "faster from l ≈ 20")
+
+
+if __name__ == "__main__":
+    unittest.main()

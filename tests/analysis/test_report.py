@@ -1,0 +1,272 @@
+"""The report from end to end: what it shows follows from the results, and wrong input ends in one clear sentence."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import io
+import json
+import re
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Any, Optional
+
+import paths  # noqa: F401  (finds the modules under test)
+import synthetic
+
+import report
+
+
+def small() -> list[dict[str, Any]]:
+    """Three contestants at one size and two l."""
+    wanted = [c for c in synthetic.CONTESTANTS if c["id"] in ("bottom_up", "kinetic_aabb", "fcl_own_verdict")]
+    return [synthetic.record(c, "tablecloth", 2000, "float", l) for l in (1, 30) for c in wanted]
+
+
+class ReportCase(unittest.TestCase):
+    def setUp(self) -> None:
+        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
+        self.addCleanup(temporary.cleanup)
+        self.folder = Path(temporary.name) / "results"
+
+    def run_report(self, *arguments: str) -> tuple[int, str, str]:
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = report.main([str(self.folder), *arguments])
+        return code, out.getvalue(), err.getvalue()
+
+    def page(self, lines: list[dict[str, Any]], tail: Optional[str] = None, figures: str = "none", title: str = "T") -> str:
+        synthetic.write(self.folder, lines, tail)
+        code, _, err = self.run_report("--figures", figures, "--title", title)
+        self.assertEqual(code, 0, err)
+        return (self.folder / "report.html").read_text(encoding="utf-8")
+
+    def refusal(self, content: Optional[str]) -> str:
+        """The sentence for a file with this content."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if content is not None:
+            (self.folder / "results.jsonl").write_text(content, encoding="utf-8")
+        code, out, err = self.run_report()
+        self.assertEqual(code, 2)
+        self.assertEqual(out, "")
+        self.assertEqual(err.count("\n"), 1, "one sentence, no traceback")
+        self.assertFalse((self.folder / "report.html").exists())
+        return err
+
+
+class TestPage(ReportCase):
+    def test_is_self_contained(self) -> None:
+        page = self.page(small(), figures="main")
+        self.assertIn("data:image/svg+xml;base64,", page)
+        for attribute in re.findall(r'(?:src|href)="([^"]*)"', page):
+            self.assertTrue(attribute.startswith(("data:", "#")), attribute[:60])
+        self.assertNotRegex(page, r"@import|url\(")
+
+    def test_figures_come_as_png_and_pdf(self) -> None:
+        self.page(small(), figures="main")
+        names = {file.name for file in (self.folder / "figures").iterdir()}
+        for figure in ("cost", "error", "counters", "latency", "l"):
+            self.assertIn(f"tablecloth-{figure}.png", names)
+            self.assertIn(f"tablecloth-{figure}.pdf", names)
+        self.assertNotIn("tablecloth-n.png", names, "one size only: no figure over sizes")
+
+    def test_figures_without_data_are_left_out(self) -> None:
+        lines = [line for line in small() if line["strategy"]["id"] == "bottom_up" and line["scene"]["per_keyframe"] == 1]
+        for line in lines:
+            line["verified"].update(looseness=0.0, candidates=line["verified"]["pairs"])
+            del line["counters"]
+            for name in ("total_p50", "total_p99", "total_worst"):
+                del line["times"][name]
+        self.page(lines, figures="main")
+        self.assertEqual({file.stem for file in (self.folder / "figures").iterdir()}, {"tablecloth-cost"})
+
+    def test_everything_from_results_is_escaped(self) -> None:
+        lines = small()
+        for line in lines:
+            line["scene"]["name"] = "<script>alert(1)</script>"
+            line["strategy"]["citation"] = "A & B <i>"
+        page = self.page(lines)
+        self.assertNotIn("<script>alert", page)
+        self.assertIn("A &amp; B &lt;i&gt;", page)
+
+    def test_two_runs_give_the_same_page(self) -> None:
+        lines = [line for line in small() if line["scene"]["per_keyframe"] == 1]
+        self.assertEqual(self.page(lines, figures="main"), self.page(lines, figures="main"))
+
+    def test_results_are_never_written(self) -> None:
+        synthetic.write(self.folder, small(), '{"schema": 1, "ki')
+        before = (self.folder / "results.jsonl").read_bytes()
+        self.run_report("--figures", "none")
+        self.assertEqual((self.folder / "results.jsonl").read_bytes(), before)
+
+    def test_all_figures_on_request(self) -> None:
+        lines = [line for line in small() if line["strategy"]["id"] == "bottom_up"]
+        self.page(lines, figures="all")
+        costs = list((self.folder / "figures").glob("*-cost.png"))
+        self.assertEqual(len(costs), 2)
+
+    def test_title(self) -> None:
+        self.assertIn("<h1>My &lt;cloth&gt;</h1>", self.page(small(), title="My <cloth>"))
+
+
+class TestShownValues(ReportCase):
+    def table(self, lines: list[dict[str, Any]]) -> str:
+        synthetic.write(self.folder, lines)
+        code, out, err = self.run_report("--print", "--figures", "none")
+        self.assertEqual(code, 0, err)
+        return out
+
+    def test_altered_time_flips_the_ratio(self) -> None:
+        lines = [line for line in small() if line["scene"]["per_keyframe"] == 30]
+        kinetic = next(line for line in lines if line["strategy"]["params"].get("queue") == "avl")
+
+        def ratio(text: str) -> float:
+            row = next(row for row in text.splitlines() if row.startswith("Kinetic AABB tree (queue avl)"))
+            return float(re.split(r"\s{2,}", row)[6].split()[0])
+
+        self.assertLess(ratio(self.table(lines)), 1)
+        for repetition in kinetic["times"]["repetitions"]:
+            for phase in repetition:
+                repetition[phase] /= 100
+        self.assertGreater(ratio(self.table(lines)), 1)
+        self.assertIn('class="n faster"', (self.folder / "report.html").read_text(encoding="utf-8"))
+
+    def test_broken_guarantee_takes_the_time_away(self) -> None:
+        lines = small()
+        kinetic = next(line for line in lines if line["strategy"]["id"] == "kinetic_aabb")
+        kinetic["verified"].update(holds=False, first_violation="frame 3: a box is too small by one ulp")
+        text = self.table(lines)
+        self.assertIn("refused: Kinetic AABB tree (queue avl): its declared guarantee or tightness is broken: "
+                      "frame 3: a box is too small by one ulp", text)  # fmt: skip
+
+    def test_refused_contestants_are_listed_with_the_reason(self) -> None:
+        lines = small()
+        synthetic.refused(lines[0], "it would take 3 hours")
+        self.assertIn("it would take 3 hours", self.page(lines))
+
+    def test_best_refit_that_is_refused_is_no_reference(self) -> None:
+        lines = [line for line in small() if line["scene"]["per_keyframe"] == 1]
+        fast = next(line for line in lines if line["strategy"]["builder"] == {"method": "median", "width": 8, "leaf_size": 4})
+        synthetic.refused(fast, "", "frame 1: a box is too small")
+        self.assertRegex(self.table(lines), r"Bottom-up refit \(leaf 1, width 2\) +exact .* 1\.00 +1\.00")
+
+    def test_missed_and_extra_are_shown(self) -> None:
+        row = next(r for r in self.table(small()).splitlines() if r.startswith("FCL with its own"))
+        self.assertEqual(re.split(r"\s{2,}", row)[8:10], ["3", "41"])
+
+    def test_looseness_of_hidden_boxes_is_unknown(self) -> None:
+        row = next(r for r in self.table(small()).splitlines() if r.startswith("FCL with its own"))
+        self.assertEqual(re.split(r"\s{2,}", row)[10:12], ["–", "–"])
+
+
+class TestLimits(ReportCase):
+    def test_dirty_tree_commits_and_sampling_are_told(self) -> None:
+        lines = small()
+        lines[0]["dirty"] = True
+        lines[1]["commit"] = "fedcba9876543210"
+        page = self.page(lines)
+        self.assertIn("uncommitted changes", page)
+        self.assertIn("2 commits", page)
+        self.assertIn("compared with the oracle on every 3rd frame only", page)
+
+    def test_single_repetition_has_no_noise(self) -> None:
+        lines = small()
+        for line in lines:
+            del line["times"]["repetitions"][1:]
+        page = self.page(lines)
+        self.assertIn("single repetition and no estimate of noise", page)
+
+
+class TestRefusals(ReportCase):
+    def test_no_file(self) -> None:
+        self.assertIn("does not exist", self.refusal(None))
+
+    def test_empty_file(self) -> None:
+        self.assertIn("has no results yet", self.refusal(""))
+
+    def test_only_a_broken_line(self) -> None:
+        self.assertIn("has no results yet", self.refusal('{"schema": 1, "kind'))
+
+    def test_unknown_schema(self) -> None:
+        line = dict(small()[0], schema=2)
+        self.assertIn("line 1: schema 2 is not known", self.refusal(json.dumps(line) + "\n"))
+
+    def test_missing_fields_are_named_with_their_line(self) -> None:
+        for path in ("kind", "scene.name", "scene.per_keyframe", "scene.primitives", "strategy.id", "strategy.guarantee",
+                     "verified.holds"):  # fmt: skip
+            with self.subTest(path):
+                good, bad = small()[:2]
+                *outer, name = path.split(".")
+                holder = bad[outer[0]] if outer else bad
+                del holder[name]
+                message = self.refusal(json.dumps(good) + "\n" + json.dumps(bad) + "\n")
+                self.assertIn(f"line 2: the field {path} is missing", message)
+
+    def test_wrong_values(self) -> None:
+        def change(line: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+            changed: Any = copy.deepcopy(line)
+            holder = changed
+            *steps, last = path.split(".")
+            for step in steps:
+                holder = holder[int(step) if step.isdigit() else step]
+            holder[last] = value
+            return changed
+
+        for path, value, words in (
+            ("scene.primitives", "many", 'scene.primitives should be a number, but is "many"'),
+            ("verified.holds", 1, "verified.holds should be true or false, but is 1"),
+            ("strategy.guarantee", "mostly", 'strategy.guarantee is "mostly"'),
+            ("times.unit", "s", 'times are in "s"'),
+            ("times.repetitions", [], "at least one entry"),
+            ("times.repetitions.0.update", -1, "update is -1.0, which is not a time"),
+            ("times.repetitions.0.update", None, "repetition 1: update should be a number"),
+            ("counters", 3, "should be objects"),
+        ):
+            with self.subTest(path):
+                self.assertIn(words, self.refusal(json.dumps(change(small()[0], path, value))))
+
+    def test_not_an_object(self) -> None:
+        self.assertIn("a result is an object", self.refusal("[1, 2]\n"))
+
+
+class TestLenience(ReportCase):
+    def test_unfinished_last_line_is_skipped_with_a_note(self) -> None:
+        lines = small()
+        page = self.page(lines, json.dumps(lines[0])[:200])
+        self.assertIn(f"Line {len(lines) + 1} of results.jsonl was skipped: it breaks off", page)
+
+    def test_broken_line_in_the_middle_is_skipped_with_a_note(self) -> None:
+        first, *rest = small()
+        self.folder.mkdir(parents=True)
+        text = json.dumps(first) + '\n{"schema": 1, "ki\n' + "".join(json.dumps(line) + "\n" for line in rest)
+        (self.folder / "results.jsonl").write_text(text, encoding="utf-8")
+        code, _, err = self.run_report("--figures", "none")
+        self.assertEqual(code, 0)
+        self.assertIn("Line 2 of results.jsonl was skipped: it is not JSON", err)
+
+    def test_optional_fields_may_be_missing(self) -> None:
+        lines = small()
+        for line in lines:
+            for name in ("when", "commit", "dirty", "machine", "seed", "counters", "bytes", "key", "run"):
+                line.pop(name, None)
+            for name in ("hash", "keyframes", "frames", "bodies"):
+                line["scene"].pop(name, None)
+            for name in ("title", "family", "tightness", "foresight", "citation", "own_scalar", "params", "builder"):
+                line["strategy"].pop(name, None)
+            line["verified"] = {"holds": True}
+            for name in ("total_p50", "total_p99", "total_worst", "build_ms", "unit"):
+                line["times"].pop(name)
+        self.assertIn("not recorded", self.page(lines))
+
+    def test_newest_of_equal_configurations_counts(self) -> None:
+        lines = small()
+        again = copy.deepcopy(lines[0])
+        synthetic.refused(again, "", "frame 7: lost an event")
+        page = self.page([*lines, again])
+        self.assertIn("frame 7: lost an event", page)
+        self.assertIn("1 older measurement", page)
+
+
+if __name__ == "__main__":
+    unittest.main()
