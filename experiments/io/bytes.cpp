@@ -1,7 +1,6 @@
 #include "experiments/io/bytes.hpp"
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -63,8 +62,13 @@ std::string read_file(const fs::path& file) {
 }
 
 void write_file_atomically(const fs::path& file, std::string_view bytes) {
-  std::string temporary = file.string() + ".XXXXXX";
-  const int descriptor = mkstemp(temporary.data());
+  std::string temporary;
+  int descriptor = -1;
+  for (int attempt = 0; attempt < 100 && descriptor < 0; ++attempt) {
+    temporary = file.string() + ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(attempt);
+    descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor < 0 && errno != EEXIST) break;
+  }
   if (descriptor < 0) fail(file, "", "cannot be written: " + std::system_category().message(errno));
   const auto give_up = [&](int reason) {
     unlink(temporary.c_str());
@@ -81,13 +85,10 @@ void write_file_atomically(const fs::path& file, std::string_view bytes) {
     }
     done += static_cast<std::size_t>(n);
   }
-  // mkstemp makes a private file; a result is as readable as any other file of the user.
-  const mode_t mask = umask(0);
-  umask(mask);
-  fchmod(descriptor, 0666 & ~mask);
-  // Without fsync a crash can leave the new name with no content, which is what the rename is meant to
-  // prevent.
-  if (fsync(descriptor) != 0 || close(descriptor) != 0) give_up(errno);
+  // Without fsync a crash can leave the new name without content: what the rename is to prevent.
+  const int synced = fsync(descriptor) == 0 ? 0 : errno;
+  const int closed = close(descriptor) == 0 ? 0 : errno;
+  if (synced != 0 || closed != 0) give_up(synced != 0 ? synced : closed);
   if (rename(temporary.c_str(), file.c_str()) != 0) give_up(errno);
 }
 

@@ -29,6 +29,7 @@ class IoTest : public ::testing::Test {
   fs::path write(const std::string& name, const std::string& bytes) const {
     const fs::path file = folder_ / name;
     fs::create_directories(file.parent_path());
+    fs::remove(file);  // some file systems flush a file that is truncated and rewritten: far slower
     std::ofstream(file, std::ios::binary) << bytes;
     return file;
   }
