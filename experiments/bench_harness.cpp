@@ -1,0 +1,61 @@
+#include "experiments/bench_harness.hpp"
+
+#include <benchmark/benchmark.h>
+
+#include <filesystem>
+#include <sstream>
+
+#include "experiments/io/bytes.hpp"
+#include "experiments/json_reader.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+json run_benchmarks(const std::vector<BenchItem>& items, std::uint32_t repetitions) {
+  // Google Benchmark is configured through flags only.
+  std::string program = "kbvh", interleave = "--benchmark_enable_random_interleaving=true";
+  char* arguments[] = {program.data(), interleave.data(), nullptr};
+  int count = 2;
+  benchmark::Initialize(&count, arguments);
+  for (const BenchItem& item : items)
+    benchmark::RegisterBenchmark(item.name.c_str(),
+                                 [&item](benchmark::State& state) {
+                                   for (auto _ : state) {
+                                     const ClipTimes& clip = item.play();
+                                     state.SetIterationTime(clip.total());
+                                     const PhaseTimes mean = clip.mean();
+                                     state.counters["motion_ms"] = 1e3 * mean.motion;
+                                     state.counters["update_ms"] = 1e3 * mean.update;
+                                     state.counters["traversal_ms"] = 1e3 * mean.traversal;
+                                     state.counters["triangle_tests_ms"] = 1e3 * mean.triangle_tests;
+                                   }
+                                 })
+        ->Iterations(1)
+        ->Repetitions(int(repetitions))
+        ->UseManualTime()
+        ->Unit(benchmark::kMillisecond);
+  std::ostringstream out, errors;
+  benchmark::JSONReporter reporter;
+  reporter.SetOutputStream(&out);
+  reporter.SetErrorStream(&errors);
+  benchmark::RunSpecifiedBenchmarks(&reporter, ".");
+  benchmark::ClearRegisteredBenchmarks();
+  return parse_json(out.str(), "Google Benchmark's report");
+}
+
+void add_to_benchmark_file(const std::string& file, const json& runs) {
+  json all = runs;
+  std::error_code error;
+  if (std::filesystem::exists(file, error)) {
+    json before = json::parse(io::read_file(file), nullptr, false);
+    if (before.is_object() && before.contains("benchmarks") && before["benchmarks"].is_array()) {
+      for (const json& run : runs.at("benchmarks")) before["benchmarks"].push_back(run);
+      before["context"] = runs.at("context");
+      all = std::move(before);
+    }
+  }
+  io::write_file_atomically(file, all.dump(1) + "\n");
+}
+
+}  // namespace kbvh::experiments

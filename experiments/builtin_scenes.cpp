@@ -1,0 +1,107 @@
+#include "experiments/builtin_scenes.hpp"
+
+#include <system_error>
+
+#include "experiments/environment.hpp"
+#include "experiments/io/animated_mesh_cache.hpp"
+#include "experiments/progress.hpp"
+#include "experiments/scenes/shapes.hpp"
+#include "experiments/scenes/tablecloth.hpp"
+#include "experiments/text.hpp"
+
+namespace kbvh::experiments {
+
+namespace {
+
+using Meshes = std::vector<io::AnimatedMesh>;
+
+Meshes tablecloth(const BuiltinOptions& options, const MakeProgress& progress) {
+  scenes::TableclothConfig config;
+  config.triangles = options.triangles;
+  if (options.obstacle_triangles > 0) config.table_triangles = options.obstacle_triangles;
+  config.seed = options.seed;
+  config.keyframes = options.keyframes;
+  const std::filesystem::path folder = cache_folder();
+  const std::filesystem::path file = folder / (scenes::cache_key(config) + ".kbvhmesh");
+  std::error_code error;
+  if (!folder.empty() && std::filesystem::exists(file, error)) {
+    try {
+      return io::load_cache(file);
+    } catch (const io::InputError&) {  // damaged or of another version: made anew below
+    }
+  }
+  const auto report = [&](double fraction) {
+    if (progress)
+      progress("simulating a tablecloth of " + std::to_string(config.triangles) + " triangles", fraction);
+  };
+  Meshes meshes = scenes::simulate_tablecloth(config, report);
+  if (!folder.empty()) {
+    try {
+      io::save_cache(meshes, file);
+    } catch (const io::InputError& problem) {
+      say(std::string("warning: the simulated scene is not kept: ") + problem.what());
+    }
+  }
+  return meshes;
+}
+
+/// The obstacle has about as many triangles up to 20 000, which is what the measurements are defined for.
+std::uint32_t obstacle_triangles(const BuiltinOptions& options) {
+  if (options.obstacle_triangles > 0) return options.obstacle_triangles;
+  return options.triangles < 20000 ? options.triangles : 20000;
+}
+
+Meshes waving_sheet(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::waving_sheet(options.triangles, options.keyframes),
+          scenes::icosphere(obstacle_triangles(options), {0.1, -0.05, 0.0}, 0.5)};
+}
+
+Meshes expanding_sphere(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::expanding_sphere(options.triangles, {0, 0, 0}, 0.2, 0.6, options.keyframes),
+          scenes::icosphere(obstacle_triangles(options), {0.5, 0.1, -0.05}, 0.4)};
+}
+
+Meshes passing_spheres(const BuiltinOptions& options, const MakeProgress&) {
+  const double last = options.keyframes > 1 ? double(options.keyframes - 1) : 1.0;
+  const double path = 1.5;
+  return {scenes::translated(scenes::icosphere(options.triangles, {-0.5 * path, 0.05, 0.1}, 0.4),
+                             {path / last, 0, 0}, options.keyframes),
+          scenes::translated(scenes::icosphere(obstacle_triangles(options), {0.5 * path, -0.05, -0.1}, 0.4),
+                             {-path / last, 0, 0}, options.keyframes)};
+}
+
+Meshes turning_box(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::rotated(scenes::box(options.triangles, {-0.5, -0.4, -0.3}, {0.5, 0.4, 0.3}), {0, 0, 0},
+                          1.0 / 120.0, options.keyframes),
+          scenes::icosphere(obstacle_triangles(options), {0.35, 0.2, 0.05}, 0.4)};
+}
+
+Meshes random_soups(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::random_soup(options.triangles, options.seed, options.keyframes),
+          scenes::random_soup(obstacle_triangles(options), options.seed + 1, options.keyframes)};
+}
+
+}  // namespace
+
+const std::vector<BuiltinScene>& builtin_scenes() {
+  static const std::vector<BuiltinScene> list{
+      {"tablecloth", "a cloth, simulated, falls onto a round table and hangs over its rim", &tablecloth},
+      {"waving_sheet", "a sheet in crossing waves cuts a sphere at rest", &waving_sheet},
+      {"expanding_sphere", "a growing sphere reaches a sphere at rest", &expanding_sphere},
+      {"passing_spheres", "two spheres fly through each other, without deforming", &passing_spheres},
+      {"turning_box", "a box turns inside a sphere at rest", &turning_box},
+      {"random_soups", "two clouds of separate drifting triangles in the same cube", &random_soups},
+  };
+  return list;
+}
+
+const BuiltinScene& find_builtin_scene(const std::string& name) {
+  std::vector<std::string> known;
+  for (const BuiltinScene& scene : builtin_scenes()) {
+    if (scene.name == name) return scene;
+    known.push_back(scene.name);
+  }
+  throw io::InputError("there is no built-in scene '" + name + "'; known are " + joined(known));
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,36 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "experiments/study.hpp"
+
+namespace kbvh::experiments {
+
+/// One subcommand: declared to CLI11, and what it does once the command line is read (its exit code).
+/// `action` is set by the subcommand that was called.
+using Action = std::function<int()>;
+
+void add_list(CLI::App& program, Action& action);
+void add_run(CLI::App& program, Action& action);
+void add_bench(CLI::App& program, Action& action);
+void add_report(CLI::App& program, Action& action);
+
+/// `run` and `bench` as said on the command line. Strings are kept as given, until `plan_of` turns them into
+/// the plan that a file would hold.
+struct StudyOptions {
+  std::string plan_file, out, scene, builder, name, order;
+  std::vector<std::string> bodies, strategies, scalars, params;
+  std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
+  std::vector<std::string> builders;
+  std::uint64_t obstacle = 0, keyframes = 0, repetitions = 0, frames_limit = 0, oracle_every = 0;
+  bool print_plan = false;
+};
+
+/// The plan that the options say, as a plan file would (without `plan_file`, which is read by itself).
+/// Throws io::InputError.
+nlohmann::json plan_of(const StudyOptions& options);
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,180 @@
+#include <cstdio>
+
+#include "experiments/cli.hpp"
+#include "experiments/io/bytes.hpp"
+#include "experiments/json_reader.hpp"
+#include "experiments/plan.hpp"
+#include "experiments/program.hpp"
+#include "experiments/progress.hpp"
+#include "experiments/text.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr const char* run_examples = R"(Examples:
+  kbvh run --scene tablecloth --triangles 2000 --l 10
+  kbvh run --body cloth.obj,motion=cloth.pc2 --body sphere:triangles=2000,centre=0:0:1,radius=0.4 --out results
+  kbvh run --scene waving_sheet --strategies bottom_up,rebuild --leaf-size 1,4 --scalar float,double
+A body is a file (.obj .ply .gltf .glb, or a folder of numbered frames) or a shape, then key=value separated by
+commas: motion clip fps (files), name scale rotate=axis:degrees translate=x:y:z (all); `kbvh list` shows shapes.
+Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input.)";
+
+constexpr const char* bench_examples = R"(Examples:
+  kbvh bench --scene tablecloth --triangles 2000,16000 --l 1,10 --repetitions 5 --out results
+  kbvh bench --plan experiments/plans/default.json --out results
+One iteration is a whole clip, timed by phases; repetitions are randomly interleaved and all kept, in
+DIR/benchmark.json and DIR/results.jsonl. Whoever breaks its guarantee is refused a time.)";
+
+/// Parameters as the plan holds them: "key=a,b" becomes {"key": ["a", "b"]}.
+json params_of(const std::vector<std::string>& assignments) {
+  json params = json::object();
+  for (const std::string& text : assignments) {
+    const auto assignment = parse_assignment(text);
+    if (!assignment)
+      throw io::InputError("--param: expected key=value or strategy.key=value, got '" + text + "'");
+    if (params.contains(assignment->first))
+      throw io::InputError("--param: '" + assignment->first + "' is given twice; separate values by commas");
+    params[assignment->first] = split(assignment->second, ',');
+  }
+  return params;
+}
+
+json scene_of(const StudyOptions& options) {
+  json scene = json::object();
+  if (options.bodies.empty()) {
+    scene["builtin"] = options.scene.empty() ? "tablecloth" : options.scene;
+  } else {
+    if (!options.scene.empty()) throw io::InputError("--scene and --body exclude each other");
+    for (const std::string& body : options.bodies) scene["bodies"].push_back(body_from_text(body));
+  }
+  if (!options.triangles.empty()) scene["triangles"] = options.triangles;
+  if (!options.seeds.empty()) scene["seed"] = options.seeds;
+  if (options.keyframes > 0) scene["keyframes"] = options.keyframes;
+  if (options.obstacle > 0) scene["obstacle"] = options.obstacle;
+  if (!options.name.empty()) scene["name"] = options.name;
+  if (!options.order.empty()) scene["order"] = split(options.order, ',');
+  return scene;
+}
+
+void set_common(json& plan, const StudyOptions& options) {
+  if (options.repetitions > 0) plan["repetitions"] = options.repetitions;
+  if (options.frames_limit > 0) plan["frames_limit"] = options.frames_limit;
+  if (options.oracle_every > 0) plan["oracle_every"] = options.oracle_every;
+}
+
+int run_study(const StudyOptions& options, Harness harness) {
+  Plan plan;
+  if (options.plan_file.empty()) {
+    const json said = plan_of(options);
+    if (options.print_plan) {
+      read_plan(said, "command line", {});
+      std::printf("%s\n", said.dump(2).c_str());
+      return success;
+    }
+    plan = read_plan(said, "command line", {});
+  } else {
+    const std::string text = io::read_file(options.plan_file);
+    json said = parse_json(text, options.plan_file);
+    if (said.is_object()) {
+      set_common(said, options);
+      if (said.contains("studies") && said["studies"].is_array())
+        for (json& study : said["studies"])
+          if (study.is_object()) set_common(study, options);
+    }
+    if (options.print_plan) {
+      std::printf("%s\n", said.dump(2).c_str());
+      return success;
+    }
+    plan = read_plan(said, options.plan_file, std::filesystem::path(options.plan_file).parent_path());
+  }
+  const StudyOutcome outcome = run_plan(plan, harness, options.out);
+  if (!options.out.empty())
+    say(std::to_string(outcome.measured) + " configurations measured, " + std::to_string(outcome.skipped) +
+        " were in " + (std::filesystem::path(options.out) / "results.jsonl").string() + " already");
+  if (outcome.refused == 0) return success;
+  say(std::to_string(outcome.refused) + " configurations break what their strategy guarantees");
+  return guarantee_broken;
+}
+
+void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
+  std::vector<CLI::Option*> said_by_plan{
+      command.add_option("--scene", o->scene, "built-in scene (default: tablecloth); `kbvh list` shows them"),
+      command.add_option("--body", o->bodies, "a body from a file or by formula; repeatable, see below")
+          ->take_all()
+          ->expected(1),
+      command.add_option("--name", o->name, "name of the scene in results"),
+      command.add_option("--triangles", o->triangles, "of the built-in scene's moving body; a list sweeps")
+          ->delimiter(','),
+      command.add_option("--obstacle", o->obstacle, "triangles of the body beside it")
+          ->check(CLI::PositiveNumber),
+      command.add_option("--keyframes", o->keyframes, "of a built-in scene (60)")->check(CLI::PositiveNumber),
+      command.add_option("--seed", o->seeds, "of what chance decides (1); a list sweeps")->delimiter(','),
+      command.add_option("--order", o->order, "vertex order: given, shuffled, or both"),
+      command
+          .add_option("--strategies", o->strategies,
+                      "ids, family:NAME, default (all that promise something) or all")
+          ->delimiter(','),
+      command.add_option("--param", o->params, "key=value or strategy.key=value; a list of values sweeps")
+          ->take_all()
+          ->expected(1),
+      command.add_option("--builder", o->builders, "median, sah, morton (each strategy's own best)")
+          ->delimiter(','),
+      command.add_option("--width", o->widths, "children per node: 2, 4, 8")->delimiter(','),
+      command.add_option("--leaf-size", o->leaf_sizes, "most primitives per leaf: 1 to 16")->delimiter(','),
+      command.add_option("--l", o->l, "frames for each keyframe interval (10); a list sweeps")
+          ->delimiter(','),
+      command.add_option("--scalar", o->scalars, "float, double (float)")->delimiter(',')};
+  command.add_option("--repetitions", o->repetitions, "timed clips of each contestant (3)")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--frames-limit", o->frames_limit, "only so many first frames")
+      ->check(CLI::PositiveNumber);
+  command
+      .add_option("--oracle-every", o->oracle_every,
+                  "compare only every n-th frame (and the last) with the truth")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--out", o->out, "folder to which results are appended (none: the table only)");
+  CLI::Option* plan = command.add_option("--plan", o->plan_file, "a study as a file, see RESULTS.md");
+  command.add_flag("--print-plan", o->print_plan, "print the plan file that says the same, and stop");
+  for (CLI::Option* option : said_by_plan) plan->excludes(option);
+}
+
+void add_command(CLI::App& program, Action& action, const char* name, const char* meaning,
+                 const char* examples, Harness harness) {
+  CLI::App* command = program.add_subcommand(name, meaning);
+  command->footer(examples);
+  auto options = std::make_shared<StudyOptions>();
+  add_study(*command, options);
+  command->callback(
+      [&action, options, harness] { action = [options, harness] { return run_study(*options, harness); }; });
+}
+
+}  // namespace
+
+json plan_of(const StudyOptions& options) {
+  json plan = json::object();
+  plan["scenes"] = json::array({scene_of(options)});
+  if (!options.strategies.empty()) plan["strategies"] = options.strategies;
+  if (!options.params.empty()) plan["params"] = params_of(options.params);
+  if (!options.builders.empty()) plan["builder"]["method"] = options.builders;
+  if (!options.widths.empty()) plan["builder"]["width"] = options.widths;
+  if (!options.leaf_sizes.empty()) plan["builder"]["leaf_size"] = options.leaf_sizes;
+  if (!options.l.empty()) plan["l"] = options.l;
+  if (!options.scalars.empty()) plan["scalars"] = options.scalars;
+  set_common(plan, options);
+  return plan;
+}
+
+void add_run(CLI::App& program, Action& action) {
+  add_command(program, action, "run", "verify and time contestants on a scene, and print a table",
+              run_examples, Harness::rounds);
+}
+
+void add_bench(CLI::App& program, Action& action) {
+  add_command(program, action, "bench", "the same under Google Benchmark", bench_examples,
+              Harness::google_benchmark);
+}
+
+}  // namespace kbvh::experiments

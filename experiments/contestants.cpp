@@ -1,0 +1,158 @@
+#include "experiments/contestants.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace kbvh::experiments {
+
+namespace {
+
+bool has_parameter(const Info& info, const std::string& key) {
+  return std::any_of(info.parameters.begin(), info.parameters.end(),
+                     [&](const Parameter& parameter) { return parameter.name == key; });
+}
+
+struct Selected {
+  const StrategyEntry* entry;
+  bool by_id;
+};
+
+std::vector<Selected> selected(const std::string& id) {
+  std::vector<Selected> list;
+  constexpr std::string_view family = "family:";
+  const bool by_family = id.starts_with(family);
+  if (id != "all" && id != "default" && !by_family) return {{&find_strategy(id), true}};
+  std::string known;
+  for (const StrategyEntry& entry : registry()) {
+    if (known.find(entry.info.family) == std::string::npos)
+      known += (known.empty() ? "" : ", ") + entry.info.family;
+    const bool wanted = id == "all" || (id == "default" && entry.info.guarantee != Guarantee::approximate) ||
+                        (by_family && entry.info.family == id.substr(family.size()));
+    if (wanted) list.push_back({&entry, false});
+  }
+  if (list.empty())
+    throw ConfigError("there is no strategy of the family '" + id.substr(family.size()) + "'; families are " +
+                      known);
+  return list;
+}
+
+/// The common parameters that are meant for this strategy; what was used is removed from `unused`.
+Sweep params_for(const Info& info, const Sweep& common, std::set<std::string>& unused) {
+  Sweep params;
+  for (const auto& [name, values] : common) {
+    const std::size_t dot = name.find('.');
+    const bool named = dot != std::string::npos;
+    if (named && name.substr(0, dot) != info.id) continue;
+    const std::string key = named ? name.substr(dot + 1) : name;
+    if (!named && !has_parameter(info, key)) continue;
+    // "strategy.key" is more exact than "key", and comes later in the map's order only by chance.
+    if (named || !params.contains(key)) params[key] = values;
+    unused.erase(name);
+  }
+  return params;
+}
+
+std::vector<std::map<std::string, std::string>> combinations(const Sweep& sweep) {
+  std::vector<std::map<std::string, std::string>> all{{}};
+  for (const auto& [key, values] : sweep) {
+    std::vector<std::map<std::string, std::string>> longer;
+    for (const auto& start : all)
+      for (const std::string& value : values) {
+        auto next = start;
+        next[key] = value;
+        longer.push_back(std::move(next));
+      }
+    all = std::move(longer);
+  }
+  return all;
+}
+
+template <class T>
+std::vector<std::optional<T>> choices(const std::vector<T>& values) {
+  if (values.empty()) return {std::nullopt};
+  return {values.begin(), values.end()};
+}
+
+std::string label_of(const ContestantSpec& spec) {
+  const Info& info = spec.entry->info;
+  std::string extras;
+  const auto add = [&](const std::string& text) { extras += (extras.empty() ? "" : " ") + text; };
+  for (const Parameter& parameter : info.parameters)
+    if (spec.params.at(parameter.name) != parameter.default_value)
+      add(parameter.name + "=" + spec.params.at(parameter.name));
+  if (!info.topology.own) {
+    const BuilderConfig& usual = info.topology.preferred;
+    if (spec.builder.method != usual.method) add(name(spec.builder.method));
+    if (spec.builder.width != usual.width) add("width=" + std::to_string(spec.builder.width));
+    if (spec.builder.leaf_size != usual.leaf_size) add("leaf=" + std::to_string(spec.builder.leaf_size));
+  }
+  return extras.empty() ? info.id : info.id + " [" + extras + "]";
+}
+
+void add_configurations(std::vector<ContestantSpec>& list, const Selected& choice, const Sweep& params,
+                        const BuilderRequest& builder, std::vector<std::string>& notes) {
+  const Info& info = choice.entry->info;
+  const BuilderRequest none;
+  const BuilderRequest& wanted = info.topology.own ? none : builder;
+  for (const auto& method : choices(wanted.methods))
+    for (const auto& width : choices(wanted.widths))
+      for (const auto& leaf_size : choices(wanted.leaf_sizes)) {
+        ContestantSpec spec;
+        spec.entry = choice.entry;
+        try {
+          spec.builder = suitable_builder(info, method, width, leaf_size);
+        } catch (const ConfigError& problem) {
+          if (choice.by_id) throw;
+          notes.push_back(std::string(problem.what()) + ": left out");
+          continue;
+        }
+        for (const auto& given : combinations(params)) {
+          spec.given = given;
+          spec.params = Params(info.id, info.parameters, given).values();
+          spec.label = label_of(spec);
+          const bool known = std::any_of(list.begin(), list.end(), [&](const ContestantSpec& other) {
+            return other.entry == spec.entry && other.label == spec.label;
+          });
+          if (!known) list.push_back(spec);
+        }
+      }
+}
+
+}  // namespace
+
+std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests, const Sweep& common,
+                                   const BuilderRequest& builder, std::vector<std::string>& notes) {
+  std::vector<ContestantSpec> list;
+  std::set<std::string> unused;
+  for (const auto& [name, values] : common) unused.insert(name);
+  for (const StrategyRequest& request : requests)
+    for (const Selected& choice : selected(request.id)) {
+      Sweep params = params_for(choice.entry->info, common, unused);
+      for (const auto& [key, values] : request.params) params[key] = values;
+      add_configurations(list, choice, params, request.builder.empty() ? builder : request.builder, notes);
+    }
+  if (!unused.empty())
+    throw ConfigError("the parameter '" + *unused.begin() + "' belongs to none of the chosen strategies");
+  if (list.empty()) throw ConfigError("no strategy is left: " + (notes.empty() ? "none chosen" : notes[0]));
+  return list;
+}
+
+template <class S>
+std::string unsuitable(const Info& info, const Scene<S>& scene) {
+  if (!(sizeof(S) == 4 ? info.has_float : info.has_double))
+    return std::string("has no ") + (sizeof(S) == 4 ? "float" : "double") + " version";
+  if (info.max_primitive_pairs == 0) return {};
+  for (const BodyPair& pair : scene.pairs) {
+    const std::uint64_t pairs = std::uint64_t(scene.bodies[pair.first].primitives.count()) *
+                                scene.bodies[pair.second].primitives.count();
+    if (pairs > info.max_primitive_pairs)
+      return "is offered at most " + std::to_string(info.max_primitive_pairs) +
+             " primitive pairs of two bodies, here are " + std::to_string(pairs);
+  }
+  return {};
+}
+
+template std::string unsuitable(const Info&, const Scene<float>&);
+template std::string unsuitable(const Info&, const Scene<double>&);
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,5 @@
+#include "experiments/program.hpp"
+
+int main(int argc, char** argv) {
+  return kbvh::experiments::run_program(argc, argv);
+}

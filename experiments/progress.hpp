@@ -1,0 +1,26 @@
+#pragma once
+#include <string>
+
+namespace kbvh::experiments {
+
+/// One line on standard error that says what long work is doing; silent unless that is a terminal.
+class Progress {
+ public:
+  Progress();
+  ~Progress() { clear(); }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  /// Replaces the line.
+  void show(const std::string& line);
+  /// Removes the line, before anything else is printed.
+  void clear();
+
+ private:
+  bool terminal_ = false;
+  bool shown_ = false;
+};
+
+/// Prints "kbvh: TEXT" on standard error.
+void say(const std::string& text);
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,120 @@
+#include "experiments/record.hpp"
+
+#include "experiments/text.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+const char* word(Tightness tightness) {
+  switch (tightness) {
+    case Tightness::tight:
+      return "tight";
+    case Tightness::conservative:
+      return "conservative";
+    case Tightness::none:
+      break;
+  }
+  return "none";
+}
+
+const char* word(Guarantee guarantee) {
+  switch (guarantee) {
+    case Guarantee::exact:
+      return "exact";
+    case Guarantee::candidate_superset:
+      return "candidate_superset";
+    case Guarantee::approximate:
+      break;
+  }
+  return "approximate";
+}
+
+const char* word(Foresight foresight) {
+  switch (foresight) {
+    case Foresight::step_bound:
+      return "step_bound";
+    case Foresight::next_keyframe:
+      return "next_keyframe";
+    case Foresight::whole_clip:
+      return "whole_clip";
+    case Foresight::none:
+      break;
+  }
+  return "none";
+}
+
+const char* word(Harness harness) {
+  return harness == Harness::rounds ? "run" : "bench";
+}
+
+template <class S>
+json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_t per_keyframe,
+                  std::size_t frames) {
+  json bodies = json::array();
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const Body<S>& body = scene.bodies[i];
+    bodies.push_back({{"name", body.name},
+                      {"primitives", body.primitives.count()},
+                      {"vertices", body.plans.vertex_count()},
+                      {"keyframes", body.plans.keyframe_count()},
+                      {"moving", body.plans.moving()},
+                      {"degenerate", loaded.meshes[i].degenerate_primitives}});
+  }
+  return {{"name", scene.name},
+          {"hash", hexadecimal(hash(scene))},
+          {"scalar", sizeof(S) == 4 ? "float" : "double"},
+          {"per_keyframe", per_keyframe},
+          {"keyframes", overlaid_keyframes(scene).size()},
+          {"frames", frames},
+          {"primitives", scene.primitive_count()},
+          {"bodies", bodies}};
+}
+
+template json scene_record(const Scene<float>&, const LoadedScene&, std::uint32_t, std::size_t);
+template json scene_record(const Scene<double>&, const LoadedScene&, std::uint32_t, std::size_t);
+
+json strategy_record(const ContestantSpec& spec) {
+  const Info& info = spec.entry->info;
+  json builder;
+  if (!info.topology.own)
+    builder = {{"method", name(spec.builder.method)},
+               {"width", spec.builder.width},
+               {"leaf_size", spec.builder.leaf_size}};
+  json params = json::object();
+  for (const auto& [key, value] : spec.params) params[key] = value;
+  return {{"id", info.id},
+          {"label", spec.label},
+          {"title", info.title},
+          {"family", info.family},
+          {"guarantee", word(info.guarantee)},
+          {"tightness", word(info.tightness)},
+          {"foresight", word(info.foresight)},
+          {"citation", info.citation},
+          {"own_scalar", info.own_scalar},
+          {"params", params},
+          {"builder", builder}};
+}
+
+std::string configuration_key(Harness harness, const std::string& program, const json& scene,
+                              const json& strategy, const Study& study, const json& machine) {
+  // nlohmann's objects are sorted by key, so the text does not depend on the order of insertion.
+  const json all{
+      {"schema", results_schema},
+      {"kind", word(harness)},
+      {"program", program},
+      {"scene", scene.at("hash")},
+      {"scalar", scene.at("scalar")},
+      {"per_keyframe", scene.at("per_keyframe")},
+      {"frames", scene.at("frames")},
+      {"strategy", strategy.at("id")},
+      {"params", strategy.at("params")},
+      {"builder", strategy.at("builder")},
+      {"repetitions", study.repetitions},
+      {"oracle_every", study.oracle_every},
+      {"machine",
+       {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type")}}};
+  return hexadecimal(hash_of(all.dump()));
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,35 @@
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "experiments/contestants.hpp"
+#include "experiments/measure.hpp"
+#include "experiments/scene_spec.hpp"
+#include "experiments/study.hpp"
+
+namespace kbvh::experiments {
+
+/// Version of the records; RESULTS.md documents it.
+inline constexpr int results_schema = 1;
+
+/// Words of result files.
+const char* word(Tightness tightness);
+const char* word(Guarantee guarantee);
+const char* word(Foresight foresight);
+const char* word(Harness harness);
+
+/// The "scene" of a record.
+template <class S>
+nlohmann::json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_t per_keyframe,
+                            std::size_t frames);
+
+/// The "strategy" of a record.
+nlohmann::json strategy_record(const ContestantSpec& spec);
+
+/// What a configuration is known by: a hash of everything that decides what is measured. `scene` and
+/// `strategy` are as above; `program` is program_identity().
+std::string configuration_key(Harness harness, const std::string& program, const nlohmann::json& scene,
+                              const nlohmann::json& strategy, const Study& study,
+                              const nlohmann::json& machine);
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,75 @@
+#include "experiments/results.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include "experiments/io/animated_mesh.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+ResultStore::ResultStore(const std::filesystem::path& folder)
+    : folder_(folder), file_(folder / "results.jsonl") {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!std::filesystem::is_directory(folder))
+    throw io::InputError("the output folder '" + folder.string() + "' cannot be made" +
+                         (error ? ": " + error.message() : ""));
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    throw io::InputError("the output folder '" + folder.string() + "' cannot be written");
+  std::ifstream in(file_, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  broken_end_ = !text.empty() && text.back() != '\n';
+  for (std::size_t begin = 0; begin < text.size();) {
+    std::size_t end = text.find('\n', begin);
+    if (end == std::string::npos) end = text.size();
+    const json record =
+        json::parse(text.begin() + std::ptrdiff_t(begin), text.begin() + std::ptrdiff_t(end), nullptr, false);
+    const bool blank = begin == end;
+    begin = end + 1;
+    if (blank) continue;
+    const auto key = record.is_object() ? record.find("key") : record.end();
+    if (!record.is_object() || key == record.end() || !key->is_string()) {
+      ++unreadable_;
+      continue;
+    }
+    known_.insert_or_assign(key->get<std::string>(), record);
+    ++records_;
+  }
+}
+
+const json* ResultStore::find(const std::string& key) const {
+  const auto record = known_.find(key);
+  return record == known_.end() ? nullptr : &record->second;
+}
+
+void ResultStore::append(const json& record) {
+  // One write, so that a reader or a second writer never sees half a line; a half line that an earlier run
+  // left is closed first, and stays where it is.
+  const std::string line =
+      (broken_end_ ? "\n" : "") + record.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+  const auto failed = [&] {
+    throw io::InputError(file_.string() + ": cannot be written: " + std::strerror(errno));
+  };
+  const int descriptor = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0644);
+  if (descriptor < 0) failed();
+  const auto written = ::write(descriptor, line.data(), line.size());
+  const bool complete = written == ssize_t(line.size()) && ::fsync(descriptor) == 0;
+  if (written >= 0 && written != ssize_t(line.size())) errno = ENOSPC;
+  const int reason = errno;
+  ::close(descriptor);
+  errno = reason;
+  if (!complete) failed();
+  broken_end_ = false;
+  known_.insert_or_assign(record.at("key").get<std::string>(), record);
+  ++records_;
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,36 @@
+#pragma once
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace kbvh::experiments {
+
+/// The append-only result file of a folder, results.jsonl: one JSON object per line, written in one piece.
+/// RESULTS.md documents the records. Lines that cannot be read (of a run that was killed) are skipped and
+/// counted, never mended.
+class ResultStore {
+ public:
+  /// Creates the folder and reads what is there. Throws io::InputError if it cannot be written.
+  explicit ResultStore(const std::filesystem::path& folder);
+  ResultStore(const ResultStore&) = delete;
+  ResultStore& operator=(const ResultStore&) = delete;
+
+  /// The newest record with this key, or nullptr.
+  const nlohmann::json* find(const std::string& key) const;
+  /// Writes the record as one line, flushed to the disk. Throws io::InputError if that fails.
+  void append(const nlohmann::json& record);
+
+  const std::filesystem::path& folder() const { return folder_; }
+  std::size_t records() const { return records_; }
+  std::size_t unreadable_lines() const { return unreadable_; }
+
+ private:
+  std::filesystem::path folder_, file_;
+  std::map<std::string, nlohmann::json> known_;
+  std::size_t records_ = 0, unreadable_ = 0;
+  bool broken_end_ = false;
+};
+
+}  // namespace kbvh::experiments

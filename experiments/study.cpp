@@ -1,0 +1,197 @@
+#include "experiments/study.hpp"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <set>
+
+#include "experiments/bench_harness.hpp"
+#include "experiments/environment.hpp"
+#include "experiments/machine.hpp"
+#include "experiments/progress.hpp"
+#include "experiments/record.hpp"
+#include "experiments/results.hpp"
+#include "experiments/table.hpp"
+#include "experiments/text.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+/// One run of a plan: what all its groups share.
+class Runner {
+ public:
+  Runner(Harness harness, const std::filesystem::path& out)
+      : harness_(harness), machine_(machine()), run_(now_utc() + "-" + std::to_string(::getpid())) {
+    if (out.empty()) return;
+    store_ = std::make_unique<ResultStore>(out);
+    if (store_->unreadable_lines() > 0)
+      say("note: " + (out / "results.jsonl").string() + " has " + std::to_string(store_->unreadable_lines()) +
+          " unreadable lines (of a run that was stopped?); they are left as they are");
+  }
+
+  void study(const Study& study, const std::vector<ContestantSpec>& contestants) {
+    for (const SceneSpec& spec : study.scenes) {
+      if (spec.optional) {
+        if (const std::string missing = missing_file(spec); !missing.empty()) {
+          note("note: the scene '" + spec.name + "' is left out, there is no " + missing);
+          continue;
+        }
+      }
+      const LoadedScene loaded = load(spec, [&](const std::string& what, double fraction) {
+        progress_.show(what + (fraction > 0 ? ": " + std::to_string(int(100 * fraction)) + " %" : ""));
+      });
+      for (const std::string& text : loaded.notes) note("note: " + text);
+      for (const std::string& scalar : study.scalars) {
+        if (scalar == "float")
+          scene<float>(study, contestants, loaded);
+        else
+          scene<double>(study, contestants, loaded);
+      }
+    }
+  }
+
+  StudyOutcome outcome() const { return outcome_; }
+
+ private:
+  void note(const std::string& text) {
+    progress_.clear();
+    if (said_.insert(text).second) say(text);
+  }
+
+  template <class S>
+  void scene(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded) {
+    const Scene<S> scene = assemble<S>(loaded);
+    Oracle<S> oracle(scene, cache_folder());
+    for (const std::uint32_t l : study.per_keyframe) {
+      std::vector<double> frames = frame_times(scene, l);
+      if (study.frames_limit > 0 && frames.size() > study.frames_limit) frames.resize(study.frames_limit);
+      group(study, contestants, loaded, scene, oracle, l, frames);
+    }
+  }
+
+  /// All contestants on one scene, in one scalar, at one l: what one table shows.
+  template <class S>
+  void group(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded,
+             const Scene<S>& scene, Oracle<S>& oracle, std::uint32_t l, const std::vector<double>& frames) {
+    const json about_scene = scene_record(scene, loaded, l, frames.size());
+    const std::string title = scene.name + ", l = " + std::to_string(l);
+    Measurement<S> measurement(scene, frames, oracle);
+    std::vector<json> records;           // in the order of the contestants
+    std::vector<std::size_t> record_of;  // of each one that is measured
+    std::size_t skipped = 0;
+    for (std::size_t c = 0; c < contestants.size(); ++c) {
+      const ContestantSpec& spec = contestants[c];
+      if (const std::string why = unsuitable(spec.entry->info, scene); !why.empty()) {
+        note("note: " + spec.entry->info.id + " is left out of " + scene.name + ": it " + why);
+        continue;
+      }
+      json record{{"schema", results_schema},
+                  {"kind", word(harness_)},
+                  {"run", run_},
+                  {"study", study.name},
+                  {"commit", commit()},
+                  {"dirty", dirty()},
+                  {"machine", machine_},
+                  {"seed", loaded.seed},
+                  {"scene", about_scene},
+                  {"strategy", strategy_record(spec)}};
+      record["key"] =
+          configuration_key(harness_, program_identity(), about_scene, record["strategy"], study, machine_);
+      if (const json* known = store_ ? store_->find(record["key"]) : nullptr) {
+        if (!known->at("verified").at("holds").template get<bool>()) ++outcome_.refused;
+        records.push_back(*known);
+        ++skipped;
+        continue;
+      }
+      progress_.show(title + ": verifying " + spec.label);
+      measurement.add(spec, study.oracle_every);
+      record_of.push_back(records.size());
+      records.push_back(std::move(record));
+    }
+    if (skipped > 0)
+      note(title + ", " + (sizeof(S) == 4 ? "float" : "double") + ": " + std::to_string(skipped) + " of " +
+           std::to_string(records.size()) + " configurations are in the results already, not measured again");
+    play_all(measurement, study.repetitions, title);
+    for (std::size_t i = 0; i < measurement.size(); ++i) {
+      json& record = records[record_of[i]];
+      complete(record, measurement[i]);
+      ++outcome_.measured;
+      if (!measurement[i].refused.empty()) ++outcome_.refused;
+      if (store_) store_->append(record);
+    }
+    outcome_.skipped += skipped;
+    progress_.clear();
+    std::printf("%s\n", results_table(records).c_str());
+    std::fflush(stdout);
+  }
+
+  template <class S>
+  void play_all(Measurement<S>& measurement, std::uint32_t repetitions, const std::string& title) {
+    std::vector<std::size_t> timed;
+    for (std::size_t i = 0; i < measurement.size(); ++i)
+      if (measurement.timed(i)) timed.push_back(i);
+    if (timed.empty()) return;
+    std::size_t done = 0;
+    const auto play = [&](std::size_t i) -> const ClipTimes& {
+      progress_.show(title + ": clip " + std::to_string(++done) + " of " +
+                     std::to_string(timed.size() * repetitions) + ", " + measurement[i].spec->label);
+      return measurement.play(i);
+    };
+    if (harness_ == Harness::rounds) {
+      for (std::uint32_t r = 0; r < repetitions; ++r)
+        for (const std::size_t i : timed) play(i);
+      return;
+    }
+    std::vector<BenchItem> items;
+    for (const std::size_t i : timed)
+      items.push_back(
+          {title + ", " + (sizeof(S) == 4 ? "float" : "double") + "/" + measurement[i].spec->label,
+           [&play, i]() -> const ClipTimes& { return play(i); }});
+    json runs = run_benchmarks(items, repetitions);
+    runs["context"]["commit"] = commit();
+    runs["context"]["dirty"] = dirty();
+    runs["context"]["machine"] = machine_;
+    if (store_) add_to_benchmark_file(store_->folder() / "benchmark.json", runs);
+  }
+
+  static void complete(json& record, const Measured& measured) {
+    record["when"] = now_utc();
+    record["verified"] = verified_record(measured);
+    record["counters"] = counters_record(measured.counters);
+    record["bytes"] = measured.counters[Counter::bytes];
+    record["times"] = nullptr;
+    if (measured.refused.empty())
+      record["times"] = times_record(measured);
+    else
+      record["refused"] = measured.refused;
+  }
+
+  Harness harness_;
+  json machine_;
+  std::string run_;
+  std::unique_ptr<ResultStore> store_;
+  Progress progress_;
+  std::set<std::string> said_;
+  StudyOutcome outcome_;
+};
+
+}  // namespace
+
+StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::path& out) {
+  // Everything that can be wrong with the contestants is found before the first is measured.
+  std::vector<std::vector<ContestantSpec>> contestants;
+  std::vector<std::string> notes;
+  for (const Study& study : plan.studies)
+    contestants.push_back(expand(study.strategies, study.params, study.builder, notes));
+  for (const std::string& text : std::set<std::string>(notes.begin(), notes.end())) say("note: " + text);
+  Runner runner(harness, out);
+  for (std::size_t i = 0; i < plan.studies.size(); ++i) runner.study(plan.studies[i], contestants[i]);
+  return runner.outcome();
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,29 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "experiments/plan.hpp"
+
+namespace kbvh::experiments {
+
+/// How the repetitions are made.
+enum class Harness : std::uint8_t {
+  rounds,            ///< `kbvh run`: the first repetition of all contestants, then the second of all, ...
+  google_benchmark,  ///< `kbvh bench`: under Google Benchmark, randomly interleaved
+};
+
+/// What a study came to.
+struct StudyOutcome {
+  std::size_t measured = 0;  ///< configurations
+  std::size_t skipped = 0;   ///< were in the results already
+  std::size_t refused = 0;   ///< got no time, because a guarantee was broken (also in earlier runs)
+};
+
+/// Does all studies of the plan: verifies every contestant, then times those that hold, prints a table for
+/// each scene, scalar and l on stdout, and appends to `out`/results.jsonl (nothing is written if `out` is
+/// empty). Configurations that are in the results already are not measured again.
+/// Throws io::InputError and ConfigError.
+StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::path& out);
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,120 @@
+#include "experiments/table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+/// Width in characters, not bytes, of UTF-8 text.
+std::size_t width_of(const std::string& text) {
+  return std::size_t(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; }));
+}
+
+double phase_of(const json& repetition, const std::string& phase) {
+  const auto get = [&](const char* name) { return repetition.at(name).get<double>(); };
+  if (phase == "query") return get("traversal") + get("triangle_tests");
+  if (phase == "total") return get("update") + get("traversal") + get("triangle_tests") + get("plan_changes");
+  if (phase == "total_with_motion") return get("motion") + phase_of(repetition, "total");
+  return get(phase.c_str());
+}
+
+bool has_times(const json& record) {
+  return record.at("times").is_object();
+}
+
+std::string milliseconds(double value) {
+  return fmt::format("{:.4g}", value);
+}
+
+std::string fraction(double value) {
+  return value == 0 ? "0" : fmt::format("{:.3g}", value);
+}
+
+}  // namespace
+
+std::string columns(const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> widths;
+  for (const auto& row : rows)
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      if (c >= widths.size()) widths.push_back(0);
+      widths[c] = std::max(widths[c], width_of(row[c]));
+    }
+  std::string text;
+  for (const auto& row : rows) {
+    std::string line;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const std::string padding(widths[c] - width_of(row[c]), ' ');
+      line += (c == 0 ? "" : "  ") + (c == 0 ? row[c] + padding : padding + row[c]);
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
+double median_phase(const json& record, const std::string& phase) {
+  std::vector<double> values;
+  for (const json& repetition : record.at("times").at("repetitions"))
+    values.push_back(phase_of(repetition, phase));
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
+
+const json* best_refit(const std::vector<json>& records) {
+  const json* best = nullptr;
+  for (const json& record : records) {
+    if (record.at("strategy").at("family") != "refit" || !has_times(record)) continue;
+    if (best == nullptr || median_phase(record, "total") < median_phase(*best, "total")) best = &record;
+  }
+  return best;
+}
+
+std::string results_table(const std::vector<json>& records) {
+  if (records.empty()) return {};
+  const json& scene = records[0].at("scene");
+  std::string text =
+      fmt::format("{}, l = {}, {}: {} frames, {} primitives\n", scene.at("name").get<std::string>(),
+                  scene.at("per_keyframe").get<std::uint64_t>(), scene.at("scalar").get<std::string>(),
+                  scene.at("frames").get<std::uint64_t>(), scene.at("primitives").get<std::uint64_t>());
+  const json* refit = best_refit(records);
+  std::vector<std::vector<std::string>> rows{{"strategy", "motion", "update", "query", "x refit",
+                                              "with motion", "missed", "extra", "protrusion", "looseness"}};
+  std::string refusals;
+  for (const json& record : records) {
+    const json& verified = record.at("verified");
+    const std::string label = record.at("strategy").at("label").get<std::string>();
+    std::vector<std::string> row{label};
+    if (has_times(record)) {
+      for (const char* phase : {"motion", "update", "query"})
+        row.push_back(milliseconds(median_phase(record, phase)));
+      for (const char* phase : {"total", "total_with_motion"})
+        row.push_back(refit == nullptr
+                          ? "-"
+                          : fmt::format("{:.3g}", median_phase(*refit, phase) / median_phase(record, phase)));
+    } else {
+      row.insert(row.end(), {"refused", "", "", "", ""});
+      refusals += "  " + label + " is refused a time: " + record.value("refused", std::string()) + "\n";
+    }
+    row.push_back(std::to_string(verified.at("missed").get<std::uint64_t>()));
+    row.push_back(std::to_string(verified.at("extra").get<std::uint64_t>()));
+    const bool audited = verified.at("audited").get<bool>();
+    row.push_back(audited ? fraction(verified.at("protrusion").get<double>()) : "-");
+    row.push_back(audited ? fraction(verified.at("looseness").get<double>()) : "-");
+    rows.push_back(std::move(row));
+  }
+  text += columns(rows) + refusals;
+  std::set<std::string> runs;
+  for (const json& record : records) runs.insert(record.value("run", std::string()));
+  if (runs.size() > 1)
+    text += "  (not all of one run: the machine may not have been the same all the time)\n";
+  return text;
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,23 @@
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace kbvh::experiments {
+
+/// Cells laid out in columns: the first column to the left, the others to the right. `rows[0]` is the head.
+std::string columns(const std::vector<std::vector<std::string>>& rows);
+
+/// The median over the repetitions of one phase, in ms per frame ("motion", "update", "query", or "total" for
+/// update, query and plan changes); of a record with times.
+double median_phase(const nlohmann::json& record, const std::string& phase);
+
+/// The fastest verified contestant of family "refit" by update + query among the records, or nullptr.
+const nlohmann::json* best_refit(const std::vector<nlohmann::json>& records);
+
+/// The table that `run` and `bench` print for records of one scene, l and scalar: times in ms per frame
+/// (medians over repetitions), speed relative to the best refit (above 1 is faster) without and with motion
+/// evaluation, and what verification saw.
+std::string results_table(const std::vector<nlohmann::json>& records);
+
+}  // namespace kbvh::experiments

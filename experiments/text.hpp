@@ -1,0 +1,32 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace kbvh::experiments {
+
+/// The parts of a text between separators; "" has one empty part.
+std::vector<std::string> split(std::string_view text, char separator);
+
+/// "a, b, c".
+std::string joined(const std::vector<std::string>& words, std::string_view separator = ", ");
+
+/// The finite number that is the whole of the text, or nothing.
+std::optional<double> parse_number(std::string_view text);
+
+/// The unsigned whole number that is the whole of the text, or nothing.
+std::optional<std::uint64_t> parse_whole(std::string_view text);
+
+/// "key=value" at its first '='; nothing if there is none or the key is empty.
+std::optional<std::pair<std::string, std::string>> parse_assignment(std::string_view text);
+
+/// 64 bits of FNV-1a with a final mix: for keys of configurations, not for secrets.
+std::uint64_t hash_of(std::string_view text, std::uint64_t seed = 0);
+
+/// 16 hexadecimal digits.
+std::string hexadecimal(std::uint64_t value);
+
+}  // namespace kbvh::experiments
