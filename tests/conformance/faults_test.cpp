@@ -37,7 +37,7 @@ class FaultyRefit : public StoredHierarchyStrategy<S, Count> {
     const QueryStatus status = Base::candidates_at(t, out, budget);
     if (out.empty()) return status;
     if constexpr (fault == Fault::repeated_pair) out.push_back(out.front());
-    if constexpr (fault == Fault::lost_pair) out.pop_back();
+    if constexpr (fault == Fault::lost_pair) out.resize(out.size() / 2);
     if constexpr (fault == Fault::wrong_order) {
       std::swap(out.front().body_a, out.front().body_b);
       std::swap(out.front().primitive_a, out.front().primitive_b);
