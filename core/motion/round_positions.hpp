@@ -21,8 +21,8 @@ struct RoundingStats {
 //
 // Admissible: |x| <= 1e30 (float), 1e100 (double), velocities alike, |times| <= 2^900; the caller checks
 // coordinates once (they are not checked per call). Round-to-nearest without flush-to-zero must be in force.
-// A result beyond the range of S is infinite, as IEEE rounding says. Cost: O(count); with SSE2 about 1 ns per
-// float and 4 ns per double, plus 5 to 10 ns for each tie or near-tie; exact integers (about 1 us) are left
+// A result beyond the range of S is infinite, as IEEE rounding says. Cost: O(count); with SSE2 about 1.5 ns
+// per float and 4 ns per double, plus 5 to 10 ns for each tie or near-tie; exact integers (about 1 us) are left
 // for results near zero between values of opposite sign and for odd magnitudes and times. No allocation but
 // in that last stage.
 
