@@ -7,9 +7,13 @@ function(kbvh_add_strategy name source target)
   set_property(GLOBAL APPEND PROPERTY KBVH_STRATEGY_NAMES ${name})
 endfunction()
 
-# Writes the source that lists every strategy. A strategy that is listed but not registered fails to link.
+# kbvh_write_manifest(FILE [NAME...]): writes the source that lists these strategies; without names, all of this
+# build. A strategy that is listed but not registered fails to link.
 function(kbvh_write_manifest file)
-  get_property(names GLOBAL PROPERTY KBVH_STRATEGY_NAMES)
+  set(names ${ARGN})
+  if(NOT names)
+    get_property(names GLOBAL PROPERTY KBVH_STRATEGY_NAMES)
+  endif()
   set(declarations "")
   set(calls "")
   foreach(name IN LISTS names)
@@ -28,4 +32,56 @@ std::vector<StrategyEntry> manifest_entries() {
 }
 }  // namespace kbvh
 ")
+endfunction()
+
+# kbvh_add_strategies(PROGRAM SOURCE...): for projects that found the installed package. Every NAME.cpp contains
+# KBVH_STRATEGY(NAME). Makes
+#   PROGRAM               the whole kbvh program (list, run, bench, report), with these strategies added to its own
+#   PROGRAM_conformance   the conformance suite over these strategies alone, its cases registered with CTest
+#   PROGRAM_strategies    the library they are compiled into, for further sources and libraries
+function(kbvh_add_strategies program)
+  set(names "")
+  foreach(source IN LISTS ARGN)
+    cmake_path(GET source STEM LAST_ONLY name)
+    list(APPEND names ${name})
+  endforeach()
+  if(NOT names)
+    message(FATAL_ERROR "kbvh_add_strategies(${program}): no source is named")
+  endif()
+  foreach(name IN LISTS names)
+    if(name IN_LIST kbvh_STRATEGY_NAMES)
+      message(FATAL_ERROR "kbvh_add_strategies(${program}): kbvh has a ${name}.cpp already")
+    endif()
+  endforeach()
+  add_library(${program}_strategies STATIC ${ARGN})
+  target_link_libraries(${program}_strategies PUBLIC kbvh::core)
+
+  if(TARGET kbvh::experiments)
+    set(manifest ${CMAKE_CURRENT_BINARY_DIR}/${program}_manifest.cpp)
+    kbvh_write_manifest(${manifest} ${kbvh_STRATEGY_NAMES} ${names})
+    add_executable(${program} ${kbvh_SHARE_DIR}/main.cpp ${manifest})
+    target_link_libraries(${program} PRIVATE kbvh::experiments ${program}_strategies ${kbvh_STRATEGY_LIBRARIES})
+  else()
+    message(WARNING "kbvh was installed without its program: there is no ${program}")
+  endif()
+
+  if(DEFINED BUILD_TESTING AND NOT BUILD_TESTING)
+    return()
+  endif()
+  find_package(GTest QUIET)
+  if(NOT GTest_FOUND)
+    message(WARNING "GTest was not found (Debian: libgtest-dev): ${program}'s strategies are not tested")
+    return()
+  endif()
+  include(GoogleTest)
+  enable_testing()
+  set(manifest ${CMAKE_CURRENT_BINARY_DIR}/${program}_own_manifest.cpp)
+  kbvh_write_manifest(${manifest} ${names})
+  add_executable(${program}_conformance ${kbvh_SHARE_DIR}/tests/conformance/conformance_test.cpp
+    ${kbvh_SHARE_DIR}/tests/support/synthetic_scenes.cpp ${manifest})
+  target_include_directories(${program}_conformance PRIVATE ${kbvh_SHARE_DIR})
+  target_link_libraries(${program}_conformance PRIVATE ${program}_strategies kbvh::core GTest::gtest
+    GTest::gtest_main)
+  gtest_discover_tests(${program}_conformance TEST_PREFIX ${program}. DISCOVERY_TIMEOUT 120
+    PROPERTIES LABELS conformance TIMEOUT 1200)
 endfunction()
