@@ -497,19 +497,34 @@ class BulletDbvt final : public Bullet<Count> {
 
   void build(std::uint32_t body) {
     BodyState& state = bodies_[body];
-    const int count = int(this->scene_.primitives(body).count());
-    for (int p = 0; p < count; ++p) {
-      btDbvtNode* leaf = state.tree.insert(volume(body, p), nullptr);
-      leaf->dataAsInt = p;
-      if (!refits_) state.nodes.push_back(leaf);
+    const std::uint32_t count = this->scene_.primitives(body).count();
+    if (count == 0) return;
+    {
+      btDbvt grown;
+      for (int p = 0; p < int(count); ++p) grown.insert(volume(body, p), nullptr)->dataAsInt = p;
+      grown.optimizeTopDown();
+      // The copy has its nodes in memory as a descent meets them: both refits and queries profit.
+      btDbvt::IClone nothing_more;
+      grown.clone(state.tree, &nothing_more);
+      state.tree.m_leaves = grown.m_leaves;  // which clone() forgets
     }
-    state.tree.optimizeTopDown();
-    if (!refits_ || state.tree.m_root == nullptr) return;
-    state.nodes.push_back(state.tree.m_root);
-    for (std::size_t i = 0; i < state.nodes.size(); ++i)
-      if (state.nodes[i]->isinternal())
-        state.nodes.insert(state.nodes.end(), {state.nodes[i]->childs[0], state.nodes[i]->childs[1]});
-    std::reverse(state.nodes.begin(), state.nodes.end());
+    state.nodes.resize(refits_ ? 0 : count);
+    std::vector<btDbvtNode*> stack{state.tree.m_root};
+    while (!stack.empty()) {
+      btDbvtNode* node = stack.back();
+      stack.pop_back();
+      if (refits_) state.nodes.push_back(node);
+      if (node->isleaf()) {
+        if (!refits_) state.nodes[std::size_t(node->dataAsInt)] = node;
+        continue;
+      }
+      // clone() puts the node at place i of its stack into childs[i & 1]; so this order is that of the
+      // memory.
+      const std::size_t place = stack.size();
+      stack.push_back(node->childs[place & 1]);
+      stack.push_back(node->childs[(place + 1) & 1]);
+    }
+    if (refits_) std::reverse(state.nodes.begin(), state.nodes.end());
   }
 
   void update(std::uint32_t body) {

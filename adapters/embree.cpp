@@ -102,7 +102,9 @@ class EmbreeRefit final : public Strategy<S> {
     for (const BodyPair& pair : this->scene_.pairs()) {
       if (!bodies_[pair.first].scene || !bodies_[pair.second].scene) continue;
       collected_.bodies = pair;
+      const std::size_t begin = out.size();
       rtcCollide(bodies_[pair.first].scene.get(), bodies_[pair.second].scene.get(), &collect, &collected_);
+      filter(pair, out, begin);
     }
     check();
     return {};
@@ -132,6 +134,8 @@ class EmbreeRefit final : public Strategy<S> {
     PairBuffer* out = nullptr;
   };
 
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
   void build(std::uint32_t body) {
     BodyState& state = bodies_[body];
     state.primitives = &this->scene_.primitives(body);
@@ -146,7 +150,7 @@ class EmbreeRefit final : public Strategy<S> {
     rtcSetGeometryBuildQuality(state.geometry.get(), RTC_BUILD_QUALITY_REFIT);
     rtcSetGeometryUserPrimitiveCount(state.geometry.get(), state.primitives->count());
     rtcSetGeometryUserData(state.geometry.get(), &state);
-    rtcSetGeometryBoundsFunction(state.geometry.get(), &bounds, nullptr);
+    rtcSetGeometryBoundsFunction(state.geometry.get(), &fit, nullptr);
     rtcCommitGeometry(state.geometry.get());
     rtcAttachGeometry(state.scene.get(), state.geometry.get());
     rtcCommitScene(state.scene.get());
@@ -163,22 +167,49 @@ class EmbreeRefit final : public Strategy<S> {
     count_.add(Counter::vertex_reads, state.primitives->vertices.size());
   }
 
-  static void bounds(const RTCBoundsFunctionArguments* args) {
-    using Lanes = Eigen::Array4f;
-    const BodyState& state = *static_cast<const BodyState*>(args->geometryUserPtr);
-    const auto vertices = (*state.primitives)[args->primID];
-    Lanes lower = Eigen::Map<const Lanes>(state.positions + std::size_t(3) * vertices[0]), upper = lower;
+  using Lanes = Eigen::Array4f;
+  struct Bounds {
+    Lanes lower, upper;  // the last lane means nothing
+  };
+  static Bounds bounds(const BodyState& state, std::uint32_t primitive) {
+    const auto vertices = (*state.primitives)[primitive];
+    const auto position = [&](std::uint32_t v) {
+      return Eigen::Map<const Lanes>(state.positions + std::size_t(3) * v);
+    };
+    Bounds box{position(vertices[0]), position(vertices[0])};
     for (std::size_t i = 1; i < vertices.size(); ++i) {
-      const Lanes p = Eigen::Map<const Lanes>(state.positions + std::size_t(3) * vertices[i]);
-      lower = lower.min(p);
-      upper = upper.max(p);
+      const Lanes p = position(vertices[i]);
+      box.lower = box.lower.min(p);
+      box.upper = box.upper.max(p);
     }
-    constexpr float smallest = std::numeric_limits<float>::min(), largest = 1.8e18f;
-    lower = (lower.abs() < smallest).select(Lanes::Constant(-smallest), lower).max(-largest).min(largest);
-    upper = (upper.abs() < smallest).select(Lanes::Constant(smallest), upper).max(-largest).min(largest);
+    return box;
+  }
+
+  static void fit(const RTCBoundsFunctionArguments* args) {
+    const BodyState& state = *static_cast<const BodyState*>(args->geometryUserPtr);
+    const Bounds tight = bounds(state, args->primID);
+    constexpr float twice_smallest = 2 * std::numeric_limits<float>::min(), largest = 1.8e18f;
+    const Lanes lower = (tight.lower - twice_smallest).max(-largest).min(largest);
+    const Lanes upper = (tight.upper + twice_smallest).max(-largest).min(largest);
     RTCBounds& box = *args->bounds_o;
     box.lower_x = lower[0], box.lower_y = lower[1], box.lower_z = lower[2];
     box.upper_x = upper[0], box.upper_y = upper[1], box.upper_z = upper[2];
+  }
+
+  /// Drops the pairs from `begin` on whose boxes are apart. All partners of a primitive come in a row.
+  void filter(const BodyPair& pair, PairBuffer& out, std::size_t begin) {
+    const BodyState &a = bodies_[pair.first], &b = bodies_[pair.second];
+    count_.add(Counter::box_tests, out.size() - begin);
+    std::size_t kept = begin;
+    std::uint32_t current = none;
+    Bounds box_a{Lanes::Zero(), Lanes::Zero()};
+    for (std::size_t i = begin; i < out.size(); ++i) {
+      if (out[i].primitive_a != current) box_a = bounds(a, current = out[i].primitive_a);
+      const Bounds box_b = bounds(b, out[i].primitive_b);
+      const auto apart = ((box_a.lower > box_b.upper) || (box_b.lower > box_a.upper)).eval();
+      if (!(apart[0] | apart[1] | apart[2])) out[kept++] = out[i];
+    }
+    out.resize(kept);
   }
 
   static void collect(void* user, RTCCollision* collisions, unsigned count) {

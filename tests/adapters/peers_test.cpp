@@ -1,6 +1,9 @@
 // The contestants from other libraries keep what they declare, on scenes that are awkward for them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/verify.hpp"
 #include "scenes.hpp"
 
@@ -52,11 +55,6 @@ void keeps_guarantee(std::uint32_t frames_per_keyframe) {
       EXPECT_EQ(found.missed_candidates, 0u);
       EXPECT_EQ(found.audit.protrusion, 0);
       EXPECT_GT(session.strategy().bytes(), 0u);
-      std::printf("%-28s %-24s pairs %6llu candidates %8llu missed %llu extra %llu looseness %.4f%s\n",
-                  describe(contestant.entry->info, contestant.params).c_str(), scene.name.c_str(),
-                  (unsigned long long)found.pairs, (unsigned long long)found.candidates,
-                  (unsigned long long)found.missed, (unsigned long long)found.extra, found.audit.looseness(),
-                  found.audited ? "" : " (not audited)");
     });
   }
 }
@@ -66,6 +64,35 @@ TEST(Peers, KeepTheirGuaranteeInFloat) {
 }
 TEST(Peers, KeepTheirGuaranteeInDouble) {
   keeps_guarantee<double>(3);
+}
+
+/// Bodies of lattice points at random scales and offsets: contact is the rule, and so is every rounding.
+template <class S>
+void never_lose_contacts(std::uint32_t seeds) {
+  std::uint64_t pairs = 0;
+  for (std::uint32_t seed = 0; seed < seeds; ++seed) {
+    const double scale = std::ldexp(1 + .1 * (seed % 7), int(seed % 60) - 30);
+    const double offset = seed % 3 == 0 ? 0 : scale * std::ldexp(1.3, int(seed % 20));
+    const auto scene = adapters_test::lattice<S>(seed, scale, offset);
+    Oracle<S> oracle(scene);
+    const auto frames = frame_times(scene, 2);
+    for_each_peer<S>([&](const Contestant& contestant) {
+      SCOPED_TRACE(describe(contestant.entry->info, contestant.params) + ", seed " + std::to_string(seed));
+      Session<S> session(scene, contestant, CountingPolicy::counting);
+      const Verification found = verify<S>(session, frames, oracle);
+      ASSERT_TRUE(found.holds()) << found.first_violation;
+      ASSERT_EQ(found.missed_candidates, 0u);
+      pairs += found.pairs;
+    });
+  }
+  EXPECT_GT(pairs, 100 * seeds);
+}
+
+TEST(Peers, NeverLoseContactsInFloat) {
+  never_lose_contacts<float>(60);
+}
+TEST(Peers, NeverLoseContactsInDouble) {
+  never_lose_contacts<double>(20);
 }
 
 TEST(Peers, RefuseToGoBackInTime) {
@@ -124,6 +151,42 @@ TEST(Peers, AnswerTheSameAfterStartingOver) {
     EXPECT_EQ(first, second);
     EXPECT_FALSE(first.empty());
   });
+}
+
+/// Bullet's margin of 1.0 is why its scene is scaled; the parameter shows the difference.
+TEST(Bullet, ScalingKeepsFalsePairsOfSmallMeshesAway) {
+  const auto found = std::find_if(registry().begin(), registry().end(),
+                                  [](const StrategyEntry& entry) { return entry.info.id == "bullet_bvh"; });
+  if (found == registry().end()) GTEST_SKIP() << "built without Bullet";
+  const auto scene =
+      adapters_test::scene<float>("millimetres", {adapters_test::soup<float>({.scale = 1e-3, .seed = 22}),
+                                                  adapters_test::soup<float>({.scale = 1e-3, .seed = 23})});
+  Oracle<float> oracle(scene);
+  const auto candidates = [&](const std::string& scale) {
+    Session<float> session(scene, {&*found, {{"scale", scale}}, {}}, CountingPolicy::silent);
+    return verify<float>(session, frame_times(scene, 2), oracle).candidates;
+  };
+  EXPECT_GT(candidates("none"), 3 * candidates("fit"));
+}
+
+/// Embree flushes denormals; nobody after it may notice.
+TEST(Embree, LeavesTheFloatingPointStateAlone) {
+  const auto found = std::find_if(registry().begin(), registry().end(),
+                                  [](const StrategyEntry& entry) { return entry.info.id == "embree_refit"; });
+  if (found == registry().end()) GTEST_SKIP() << "built without Embree";
+  const auto scene = adapters_test::awkward_scenes<float>()[1];
+  Session<float> session(scene, {&*found, {}, {}}, CountingPolicy::silent);
+  PhaseTimes times;
+  PairBuffer pairs;
+  volatile float denormal = 1e-40f;
+  session.reset(0);
+  EXPECT_NE(denormal * .5f, 0);
+  for (double t : {.5, 1., 1.5}) {
+    session.advance(t, times);
+    EXPECT_NE(denormal * .5f, 0);
+    session.query(pairs, times);
+    EXPECT_NE(denormal * .5f, 0);
+  }
 }
 
 }  // namespace

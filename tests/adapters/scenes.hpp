@@ -90,6 +90,21 @@ kbvh::Scene<S> scene(std::string name, std::vector<kbvh::Body<S>> bodies) {
   return result;
 }
 
+/// Coordinates from a coarse lattice: most contacts are touching or coplanar.
+template <class S>
+kbvh::Scene<S> lattice(std::uint32_t seed, double scale, double offset) {
+  std::vector<kbvh::Body<S>> bodies{soup<S>({.primitives = 50, .seed = 2 * seed}),
+                                    soup<S>({.primitives = 40, .seed = 2 * seed + 1})};
+  for (auto& body : bodies) {
+    std::vector<std::vector<double>> keyframes(body.plans.keyframe_count());
+    for (std::size_t k = 0; k < keyframes.size(); ++k)
+      for (std::size_t i = 0; i < std::size_t(3) * body.plans.vertex_count(); ++i)
+        keyframes[k].push_back(offset + scale * std::round(double(body.plans.keyframe(k)[i]) * 4) / 4);
+    body.plans = plans<S>(body.plans.vertex_count(), keyframes);
+  }
+  return scene<S>("lattice", std::move(bodies));
+}
+
 template <class S>
 std::vector<kbvh::Scene<S>> awkward_scenes() {
   std::vector<kbvh::Scene<S>> scenes;
@@ -110,25 +125,14 @@ std::vector<kbvh::Scene<S>> awkward_scenes() {
   two("segments", {.primitives = 60, .corners = 2, .size = .5, .seed = 9});
   two("hexagons", {.corners = 6, .seed = 10});
   two("points", {.primitives = 20, .corners = 1, .size = 0, .seed = 11});
-  // Coordinates from a coarse lattice: most contacts are touching or coplanar.
-  {
-    auto a = soup<S>({.primitives = 50, .seed = 12}), b = soup<S>({.primitives = 50, .seed = 13});
-    for (auto* body : {&a, &b}) {
-      std::vector<std::vector<double>> keyframes(body->plans.keyframe_count());
-      for (std::size_t k = 0; k < keyframes.size(); ++k)
-        for (std::size_t i = 0; i < std::size_t(3) * body->plans.vertex_count(); ++i)
-          keyframes[k].push_back(std::round(double(body->plans.keyframe(k)[i]) * 4) / 4);
-      body->plans = plans<S>(body->plans.vertex_count(), keyframes);
-    }
-    scenes.push_back(scene<S>("lattice", {a, b}));
-  }
+  scenes.push_back(lattice<S>(12, 1, 0));
   // Sheets that touch exactly, at l = 1, in the last keyframe; one rests.
   scenes.push_back(scene<S>("touching sheets", {grid<S>(5, .25, 3, {1, .5, 0}), grid<S>(4, .5, 4, {0}),
                                                 grid<S>(3, .5, 3, {-1, -.25, 0})}));
-  // A body of one triangle, an empty one, and a thousand times larger one.
+  // A body of one triangle, an empty one, and one of many.
   {
-    auto small = soup<S>({.primitives = 1, .scale = 1e-2, .seed = 14});
-    auto large = soup<S>({.primitives = 30, .scale = 10, .size = 1, .seed = 15});
+    auto small = soup<S>({.primitives = 1, .scale = 1, .size = 2, .seed = 14});
+    auto large = soup<S>({.primitives = 300, .scale = 10, .size = .5, .seed = 15});
     kbvh::Body<S> empty{"empty", {}, plans<S>(0, {{}})};
     scenes.push_back(scene<S>("one, none, many", {small, empty, large}));
   }
