@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Callable, Sequence
 from enum import Enum
 
@@ -16,6 +17,10 @@ from colours import Look
 from text import tick as plain_tick
 
 FormatTick = Callable[[float], str]
+
+
+#: Characters after which names of contestants go on in a second line.
+WRAP = 38
 
 
 class KeyLines(Enum):
@@ -96,7 +101,7 @@ def mark(axes: Axes, x: float, y: float, look: Look, size: float = 7.5, zorder: 
 def contestants_on_y(axes: Axes, labels: Sequence[str], looks: Sequence[Look]) -> None:
     """A row per contestant from top to bottom, named at the left with its marker."""
     axes.set_yticks(range(len(labels)))
-    axes.set_yticklabels(labels)
+    axes.set_yticklabels([textwrap.fill(label, WRAP) for label in labels], linespacing=0.95)
     axes.set_ylim(len(labels) - 0.4, -0.6)
     axes.tick_params(axis="y", length=0, pad=19)
     beside = offset_copy(axes.get_yaxis_transform(), axes.figure, x=-11, y=0, units="points")
@@ -108,10 +113,11 @@ def contestants_on_y(axes: Axes, labels: Sequence[str], looks: Sequence[Look]) -
 def key(axes: Axes, entries: Sequence[tuple[str, Look]], lines: KeyLines) -> None:
     """A list of contestants in axes of its own: marker, line style if they are drawn as lines, and name."""
     axes.set_axis_off()
-    height = axes.figure.get_figheight() * 72 - 60
-    step = min(16.0, height / max(len(entries), 1))
-    for row, (label, look) in enumerate(entries):
-        at = offset_copy(axes.transAxes, axes.figure, x=0, y=-8 - row * step, units="points")
+    below = 0.0
+    for label, look in entries:
+        lines_of_label = textwrap.wrap(label, WRAP)
+        below += 16
+        at = offset_copy(axes.transAxes, axes.figure, x=0, y=8 - below, units="points")
         start = 36 if lines is KeyLines.shown else 8
         if lines is KeyLines.shown:
             left = offset_copy(at, axes.figure, x=2, units="points")
@@ -120,12 +126,18 @@ def key(axes: Axes, entries: Sequence[tuple[str, Look]], lines: KeyLines) -> Non
         axes.plot([0], [1], marker=look.marker, color=look.colour, markerfacecolor=look.face, markersize=6,
                   markeredgewidth=1.4, linestyle="none", clip_on=False, transform=middle)  # fmt: skip
         text_at = offset_copy(at, axes.figure, x=start + 8, units="points")
-        axes.text(0, 1, label, transform=text_at, va="center_baseline", fontsize=8.5, clip_on=False)
+        axes.text(0, 1, lines_of_label[0], transform=text_at, va="center_baseline", fontsize=8.5, clip_on=False)
+        for more in lines_of_label[1:]:
+            below += 11
+            next_line = offset_copy(axes.transAxes, axes.figure, x=start + 14, y=8 - below, units="points")
+            axes.text(0, 1, more, transform=next_line, va="center_baseline", fontsize=8.5, clip_on=False)
 
 
-def key_width(labels: Sequence[str]) -> float:
-    """Inches that a key of these names needs."""
-    return 0.75 + 0.074 * max(map(len, labels))
+def key_size(labels: Sequence[str]) -> tuple[float, float]:
+    """Width and height in inches that a key of these names needs."""
+    wrapped = [textwrap.wrap(label, WRAP) for label in labels]
+    widest = max(len(line) for lines in wrapped for line in lines)
+    return 0.8 + 0.074 * widest, 0.35 + sum(16 + 11 * (len(lines) - 1) for lines in wrapped) / 72
 
 
 def _segment(axes: Axes, left: Transform, look: Look) -> Line2D:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 #: family -> (colour, matplotlib marker)
 FAMILIES: dict[str, tuple[str, str]] = {
     "refit": ("#0072B2", "o"),
+    "period": ("#7A7A7A", "d"),
     "kinetic": ("#D55E00", "s"),
     "rebuild": ("#009E73", "^"),
     "oracle": ("#000000", "X"),
@@ -28,7 +29,6 @@ FREE: tuple[tuple[str, str], ...] = (
     ("#8C7A00", "<"),
     ("#44AA99", "p"),
     ("#5D4A9C", ">"),
-    ("#7F7F7F", "d"),
     ("#AA4499", "8"),
     ("#117733", "*"),
     ("#6B4C2A", "H"),

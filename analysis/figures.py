@@ -20,18 +20,21 @@ from axes import (
     fixed_log_axis,
     keep_labels_apart,
     key,
-    key_width,
+    key_size,
     log_axis,
     mark,
     zero_log_axis,
 )
 from colours import PHASE_NAMES, PHASES, Look
-from ratios import crossings, pareto_front
+from ratios import best_refit_line, crossings, pareto_front
 from text import percent_tick, significant, size, tick
 
 WIDTH = 10.5  #: of every figure, in inches
 #: Bars longer than this many times the fastest are torn off, or the others could not be read.
 TORN = 12.0
+
+#: Families that refit every box in every frame; only the first holds the best one.
+REFITS = ("refit", "period")
 
 Looks = dict[str, Look]
 
@@ -54,21 +57,21 @@ def cost_split(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
 def draw_cost_split(axes: Axes, rows: pd.DataFrame, looks: Looks) -> None:
     """`rows` from top to bottom; bars that would hide the others are torn and keep their number."""
     contestants_on_y(axes, list(rows["label"]), [looks[c] for c in rows["contestant"]])
-    totals = rows[list(PHASES)].sum(axis=1).to_numpy()
-    limit = max(total for total in totals if total <= TORN * totals.min()) * 1.0
+    totals = rows["total_motion"].to_numpy()
+    limit = max(total for total in totals if total <= TORN * totals.min())
     torn = totals > limit
     if torn.any():
         limit *= 1.12
     left = np.zeros(len(rows))
-    shown = [phase for phase in PHASES if rows[phase].max() > 0]
+    shown = [phase for phase in PHASES if rows[f"middle_{phase}"].max() > 0]
     for phase in shown:
         colour, hatch = PHASES[phase]
-        ends = np.minimum(left + rows[phase].to_numpy(), limit)
+        ends = np.minimum(left + rows[f"middle_{phase}"].to_numpy(), limit)
         axes.barh(range(len(rows)), ends - left, left=left, height=0.66, color=colour, hatch=hatch,
                   edgecolor="#33415C" if hatch else "white", linewidth=0.4)  # fmt: skip
         left = ends
     for row, total in enumerate(totals):
-        end = limit if torn[row] else total
+        end = limit if torn[row] else left[row]
         if torn[row]:
             step = limit * 0.006
             axes.plot([end - step, end + step, end - step, end + step], row + np.array([-0.4, -0.13, 0.13, 0.4]),
@@ -90,9 +93,9 @@ def time_against_error(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
     """Total time against looseness and false candidates, with Pareto fronts; errors of approximate ones apart."""
     rows = group[group["total_motion"] > 0].sort_values("total_motion").reset_index(drop=True)
     panels: list[tuple[str, str]] = []
-    if (rows["looseness"] > 0).any():
+    if rows["looseness"].nunique() > 1:
         panels.append(("looseness", "looseness of the boxes"))
-    if (rows["false_candidates"] > 0).any():
+    if rows["false_candidates"].nunique() > 1:
         panels.append(("false_candidates", "false candidates per true pair"))
     wrong = rows[((rows["missed"] > 0) | (rows["extra"] > 0))]
     protruding = rows[rows["protrusion"] > 0]
@@ -100,9 +103,9 @@ def time_against_error(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
         return None
     names = [f"{number + 1}  {label}" for number, label in enumerate(rows["label"])]
     count = len(panels) + (1 if len(wrong) else 0) + (1 if len(protruding) else 0)
-    side = key_width(names)
+    side, tall = key_size(names)
     deep = 2 if count > 2 else 1
-    figure = Figure(figsize=(WIDTH, max(3.6 * deep, 0.7 + 0.225 * len(rows))), layout="constrained")
+    figure = Figure(figsize=(WIDTH, max(3.6 * deep, tall)), layout="constrained")
     across = min(count, 2)
     grid = figure.add_gridspec(deep, across + 1, width_ratios=[(WIDTH - side) / across] * across + [side])
     drawn: list[tuple[Axes, list[tuple[float, float]], list[str]]] = []
@@ -184,8 +187,8 @@ def _lines(
     """Panels of lines over `x` with one key at the right."""
     last = rows.sort_values(x).groupby("contestant").tail(1).sort_values(panels[-1][0], ascending=False)
     entries = [(label, looks[c]) for label, c in zip(last["label"], last["contestant"])]
-    side = key_width([label for label, _ in entries])
-    figure = Figure(figsize=(WIDTH, max(4.0, 0.7 + 0.225 * len(entries))), layout="constrained")
+    side, tall = key_size([label for label, _ in entries])
+    figure = Figure(figsize=(WIDTH, max(4.0, tall)), layout="constrained")
     grid = figure.add_gridspec(1, len(panels) + 1, width_ratios=[(WIDTH - side) / len(panels)] * len(panels) + [side])
     all_axes = []
     for place, (column, title) in enumerate(panels):
@@ -204,11 +207,16 @@ def _lines(
     return figure, all_axes
 
 
+def _time_panels(rows: pd.DataFrame) -> list[tuple[str, str]]:
+    panels = [("updating", "update (ms per frame)"), ("total_motion", "total with motion (ms per frame)")]
+    return [(column, title) for column, title in panels if (rows[column] > 0).any()]
+
+
 def over_frames_per_keyframe(rows: pd.DataFrame, looks: Looks) -> Optional[Figure]:
     """Update and total time against l; where a line crosses the best refit is marked."""
-    if rows["l"].nunique() < 2:
+    panels = _time_panels(rows)
+    if rows["l"].nunique() < 2 or not panels:
         return None
-    panels = [("updating", "update (ms per frame)"), ("total_motion", "total with motion (ms per frame)")]
     figure, all_axes = _lines(rows, looks, "l", panels, "interpolated frames per keyframe, l")
     found: list[tuple[Axes, list[tuple[float, float]], list[str]]] = []
     for axes, (column, _) in zip(all_axes, panels):
@@ -234,19 +242,11 @@ def over_frames_per_keyframe(rows: pd.DataFrame, looks: Looks) -> Optional[Figur
     return figure
 
 
-def best_refit_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Series]:
-    """The smallest time of any refit at each x."""
-    refits = rows[(rows["family"] == "refit") & (rows["guarantee"] != "approximate")]
-    best = refits.groupby(x)[column].min()
-    best = best[best > 0]
-    return best if len(best) else None
-
-
 def over_size(rows: pd.DataFrame, looks: Looks) -> Optional[Figure]:
     """Update and total time against the number of primitives, with a slope of n to compare with."""
-    if rows["primitives"].nunique() < 2:
+    panels = _time_panels(rows)
+    if rows["primitives"].nunique() < 2 or not panels:
         return None
-    panels = [("updating", "update (ms per frame)"), ("total_motion", "total with motion (ms per frame)")]
     figure, all_axes = _lines(rows, looks, "primitives", panels, "primitives n")
     for axes in all_axes:
         _slope(axes)
@@ -270,7 +270,7 @@ def counters(group: pd.DataFrame, over: pd.DataFrame, looks: Looks) -> Optional[
     """
     several = over["primitives"].nunique() > 1
     rows = over if several else group
-    rows = rows[(rows["certificates_failed_per_frame"] > 0) | (rows["family"] == "refit")]
+    rows = rows[(rows["certificates_failed_per_frame"] > 0) | rows["family"].isin(REFITS)]
     wanted = [
         ("certificates_failed_per_frame", "events per frame"),
         ("values_written_per_frame", "bound values written per frame"),

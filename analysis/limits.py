@@ -23,7 +23,7 @@ def _noise(timed: pd.DataFrame) -> tuple[str, str]:
     if timed.empty:
         return "Noise", "Nothing was timed."
     single = int((timed["repetitions"] < 2).sum())
-    several = timed[timed["repetitions"] > 1]
+    several = timed[(timed["repetitions"] > 1) & timed["spread"].notna()]
     words = []
     if len(several):
         spread = several["spread"].median()
@@ -98,10 +98,11 @@ def _extent(runs: pd.DataFrame) -> tuple[str, str]:
         f"{text.listing([f'{value:g}' for value in depths])}, in {text.listing(scalars)}: lines say nothing outside these "
         "values."
     ]
-    shorter = runs[runs["frames"] < 20]
+    shorter = runs[runs["frames"] < 100]
     if len(shorter):
         words.append(
-            f"{text.plural(len(shorter), 'run')} had fewer than 20 frames; 99th percentile and worst frame say little there."
+            f"{text.plural(len(shorter), 'run')} of {len(runs)} had fewer than 100 frames: their 99th percentile is the worst "
+            "frame."
         )
     seeds = runs["seed"][runs["seed"] != ""].unique()
     if len(seeds) == 1:

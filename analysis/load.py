@@ -307,7 +307,9 @@ def _newest(runs: pd.DataFrame) -> tuple[pd.DataFrame, int]:
 
 
 def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Adds the medians over repetitions of each phase and of the sums, in ms per frame, and their spread."""
+    """Adds medians over repetitions of each phase and of the sums, in ms per frame, their spread, and
+    `middle_` and a phase: that phase in the repetition with the median total.
+    """
     sums = times.assign(
         query=times["traversal"] + times["triangle_tests"],
         updating=times["update"] + times["plan_changes"],
@@ -320,6 +322,10 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     extremes = grouped["total_motion"].agg(["min", "max", "count"])
     medians["spread"] = (extremes["max"] - extremes["min"]) / medians["total_motion"].where(medians["total_motion"] > 0)
     medians["repetitions"] = extremes["count"]
+    # The repetition in the middle (the lower one of two), whose phases add up to its total.
+    middle = sums.sort_values(["run", "total_motion", "repetition"]).groupby("run")
+    middle = middle.apply(lambda rows: rows.iloc[(len(rows) - 1) // 2][list(PHASES)]) if len(sums) else medians[list(PHASES)]
+    medians = medians.join(middle.add_prefix("middle_").astype(float))
     joined = runs.merge(medians, how="left", left_on="run", right_index=True)
     joined["repetitions"] = joined["repetitions"].fillna(0).astype(int)
     joined["false_candidates"] = (joined["candidates"] - joined["pairs"] + joined["missed_candidates"].fillna(0)) / np.maximum(

@@ -95,6 +95,14 @@ def pareto_front(points: list[tuple[float, float]]) -> list[int]:
     return front
 
 
+def best_refit_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Series]:
+    """The smallest time of any refit at each x."""
+    refits = rows[(rows["family"] == "refit") & (rows["guarantee"] != "approximate")]
+    best = refits.groupby(x)[column].min()
+    best = best[best > 0]
+    return best if len(best) else None
+
+
 @dataclass(frozen=True)
 class Crossing:
     """Where a line meets the reference: at `x`, from then on `faster` or not."""

@@ -37,6 +37,7 @@ class Section:
     sizes: str  #: of the smaller versions of the scene
     groups: list[tables.Group]
     pictures: list[Picture] = field(default_factory=list)
+    missing: str = ""  #: why a figure that one would expect is not there
     break_even: list[tuple[str, str, str, str]] = field(default_factory=list)
 
 
@@ -125,6 +126,10 @@ def _sections(
         if len(timed) and which != "none":
             head = headline(timed)
             section.pictures += _group_pictures(timed[timed["group"] == head], timed, all_looks, folder, slug)
+            if not any(one.name == f"{slug}-error" for one in section.pictures):
+                section.missing = (
+                    "Time against error is not drawn: all contestants have the same errors here (the table has them)."
+                )
             if which == "all":
                 for other in timed["group"].unique():
                     if other != head:
@@ -144,7 +149,7 @@ def headline(timed: pd.DataFrame) -> str:
     if (rows["scalar"] == "float").any():
         rows = rows[rows["scalar"] == "float"]
     depths = sorted(rows["l"].unique())
-    rows = rows[rows["l"] == depths[(len(depths) - 1) // 2]]
+    rows = rows[rows["l"] == depths[len(depths) // 2]]
     return str(rows["group"].iloc[0])
 
 
@@ -172,6 +177,8 @@ def _group_pictures(
         timed[(timed["scalar"] == first["scalar"]) & (timed["l"] == first["l"]) & (timed["machine"] == first["machine"])]
         .drop_duplicates(["contestant", "primitives"], keep="last")
     ) if len(timed) else timed  # fmt: skip
+    several = len(sizes) and sizes["primitives"].nunique() > 1
+    counted = f"{first['scene']}, {first['scalar']}, l = {first['l']:g}" if several else place
     made = [
         picture(
             folder, f"{slug}-cost", f"Where the time goes: {place}",
@@ -186,7 +193,7 @@ def _group_pictures(
             lambda: figures.time_against_error(group, all_looks),
         ),
         picture(
-            folder, f"{slug}-counters", f"Work that does not depend on the machine: {place}",
+            folder, f"{slug}-counters", f"Work that does not depend on the machine: {counted}",
             "An event-driven strategy writes a bound only when an event changes it, while a refit writes all of them in every "
             "frame: that is the work it saves. What it pays are the events, each of which costs more time than writing a value.",
             lambda: figures.counters(group, sizes, all_looks),

@@ -38,8 +38,8 @@ class Row:
     update: str
     query: str
     total: str
-    ratio: "Shown"
-    ratio_without_motion: "Shown"
+    ratio: Shown
+    ratio_without_motion: Shown
     missed: str
     extra: str
     protrusion: str
@@ -76,11 +76,11 @@ class Glance:
     refit_time: str
     exact: str
     exact_contestant: str
-    exact_ratio: "Shown"
+    exact_ratio: Shown
     exact_faster: Optional[bool]
     approximate: str
     approximate_contestant: str
-    approximate_ratio: "Shown"
+    approximate_ratio: Shown
 
 
 class Ratios:
@@ -133,7 +133,10 @@ def _row(row: object, all_ratios: Ratios) -> Row:
     return Row(
         contestant=row.contestant,
         label=row.label,
-        note=f"computes in {own}" if own and own != row.scalar else "",
+        note=text.listing(
+            ([f"computes in {own}"] if own and own != row.scalar else [])
+            + (["fetches positions itself"] if row.motion == 0 else [])
+        ),
         guarantee=GUARANTEE_NAMES[row.guarantee],
         motion=text.milliseconds(row.motion),
         update=text.milliseconds(row.updating),
@@ -234,10 +237,8 @@ def _first(rows: pd.DataFrame) -> Optional[pd.Series]:
 
 def break_even(rows: pd.DataFrame) -> list[tuple[str, str, str, str]]:
     """Contestant, label, and in words where it becomes faster than the best refit: update, total."""
-    from figures import best_refit_line
-
     result = []
-    lines = {column: best_refit_line(rows, column, "l") for column in ("updating", "total_motion")}
+    lines = {column: ratios.best_refit_line(rows, column, "l") for column in ("updating", "total_motion")}
     for contestant, line in rows[rows["family"] != "refit"].groupby("contestant"):
         words = []
         for column, best in lines.items():

@@ -139,7 +139,7 @@ def study() -> list[dict[str, Any]]:
         for primitives in sizes:
             for scalar in scalars:
                 for l in depths:
-                    if primitives != sizes[-1] and l != depths[(len(depths) - 1) // 2]:
+                    if primitives != sizes[-1] and l != depths[len(depths) // 2]:
                         continue
                     for contestant in CONTESTANTS:
                         line = record(contestant, scene, primitives, scalar, l)
