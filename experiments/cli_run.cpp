@@ -92,10 +92,10 @@ int run_study(const StudyOptions& options, Harness harness) {
   }
   const StudyOutcome outcome = run_plan(plan, harness, options.out);
   if (!options.out.empty())
-    say(std::to_string(outcome.measured) + " configurations measured, " + std::to_string(outcome.skipped) +
+    say(counted(outcome.measured, "configuration") + " measured, " + std::to_string(outcome.skipped) +
         " were in " + (std::filesystem::path(options.out) / "results.jsonl").string() + " already");
   if (outcome.refused == 0) return success;
-  say(std::to_string(outcome.refused) + " configurations break what their strategy guarantees");
+  say(counted(outcome.refused, "configuration") + " in which a strategy breaks what it guarantees");
   return guarantee_broken;
 }
 
@@ -115,7 +115,7 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
       command.add_option("--order", o->order, "vertex order: given, shuffled, or both"),
       command
           .add_option("--strategies", o->strategies,
-                      "ids, family:NAME, default (all that promise something) or all")
+                      "ids, family:NAME, default (all that promise something) or all; !x: but not x")
           ->delimiter(','),
       command.add_option("--param", o->params, "key=value or strategy.key=value; a list of values sweeps")
           ->take_all()

@@ -45,7 +45,7 @@ Sweep params_for(const Info& info, const Sweep& common, std::set<std::string>& u
     if (named && name.substr(0, dot) != info.id) continue;
     const std::string key = named ? name.substr(dot + 1) : name;
     if (!named && !has_parameter(info, key)) continue;
-    // "strategy.key" is more exact than "key", and comes later in the map's order only by chance.
+    // "strategy.key" is the more exact one, whichever of the two comes first.
     if (named || !params.contains(key)) params[key] = values;
     unused.erase(name);
   }
@@ -125,12 +125,19 @@ std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests,
   std::vector<ContestantSpec> list;
   std::set<std::string> unused;
   for (const auto& [name, values] : common) unused.insert(name);
+  std::set<const StrategyEntry*> excluded;
   for (const StrategyRequest& request : requests)
+    if (request.id.starts_with('!'))
+      for (const Selected& choice : selected(request.id.substr(1))) excluded.insert(choice.entry);
+  for (const StrategyRequest& request : requests) {
+    if (request.id.starts_with('!')) continue;
     for (const Selected& choice : selected(request.id)) {
+      if (excluded.contains(choice.entry)) continue;
       Sweep params = params_for(choice.entry->info, common, unused);
       for (const auto& [key, values] : request.params) params[key] = values;
       add_configurations(list, choice, params, request.builder.empty() ? builder : request.builder, notes);
     }
+  }
   if (!unused.empty())
     throw ConfigError("the parameter '" + *unused.begin() + "' belongs to none of the chosen strategies");
   if (list.empty()) throw ConfigError("no strategy is left: " + (notes.empty() ? "none chosen" : notes[0]));

@@ -21,7 +21,7 @@ struct BuilderRequest {
 };
 
 /// Strategies as a plan asks for them: an id, "family:NAME", "default" (all that promise something) or "all",
-/// with parameters of their own.
+/// with parameters of their own; or "!" and one of these, which takes them out again.
 struct StrategyRequest {
   std::string id;
   Sweep params;

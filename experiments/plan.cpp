@@ -40,7 +40,11 @@ BuilderRequest read_builder(const json& object, const std::string& place) {
       keys.fail("method", problem.what());
     }
   }
-  for (const std::uint64_t width : keys.wholes("width", 2, 8)) request.widths.push_back(std::uint32_t(width));
+  for (const std::uint64_t width : keys.wholes("width", 2, 8)) {
+    if (width != 2 && width != 4 && width != 8)
+      keys.fail("width", "expected 2, 4 or 8, got " + std::to_string(width));
+    request.widths.push_back(std::uint32_t(width));
+  }
   for (const std::uint64_t size : keys.wholes("leaf_size", 1, 16))
     request.leaf_sizes.push_back(std::uint32_t(size));
   keys.finish();

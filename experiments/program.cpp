@@ -1,13 +1,15 @@
 #include "experiments/program.hpp"
 
-#include <cstdio>
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include "core/params.hpp"
 #include "experiments/cli.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/machine.hpp"
 #include "experiments/progress.hpp"
+#include "experiments/text.hpp"
 
 namespace kbvh::experiments {
 
@@ -40,6 +42,15 @@ int run_program(int argc, const char* const* argv) {
   add_run(program, action);
   add_bench(program, action);
   add_report(program, action);
+  // CLI11 would only say that a command is missing.
+  std::vector<std::string> commands;
+  for (const CLI::App* command : program.get_subcommands({})) commands.push_back(command->get_name());
+  if (argc > 1 && argv[1][0] != '-' &&
+      std::find(commands.begin(), commands.end(), argv[1]) == commands.end()) {
+    say("there is no command '" + std::string(argv[1]) + "'; known are " + joined(commands) +
+        " (try --help)");
+    return wrong_use;
+  }
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& problem) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <set>
 
+#include "experiments/text.hpp"
+
 namespace kbvh::experiments {
 
 using nlohmann::json;
@@ -80,9 +82,10 @@ std::string results_table(const std::vector<json>& records) {
   if (records.empty()) return {};
   const json& scene = records[0].at("scene");
   std::string text =
-      fmt::format("{}, l = {}, {}: {} frames, {} primitives\n", scene.at("name").get<std::string>(),
+      fmt::format("{}, l = {}, {}: {}, {}\n", scene.at("name").get<std::string>(),
                   scene.at("per_keyframe").get<std::uint64_t>(), scene.at("scalar").get<std::string>(),
-                  scene.at("frames").get<std::uint64_t>(), scene.at("primitives").get<std::uint64_t>());
+                  counted(scene.at("frames").get<std::uint64_t>(), "frame"),
+                  counted(scene.at("primitives").get<std::uint64_t>(), "primitive"));
   const json* refit = best_refit(records);
   std::vector<std::vector<std::string>> rows{{"strategy", "motion", "update", "query", "x refit",
                                               "with motion", "missed", "extra", "protrusion", "looseness"}};

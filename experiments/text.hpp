@@ -14,6 +14,9 @@ std::vector<std::string> split(std::string_view text, char separator);
 /// "a, b, c".
 std::string joined(const std::vector<std::string>& words, std::string_view separator = ", ");
 
+/// "1 frame", "2 frames".
+std::string counted(std::uint64_t count, const std::string& noun);
+
 /// The finite number that is the whole of the text, or nothing.
 std::optional<double> parse_number(std::string_view text);
 

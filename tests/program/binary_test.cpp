@@ -1,0 +1,203 @@
+// The kbvh binary as a shell sees it: exit codes, what goes where, and a small study from end to end.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "core/registry.hpp"
+#include "temporary_folder.hpp"
+
+namespace kbvh::experiments {
+namespace {
+
+using nlohmann::json;
+
+struct Outcome {
+  int code;
+  std::string out, err;
+};
+
+/// One folder for all runs of a test; the cache is inside of it.
+class Binary : public testing::Test {
+ protected:
+  Outcome kbvh(const std::string& arguments, const std::string& environment = "") {
+    const auto out = folder_ / "stdout", err = folder_ / "stderr";
+    const std::string command = "cd '" + folder_.path().string() + "' && KBVH_CACHE='" +
+                                (folder_ / "cache").string() + "' " + environment + " '" KBVH_PROGRAM "' " +
+                                arguments + " >'" + out.string() + "' 2>'" + err.string() + "'";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of_file(out), text_of_file(err)};
+  }
+  std::vector<json> records(const std::string& file = "out/results.jsonl") {
+    std::vector<json> list;
+    std::ifstream in(folder_ / file);
+    for (std::string line; std::getline(in, line);) list.push_back(json::parse(line));
+    return list;
+  }
+  TemporaryFolder folder_;
+};
+
+/// Small enough for every contestant: 100 triangles, few frames.
+const std::string tiny = "--scene waving_sheet --triangles 100 --keyframes 3 --l 2 --repetitions 2 ";
+
+TEST_F(Binary, HelpHasExamples) {
+  for (const char* command : {"list", "run", "bench", "report"}) {
+    const Outcome help = kbvh(std::string(command) + " --help");
+    EXPECT_EQ(help.code, 0);
+    EXPECT_NE(help.out.find("Example"), std::string::npos) << command;
+    EXPECT_NE(help.out.find(std::string("kbvh ") + command), std::string::npos) << command;
+  }
+  EXPECT_EQ(kbvh("--help").code, 0);
+  EXPECT_EQ(kbvh("--version").code, 0);
+}
+
+TEST_F(Binary, WrongUseIsCodeTwoAndOneSentence) {
+  write_text(folder_ / "plan.json", R"({"scenes": "tablecloth", "repetition": 3})");
+  write_text(folder_ / "broken.json", "{");
+  write_text(folder_ / "bad.obj", "v 0 0 0\nv 1 0 0\nv 0 1 nan\nf 1 2 3\n");
+  write_text(folder_ / "file", "x");
+  const std::pair<std::string, std::string> cases[] = {
+      {"", "subcommand"},
+      {"fly", "fly"},
+      {"run --triangles many", "many"},
+      {"run --l 0", "l: expected a whole number"},
+      {"run --scene nowhere", "there is no built-in scene 'nowhere'"},
+      {"run --strategies nobody", "there is no strategy 'nobody'"},
+      {"run --param speed=3", "'speed' belongs to none"},
+      {"run --param speed", "expected key=value"},
+      {"run --width 3", "expected 2, 4 or 8"},
+      {"run --leaf-size 17", "from 1 to 16"},
+      {"run --builder magic", "magic"},
+      {"run --scalar half", "half"},
+      {"run --order sideways", "sideways"},
+      {"run --scene tablecloth --body sphere", "exclude"},
+      {"run --body sphere:triangles=20 --triangles 30", "triangles"},
+      {"run --body missing.obj --body sphere", "missing.obj"},
+      {"run --body bad.obj --body sphere", "bad.obj"},
+      {"run --body sphere:size=3", "'size'"},
+      {"run --plan missing.json", "missing.json"},
+      {"run --plan plan.json", "plan.json: there is no key 'repetition'"},
+      {"run --plan broken.json", "broken.json: line 1"},
+      {"run --plan plan.json --l 3", "--l"},
+      {"run " + tiny + "--out file/out", "file/out"},
+      {"report --out nowhere", "nowhere/results.jsonl"},
+      {"report", "--out"},
+  };
+  for (const auto& [arguments, part] : cases) {
+    const Outcome outcome = kbvh(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments << "\n" << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << arguments << "\n" << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << arguments << "\n"
+                                                                           << outcome.err;
+    EXPECT_EQ(outcome.out, "") << arguments;
+  }
+}
+
+TEST_F(Binary, ListsEveryStrategy) {
+  const Outcome text = kbvh("list");
+  const Outcome as_json = kbvh("list --json");
+  EXPECT_EQ(text.code, 0);
+  EXPECT_EQ(as_json.code, 0);
+  const json all = json::parse(as_json.out);
+  ASSERT_EQ(all.at("strategies").size(), registry().size());
+  for (std::size_t i = 0; i < registry().size(); ++i) {
+    EXPECT_EQ(all.at("strategies")[i].at("id"), registry()[i].info.id);
+    EXPECT_NE(text.out.find(registry()[i].info.title), std::string::npos);
+  }
+  EXPECT_NE(text.out.find("tablecloth"), std::string::npos);
+}
+
+TEST_F(Binary, RunsRecordsAndResumes) {
+  const std::string run = "run " + tiny + "--strategies all --out out";
+  const Outcome first = kbvh(run);
+  ASSERT_EQ(first.code, 0) << first.err << first.out;
+  EXPECT_NE(first.out.find("bottom_up"), std::string::npos);
+  const auto list = records();
+  ASSERT_FALSE(list.empty());
+  for (const json& record : list) {
+    SCOPED_TRACE(record.at("strategy").at("id"));
+    EXPECT_EQ(record.at("schema"), 1);
+    EXPECT_EQ(record.at("kind"), "run");
+    EXPECT_EQ(record.at("scene").at("frames"), 5);
+    EXPECT_TRUE(record.at("verified").at("holds"));
+    EXPECT_EQ(record.at("times").at("repetitions").size(), 2u);
+    EXPECT_EQ(record.at("times").at("frames"), 4u);
+    EXPECT_GT(record.at("verified").at("pairs"), 0u);
+    EXPECT_EQ(record.at("bytes"), record.at("counters").at("bytes"));
+  }
+  const std::string before = text_of_file(folder_ / "out/results.jsonl");
+  const Outcome second = kbvh(run);
+  EXPECT_EQ(second.code, 0);
+  EXPECT_NE(second.err.find("already"), std::string::npos) << second.err;
+  EXPECT_EQ(text_of_file(folder_ / "out/results.jsonl"), before);
+  EXPECT_EQ(second.out, first.out);
+  // As if killed in the middle of the last record: that one alone is made again.
+  write_text(folder_ / "out/results.jsonl", before.substr(0, before.size() - 20));
+  const Outcome third = kbvh(run);
+  EXPECT_EQ(third.code, 0);
+  EXPECT_NE(third.err.find("1 configuration measured"), std::string::npos) << third.err;
+}
+
+TEST_F(Binary, BenchKeepsEveryRepetition) {
+  const Outcome bench =
+      kbvh("bench " + tiny + "--strategies bottom_up --leaf-size 1,4 --scalar float,double --out out");
+  ASSERT_EQ(bench.code, 0) << bench.err;
+  EXPECT_EQ(records().size(), 4u);
+  const json google = json::parse(text_of_file(folder_ / "out/benchmark.json"));
+  std::size_t iterations = 0;
+  for (const json& one : google.at("benchmarks"))
+    if (one.at("run_type") == "iteration") {
+      ++iterations;
+      EXPECT_EQ(one.at("iterations"), 1);
+      EXPECT_GT(one.at("real_time"), 0);
+      EXPECT_TRUE(one.contains("update_ms"));
+    }
+  EXPECT_EQ(iterations, 8u);
+}
+
+TEST_F(Binary, APlanSaysWhatTheCommandLineSays) {
+  const std::string arguments =
+      "--body waving_sheet:triangles=50,keyframes=3 --body "
+      "sphere:triangles=80,centre=0:0:0.1,radius=0.4,scale=0.9 "
+      "--name pair --strategies bottom_up --l 1,2 --scalar double --leaf-size 2 --repetitions 1 --order "
+      "shuffled ";
+  const Outcome plan = kbvh("run " + arguments + "--print-plan");
+  ASSERT_EQ(plan.code, 0) << plan.err;
+  write_text(folder_ / "plan.json", plan.out);
+  ASSERT_EQ(kbvh("run " + arguments + "--out out").code, 0);
+  const Outcome same = kbvh("run --plan plan.json --out out");
+  EXPECT_EQ(same.code, 0);
+  EXPECT_NE(same.err.find("0 configurations measured, 2 were in"), std::string::npos) << same.err;
+  EXPECT_EQ(records()[0].at("scene").at("name"), "pair-shuffled");
+}
+
+TEST_F(Binary, OptionalScenesMayBeAbsent) {
+  write_text(folder_ / "plan.json", R"({"strategies": "bottom_up", "repetitions": 1, "scenes": [
+      {"name": "away", "optional": true, "bodies": [{"file": "away.obj"}, "box"]},
+      {"builtin": "waving_sheet", "triangles": 50, "keyframes": 2}]})");
+  const Outcome run = kbvh("run --plan plan.json");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.err.find("'away' is left out"), std::string::npos) << run.err;
+}
+
+TEST_F(Binary, WorksWithoutACache) {
+  write_text(folder_ / "file", "x");
+  const Outcome run =
+      kbvh("run " + tiny + "--strategies bottom_up", "KBVH_CACHE='" + (folder_ / "file/x").string() + "'");
+  EXPECT_EQ(run.code, 0);
+  EXPECT_NE(run.err.find("warning: the cache folder"), std::string::npos) << run.err;
+}
+
+TEST_F(Binary, NothingMovesAndNothingMeets) {
+  const Outcome run =
+      kbvh("run --body box:triangles=12 --body sphere:triangles=20,centre=9:0:0 --strategies default");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.out.find("1 frame,"), std::string::npos) << run.out;
+  const Outcome alone = kbvh("run --body sphere:triangles=20,step=0:0:0.1,keyframes=3 --strategies default");
+  EXPECT_EQ(alone.code, 0) << alone.err;
+}
+
+}  // namespace
+}  // namespace kbvh::experiments
