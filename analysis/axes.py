@@ -9,6 +9,7 @@ from enum import Enum
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 from matplotlib.transforms import Affine2D, ScaledTranslation, Transform, offset_copy
@@ -28,6 +29,14 @@ class KeyLines(Enum):
 
     shown = "shown"
     hidden = "hidden"
+
+
+def settle(figure: Figure) -> None:
+    """Lays a figure out once and for all, and to the same digits in every run (the solver varies in the last)."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes in figure.axes:
+        axes.set_position([round(value, 4) for value in axes.get_position().bounds])
 
 
 def log_axis(axes: Axes, which: str, values: Sequence[float], tick: FormatTick = plain_tick) -> None:

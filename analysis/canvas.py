@@ -13,6 +13,8 @@ import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from axes import settle
+
 #: Text size and frame of every figure; set only while one is drawn, so that nothing global changes.
 STYLE: dict[str, object] = {
     "font.family": "DejaVu Sans",
@@ -61,8 +63,7 @@ def picture(
         if figure is None:
             return None
         FigureCanvasAgg(figure)
-        figure.draw_without_rendering()  # lays it out once, not once per format
-        figure.set_layout_engine("none")
+        settle(figure)
         folder.mkdir(parents=True, exist_ok=True)
         figure.savefig(folder / f"{name}.png", dpi=160)
         figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None, "Title": title})

@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from axes import (
+    WRAP,
     KeyLines,
     contestants_on_y,
     fixed_log_axis,
@@ -23,10 +24,11 @@ from axes import (
     key_size,
     log_axis,
     mark,
+    settle,
     zero_log_axis,
 )
 from colours import PHASE_NAMES, PHASES, Look
-from ratios import best_refit_line, crossings, pareto_front
+from ratios import best_refit_line, crossings, fastest_configurations, pareto_front, without_oracles
 from text import percent_tick, significant, size, tick
 
 WIDTH = 10.5  #: of every figure, in inches
@@ -39,16 +41,26 @@ REFITS = ("refit", "period")
 Looks = dict[str, Look]
 
 
-def _rows_figure(rows: int, legend: float = 0.0) -> Figure:
-    return Figure(figsize=(WIDTH, 0.9 + legend + 0.27 * rows), layout="constrained")
+#: From this many contestants on, further configurations of a strategy get no name, or no row, of their own.
+CROWD = 20
+
+
+def _rows_figure(labels: Sequence[str], legend: float = 0.0) -> Figure:
+    each = 0.35 if max(map(len, labels)) > WRAP else 0.27
+    return Figure(figsize=(WIDTH, 0.9 + legend + each * len(labels)), layout="constrained")
+
+
+def thinned(rows: pd.DataFrame) -> pd.DataFrame:
+    """All rows, or the fastest configuration of each strategy where they would be a crowd."""
+    return fastest_configurations(rows) if len(rows) > CROWD else rows
 
 
 def cost_split(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
     """Stacked bars of the time per frame by phase, fastest on top."""
-    rows = group.sort_values("total_motion")
+    rows = thinned(group).sort_values("total_motion")
     if rows.empty or not rows["total_motion"].max() > 0:
         return None
-    figure = _rows_figure(len(rows), 0.3)
+    figure = _rows_figure(list(rows["label"]), 0.3)
     axes = figure.subplots()
     draw_cost_split(axes, rows, looks)
     return figure
@@ -90,63 +102,83 @@ def draw_cost_split(axes: Axes, rows: pd.DataFrame, looks: Looks) -> None:
 
 
 def time_against_error(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Total time against looseness and false candidates, with Pareto fronts; errors of approximate ones apart."""
-    rows = group[group["total_motion"] > 0].sort_values("total_motion").reset_index(drop=True)
+    """Total time against looseness and false candidates, with Pareto fronts; errors of approximate ones apart.
+
+    Contestants are numbered by speed. In a crowd only the fastest configuration of each strategy and those on a
+    front have a number; the others are small marks. None where nobody differs from the others in any error.
+    """
+    rows = without_oracles(group[group["total_motion"] > 0]).sort_values("total_motion").reset_index(drop=True)
     panels: list[tuple[str, str]] = []
     if rows["looseness"].nunique() > 1:
         panels.append(("looseness", "looseness of the boxes"))
     if rows["false_candidates"].nunique() > 1:
         panels.append(("false_candidates", "false candidates per true pair"))
-    wrong = rows[((rows["missed"] > 0) | (rows["extra"] > 0))]
-    protruding = rows[rows["protrusion"] > 0]
-    if len(rows) < 2 or not (panels or len(wrong) or len(protruding)):
+    if (rows["missed"] > 0).any() or (rows["extra"] > 0).any():
+        panels.append(("wrong", "wrong pairs per true pair"))
+    if (rows["protrusion"] > 0).any():
+        panels.append(("protrusion", "protrusion (scene units)"))
+    if len(rows) < 2 or not panels:
         return None
-    names = [f"{number + 1}  {label}" for number, label in enumerate(rows["label"])]
-    count = len(panels) + (1 if len(wrong) else 0) + (1 if len(protruding) else 0)
+    rows["number"] = _numbers(rows, [column for column, _ in panels if column != "wrong"])
+    named = rows[rows["number"] > 0]
+    names = [f"{number}  {label}" for number, label in zip(named["number"], named["label"])]
     side, tall = key_size(names)
-    deep = 2 if count > 2 else 1
+    deep = 2 if len(panels) > 2 else 1
+    across = min(len(panels), 2)
     figure = Figure(figsize=(WIDTH, max(3.6 * deep, tall)), layout="constrained")
-    across = min(count, 2)
     grid = figure.add_gridspec(deep, across + 1, width_ratios=[(WIDTH - side) / across] * across + [side])
     drawn: list[tuple[Axes, list[tuple[float, float]], list[str]]] = []
-    for place in range(count):
+    for place, (column, label) in enumerate(panels):
         axes = figure.add_subplot(grid[place // 2, place % 2])
-        if place < len(panels):
-            drawn.append((axes, *draw_error_panel(axes, rows, looks, *panels[place])))
-        elif place == len(panels) and len(wrong):
+        if column == "wrong":
             drawn.append((axes, *draw_wrong_pairs(axes, rows, looks)))
         else:
-            drawn.append((axes, *draw_error_panel(axes, rows, looks, "protrusion", "protrusion (scene units)")))
+            drawn.append((axes, *draw_error_panel(axes, rows, looks, column)))
+        axes.set_xlabel(label)
         if place % 2 == 0:
             axes.set_ylabel("total time per frame (ms)")
-    entries = [(name, looks[c]) for name, c in zip(names, rows["contestant"])]
-    key(figure.add_subplot(grid[:, across]), entries, KeyLines.hidden)
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    key(figure.add_subplot(grid[:, across]), list(zip(names, (looks[c] for c in named["contestant"]))), KeyLines.hidden)
+    settle(figure)
     for axes, points, numbers in drawn:
         keep_labels_apart(axes, points, numbers)
     return figure
 
 
+def _numbers(rows: pd.DataFrame, errors: Sequence[str]) -> list[int]:
+    """Numbers from 1 for the contestants that are named, 0 for the others."""
+    named = set(rows.index)
+    if len(rows) > CROWD:
+        named = set(fastest_configurations(rows).index)
+        for column in errors:
+            named |= set(pareto_front(list(zip(rows[column].astype(float), rows["total_motion"].astype(float)))))
+    count = 0
+    numbers = []
+    for row in rows.index:
+        count += row in named
+        numbers.append(count if row in named else 0)
+    return numbers
+
+
 def draw_error_panel(
-    axes: Axes, rows: pd.DataFrame, looks: Looks, column: str, label: str
+    axes: Axes, rows: pd.DataFrame, looks: Looks, column: str
 ) -> tuple[list[tuple[float, float]], list[str]]:
-    """Time against one error that is 0 at best; returns the points with their numbers in the key."""
+    """Time against one error that is 0 at best; returns the points that have a number, and the numbers."""
     known = rows[rows[column].notna()]
-    format_tick = percent_tick if column == "looseness" else tick
     log_axis(axes, "y", list(rows["total_motion"]))
-    zero_log_axis(axes, list(known[column]), format_tick)
+    zero_log_axis(axes, list(known[column]), percent_tick if column == "looseness" else tick)
     points = list(zip(known[column].astype(float), known["total_motion"].astype(float)))
     front = [points[i] for i in pareto_front(points)]
-    if front:
-        right = axes.get_xlim()[1]
-        top = axes.get_ylim()[1]
-        axes.plot([front[0][0], *_stair_x(front, right)], [top, *_stair_y(front)], color="#777777", linewidth=1,
-                  linestyle=(0, (4, 2)), zorder=1)  # fmt: skip
-    for point, contestant in zip(points, known["contestant"]):
-        mark(axes, *point, looks[contestant])
-    axes.set_xlabel(label)
-    return points, [str(i + 1) for i in known.index]
+    right, top = axes.get_xlim()[1], axes.get_ylim()[1]
+    axes.plot([front[0][0], *_stair_x(front, right)], [top, *_stair_y(front)], color="#777777", linewidth=1,
+              linestyle=(0, (4, 2)), zorder=1)  # fmt: skip
+    numbered, numbers = [], []
+    for point, contestant, number in zip(points, known["contestant"], known["number"]):
+        mark(axes, *point, looks[contestant], size=7.5 if number else 4.5, zorder=3 if number else 2)
+        # Where errors are rare, the many that have none need no number, but for the fastest.
+        if number and (column != "protrusion" or point[0] > 0 or point in front):
+            numbered.append(point)
+            numbers.append(str(number))
+    return numbered, numbers
 
 
 def _stair_x(front: Sequence[tuple[float, float]], right: float) -> list[float]:
@@ -177,8 +209,8 @@ def draw_wrong_pairs(axes: Axes, rows: pd.DataFrame, looks: Looks) -> tuple[list
         for face, label in (("#444444", "missed"), ("white", "extra"))
     ]
     axes.legend(handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncol=2, frameon=False, borderaxespad=0.1)
-    axes.set_xlabel("wrong pairs per true pair")
-    return points, [str(i + 1) for i in wrong.index]
+    numbered = [(point, str(number)) for point, number in zip(points, wrong["number"]) if number]
+    return [point for point, _ in numbered], [number for _, number in numbered]
 
 
 def _lines(
@@ -234,8 +266,7 @@ def over_frames_per_keyframe(rows: pd.DataFrame, looks: Looks) -> Optional[Figur
         for point in points:
             axes.plot(*point, marker="o", markersize=12, markerfacecolor="none", color="#222222", markeredgewidth=1.1)
         found.append((axes, points, [f"l≈{x:.0f}" for x, _ in points]))
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    settle(figure)
     for axes, points, labels in found:
         if points:
             keep_labels_apart(axes, points, labels)
@@ -284,7 +315,7 @@ def counters(group: pd.DataFrame, over: pd.DataFrame, looks: Looks) -> Optional[
             _slope(axes)
         return figure
     rows = rows.sort_values(panels[-1][0], ascending=True)
-    figure = _rows_figure(len(rows), 0.25)
+    figure = _rows_figure(list(rows["label"]), 0.25)
     all_axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axes, (column, title) in zip(all_axes, panels):
         draw_counter(axes, rows, looks, column)
@@ -313,10 +344,10 @@ def draw_counter(axes: Axes, rows: pd.DataFrame, looks: Looks, column: str) -> N
 
 def latency(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
     """Median, 99th percentile and worst frame of each contestant on a log scale."""
-    rows = group[(group["p50"] > 0) & (group["worst"] > 0)].sort_values("worst")
+    rows = thinned(group[(group["p50"] > 0) & (group["worst"] > 0)]).sort_values("worst")
     if rows.empty:
         return None
-    figure = _rows_figure(len(rows), 0.3)
+    figure = _rows_figure(list(rows["label"]), 0.3)
     axes = figure.subplots()
     contestants_on_y(axes, list(rows["label"]), [looks[c] for c in rows["contestant"]])
     log_axis(axes, "x", [*rows["p50"], *rows["worst"]])

@@ -244,7 +244,8 @@ def _family(name: str, bodies: Any) -> str:
 
     `tablecloth-2048-200` is `tablecloth` if its bodies have 2048 and 200 primitives.
     """
-    counts = {str(body.get("primitives")) for body in bodies if isinstance(body, dict)} if isinstance(bodies, list) else set()
+    listed = bodies if isinstance(bodies, list) else []
+    counts = {str(body.get("primitives")) for body in listed if isinstance(body, dict)}
     head, *rest = name.split("-")
     return "-".join([head, *(part for part in rest if part not in counts)])
 
@@ -284,7 +285,7 @@ def _labels(runs: pd.DataFrame) -> pd.Series:
         names = sorted({name for fact in facts for name in fact})
         varying = [name for name in names if len({fact.get(name, "") for fact in facts}) > 1]
         for row, fact in zip(unique.itertuples(), facts):
-            told = ", ".join(f"{name} {fact[name]}".replace("_", " ") for name in varying if fact.get(name, "") != "")
+            told = ", ".join(f"{name} {fact[name]}".replace("_", " ").strip().replace(" ", "\u00a0") for name in varying if fact.get(name, "") != "")
             labels[row.contestant] = f"{row.title} ({told})" if told else row.title
     for title, same in runs.drop_duplicates("contestant").groupby(lambda i: labels[runs.at[i, "contestant"]]):
         if same["id"].nunique() > 1:  # two strategies with one title would share a line in a legend
@@ -296,7 +297,7 @@ def _labels(runs: pd.DataFrame) -> pd.Series:
 def _facts(params: dict[str, Any], builder: Optional[dict[str, Any]]) -> dict[str, str]:
     facts = {name: str(value) for name, value in params.items()}
     for name, value in (builder or {}).items():
-        facts[{"leaf_size": "leaf", "method": "builder"}.get(name, name)] = str(value)
+        facts[{"leaf_size": "leaf", "method": ""}.get(name, name)] = str(value)
     return facts
 
 
@@ -324,11 +325,13 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     medians["repetitions"] = extremes["count"]
     # The repetition in the middle (the lower one of two), whose phases add up to its total.
     middle = sums.sort_values(["run", "total_motion", "repetition"]).groupby("run")
-    middle = middle.apply(lambda rows: rows.iloc[(len(rows) - 1) // 2][list(PHASES)]) if len(sums) else medians[list(PHASES)]
+    if len(sums):
+        middle = middle.apply(lambda rows: rows.iloc[(len(rows) - 1) // 2][list(PHASES)])
+    else:
+        middle = medians[list(PHASES)]
     medians = medians.join(middle.add_prefix("middle_").astype(float))
     joined = runs.merge(medians, how="left", left_on="run", right_index=True)
     joined["repetitions"] = joined["repetitions"].fillna(0).astype(int)
-    joined["false_candidates"] = (joined["candidates"] - joined["pairs"] + joined["missed_candidates"].fillna(0)) / np.maximum(
-        joined["pairs"], 1
-    )
+    false = joined["candidates"] - joined["pairs"] + joined["missed_candidates"].fillna(0)
+    joined["false_candidates"] = false / np.maximum(joined["pairs"], 1)
     return joined

@@ -95,12 +95,28 @@ def pareto_front(points: list[tuple[float, float]]) -> list[int]:
     return front
 
 
+def fastest_configurations(rows: pd.DataFrame) -> pd.DataFrame:
+    """Of each strategy only the configuration that is the fastest on average, so that lines stay readable."""
+    chosen = []
+    for _, same in rows.groupby("id"):
+        covered = same.groupby("contestant")["group"].nunique()
+        complete = same[same["contestant"].isin(covered[covered == covered.max()].index)]
+        chosen.append(complete.groupby("contestant")["total_motion"].mean().idxmin())
+    return rows[rows["contestant"].isin(chosen)]
+
+
 def best_refit_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Series]:
     """The smallest time of any refit at each x."""
     refits = rows[(rows["family"] == "refit") & (rows["guarantee"] != "approximate")]
     best = refits.groupby(x)[column].min()
     best = best[best > 0]
     return best if len(best) else None
+
+
+def without_oracles(rows: pd.DataFrame) -> pd.DataFrame:
+    """Without brute force, which would squeeze all others together on a shared axis; unless nothing else is there."""
+    others = rows[rows["family"] != "oracle"]
+    return others if len(others) else rows
 
 
 @dataclass(frozen=True)

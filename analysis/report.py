@@ -17,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 import figures
+import ratios
 import tables
 import text
 from canvas import Picture, picture
@@ -153,16 +154,6 @@ def headline(timed: pd.DataFrame) -> str:
     return str(rows["group"].iloc[0])
 
 
-def fastest_configurations(rows: pd.DataFrame) -> pd.DataFrame:
-    """Of each strategy only the configuration that is the fastest on average, so that lines stay readable."""
-    chosen = []
-    for _, same in rows.groupby("id"):
-        covered = same.groupby("contestant")["group"].nunique()
-        complete = same[same["contestant"].isin(covered[covered == covered.max()].index)]
-        chosen.append(complete.groupby("contestant")["total_motion"].mean().idxmin())
-    return rows[rows["contestant"].isin(chosen)]
-
-
 def _place(row: pd.Series) -> str:
     return f"{row['scene']}, {text.size(row['primitives'])} primitives, {row['scalar']}, l = {row['l']:g}"
 
@@ -173,23 +164,28 @@ def _group_pictures(
     """Cost split, time against error, counters and latency of one group."""
     first = group.iloc[0]
     place = _place(first)
-    sizes = fastest_configurations(
+    sizes = ratios.fastest_configurations(
         timed[(timed["scalar"] == first["scalar"]) & (timed["l"] == first["l"]) & (timed["machine"] == first["machine"])]
         .drop_duplicates(["contestant", "primitives"], keep="last")
     ) if len(timed) else timed  # fmt: skip
+    crowd = len(group) > figures.CROWD
+    fastest_only = " Of each strategy only the fastest configuration is drawn." if crowd else ""
+    left_out = _left_out(group)
     several = len(sizes) and sizes["primitives"].nunique() > 1
     counted = f"{first['scene']}, {first['scalar']}, l = {first['l']:g}" if several else place
     made = [
         picture(
             folder, f"{slug}-cost", f"Where the time goes: {place}",
             "Each bar is the mean time of one frame, split into its phases; the shorter, the better, and the fastest is on "
-            "top. A bar with a white zigzag at its end is longer than the picture: its number tells how long.",
+            "top. A bar with a white zigzag at its end is longer than the picture: its number tells how long."
+            + fastest_only,
             lambda: figures.cost_split(group, all_looks),
         ),
         picture(
             folder, f"{slug}-error", f"Time against error: {place}",
             "Lower is faster, further left is more exact, and the grey strip holds those with no error at all. Nothing beats "
-            "the strategies on the dashed line in both at once; whatever lies above and right of it is beaten by one of them.",
+            "the strategies on the dashed line in both at once; whatever lies above and right of it is beaten by one of them."
+            + (" Small marks are further configurations of a strategy." if crowd else "") + left_out,
             lambda: figures.time_against_error(group, all_looks),
         ),
         picture(
@@ -201,11 +197,18 @@ def _group_pictures(
         picture(
             folder, f"{slug}-latency", f"Even or jerky: {place}",
             "The dot is the median frame, the bar the time that 99 % of frames stay within, the cross the worst one; motion "
-            "evaluation is not included. A long line means that work is saved up for a few frames, which shows as a stutter even if the mean is good.",
+            "evaluation is not included. A long line means that work is saved up for a few frames, which shows as a stutter "
+            "even if the mean is good."
+            + fastest_only,
             lambda: figures.latency(group, all_looks),
         ),
     ]  # fmt: skip
     return [one for one in made if one is not None]
+
+
+def _left_out(rows: pd.DataFrame) -> str:
+    oracles = sorted(set(rows["label"]) - set(ratios.without_oracles(rows)["label"]))
+    return f" Only the table has {text.listing(oracles)}, which would squeeze the others." if oracles else ""
 
 
 def _trends(
@@ -215,21 +218,25 @@ def _trends(
     first = timed[timed["group"] == head].iloc[0]
     same = timed[(timed["scalar"] == first["scalar"]) & (timed["machine"] == first["machine"])]
     same = same.drop_duplicates(["contestant", "primitives", "l"], keep="last")
-    depths = fastest_configurations(same[same["primitives"] == first["primitives"]])
-    sizes = fastest_configurations(same[same["l"] == first["l"]])
+    left_out = _left_out(same)
+    same = ratios.without_oracles(same)
+    depths = ratios.fastest_configurations(same[same["primitives"] == first["primitives"]])
+    sizes = ratios.fastest_configurations(same[same["l"] == first["l"]])
     where = f"{first['scene']}, {first['scalar']}"
     made = [
         picture(
             folder, f"{slug}-l", f"Frames per keyframe: {where}, {text.size(first['primitives'])} primitives",
             "The number of events depends on the keyframes only, so strategies that work at events gain as more frames are "
             "interpolated between two of them, while a refit (the broad blue band is the best one) pays for every frame. A "
-            "ring marks the break-even point, from which on the falling line wins.",
+            "ring marks the break-even point, from which on the falling line wins."
+            + left_out,
             lambda: figures.over_frames_per_keyframe(depths, all_looks),
         ),
         picture(
             folder, f"{slug}-n", f"Size: {where}, l = {first['l']:g}",
             "Both axes are logarithmic, so a cost proportional to n is a straight line as steep as the thin grey one. A "
-            "steeper line grows faster than the scene; parallel lines differ by a constant factor at every size.",
+            "steeper line grows faster than the scene; parallel lines differ by a constant factor at every size."
+            + left_out,
             lambda: figures.over_size(sizes, all_looks),
         ),
     ]  # fmt: skip
@@ -277,7 +284,9 @@ def _made(study: Study) -> list[tuple[str, str]]:
     runs, timed = study.runs, study.timed
     when = sorted(value for value in runs["when"].unique() if value)
     dirty = runs[runs["dirty"]]
-    state = "clean tree" if dirty.empty else "with uncommitted changes" if len(dirty) == len(runs) else "partly with uncommitted changes"
+    state = "clean tree"
+    if len(dirty):
+        state = "with uncommitted changes" if len(dirty) == len(runs) else "partly with uncommitted changes"
     repetitions = sorted(timed["repetitions"].unique())
     span = "" if not repetitions else text.listing([str(n) for n in repetitions])
     every = int(runs["sampled_every"].max())

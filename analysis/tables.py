@@ -265,10 +265,11 @@ def plain(scene: str, group: Group) -> str:
          row.missed, row.extra, row.protrusion, row.looseness, row.memory)
         for row in group.rows
     ]  # fmt: skip
-    cells = [tuple(str(cell).replace("\u202f", " ").replace("\u00a0", " ") for cell in row) for row in cells]
+    cells = [tuple(str(cell) for cell in row) for row in cells]
     widths = [max(len(row[i]) for row in cells) for i in range(len(PLAIN_COLUMNS))]
     lines = [f"{scene}: {group.title}; times in ms per frame, ratio to the best refit (above 1 is faster)"]
     for row in cells:
         lines.append("  ".join(c.ljust(w) if i < 2 else c.rjust(w) for i, (c, w) in enumerate(zip(row, widths))).rstrip())
     lines += [f"  refused: {label}: {reason}" for _, label, reason in group.refused]
-    return "\n".join(lines)
+    spaces = str.maketrans("\u202f\u00a0\u2009", "   ")
+    return "\n".join(lines).translate(spaces)
