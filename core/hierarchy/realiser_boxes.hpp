@@ -11,10 +11,12 @@ namespace kbvh {
 /// positions.
 template <class S>
 Box<S> box_of_realisers(const std::uint32_t* realisers, const SampledMotion<S>& motion, std::uint32_t body) {
+  motion.fetch(body, {realisers, 6});
+  const S* positions = motion.positions(body);
   Box<S> box;
-  for (int axis = 0; axis < 3; ++axis) {
-    box.lower[axis] = motion.position(body, realisers[2 * axis])[axis];
-    box.upper[axis] = motion.position(body, realisers[2 * axis + 1])[axis];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    box.lower[axis] = positions[std::size_t(3) * realisers[2 * axis] + axis];
+    box.upper[axis] = positions[std::size_t(3) * realisers[2 * axis + 1] + axis];
   }
   return box;
 }

@@ -29,8 +29,10 @@ void Playback<S>::seek(double t) {
     for (auto& state : bodies_) std::fill(state.stamp.begin(), state.stamp.end(), 0);
     epoch_ = 1;
   }
-  for (auto& state : bodies_)
+  for (auto& state : bodies_) {
+    state.fetched = 0;
     if (state.plans.moving()) state.all_current = false;
+  }
 }
 
 template <class S>
@@ -44,7 +46,9 @@ void Playback<S>::evaluate_all() {
 
 template <class S>
 void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices) {
-  if (!state.plans.moving()) {  // a static body is evaluated once, for good
+  // A static body is evaluated once, for good.
+  if (!state.plans.moving() || std::uint64_t(16) * state.fetched > state.plans.vertex_count()) {
+    if (state.plans.moving()) fetched_ += state.plans.vertex_count() - state.fetched;
     state.plans.evaluate(time_, state.positions.data(), &rounding_);
     state.all_current = true;
     return;
@@ -57,6 +61,7 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
     }
   if (stale_.empty()) return;
   fetched_ += stale_.size();
+  state.fetched += std::uint32_t(stale_.size());
   state.plans.evaluate(time_, stale_, state.positions.data(), &rounding_);
 }
 

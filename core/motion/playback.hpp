@@ -45,7 +45,7 @@ class Playback {
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return bodies_[body].plans; }
   std::uint32_t body_count() const { return std::uint32_t(bodies_.size()); }
-  /// Positions evaluated one by one so far, and how the values were decided.
+  /// Positions evaluated on demand so far, and how the values were decided.
   std::uint64_t fetched() const { return fetched_; }
   const RoundingStats& rounding() const { return rounding_; }
 
@@ -54,6 +54,7 @@ class Playback {
     FlightPlans<S> plans;
     std::vector<S> positions;
     std::vector<std::uint32_t> stamp;
+    std::uint32_t fetched = 0;  ///< at the current time
     bool all_current = false;
   };
   void fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices);

@@ -36,7 +36,7 @@ using Longs [[gnu::vector_size(kLanes * 8)]] = std::int64_t;
 using Ints [[gnu::vector_size(kLanes * 4)]] = std::int32_t;
 using Unsigned [[gnu::vector_size(kLanes * 4)]] = std::uint32_t;
 
-/// Values per block; blocks are padded.
+/// Most values per block; blocks are padded to whole groups.
 constexpr std::size_t kBlock = 256;
 /// Values whose masks are looked at together.
 constexpr std::size_t kGroup = 8;
@@ -140,14 +140,15 @@ template <class I>
 /// Which candidates stage 1 computes.
 enum class RatioLength { any, short_ratio };
 
-/// Stage 1 for float over kBlock values: out is right but at the places listed; returns their number.
+/// Stage 1 for float over `size` values, a multiple of kGroup: out is right but at the places listed; returns
+/// their number.
 template <PieceKind kind, RatioLength length_of_ratio>
 [[gnu::always_inline]] inline std::size_t first_stage(const float* x0, const float* x1,
                                                       const TimeFraction& fraction, float* __restrict out,
-                                                      std::uint16_t* __restrict list) {
+                                                      std::uint16_t* __restrict list, std::size_t size) {
   const double ratio = fraction.ratio.hi, rest = fraction.rest;
   std::size_t length = 0;
-  for (std::size_t i = 0; i < kBlock; i += kGroup) {
+  for (std::size_t i = 0; i < size; i += kGroup) {
     Ints open[kGroup / kLanes];
     Ints some{};
     KBVH_UNROLL
@@ -208,19 +209,20 @@ template <PieceKind kind>
 template <PieceKind kind>
 [[gnu::always_inline]] inline std::size_t first_stage(const float* x0, const float* x1,
                                                       const TimeFraction& fraction, float* __restrict out,
-                                                      std::uint16_t* __restrict list) {
-  return fraction.short_ratio ? first_stage<kind, RatioLength::short_ratio>(x0, x1, fraction, out, list)
-                              : first_stage<kind, RatioLength::any>(x0, x1, fraction, out, list);
+                                                      std::uint16_t* __restrict list, std::size_t size) {
+  return fraction.short_ratio ? first_stage<kind, RatioLength::short_ratio>(x0, x1, fraction, out, list, size)
+                              : first_stage<kind, RatioLength::any>(x0, x1, fraction, out, list, size);
 }
 
-/// Stage 1 for double, in double-double: out is right but at the places listed; returns their number.
+/// Stage 1 for double, in double-double, likewise: out is right but at the places listed; returns their
+/// number.
 template <PieceKind kind>
 [[gnu::always_inline]] inline std::size_t first_stage(const double* x0, const double* x1,
                                                       const TimeFraction& fraction, double* __restrict out,
-                                                      std::uint16_t* __restrict list) {
+                                                      std::uint16_t* __restrict list, std::size_t size) {
   const DoubleDouble ratio = fraction.ratio, halves = fraction.ratio_halves;
   std::size_t length = 0;
-  for (std::size_t i = 0; i < kBlock; i += kGroup) {
+  for (std::size_t i = 0; i < size; i += kGroup) {
     Longs open[kGroup / kLanes];
     Longs some{};
     KBVH_UNROLL

@@ -135,13 +135,14 @@ S round_one(S x0, S x1, const TimeFraction& f, const Times& times, RoundingStats
   return round_exactly<kind>(x0, x1, times);
 }
 
-/// Rounds one full block; x0, x1 and out may be the same array.
+/// Rounds one block of `size` values, a multiple of kGroup; x0, x1 and out may be the same array.
 template <PieceKind kind, class S>
-void round_block(const S* x0, const S* x1, const TimeFraction& f, const Times& times, S* out,
-                 RoundingStats& stats) {
+[[gnu::always_inline]] inline void round_block(const S* x0, const S* x1, std::size_t size,
+                                               const TimeFraction& f, const Times& times, S* out,
+                                               RoundingStats& stats) {
   alignas(64) S result[kBlock];
   std::uint16_t list[kBlock + kGroup];
-  const std::size_t count = first_stage<kind>(x0, x1, f, result, list);
+  const std::size_t count = first_stage<kind>(x0, x1, f, result, list, size);
   stats.second_stage += count;
   const bool second_helps = std::is_same_v<S, float> ? f.single : f.ratio_exact;
   for (std::size_t k = 0; k < kGroup; ++k) list[count + k] = 0;
@@ -160,7 +161,7 @@ void round_block(const S* x0, const S* x1, const TimeFraction& f, const Times& t
       result[j] = second_helps && hard[k] == 0 ? chosen[k] : round_one<kind>(x0[j], x1[j], f, times, stats);
     }
   }
-  std::memcpy(out, result, sizeof result);
+  std::memcpy(out, result, size * sizeof(S));
 }
 
 template <PieceKind kind, class S>
@@ -174,13 +175,16 @@ void round_all(const S* x0, const S* x1, std::size_t count, const TimeFraction& 
   }
   std::size_t begin = 0;
   for (; begin + kBlock <= count; begin += kBlock) {
-    round_block<kind>(x0 + begin, x1 + begin, f, times, out + begin, stats);
+    round_block<kind>(x0 + begin, x1 + begin, kBlock, f, times, out + begin, stats);
   }
   if (begin == count) return;
-  S start[kBlock] = {}, end[kBlock] = {};
+  const std::size_t rest = count - begin, size = (rest + kGroup - 1) / kGroup * kGroup;
+  S start[kBlock], end[kBlock];
   std::copy(x0 + begin, x0 + count, start);
   std::copy(x1 + begin, x1 + count, end);
-  round_block<kind>(start, end, f, times, start, stats);
+  std::fill(start + rest, start + size, S(0));
+  std::fill(end + rest, end + size, S(0));
+  round_block<kind>(start, end, size, f, times, start, stats);
   std::copy(start, start + (count - begin), out + begin);
 }
 
@@ -242,7 +246,7 @@ void round_chord_vertices(const S* p0, const S* p1, const std::uint32_t* vertice
   }
   const TimeFraction f = chord_fraction(t0, t1, t);
   constexpr std::size_t per_block = kBlock / 3;
-  S start[kBlock] = {}, end[kBlock] = {};
+  S start[kBlock], end[kBlock];
   for (std::size_t begin = 0; begin < count; begin += per_block) {
     const std::size_t many = std::min(per_block, count - begin);
     for (std::size_t i = 0; i < many; ++i) {
