@@ -39,7 +39,15 @@ endfunction()
 #   PROGRAM               the whole kbvh program (list, run, bench, report), with these strategies added to its own
 #   PROGRAM_conformance   the conformance suite over these strategies alone, its cases registered with CTest
 #   PROGRAM_strategies    the library they are compiled into, for further sources and libraries
-function(kbvh_add_strategies program)
+# A macro, because enable_testing() counts only in the folder that calls it, not inside a function.
+macro(kbvh_add_strategies program)
+  if(NOT DEFINED BUILD_TESTING OR BUILD_TESTING)
+    enable_testing()
+  endif()
+  kbvh_add_strategy_targets(${program} ${ARGN})
+endmacro()
+
+function(kbvh_add_strategy_targets program)
   set(names "")
   foreach(source IN LISTS ARGN)
     cmake_path(GET source STEM LAST_ONLY name)
@@ -74,7 +82,6 @@ function(kbvh_add_strategies program)
     return()
   endif()
   include(GoogleTest)
-  enable_testing()
   set(manifest ${CMAKE_CURRENT_BINARY_DIR}/${program}_own_manifest.cpp)
   kbvh_write_manifest(${manifest} ${names})
   add_executable(${program}_conformance ${kbvh_SHARE_DIR}/tests/conformance/conformance_test.cpp
