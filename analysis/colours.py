@@ -37,7 +37,7 @@ FREE: tuple[tuple[str, str], ...] = (
 LINE_STYLES: tuple[object, ...] = ("-", (0, (5, 2)), (0, (1.2, 1.4)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
 
 #: How far a family's colour is mixed with white (> 0) or black (< 0) for its members, in turn.
-SHADES: tuple[float, ...] = (0.0, -0.35, 0.35, -0.6, 0.55)
+SHADES: tuple[float, ...] = (0.0, -0.3, -0.5, -0.68, 0.25)
 
 #: Phases of a frame, from light to dark so that they differ in grey, too; none is a family's colour.
 PHASES: dict[str, tuple[str, str]] = {

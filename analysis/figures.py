@@ -226,7 +226,7 @@ def _lines(
     for place, (column, title) in enumerate(panels):
         axes = figure.add_subplot(grid[0, place])
         positive = rows[rows[column] > 0]
-        fixed_log_axis(axes, "x", list(rows[x]), size if x == "primitives" else (lambda value: f"{value:g}"))
+        fixed_log_axis(axes, "x", list(rows[x]), size if x == "moving" else (lambda value: f"{value:g}"))
         log_axis(axes, "y", list(positive[column]))
         for contestant, line in positive.sort_values(x).groupby("contestant"):
             look = looks[contestant]
@@ -274,23 +274,30 @@ def over_frames_per_keyframe(rows: pd.DataFrame, looks: Looks) -> Optional[Figur
 
 
 def over_size(rows: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Update and total time against the number of primitives, with a slope of n to compare with."""
+    """Update and total time against the number of moving primitives, with a slope of n to compare with."""
     panels = _time_panels(rows)
-    if rows["primitives"].nunique() < 2 or not panels:
+    if rows["moving"].nunique() < 2 or not panels:
         return None
-    figure, all_axes = _lines(rows, looks, "primitives", panels, "primitives n")
+    figure, all_axes = _lines(rows, looks, "moving", panels, "moving primitives n")
     for axes in all_axes:
         _slope(axes)
     return figure
 
 
 def _slope(axes: Axes) -> None:
-    """A thin line of slope n through the lower middle of the panel."""
-    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
-    a, b = x0 * (x1 / x0) ** 0.55, x0 * (x1 / x0) ** 0.92
-    low = y0 * (y1 / y0) ** 0.04
-    axes.plot([a, b], [low, low * b / a], color="#999999", linewidth=0.9, zorder=1)
-    axes.annotate("∝ n", (b, low * b / a), xytext=(3, 0), textcoords="offset points", fontsize=8, color="#777777",
+    """A thin line of slope n at the lower right, below all others; the panel grows to hold it."""
+    (x0, x1), (_, y1) = axes.get_xlim(), axes.get_ylim()
+    a, b = x0 * (x1 / x0) ** 0.6, x0 * (x1 / x0) ** 0.9
+    lowest = min(
+        float(np.interp(math.log(x), np.log(line.get_xdata()), np.log(line.get_ydata())))
+        for line in axes.lines
+        for x in (a, b)
+    )
+    high = math.exp(lowest) * (y1 / math.exp(lowest)) ** -0.05
+    low = high * a / b
+    axes.set_ylim(min(axes.get_ylim()[0], low * (y1 / low) ** -0.03), y1)
+    axes.plot([a, b], [low, high], color="#999999", linewidth=0.9, zorder=1)
+    axes.annotate("∝ n", (b, high), xytext=(3, 0), textcoords="offset points", fontsize=8, color="#777777",
                   va="center")  # fmt: skip
 
 
@@ -299,7 +306,7 @@ def counters(group: pd.DataFrame, over: pd.DataFrame, looks: Looks) -> Optional[
 
     Lines over n where `over` has several sizes; else bars for `group`. None without events.
     """
-    several = over["primitives"].nunique() > 1
+    several = over["moving"].nunique() > 1
     rows = over if several else group
     rows = rows[(rows["certificates_failed_per_frame"] > 0) | rows["family"].isin(REFITS)]
     wanted = [
@@ -310,7 +317,7 @@ def counters(group: pd.DataFrame, over: pd.DataFrame, looks: Looks) -> Optional[
     if not (rows["certificates_failed_per_frame"] > 0).any():
         return None
     if several:
-        figure, all_axes = _lines(rows, looks, "primitives", panels, "primitives n")
+        figure, all_axes = _lines(rows, looks, "moving", panels, "moving primitives n")
         for axes in all_axes:
             _slope(axes)
         return figure

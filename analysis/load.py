@@ -201,6 +201,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "keyframes": record.number("scene.keyframes", math.nan),
         "frames": record.number("scene.frames", math.nan),
         "primitives": record.number("scene.primitives"),
+        "moving": _moving(bodies) or record.number("scene.primitives"),
         "bodies": bodies if isinstance(bodies, list) else [],
         "id": record.text("strategy.id"),
         "title": record.text("strategy.title", record.text("strategy.id")),
@@ -237,6 +238,13 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         [row["scene_name"], row["hash"], row["primitives"], row["scalar"], row["l"], str(row["frames"]), row["machine"]]
     )
     return row
+
+
+def _moving(bodies: Any) -> float:
+    """Primitives of the bodies that move, as the paper counts; 0 if unknown."""
+    listed = [body for body in bodies if isinstance(body, dict)] if isinstance(bodies, list) else []
+    counts = [body.get("primitives") for body in listed if body.get("moving") is True]
+    return float(sum(count for count in counts if isinstance(count, (int, float))))
 
 
 def _family(name: str, bodies: Any) -> str:

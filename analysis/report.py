@@ -171,7 +171,7 @@ def _group_pictures(
     crowd = len(group) > figures.CROWD
     fastest_only = " Of each strategy only the fastest configuration is drawn." if crowd else ""
     left_out = _left_out(group)
-    several = len(sizes) and sizes["primitives"].nunique() > 1
+    several = len(sizes) and sizes["moving"].nunique() > 1
     counted = f"{first['scene']}, {first['scalar']}, l = {first['l']:g}" if several else place
     made = [
         picture(
