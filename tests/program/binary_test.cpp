@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -22,10 +24,11 @@ struct Outcome {
 /// One folder for all runs of a test; the cache is inside of it.
 class Binary : public testing::Test {
  protected:
-  Outcome kbvh(const std::string& arguments, const std::string& environment = "") {
+  Outcome kbvh(const std::string& arguments, const std::string& environment = "",
+               const std::string& program = KBVH_PROGRAM) {
     const auto out = folder_ / "stdout", err = folder_ / "stderr";
     const std::string command = "cd '" + folder_.path().string() + "' && KBVH_CACHE='" +
-                                (folder_ / "cache").string() + "' " + environment + " '" KBVH_PROGRAM "' " +
+                                (folder_ / "cache").string() + "' " + environment + " '" + program + "' " +
                                 arguments + " >'" + out.string() + "' 2>'" + err.string() + "'";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of_file(out), text_of_file(err)};
@@ -180,6 +183,32 @@ TEST_F(Binary, OptionalScenesMayBeAbsent) {
   const Outcome run = kbvh("run --plan plan.json");
   EXPECT_EQ(run.code, 0) << run.err;
   EXPECT_NE(run.err.find("'away' is left out"), std::string::npos) << run.err;
+}
+
+TEST_F(Binary, BrokenGuaranteesAreRefusedATime) {
+  for (const char* command : {"run ", "bench "}) {
+    const std::string out = std::string(1, command[0]) + "-out";
+    const Outcome run = kbvh(command + tiny + "--strategies all --out " + out, "", KBVH_FAULTY_PROGRAM);
+    EXPECT_EQ(run.code, 1) << run.err;
+    EXPECT_NE(run.err.find("3 configurations in which"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("only_small is left out"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("only_double is left out"), std::string::npos) << run.err;
+    EXPECT_NE(run.out.find("throws is refused a time: it threw: out of luck"), std::string::npos) << run.out;
+    std::map<std::string, json> by_id;
+    for (const json& record : records(out + "/results.jsonl")) by_id[record.at("strategy").at("id")] = record;
+    ASSERT_EQ(by_id.size(), 5u);
+    for (const char* id : {"loses", "repeats", "throws"}) {
+      EXPECT_TRUE(by_id.at(id).at("times").is_null()) << id;
+      EXPECT_FALSE(by_id.at(id).at("verified").at("holds")) << id;
+      EXPECT_EQ(by_id.at(id).at("refused"), by_id.at(id).at("verified").at("first_violation")) << id;
+    }
+    for (const char* id : {"honest", "admits_to_lose"})
+      EXPECT_TRUE(by_id.at(id).at("times").is_object()) << id;
+    EXPECT_GT(by_id.at("admits_to_lose").at("verified").at("missed"), 0u);
+    EXPECT_GT(by_id.at("repeats").at("verified").at("repeated"), 0u);
+    // Known failures still are failures when nothing is measured again.
+    EXPECT_EQ(kbvh(command + tiny + "--strategies all --out " + out, "", KBVH_FAULTY_PROGRAM).code, 1);
+  }
 }
 
 TEST_F(Binary, WorksWithoutACache) {

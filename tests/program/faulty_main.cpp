@@ -1,0 +1,84 @@
+// The program with a list of strategies of its own, as a project out of the tree links it: one honest
+// strategy and some that fail, to see that the program refuses them a time and says so.
+#include "core/registry.hpp"
+#include "experiments/program.hpp"
+
+namespace kbvh {
+namespace {
+
+enum class Fault { none, loses_a_pair, repeats_a_pair, throws };
+
+/// Every pair of primitives is a candidate, but for the fault.
+template <class S, Fault fault>
+class EveryPair : public Strategy<S> {
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  EveryPair(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies, const Params&)
+      : Strategy<S>(scene, motion) {}
+  void reset(double) override { this->clear_triangle_stats(); }
+  void advance(double) override {
+    if (fault == Fault::throws) throw std::runtime_error("out of luck");
+  }
+  QueryStatus candidates_at(double, PairBuffer& out, const Budget&) override {
+    for (const BodyPair& pair : this->scene_.pairs())
+      for (std::uint32_t a = 0; a < this->scene_.primitives(pair.first).count(); ++a)
+        for (std::uint32_t b = 0; b < this->scene_.primitives(pair.second).count(); ++b)
+          out.push_back({pair.first, a, pair.second, b});
+    if (fault == Fault::repeats_a_pair && !out.empty()) out.push_back(out.front());
+    return {};
+  }
+  void confirm(double t, PairBuffer& pairs) override {
+    Strategy<S>::confirm(t, pairs);
+    if (fault == Fault::loses_a_pair && !pairs.empty()) pairs.pop_back();
+  }
+  std::size_t bytes() const override { return 0; }
+};
+
+template <class S, class Count>
+struct Honest : EveryPair<S, Fault::none> {
+  using EveryPair<S, Fault::none>::EveryPair;
+};
+template <class S, class Count>
+struct Loses : EveryPair<S, Fault::loses_a_pair> {
+  using EveryPair<S, Fault::loses_a_pair>::EveryPair;
+};
+template <class S, class Count>
+struct Repeats : EveryPair<S, Fault::repeats_a_pair> {
+  using EveryPair<S, Fault::repeats_a_pair>::EveryPair;
+};
+template <class S, class Count>
+struct Throws : EveryPair<S, Fault::throws> {
+  using EveryPair<S, Fault::throws>::EveryPair;
+};
+
+Info info(const char* id, Guarantee guarantee) {
+  Info info;
+  info.id = id;
+  info.title = id;
+  info.family = guarantee == Guarantee::exact ? "refit" : "loose";
+  info.citation = "nobody";
+  info.tightness = Tightness::none;
+  info.guarantee = guarantee;
+  info.topology.own = true;
+  return info;
+}
+
+}  // namespace
+
+std::vector<StrategyEntry> manifest_entries() {
+  Info small = info("only_small", Guarantee::exact);
+  small.max_primitive_pairs = 10;
+  return {make_entry<Honest>(info("honest", Guarantee::exact)),
+          make_entry<Loses>(info("loses", Guarantee::exact)),
+          make_entry<Loses>(info("admits_to_lose", Guarantee::approximate)),
+          make_entry<Repeats>(info("repeats", Guarantee::candidate_superset)),
+          make_entry<Throws>(info("throws", Guarantee::exact)),
+          make_entry<Honest>(small),
+          make_entry<Honest, Scalars::double_only>(info("only_double", Guarantee::exact))};
+}
+
+}  // namespace kbvh
+
+int main(int argc, char** argv) {
+  return kbvh::experiments::run_program(argc, argv);
+}
