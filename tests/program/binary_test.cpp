@@ -160,6 +160,13 @@ TEST_F(Binary, BenchKeepsEveryRepetition) {
   EXPECT_EQ(iterations, 8u);
 }
 
+TEST_F(Binary, BenchTakesEveryContestant) {
+  // Some have no motion time at all, of which Google Benchmark makes statistics that are not numbers.
+  const Outcome bench = kbvh("bench " + tiny + "--strategies all --out out");
+  ASSERT_EQ(bench.code, 0) << bench.err;
+  EXPECT_GT(json::parse(text_of_file(folder_ / "out/benchmark.json")).at("benchmarks").size(), 0u);
+}
+
 TEST_F(Binary, APlanSaysWhatTheCommandLineSays) {
   const std::string arguments =
       "--body waving_sheet:triangles=50,keyframes=3 --body "
