@@ -16,9 +16,10 @@ void confirm_pairs(const SceneView<S>& scene, const SampledMotion<S>& motion, Pa
     motion.fetch(pair.body_b, b);
     const S* positions_a = motion.positions(pair.body_a);
     const S* positions_b = motion.positions(pair.body_b);
-    bool intersect = overlap(primitive_box(a, positions_a), primitive_box(b, positions_b));
-    if (intersect && primitives_a.kind == PrimitiveKind::polygons &&
-        primitives_b.kind == PrimitiveKind::polygons) {
+    bool intersect = false;
+    if (primitives_a.kind != PrimitiveKind::polygons || primitives_b.kind != PrimitiveKind::polygons) {
+      intersect = overlap(primitive_box(a, positions_a), primitive_box(b, positions_b));
+    } else {
       intersect = polygons_intersect<S>(
           a, [&](std::uint32_t v) { return positions_a + std::size_t(3) * v; }, b,
           [&](std::uint32_t v) { return positions_b + std::size_t(3) * v; }, stats);

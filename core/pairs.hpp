@@ -14,7 +14,17 @@ namespace kbvh {
 /// Two primitives of a scene. Canonical: body_a < body_b, or body_a = body_b and primitive_a < primitive_b.
 struct PrimitivePair {
   std::uint32_t body_a, primitive_a, body_b, primitive_b;
-  auto operator<=>(const PrimitivePair&) const = default;
+  bool operator==(const PrimitivePair&) const = default;
+  /// By body and primitive of a, then of b.
+  auto operator<=>(const PrimitivePair& other) const {
+    const auto order = key(body_a, primitive_a) <=> key(other.body_a, other.primitive_a);
+    return order != 0 ? order : key(body_b, primitive_b) <=> key(other.body_b, other.primitive_b);
+  }
+
+ private:
+  static std::uint64_t key(std::uint32_t high, std::uint32_t low) {
+    return (std::uint64_t(high) << 32) | low;
+  }
 };
 static_assert(sizeof(PrimitivePair) == 16);
 
@@ -61,12 +71,41 @@ template <class S>
 void confirm_pairs(const SceneView<S>& scene, const SampledMotion<S>& motion, PairBuffer& pairs,
                    TriangleTestStats& stats);
 
+/// Lower and upper corner of a box in 4 lanes, the last of which means nothing.
+template <class S>
+struct LaneBox {
+  using Lanes = Eigen::Array<S, 4, 1>;
+  Lanes lower, upper;
+
+  /// The box of at least one vertex. Reads one scalar past the last vertex (playback positions are padded).
+  static LaneBox of(std::span<const std::uint32_t> vertices, const S* positions) {
+    const auto at = [positions](std::uint32_t v) {
+      return Eigen::Map<const Lanes>(positions + std::size_t(3) * v);
+    };
+    LaneBox box{at(vertices[0]), at(vertices[0])};
+    for (std::size_t i = 1; i < vertices.size(); ++i) {
+      const Lanes p = at(vertices[i]);
+      box.lower = box.lower.min(p);
+      box.upper = box.upper.max(p);
+    }
+    return box;
+  }
+  void extend(const LaneBox& other) {
+    lower = lower.min(other.lower);
+    upper = upper.max(other.upper);
+  }
+  bool overlaps(const LaneBox& other) const {
+    return (lower[0] <= other.upper[0]) & (other.lower[0] <= upper[0]) & (lower[1] <= other.upper[1]) &
+           (other.lower[1] <= upper[1]) & (lower[2] <= other.upper[2]) & (other.lower[2] <= upper[2]);
+  }
+  Box<S> box() const { return {{lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}}; }
+};
+
 /// The box of one primitive at the motion's current time; its vertices must be current.
+/// Reads one scalar past the last vertex.
 template <class S>
 Box<S> primitive_box(std::span<const std::uint32_t> vertices, const S* positions) {
-  Box<S> box;
-  for (std::uint32_t v : vertices) box.extend(positions + std::size_t(3) * v);
-  return box;
+  return LaneBox<S>::of(vertices, positions).box();
 }
 
 /// Turns overlapping leaves into candidate pairs: appends the primitive pairs of two leaves whose own boxes
@@ -92,24 +131,30 @@ class LeafPairs {
       out_->push_back({body_a_, a_->primitives[na.first()], body_b_, b_->primitives[nb.first()]});
       return;
     }
-    Box<S> boxes_b[16];
-    for (std::uint32_t j = 0; j < nb.count(); ++j)
+    LaneBox<S> boxes_b[16];
+    LaneBox<S> whole_b = boxes_b[0] = box(body_b_, *primitives_b_, b_->primitives[nb.first()]);
+    for (std::uint32_t j = 1; j < nb.count(); ++j) {
       boxes_b[j] = box(body_b_, *primitives_b_, b_->primitives[nb.first() + j]);
+      whole_b.extend(boxes_b[j]);
+    }
+    std::uint64_t tests = na.count();
     for (std::uint32_t i = 0; i < na.count(); ++i) {
       const std::uint32_t primitive = a_->primitives[na.first() + i];
-      const Box<S> box_a = box(body_a_, *primitives_a_, primitive);
+      const LaneBox<S> box_a = box(body_a_, *primitives_a_, primitive);
+      if (!box_a.overlaps(whole_b)) continue;
+      tests += nb.count();
       for (std::uint32_t j = 0; j < nb.count(); ++j)
-        if (overlap(box_a, boxes_b[j]))
+        if (box_a.overlaps(boxes_b[j]))
           out_->push_back({body_a_, primitive, body_b_, b_->primitives[nb.first() + j]});
     }
-    count_->add(Counter::box_tests, std::uint64_t(na.count()) * nb.count());
+    count_->add(Counter::box_tests, tests);
   }
 
  private:
-  Box<S> box(std::uint32_t body, const Primitives& primitives, std::uint32_t primitive) const {
+  LaneBox<S> box(std::uint32_t body, const Primitives& primitives, std::uint32_t primitive) const {
     const auto vertices = primitives[primitive];
     motion_->fetch(body, vertices);
-    return primitive_box(vertices, motion_->positions(body));
+    return LaneBox<S>::of(vertices, motion_->positions(body));
   }
   const SampledMotion<S>* motion_;
   const Primitives* primitives_a_;

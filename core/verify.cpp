@@ -38,7 +38,8 @@ PairBuffer difference(const PairBuffer& from, const PairBuffer& without) {
 template <class S>
 class FrameChecker {
  public:
-  FrameChecker(Session<S>& session, Verification& result) : session_(session), result_(result) {}
+  FrameChecker(Session<S>& session, Verification& result)
+      : session_(session), result_(result), sound_(session.scene().bodies.size()) {}
 
   /// Takes the answers by value: sorting must not disturb the buffers that strategies keep warm.
   void check_pairs(PairBuffer candidates, PairBuffer confirmed, const PairBuffer& truth) {
@@ -69,11 +70,12 @@ class FrameChecker {
   void check_bounds() {
     const Info& info = session_.info();
     for (std::uint32_t body = 0; body < session_.scene().bodies.size(); ++body) {
-      const auto view = session_.strategy().audit_view(body);
+      auto view = session_.strategy().audit_view(body);
       if (!view) continue;
       result_.audited = true;
-      const Audit found =
-          audit(*view, session_.scene().bodies[body].primitives, session_.playback().positions(body));
+      const Audit found = audit(*view, session_.scene().bodies[body].primitives,
+                                session_.playback().positions(body), &sound_[body]);
+      if (found.topology_error.empty()) sound_[body] = std::move(view->topology);
       result_.audit.add(found);
       const std::string where = "body " + std::to_string(body) + ": ";
       if (!found.topology_error.empty()) violate(where + found.topology_error);
@@ -90,6 +92,7 @@ class FrameChecker {
   }
   Session<S>& session_;
   Verification& result_;
+  std::vector<Topology> sound_;  ///< of each body, as last found sound: most never change
 };
 
 }  // namespace

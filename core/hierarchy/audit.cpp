@@ -48,10 +48,11 @@ std::vector<Box<double>> tight_boxes(const Topology& topology, const Primitives&
 }
 
 template <class S>
-Audit audit(const AuditView& view, const Primitives& primitives, const S* positions) {
+Audit audit(const AuditView& view, const Primitives& primitives, const S* positions, const Topology* sound) {
   Audit result;
   result.nodes = view.topology.size();
-  result.topology_error = check_topology(view.topology, primitives.count());
+  if (sound == nullptr || !(view.topology == *sound))
+    result.topology_error = check_topology(view.topology, primitives.count());
   if (!result.topology_error.empty()) return result;
   if (view.boxes.size() != view.topology.size()) {
     result.topology_error =
@@ -98,7 +99,7 @@ double sah_cost(const Topology& topology, const std::vector<Box<double>>& boxes,
 
 template std::vector<Box<double>> tight_boxes(const Topology&, const Primitives&, const float*);
 template std::vector<Box<double>> tight_boxes(const Topology&, const Primitives&, const double*);
-template Audit audit(const AuditView&, const Primitives&, const float*);
-template Audit audit(const AuditView&, const Primitives&, const double*);
+template Audit audit(const AuditView&, const Primitives&, const float*, const Topology*);
+template Audit audit(const AuditView&, const Primitives&, const double*, const Topology*);
 
 }  // namespace kbvh

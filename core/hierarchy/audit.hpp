@@ -24,7 +24,8 @@ struct Audit {
 /// Audits topology, validity and tightness of one body against its current positions [vertex][3]. O(nodes +
 /// vertices).
 template <class S>
-Audit audit(const AuditView& view, const Primitives& primitives, const S* positions);
+Audit audit(const AuditView& view, const Primitives& primitives, const S* positions,
+            const Topology* sound = nullptr);
 
 /// Exact boxes of all nodes, in double; the reference for validity and tightness.
 template <class S>

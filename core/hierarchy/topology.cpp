@@ -43,33 +43,33 @@ std::string check_topology(const Topology& topology, std::uint32_t primitive_cou
   bool first_leaf = true, perfect = true;
   for (std::uint32_t i = 0; i < n; ++i) {
     const TopologyNode node = topology.nodes[i];
-    const std::string where = "node " + std::to_string(i) + ": ";
-    if (!seen_node[i]) return where + "comes before its parent or has none";
-    if (node.count() == 0) return where + "is empty";
+    const auto fault = [i](const std::string& what) { return "node " + std::to_string(i) + ": " + what; };
+    if (!seen_node[i]) return fault("comes before its parent or has none");
+    if (node.count() == 0) return fault("is empty");
     if (node.is_leaf()) {
       if (node.count() > topology.leaf_size)
-        return where + std::to_string(node.count()) + " primitives in a leaf";
+        return fault(std::to_string(node.count()) + " primitives in a leaf");
       if (first_leaf) leaf_depth = topology.depths[i];
       first_leaf = false;
       perfect = perfect && topology.depths[i] == leaf_depth;
       for (std::uint32_t k = node.first(); k < node.first() + node.count(); ++k) {
         if (k >= primitive_count || seen_entry[k]++)
-          return where + "leaf entry " + std::to_string(k) + " is shared";
+          return fault("leaf entry " + std::to_string(k) + " is shared");
         const std::uint32_t primitive = topology.primitives[k];
         if (primitive >= primitive_count || seen_primitive[primitive]++)
-          return where + "primitive " + std::to_string(primitive) + " is in two leaves or does not exist";
+          return fault("primitive " + std::to_string(primitive) + " is in two leaves or does not exist");
       }
     } else {
       if (node.count() < 2 || node.count() > topology.width)
-        return where + std::to_string(node.count()) + " children";
+        return fault(std::to_string(node.count()) + " children");
       perfect = perfect && (i == 0 || node.count() == topology.width);
       for (std::uint32_t child = node.first(); child < node.first() + node.count(); ++child) {
-        if (child <= i || child >= n) return where + "child " + std::to_string(child) + " does not follow it";
-        if (seen_node[child]++) return where + "child " + std::to_string(child) + " has two parents";
+        if (child <= i || child >= n) return fault("child " + std::to_string(child) + " does not follow it");
+        if (seen_node[child]++) return fault("child " + std::to_string(child) + " has two parents");
         if (topology.parents[child] != i)
-          return where + "is not recorded as parent of " + std::to_string(child);
+          return fault("is not recorded as parent of " + std::to_string(child));
         if (topology.depths[child] != std::min(255, topology.depths[i] + 1))
-          return where + "wrong depth of child " + std::to_string(child);
+          return fault("wrong depth of child " + std::to_string(child));
       }
     }
   }

@@ -45,6 +45,7 @@ struct Topology {
 
   std::uint32_t size() const { return std::uint32_t(nodes.size()); }
   bool empty() const { return nodes.empty(); }
+  bool operator==(const Topology&) const = default;
   std::size_t bytes() const {
     return nodes.size() * (sizeof(TopologyNode) + sizeof(std::uint32_t) + 1) +
            primitives.size() * sizeof(std::uint32_t);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/assert.hpp"
+#include "core/counters.hpp"
 #include "core/hierarchy/topology.hpp"
 #include "core/kinetic/event.hpp"
 

@@ -81,7 +81,9 @@ template <class V, class S>
 [[gnu::always_inline]] inline Doubles load_widened(const float* from) {
 #if defined(__SSE2__) && !defined(__AVX__)
   // GCC 12 would convert one lane at a time.
-  return _mm_cvtps_pd(_mm_castpd_ps(_mm_load_sd(reinterpret_cast<const double*>(from))));
+  double both;
+  __builtin_memcpy(&both, from, sizeof both);  // `from` is aligned for a float only
+  return _mm_cvtps_pd(_mm_castpd_ps(_mm_set_sd(both)));
 #else
   return __builtin_convertvector(load<Floats>(from), Doubles);
 #endif
