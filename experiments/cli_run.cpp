@@ -112,7 +112,7 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
           ->check(CLI::PositiveNumber),
       command.add_option("--keyframes", o->keyframes, "of a built-in scene (60)")->check(CLI::PositiveNumber),
       command.add_option("--seed", o->seeds, "of what chance decides (1); a list sweeps")->delimiter(','),
-      command.add_option("--order", o->order, "vertex order: given, shuffled, or both"),
+      command.add_option("--order", o->order, "vertex order: given, shuffled, renumbered; a list sweeps"),
       command
           .add_option("--strategies", o->strategies,
                       "ids, family:NAME, default (all that promise something) or all; !x: but not x")

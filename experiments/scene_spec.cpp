@@ -4,6 +4,7 @@
 #include <numeric>
 #include <set>
 
+#include "core/hierarchy/renumber.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/io/load.hpp"
 #include "experiments/json_reader.hpp"
@@ -88,6 +89,13 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
   if (body.frames_per_second < 0) keys.fail("fps", "must not be negative");
   keys.finish();
   return body;
+}
+
+VertexOrder order_of(const std::string& word, const JsonReader& keys) {
+  if (word == "given") return VertexOrder::given;
+  if (word == "shuffled") return VertexOrder::shuffled;
+  if (word == "renumbered") return VertexOrder::renumbered;
+  keys.fail("order", "expected given, shuffled or renumbered, got '" + word + "'");
 }
 
 }  // namespace
@@ -177,12 +185,10 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
   for (const std::uint64_t count : triangles)
     for (const std::uint64_t seed : seeds)
       for (const std::string& order : orders) {
-        if (order != "given" && order != "shuffled")
-          keys.fail("order", "expected given or shuffled, got '" + order + "'");
         SceneSpec spec = base;
         spec.options.triangles = std::uint32_t(count);
         spec.options.seed = seed;
-        spec.shuffled = order == "shuffled";
+        spec.order = order_of(order, keys);
         scenes.push_back(std::move(spec));
       }
   return scenes;
@@ -301,12 +307,15 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     loaded.meshes.push_back(std::move(mesh));
   }
   if (loaded.name.empty()) loaded.name = joined(names, "+");
-  if (spec.shuffled) {
+  if (!spec.name.empty()) loaded.name = spec.name;
+  loaded.order = spec.order;
+  if (spec.order == VertexOrder::shuffled) {
     for (std::size_t i = 0; i < loaded.meshes.size(); ++i)
       shuffle_vertices(loaded.meshes[i], hash_of(std::to_string(i), spec.options.seed));
     loaded.name += "-shuffled";
+  } else if (spec.order == VertexOrder::renumbered) {
+    loaded.name += "-renumbered";
   }
-  if (!spec.name.empty()) loaded.name = spec.name + (spec.shuffled ? "-shuffled" : "");
   if (loaded.meshes.empty()) throw io::InputError("the scene has no body");
   return loaded;
 }
@@ -332,6 +341,8 @@ Scene<S> assemble(const LoadedScene& loaded) {
   }
   scene.pairs = all_pairs(scene.bodies);
   validate(scene);
+  if (loaded.order == VertexOrder::renumbered)
+    scene = std::move(renumber_in_leaf_order(scene, BuilderConfig{}).scene);
   return scene;
 }
 

@@ -33,13 +33,20 @@ struct BodySpec {
   std::string place;  ///< for messages
 };
 
+/// In which order a scene stores its vertices (and, renumbered, its primitives).
+enum class VertexOrder : std::uint8_t {
+  given,       ///< as the file or the generator has them
+  shuffled,    ///< at random, as a careless exporter leaves them
+  renumbered,  ///< as the leaves of the default topology meet them (core/hierarchy/renumber.hpp)
+};
+
 /// A scene as a plan says it.
 struct SceneSpec {
   std::string name;     ///< empty: from what is in it
   std::string builtin;  ///< or empty: the bodies
   BuiltinOptions options;
   std::vector<BodySpec> bodies;
-  bool shuffled = false;  ///< vertices in random order (of options.seed), as a careless exporter leaves them
+  VertexOrder order = VertexOrder::given;
   bool optional = false;  ///< skipped with a note if a file does not exist
 };
 
@@ -58,9 +65,10 @@ std::vector<SceneSpec> read_scenes(const nlohmann::json& scene, const std::strin
 struct LoadedScene {
   std::string name;
   std::uint64_t seed = 1;
-  std::vector<io::AnimatedMesh> meshes;  ///< placed, in double
-  std::vector<std::string> sources;      ///< of each: its file, or how it was made
-  std::vector<std::string> notes;        ///< what readers noticed, one sentence each
+  std::vector<io::AnimatedMesh> meshes;    ///< placed, in double
+  std::vector<std::string> sources;        ///< of each: its file, or how it was made
+  VertexOrder order = VertexOrder::given;  ///< `renumbered` is left to `assemble`
+  std::vector<std::string> notes;          ///< what readers noticed, one sentence each
 };
 
 /// Reads or makes all bodies. Throws io::InputError.

@@ -183,6 +183,20 @@ TEST_F(Binary, APlanSaysWhatTheCommandLineSays) {
   EXPECT_EQ(records()[0].at("scene").at("name"), "pair-shuffled");
 }
 
+TEST_F(Binary, OrdersAreDifferentScenesOfTheSameGeometry) {
+  const Outcome run =
+      kbvh("run " + tiny + "--strategies bottom_up --order given,shuffled,renumbered --out out");
+  ASSERT_EQ(run.code, 0) << run.err;
+  const auto list = records();
+  ASSERT_EQ(list.size(), 3u);
+  EXPECT_EQ(list[2].at("scene").at("name"), "waving_sheet-98-renumbered");
+  for (const json& record : list) {
+    EXPECT_EQ(record.at("verified").at("pairs"), list[0].at("verified").at("pairs"));
+  }
+  EXPECT_NE(list[1].at("scene").at("hash"), list[0].at("scene").at("hash"));
+  EXPECT_NE(list[2].at("scene").at("hash"), list[0].at("scene").at("hash"));
+}
+
 TEST_F(Binary, OptionalScenesMayBeAbsent) {
   write_text(folder_ / "plan.json", R"({"strategies": "bottom_up", "repetitions": 1, "scenes": [
       {"name": "away", "optional": true, "bodies": [{"file": "away.obj"}, "box"]},
