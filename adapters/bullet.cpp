@@ -500,8 +500,14 @@ class BulletDbvt final : public Bullet<Count> {
     const std::uint32_t count = this->scene_.primitives(body).count();
     if (count == 0) return;
     {
+      // Insertion and optimizeTopDown() multiply extents: far from 1 they overflow, and the latter then
+      // writes out of bounds. The shape of the tree is decided at a sane size; true volumes follow below.
+      const float scale = sane_scale(body);
       btDbvt grown;
-      for (int p = 0; p < int(count); ++p) grown.insert(volume(body, p), nullptr)->dataAsInt = p;
+      for (int p = 0; p < int(count); ++p) {
+        const btDbvtVolume real = volume(body, p);
+        grown.insert(btDbvtVolume::FromMM(real.Mins() * scale, real.Maxs() * scale), nullptr)->dataAsInt = p;
+      }
       grown.optimizeTopDown();
       // The copy has its nodes in memory as a descent meets them: both refits and queries profit.
       btDbvt::IClone nothing_more;
@@ -524,19 +530,46 @@ class BulletDbvt final : public Bullet<Count> {
       stack.push_back(node->childs[place & 1]);
       stack.push_back(node->childs[(place + 1) & 1]);
     }
+    // Children before parents, and true volumes in place of the scaled ones.
+    std::vector<btDbvtNode*> order;
+    stack = {state.tree.m_root};
+    while (!stack.empty()) {
+      btDbvtNode* node = stack.back();
+      stack.pop_back();
+      order.push_back(node);
+      if (node->isleaf()) continue;
+      stack.push_back(node->childs[0]);
+      stack.push_back(node->childs[1]);
+    }
+    std::reverse(order.begin(), order.end());
+    for (btDbvtNode* node : order) set_volume(body, *node);
     if (refits_) std::reverse(state.nodes.begin(), state.nodes.end());
+  }
+
+  /// A power of two that brings the body's coordinates to about 1000.
+  float sane_scale(std::uint32_t body) const {
+    float largest = 0;
+    for (std::uint32_t p = 0; p < this->scene_.primitives(body).count(); ++p) {
+      const btDbvtVolume v = volume(body, int(p));
+      for (int axis = 0; axis < 3; ++axis)
+        largest = std::max({largest, std::abs(v.Mins()[axis]), std::abs(v.Maxs()[axis])});
+    }
+    if (largest == 0) return 1;
+    return std::ldexp(1.0F, std::clamp(10 - std::ilogb(largest), -126, 126));
+  }
+
+  void set_volume(std::uint32_t body, btDbvtNode& node) const {
+    if (node.isleaf())
+      node.volume = volume(body, node.dataAsInt);
+    else
+      Merge(node.childs[0]->volume, node.childs[1]->volume, node.volume);
   }
 
   void update(std::uint32_t body) {
     BodyState& state = bodies_[body];
     if (state.nodes.empty()) return;
     if (refits_) {
-      for (btDbvtNode* node : state.nodes) {
-        if (node->isleaf())
-          node->volume = volume(body, node->dataAsInt);
-        else
-          Merge(node->childs[0]->volume, node->childs[1]->volume, node->volume);
-      }
+      for (btDbvtNode* node : state.nodes) set_volume(body, *node);
       this->count_refit(this->scene_.primitives(body).count());
       return;
     }

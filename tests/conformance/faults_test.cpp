@@ -139,8 +139,8 @@ Info info(const char* id) {
 template <template <class, class> class Strategy>
 std::string violation(const char* id) {
   const StrategyEntry entry = make_entry<Strategy>(info(id));
-  return check(entry, synthetic_scene<float>("sheets"), 7, {}, entry.info.topology.preferred) + "|" +
-         check(entry, synthetic_scene<double>("sheets"), 7, {}, entry.info.topology.preferred);
+  return check(entry, synthetic_scene<float>("soups"), 7, {}, entry.info.topology.preferred) + "|" +
+         check(entry, synthetic_scene<double>("soups"), 7, {}, entry.info.topology.preferred);
 }
 
 void expect_caught(const std::string& violations, const std::string& expected) {
