@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <filesystem>
 
 #include "experiments/cli.hpp"
 #include "experiments/io/bytes.hpp"
@@ -42,6 +43,18 @@ json params_of(const std::vector<std::string>& assignments) {
   return params;
 }
 
+/// --clip is for every glTF body that does not name a clip of its own.
+void choose_clip(json& scene, const std::string& clip) {
+  bool used = false;
+  for (json& body : scene["bodies"]) {
+    const std::string extension = std::filesystem::path(body.value("file", "")).extension().string();
+    if ((extension != ".gltf" && extension != ".glb") || body.contains("clip")) continue;
+    body["clip"] = clip;
+    used = true;
+  }
+  if (!used) throw io::InputError("--clip: no --body is a glTF file without a clip of its own");
+}
+
 json scene_of(const StudyOptions& options) {
   json scene = json::object();
   if (options.bodies.empty()) {
@@ -50,6 +63,7 @@ json scene_of(const StudyOptions& options) {
     if (!options.scene.empty()) throw io::InputError("--scene and --body exclude each other");
     for (const std::string& body : options.bodies) scene["bodies"].push_back(body_from_text(body));
   }
+  if (!options.clip.empty()) choose_clip(scene, options.clip);
   if (!options.triangles.empty()) scene["triangles"] = options.triangles;
   if (!options.seeds.empty()) scene["seed"] = options.seeds;
   if (options.keyframes > 0) scene["keyframes"] = options.keyframes;
@@ -105,6 +119,8 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
       command.add_option("--body", o->bodies, "a body from a file or by formula; repeatable, see below")
           ->take_all()
           ->expected(1),
+      command.add_option("--clip", o->clip,
+                         "animation of glTF bodies: its name or index; also as clip= in --body"),
       command.add_option("--name", o->name, "name of the scene in results"),
       command.add_option("--triangles", o->triangles, "of the built-in scene's moving body; a list sweeps")
           ->delimiter(','),
