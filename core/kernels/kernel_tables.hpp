@@ -1,0 +1,38 @@
+#pragma once
+// Internal: tables of kernels, one for each instruction set (kernel_set.hpp). Kernel files include this and
+// no standard headers with inline functions.
+
+#if defined(KBVH_X86_KERNELS)
+/// Inside namespace kbvh: declares `table`, of type `const Type`, in the namespaces of all instruction sets.
+#define KBVH_DECLARE_KERNELS(Type, table) \
+  namespace kernels::portable {           \
+  extern const Type table;                \
+  }                                       \
+  namespace kernels::sse {                \
+  extern const Type table;                \
+  }                                       \
+  namespace kernels::avx2 {               \
+  extern const Type table;                \
+  }                                       \
+  namespace kernels::avx512 {             \
+  extern const Type table;                \
+  }
+/// The table that a KernelSet names.
+#define KBVH_SELECT_KERNELS(set, table)                                                 \
+  (*kbvh::kernels::choose({&kbvh::kernels::portable::table, &kbvh::kernels::sse::table, \
+                           &kbvh::kernels::avx2::table, &kbvh::kernels::avx512::table}, \
+                          static_cast<int>(set)))
+#else
+#define KBVH_DECLARE_KERNELS(Type, table) \
+  namespace kernels::portable {           \
+  extern const Type table;                \
+  }
+#define KBVH_SELECT_KERNELS(set, table) (static_cast<void>(set), kbvh::kernels::portable::table)
+#endif
+
+namespace kbvh::kernels {
+template <class Table>
+inline const Table* choose(const Table* const (&tables)[4], int set) {
+  return tables[set];
+}
+}  // namespace kbvh::kernels

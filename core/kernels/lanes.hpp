@@ -1,0 +1,91 @@
+#pragma once
+// Internal to core/kernels/*.cpp: vectors as wide as the instruction set that the file is compiled for.
+// Everything is in an anonymous namespace and forced inline, so that no two translation units share code.
+// "portable" has vectors of one lane, which are plain numbers: the same source, without any extension.
+#include <cstddef>
+#include <cstdint>
+#if !defined(KBVH_KERNELS_portable)
+#include <immintrin.h>
+#endif
+
+namespace kbvh {
+namespace {
+
+#if defined(KBVH_KERNELS_avx512)
+constexpr std::size_t kRegisterBytes = 64;
+#elif defined(KBVH_KERNELS_avx2)
+constexpr std::size_t kRegisterBytes = 32;
+#elif defined(KBVH_KERNELS_sse)
+constexpr std::size_t kRegisterBytes = 16;
+#else
+constexpr std::size_t kRegisterBytes = 0;
+#endif
+
+template <class S, std::size_t n>
+struct VectorOf {
+  using type [[gnu::vector_size(n * sizeof(S))]] = S;
+};
+template <class S>
+struct VectorOf<S, 1> {
+  using type = S;
+};
+/// n numbers that are computed together; for n = 1 a plain number.
+template <class S, std::size_t n>
+using Vector = typename VectorOf<S, n>::type;
+
+/// Most lanes of a register, or 1.
+template <class S>
+constexpr std::size_t native_lanes = kRegisterBytes == 0 ? 1 : kRegisterBytes / sizeof(S);
+
+template <class V, class S>
+[[gnu::always_inline]] inline V load_lanes(const S* from) {
+  V v;
+  __builtin_memcpy(&v, from, sizeof v);
+  return v;
+}
+template <class V, class S>
+[[gnu::always_inline]] inline void store_lanes(S* to, V v) {
+  __builtin_memcpy(to, &v, sizeof v);
+}
+/// The smaller of each lane; b where they are equal (both zeros are one number here) or unordered.
+template <class V>
+[[gnu::always_inline]] inline V smaller(V a, V b) {
+  return a < b ? a : b;
+}
+template <class V>
+[[gnu::always_inline]] inline V larger(V a, V b) {
+  return a > b ? a : b;
+}
+
+/// One bit for each lane of a comparison's result.
+[[gnu::always_inline]] inline unsigned mask_bits(bool lane) {
+  return lane ? 1U : 0U;
+}
+#if !defined(KBVH_KERNELS_portable)
+[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int32_t, 4> m) {
+  return unsigned(_mm_movemask_ps((__m128)m));
+}
+[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int64_t, 2> m) {
+  return unsigned(_mm_movemask_pd((__m128d)m));
+}
+#endif
+#if defined(KBVH_KERNELS_avx2) || defined(KBVH_KERNELS_avx512)
+[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int32_t, 8> m) {
+  return unsigned(_mm256_movemask_ps((__m256)m));
+}
+[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int64_t, 4> m) {
+  return unsigned(_mm256_movemask_pd((__m256d)m));
+}
+#endif
+#if defined(KBVH_KERNELS_avx512)
+// Through 32 bits: GCC 12 can spill a 16-bit mask and reload more than it wrote.
+[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int32_t, 16> m) {
+  return unsigned(_mm512_movepi32_mask((__m512i)m)) & 0xffffU;
+}
+[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int64_t, 8> m) {
+  return unsigned(_mm512_movepi64_mask((__m512i)m)) & 0xffU;
+}
+#endif
+
+}  // namespace
+}  // namespace kbvh
