@@ -18,8 +18,8 @@ class Rebuild final : public StoredHierarchyStrategy<S, Count> {
       : Base(scene, motion, std::move(topologies), params) {
     config_.method = build_method(params.word("method"));
     for (const auto& hierarchy : this->hierarchies_) {
-      config_.width = hierarchy.topology.width;
-      config_.leaf_size = hierarchy.topology.leaf_size;
+      config_.width = hierarchy.topology().width;
+      config_.leaf_size = hierarchy.topology().leaf_size;
     }
   }
 
@@ -28,12 +28,11 @@ class Rebuild final : public StoredHierarchyStrategy<S, Count> {
     const Primitives& primitives = this->scene_.primitives(body);
     const auto boxes = primitive_boxes(primitives, this->sampled_.positions(body));
     auto& hierarchy = this->hierarchies_[body];
-    hierarchy.assign(build_topology<S>(boxes, config_), primitives);
+    hierarchy.assign(build_topology<S>(boxes, config_), primitives, hierarchy.kernels());
     this->refit(body);
-    this->count_.add(Counter::nodes_visited, hierarchy.topology.size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology.size());
-    this->count_.add(Counter::vertex_reads,
-                     primitives.vertices.size() + hierarchy.leaf_vertices.vertices.size());
+    this->count_.add(Counter::nodes_visited, hierarchy.topology().size());
+    this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology().size());
+    this->count_.add(Counter::vertex_reads, primitives.vertices.size() + hierarchy.leaf_vertex_count());
   }
 
   BuilderConfig config_;

@@ -18,7 +18,7 @@ class TopDown final : public StoredHierarchyStrategy<S, Count> {
           const Params& params)
       : Base(scene, motion, std::move(topologies), params) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-      ranges_.push_back(primitive_ranges(this->hierarchies_[body].topology));
+      ranges_.push_back(primitive_ranges(this->hierarchies_[body].topology()));
   }
 
  private:
@@ -32,19 +32,20 @@ class TopDown final : public StoredHierarchyStrategy<S, Count> {
     auto& hierarchy = this->hierarchies_[body];
     const S* positions = this->sampled_.positions(body);
     const Primitives& primitives = this->scene_.primitives(body);
+    const Topology& topology = hierarchy.topology();
     std::uint64_t reads = 0;
-    for (std::uint32_t node = 0; node < hierarchy.topology.size(); ++node) {
+    for (std::uint32_t node = 0; node < topology.size(); ++node) {
       Box<S> box;
       const Range range = ranges_[body][node];
       for (std::uint32_t i = range.begin; i < range.end; ++i) {
-        const auto vertices = primitives[hierarchy.topology.primitives[i]];
+        const auto vertices = primitives[topology.primitives[i]];
         reads += vertices.size();
         for (std::uint32_t v : vertices) box.extend(positions + std::size_t(3) * v);
       }
-      hierarchy.boxes[node] = box;
+      hierarchy.set_box(node, box);
     }
-    this->count_.add(Counter::nodes_visited, hierarchy.topology.size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology.size());
+    this->count_.add(Counter::nodes_visited, topology.size());
+    this->count_.add(Counter::values_written, std::uint64_t(6) * topology.size());
     this->count_.add(Counter::vertex_reads, reads);
   }
 

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/kernels/limits.hpp"
+
 namespace kbvh {
 
 namespace {
@@ -86,6 +88,10 @@ KernelSet active_kernel_set() {
                                                 : checked(kernel_set(wanted));
   }();
   return initial;
+}
+
+const LimitKernels& limit_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, limits);
 }
 
 void use_kernel_set(KernelSet set) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/kernels/kernel_set.hpp"
 #include "tests/conformance/check.hpp"
 
 namespace kbvh::test {
@@ -70,6 +71,29 @@ TEST_P(Configurations, AllConform) {
 
 INSTANTIATE_TEST_SUITE_P(Registry, Configurations, testing::ValuesIn(strategy_ids()),
                          [](const auto& test) { return test.param; });
+
+// Positions, refits, queries and triangle tests by every set of kernels that this machine can run.
+class Kernels : public testing::TestWithParam<KernelSet> {};
+
+TEST_P(Kernels, Conform) {
+  const KernelSet before = active_kernel_set();
+  use_kernel_set(GetParam());
+  for (const std::string id : {"bottom_up", "top_down", "kinetic_aabb"}) {
+    const StrategyEntry& entry = find_strategy(id);
+    for (const std::string& scene_name : synthetic_scene_names()) {
+      const std::string where = id + " on " + scene_name + " with " + name(GetParam());
+      const BuilderConfig builder = entry.info.topology.preferred;
+      expect_conforms(check(entry, synthetic_scene<float>(scene_name, 10), 10, {}, builder),
+                      where + ", float");
+      expect_conforms(check(entry, synthetic_scene<double>(scene_name, 10), 10, {}, builder),
+                      where + ", double");
+    }
+  }
+  use_kernel_set(before);
+}
+
+INSTANTIATE_TEST_SUITE_P(Registry, Kernels, testing::ValuesIn(supported_kernel_sets()),
+                         [](const auto& test) { return std::string(name(test.param)); });
 
 TEST(Registry, DescribesEveryStrategy) {
   EXPECT_GE(registry().size(), 1u);

@@ -51,17 +51,20 @@ class FaultyRefit : public StoredHierarchyStrategy<S, Count> {
     if (fault == Fault::stale_frame && frame_ == 5) return;
     this->refit(body);
     auto& hierarchy = this->hierarchies_[body];
-    if (hierarchy.topology.size() < 4) return;
-    Box<S>& box = hierarchy.boxes[hierarchy.topology.size() - 2];
+    const Topology& topology = hierarchy.topology();
+    if (topology.size() < 4) return;
+    const std::uint32_t faulty = topology.size() - 2;
+    Box<S> box = hierarchy.box(faulty);
     if constexpr (fault == Fault::one_ulp) box.upper[1] = std::nextafter(box.upper[1], S(-1e38));
     if constexpr (fault == Fault::too_loose) box.upper[1] = std::nextafter(box.upper[1], S(1e38));
     if constexpr (fault == Fault::swapped_axis) {
       std::swap(box.lower[1], box.lower[2]);
       std::swap(box.upper[1], box.upper[2]);
     }
+    hierarchy.set_box(faulty, box);
     if constexpr (fault == Fault::dropped_child) {
-      const TopologyNode node = hierarchy.topology.nodes[1];
-      if (!node.is_leaf()) hierarchy.boxes[1] = hierarchy.boxes[node.first()];
+      const TopologyNode node = topology.nodes[1];
+      if (!node.is_leaf()) hierarchy.set_box(1, hierarchy.box(node.first()));
     }
   }
   std::uint64_t frame_ = 0;

@@ -23,7 +23,7 @@ class SparseRefit final : public kbvh::StoredHierarchyStrategy<S, Count> {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       seen_[body].positions.resize(std::size_t(3) * scene.vertex_count(body));
       seen_[body].moved.resize(scene.vertex_count(body));
-      seen_[body].changed.resize(this->hierarchies_[body].topology.size());
+      seen_[body].changed.resize(this->hierarchies_[body].topology().size());
     }
   }
 
@@ -57,17 +57,17 @@ class SparseRefit final : public kbvh::StoredHierarchyStrategy<S, Count> {
     auto& hierarchy = this->hierarchies_[body];
     std::vector<std::uint8_t>& changed = seen_[body].changed;
     std::uint64_t recomputed = 0;
-    for (std::uint32_t i = hierarchy.topology.size(); i-- > 0;) {
-      const kbvh::TopologyNode node = hierarchy.topology.nodes[i];
-      changed[i] = concerned(node, hierarchy.leaf_vertices[i], seen_[body]);
+    for (std::uint32_t i = hierarchy.topology().size(); i-- > 0;) {
+      const kbvh::TopologyNode node = hierarchy.topology().nodes[i];
+      changed[i] = concerned(node, hierarchy.leaf_vertices(i), seen_[body]);
       if (changed[i] == 0) continue;
       ++recomputed;
-      const kbvh::Box<S> box = node.is_leaf() ? kbvh::leaf_box(hierarchy.leaf_vertices[i], positions)
-                                              : union_of_children(node, hierarchy.boxes.data());
-      changed[i] = !(box == hierarchy.boxes[i]);
-      hierarchy.boxes[i] = box;
+      const kbvh::Box<S> box = node.is_leaf() ? kbvh::leaf_box(hierarchy.leaf_vertices(i), positions)
+                                              : union_of_children(node, hierarchy);
+      changed[i] = !(box == hierarchy.box(i));
+      hierarchy.set_box(i, box);
     }
-    this->count_.add(Counter::nodes_visited, hierarchy.topology.size());
+    this->count_.add(Counter::nodes_visited, hierarchy.topology().size());
     this->count_.add(Counter::values_written, 6 * recomputed);
   }
 
@@ -93,9 +93,9 @@ class SparseRefit final : public kbvh::StoredHierarchyStrategy<S, Count> {
     return any;
   }
 
-  static kbvh::Box<S> union_of_children(kbvh::TopologyNode node, const kbvh::Box<S>* boxes) {
-    kbvh::Box<S> box = boxes[node.first()];
-    for (std::uint32_t k = 1; k < node.count(); ++k) box.extend(boxes[node.first() + k]);
+  static kbvh::Box<S> union_of_children(kbvh::TopologyNode node, const kbvh::WideHierarchy<S>& hierarchy) {
+    kbvh::Box<S> box = hierarchy.box(node.first());
+    for (std::uint32_t k = 1; k < node.count(); ++k) box.extend(hierarchy.box(node.first() + k));
     return box;
   }
 

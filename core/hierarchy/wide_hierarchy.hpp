@@ -1,0 +1,132 @@
+#pragma once
+#include <boost/align/aligned_allocator.hpp>
+#include <cstdint>
+#include <vector>
+
+#include "core/counters.hpp"
+#include "core/hierarchy/topology.hpp"
+#include "core/hierarchy/traversal.hpp"
+#include "core/kernels/kernel_set.hpp"
+#include "core/kernels/wide_overlap.hpp"
+#include "core/kernels/wide_refit.hpp"
+#include "core/motion/motion_view.hpp"
+#include "core/pairs.hpp"
+
+namespace kbvh {
+
+/// An array that starts on a cache line.
+template <class T>
+using AlignedArray = std::vector<T, boost::alignment::aligned_allocator<T, 64>>;
+
+/// One body's hierarchy with stored boxes, laid out for refits and queries that handle all children of a node
+/// at once: structure of arrays per node, -upper instead of upper, the unique vertices of a node's leaves in
+/// lists of one length (core/kernels/wide_layout.hpp). Any topology fits; perfect ones are fastest.
+template <class S>
+class WideHierarchy {
+ public:
+  /// Takes a topology over the primitives; boxes mean nothing until they are made. Allocates; nothing else
+  /// does.
+  void assign(Topology topology, const Primitives& primitives, KernelSet kernels);
+
+  const Topology& topology() const { return topology_; }
+  bool empty() const { return topology_.empty(); }
+
+  /// Recomputes every box from positions [vertex][3], children first. O(nodes + vertices of leaves).
+  void refit(const S* positions) { refit_nodes(positions, 0, node_count()); }
+  /// The same for the wide nodes [begin, end); children must be current or in the range.
+  void refit_nodes(const S* positions, std::uint32_t begin, std::uint32_t end) {
+    refit_(arrays(), positions, begin, end);
+  }
+  std::uint32_t node_count() const { return std::uint32_t(nodes_.size()); }
+  /// Wide nodes of depth d are [levels()[d], levels()[d + 1]); they depend on deeper ones only. Empty if the
+  /// topology does not list its nodes by depth.
+  const std::vector<std::uint32_t>& levels() const { return levels_; }
+
+  /// The box of a node of the topology.
+  Box<S> box(std::uint32_t node) const;
+  void set_box(std::uint32_t node, const Box<S>& box);
+  /// The unique vertices of a leaf, ascending; nothing for an inner node.
+  std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const { return leaf_vertices_[node]; }
+  std::size_t leaf_vertex_count() const { return leaf_vertices_.vertices.size(); }
+
+  /// To be called when positions have changed: boxes of primitives are made anew when a query asks.
+  void positions_changed() {
+    if (++stamp_ == 0) {
+      std::fill(stamps_.begin(), stamps_.end(), 0);
+      stamp_ = 1;
+    }
+  }
+
+  WideArrays<S> arrays() const {
+    return {nodes_.data(), const_cast<S*>(lanes_.data()), const_cast<S*>(own_.data()), vertices_.data()};
+  }
+  WideLeaves<S> leaves(const S* positions) {
+    return {first_entry_.data(), first_corner_.data(), corners_.data(), primitives_.data(),
+            rows_.data(),        stamps_.data(),       stamp_,          positions};
+  }
+  /// The leaf numbered by `WideNode::first_leaf`: is its cache of primitive boxes of these positions?
+  bool leaf_is_current(std::uint32_t leaf) const { return stamps_[leaf] == stamp_; }
+  std::uint32_t leaf_number(LeafSlot slot) const { return nodes_[slot.node()].first_leaf + slot.lane(); }
+  std::span<const std::uint32_t> leaf_primitives(std::uint32_t leaf) const {
+    return {primitives_.data() + first_entry_[leaf], primitives_.data() + first_entry_[leaf + 1]};
+  }
+  std::uint32_t padded_leaf_size() const {
+    return topology_.leaf_size <= 4 ? 4 : topology_.leaf_size <= 8 ? 8 : 16;
+  }
+  KernelSet kernels() const { return kernels_; }
+
+  /// Memory in bytes.
+  std::size_t bytes() const;
+  /// Entries of the padded vertex lists.
+  std::size_t listed_vertices() const { return vertices_.size(); }
+
+ private:
+  struct Place {
+    std::uint32_t node = none, lane = 0;  // in the parent; the root has none
+    std::uint32_t wide = none;            // of inner nodes
+  };
+  static constexpr std::uint32_t none = ~std::uint32_t(0);
+  void place_nodes();
+  void list_vertices();
+  void list_leaves(const Primitives& primitives);
+
+  Topology topology_;
+  LeafVertices leaf_vertices_;
+  KernelSet kernels_ = KernelSet::portable;
+  typename WideRefitKernels<S>::Refit refit_ = nullptr;
+  std::vector<Place> places_;  // of the topology's nodes
+  std::vector<std::uint32_t> levels_;
+  AlignedArray<WideNode> nodes_;
+  AlignedArray<S> lanes_, own_;
+  AlignedArray<std::uint32_t> vertices_;
+  std::vector<std::uint32_t> first_entry_, first_corner_, corners_, primitives_, stamps_;
+  AlignedArray<S> rows_;
+  std::uint32_t stamp_ = 1;
+};
+
+/// The query on two wide hierarchies; keeps its buffers from frame to frame.
+template <class S>
+class WideQuery {
+ public:
+  /// Appends the pairs of primitives whose boxes, and those of all nodes above them, overlap. Both
+  /// hierarchies need the same width and leaf size. Returns what the budget left undone; adds the box tests
+  /// made to `tests`.
+  QueryStatus run(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
+                  const SceneView<S>& scene, const SampledMotion<S>& motion, const Budget& budget,
+                  PairBuffer& out, std::uint64_t& tests);
+
+ private:
+  void leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
+                       const SceneView<S>& scene, const SampledMotion<S>& motion, std::size_t count,
+                       PairBuffer& out, std::uint64_t& tests);
+  std::vector<WidePair> stack_;
+  std::vector<LeafSlot> leaf_pairs_;
+  PairBuffer chunk_;
+};
+
+extern template class WideHierarchy<float>;
+extern template class WideHierarchy<double>;
+extern template class WideQuery<float>;
+extern template class WideQuery<double>;
+
+}  // namespace kbvh

@@ -1,0 +1,135 @@
+// Not contestants but limits to hold contestants against, in the same run and over the same frames. They
+// answer no query (guarantee: approximate, every pair is missed); only their update time means something.
+//   limit_moved_bytes   an update reads and writes the bytes of a wide refit, in order, and computes nothing:
+//                       positions and vertex lists are read once, nodes are written once.
+//   limit_plain_motion  an update interpolates every position in the scene's scalar, however it rounds: what
+//   the
+//                       correctly rounded evaluation (phase "motion") is compared with.
+
+#include "core/kernels/limits.hpp"
+#include "core/hierarchy/wide_hierarchy.hpp"
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, Foresight wanted>
+class Limit : public Strategy<S> {
+ public:
+  static constexpr Foresight foresight = wanted;
+  Limit(const SceneView<S>& scene, const SampledMotion<S>& motion)
+      : Strategy<S>(scene, motion), kernels_(&limit_kernels(active_kernel_set())) {}
+
+  void reset(double t) override {
+    time_ = t;
+    update_all(t);
+  }
+  void advance(double t) override {
+    if (t < time_)
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
+                                  std::to_string(t));
+    time_ = t;
+    update_all(t);
+  }
+  QueryStatus candidates_at(double /*t*/, PairBuffer& /*out*/, const Budget& /*budget*/) override {
+    return {};
+  }
+  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}
+
+ protected:
+  virtual void update(std::uint32_t body, double t) = 0;
+  const LimitKernels* kernels_;
+
+ private:
+  void update_all(double t) {
+    for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body)
+      if (this->scene_.moving(body)) update(body, t);
+  }
+  double time_ = 0;
+};
+
+template <class S, class Count>
+class MovedBytes final : public Limit<S, Foresight::none> {
+ public:
+  MovedBytes(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params&)
+      : Limit<S, Foresight::none>(scene, motion), hierarchies_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), active_kernel_set());
+  }
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
+    return total;
+  }
+
+ private:
+  void update(std::uint32_t body, double) override {
+    const auto& hierarchy = hierarchies_[body];
+    const WideArrays<S> arrays = hierarchy.arrays();
+    const std::size_t nodes = hierarchy.node_count();
+    sum_ ^= this->kernels_->read(this->sampled_.positions(body),
+                                 std::size_t(3) * this->scene_.vertex_count(body) * sizeof(S));
+    sum_ ^= this->kernels_->read(arrays.vertices, hierarchy.listed_vertices() * sizeof(std::uint32_t));
+    sum_ ^= this->kernels_->read(arrays.nodes, nodes * sizeof(WideNode));
+    this->kernels_->write(arrays.lanes, nodes * lane_scalars(hierarchy.topology().width) * sizeof(S), sum_);
+    this->kernels_->write(arrays.own, nodes * 8 * sizeof(S), sum_);
+  }
+  std::vector<WideHierarchy<S>> hierarchies_;
+  unsigned sum_ = 0;
+};
+
+template <class S, class Count>
+class PlainMotion final : public Limit<S, Foresight::whole_clip> {
+ public:
+  PlainMotion(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies, const Params&)
+      : Limit<S, Foresight::whole_clip>(scene, motion), motion_(motion) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      positions_.emplace_back(std::size_t(3) * scene.vertex_count(body));
+  }
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const auto& positions : positions_) total += positions.size() * sizeof(S);
+    return total;
+  }
+
+ private:
+  void update(std::uint32_t body, double t) override {
+    const FlightPlans<S>& plans = motion_.plans(body);
+    const auto times = plans.keyframe_times();
+    const std::size_t k = plans.segment_at(t), next = std::min(k + 1, times.size() - 1);
+    const double ratio = next == k || t <= times[k] ? 0 : (t - times[k]) / (times[next] - times[k]);
+    if constexpr (sizeof(S) == 4)
+      this->kernels_->lerp_float(plans.keyframe(k), plans.keyframe(next), positions_[body].size(),
+                                 float(ratio), positions_[body].data());
+    else
+      this->kernels_->lerp_double(plans.keyframe(k), plans.keyframe(next), positions_[body].size(), ratio,
+                                  positions_[body].data());
+  }
+  ClipMotion<S> motion_;
+  std::vector<std::vector<S>> positions_;
+};
+
+Info limit(const char* id, const char* title) {
+  Info info;
+  info.id = id;
+  info.title = title;
+  info.family = "limit";
+  info.citation = "kbvh: a bound for others, not a contestant";
+  info.tightness = Tightness::none;
+  info.guarantee = Guarantee::approximate;
+  info.can.plan_changes = true;
+  return info;
+}
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(limits) {
+  using namespace kbvh;
+  Info bytes = limit("limit_moved_bytes", "limit: moving the bytes of a refit");
+  bytes.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
+  Info motion = limit("limit_plain_motion", "limit: plain interpolation of all positions");
+  motion.positions = PositionUse::fetched;
+  motion.topology.own = true;
+  return {make_entry<MovedBytes>(bytes), make_entry<PlainMotion>(motion)};
+}

@@ -1,0 +1,180 @@
+// Wide hierarchies: every set of kernels gives the same bits as boxes made one by one, for every builder,
+// width and leaf size, and the same pairs as comparing all boxes with all.
+#include "core/hierarchy/wide_hierarchy.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "core/hierarchy/builders.hpp"
+#include "core/hierarchy/stored_hierarchy.hpp"
+
+namespace kbvh {
+namespace {
+
+/// A scene of two soups of polygons with 1 to 5 vertices, some of them shared.
+template <class S>
+Scene<S> soups(std::uint32_t primitives, std::uint32_t seed) {
+  Scene<S> scene;
+  scene.name = "soups";
+  std::mt19937 random(seed);
+  const auto unit = [&] { return S(random() % 4096) / S(2048) - S(1); };
+  for (int body = 0; body < 2; ++body) {
+    Body<S> made;
+    made.name = "soup";
+    std::vector<S> positions;
+    std::uint32_t count = 0;
+    for (std::uint32_t p = 0; p < primitives; ++p) {
+      std::vector<std::uint32_t> corners;
+      const S centre[3] = {unit(), unit(), unit()};
+      for (std::uint32_t k = 0; k < 1 + random() % 5; ++k) {
+        if (count > 0 && random() % 4 == 0) {
+          corners.push_back(random() % count);
+          continue;
+        }
+        for (S c : centre) positions.push_back(c + unit() / S(8) + S(0));
+        corners.push_back(count++);
+      }
+      made.primitives.add(corners);
+    }
+    made.plans = FlightPlans<S>(count, {0}, std::move(positions));
+    scene.bodies.push_back(std::move(made));
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  return scene;
+}
+
+template <class S>
+Box<S> box_below(const Topology& topology, std::uint32_t node, const std::vector<Box<S>>& boxes) {
+  Box<S> box;
+  const TopologyNode n = topology.nodes[node];
+  for (std::uint32_t k = n.first(); k < n.first() + n.count(); ++k)
+    box.extend(n.is_leaf() ? boxes[topology.primitives[k]] : box_below(topology, k, boxes));
+  return box;
+}
+
+struct Shape {
+  std::uint32_t primitives;
+  BuilderConfig builder;
+};
+
+std::vector<Shape> shapes() {
+  std::vector<Shape> list;
+  for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
+    for (const std::uint32_t width : {2u, 4u, 8u})
+      for (std::uint32_t leaf = 1; leaf <= 16; leaf += leaf < 5 ? 1 : 3)
+        for (const std::uint32_t primitives : {1u, 2u, 7u, 64u, 300u})
+          list.push_back({primitives, {.method = method, .width = width, .leaf_size = leaf}});
+  return list;
+}
+
+template <class S>
+void check_all_shapes() {
+  for (const Shape& shape : shapes()) {
+    const Scene<S> scene = soups<S>(shape.primitives, shape.primitives + shape.builder.leaf_size);
+    const SceneView<S> view(scene);
+    Playback<S> playback(scene);
+    playback.evaluate_all();
+    const SampledMotion<S> motion(playback);
+    std::vector<Box<S>> boxes[2];
+    std::vector<PrimitivePair> expected;
+    for (std::uint32_t body = 0; body < 2; ++body)
+      boxes[body] = primitive_boxes(view.primitives(body), playback.positions(body));
+    for (std::uint32_t p = 0; p < boxes[0].size(); ++p)
+      for (std::uint32_t q = 0; q < boxes[1].size(); ++q)
+        if (overlap(boxes[0][p], boxes[1][q])) expected.push_back({0, p, 1, q});
+    std::uint64_t first_tests = 0;
+    for (const KernelSet set : supported_kernel_sets()) {
+      const std::string where = std::string(name(set)) + ", " + name(shape.builder.method) + ", width " +
+                                std::to_string(shape.builder.width) + ", leaf " +
+                                std::to_string(shape.builder.leaf_size) + ", " +
+                                std::to_string(shape.primitives);
+      WideHierarchy<S> hierarchies[2];
+      for (std::uint32_t body = 0; body < 2; ++body) {
+        hierarchies[body].assign(build_topology<S>(boxes[body], shape.builder), view.primitives(body), set);
+        hierarchies[body].refit(playback.positions(body));
+        const Topology& topology = hierarchies[body].topology();
+        for (std::uint32_t node = 0; node < topology.size(); ++node)
+          ASSERT_EQ(hierarchies[body].box(node), box_below(topology, node, boxes[body]))
+              << where << ", node " << node;
+      }
+      WideQuery<S> query;
+      PairBuffer pairs;
+      std::uint64_t tests = 0;
+      const QueryStatus status =
+          query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{}, pairs, tests);
+      EXPECT_TRUE(status.complete()) << where;
+      std::sort(pairs.begin(), pairs.end());
+      ASSERT_EQ(pairs, expected) << where;
+      if (set == KernelSet::portable) first_tests = tests;
+      EXPECT_EQ(tests, first_tests) << where;  // counters do not depend on the kernels, either
+    }
+  }
+}
+
+TEST(WideHierarchy, KernelsAgreeInFloat) {
+  check_all_shapes<float>();
+}
+TEST(WideHierarchy, KernelsAgreeInDouble) {
+  check_all_shapes<double>();
+}
+
+TEST(WideHierarchy, SetBoxIsWhatTheQueryReads) {
+  const Scene<float> scene = soups<float>(100, 5);
+  const SceneView<float> view(scene);
+  Playback<float> playback(scene);
+  playback.evaluate_all();
+  const auto boxes = primitive_boxes(view.primitives(0), playback.positions(0));
+  WideHierarchy<float> made, set;
+  const Topology topology = build_topology<float>(boxes, {.width = 8, .leaf_size = 4});
+  made.assign(topology, view.primitives(0), active_kernel_set());
+  set.assign(topology, view.primitives(0), active_kernel_set());
+  made.refit(playback.positions(0));
+  for (std::uint32_t node = 0; node < topology.size(); ++node) set.set_box(node, made.box(node));
+  for (std::uint32_t wide = 0; wide < made.node_count(); ++wide) {
+    for (std::size_t i = 0; i < lane_scalars(8); ++i)
+      EXPECT_EQ(made.arrays().lanes[wide * lane_scalars(8) + i],
+                set.arrays().lanes[wide * lane_scalars(8) + i]);
+    for (std::size_t i : {0, 1, 2, 4, 5, 6})
+      EXPECT_EQ(made.arrays().own[8 * wide + i], set.arrays().own[8 * wide + i]);
+  }
+}
+
+TEST(WideHierarchy, ABudgetLeavesWorkUndone) {
+  const Scene<float> scene = soups<float>(300, 6);
+  const SceneView<float> view(scene);
+  Playback<float> playback(scene);
+  playback.evaluate_all();
+  const SampledMotion<float> motion(playback);
+  WideHierarchy<float> hierarchies[2];
+  for (std::uint32_t body = 0; body < 2; ++body) {
+    const auto boxes = primitive_boxes(view.primitives(body), playback.positions(body));
+    hierarchies[body].assign(build_topology<float>(boxes, {.width = 2, .leaf_size = 1}),
+                             view.primitives(body), active_kernel_set());
+    hierarchies[body].refit(playback.positions(body));
+  }
+  WideQuery<float> query;
+  PairBuffer all, some;
+  std::uint64_t tests = 0;
+  query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{}, all, tests);
+  const QueryStatus status =
+      query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{tests / 2}, some, tests);
+  EXPECT_FALSE(status.complete());
+  EXPECT_LT(some.size(), all.size());
+}
+
+TEST(KernelSets, AreNamedAndChecked) {
+  EXPECT_EQ(supported_kernel_sets().front(), KernelSet::portable);
+  EXPECT_THROW(kernel_set("mmx"), std::invalid_argument);
+  const KernelSet before = active_kernel_set();
+  for (const KernelSet set : supported_kernel_sets()) {
+    EXPECT_EQ(kernel_set(name(set)), set);
+    use_kernel_set(set);
+    EXPECT_EQ(active_kernel_set(), set);
+  }
+  use_kernel_set(before);
+}
+
+}  // namespace
+}  // namespace kbvh
