@@ -1,38 +1,41 @@
-// Embree 3.13 (Wald et al. 2014) as a contestant: scenes of one body each, refitted, and rtcCollide.
+// Embree 3.13 (Wald et al. 2014) as a contestant: a scene per body, refitted, and rtcCollide.
 //
-// - RTC_BUILD_QUALITY_REFIT of a geometry is ignored (a full rebuild, 30 times dearer) unless its scene is
-// both
-//   RTC_BUILD_QUALITY_LOW and RTC_SCENE_FLAG_DYNAMIC; any tri_accel or object_accel of the device but the
-//   default ends it, too. Compact scenes refit fastest: their leaves hold indices, so that nodes are all
-//   there is to write. Robust scenes, other instruction sets and vertices of 16 bytes gain nothing.
-// - rtcCollide takes user geometry only, whose refit calls back for every primitive. Triangle geometry, which
-//   Embree refits by itself and faster, cannot answer. Hence two ways, by the parameter `geometry`:
-//   `user`       the update refits user geometry, the query collides it: one hierarchy, both times are
-//   Embree's. `triangles`  the update refits triangle geometry over shared buffers, Embree's fastest, and
-//   nothing reads it.
-//                The query first refits user geometry: ITS TIME HOLDS A SECOND REFIT AND IS NOT TO BE QUOTED.
-//   Bodies of other than triangles are there given a triangle (lower, upper, lower) per primitive, whose box
-//   is the primitive's; to write these is part of the update.
-// - rtcCollide may call back from several threads with denormals flushed: the callback only collects ids, and
-//   kbvh's test follows after the floating-point state is restored.
-// - Every instance asks for one thread. In Embree 3 with TBB that limit is process-wide while a device lives.
-// So
-//   calls come from the caller's thread, which takes no lock; there is one for calls from others all the
-//   same.
-// - rtcCollide compares node boxes, and so those of primitives where each has a leaf to itself. The
-// candidates
-//   of larger leaves are all their pairs; only these, which come several at a time, are filtered here.
-// - Denormal bounds are widened to the smallest normal number, so that flushing them cannot lose a pair;
-// bounds
-//   beyond 1.8e18, which Embree takes for invalid, are clamped. Both are monotone: what touches still does.
-// - The hierarchy cannot be seen, so there is no audit. Float scenes only.
+// Refit. RTC_BUILD_QUALITY_REFIT of a geometry is ignored (a full rebuild, 30 times dearer) unless its scene
+// is both RTC_BUILD_QUALITY_LOW and RTC_SCENE_FLAG_DYNAMIC; any tri_accel or object_accel of the device but
+// the default ends it, too. Compact scenes refit fastest: their leaves hold indices, and only nodes are
+// written. Robust scenes, other instruction sets and vertices of 16 bytes gain nothing.
+//
+// Geometry. rtcCollide takes user geometry only, whose refit calls back for every primitive. Triangle
+// geometry, which Embree refits by itself and faster, cannot answer. Hence the parameter `geometry`:
+// - user: the update refits user geometry and the query collides it: one hierarchy, and both times are
+//   Embree's.
+// - triangles: the update refits triangle geometry over shared buffers, Embree's fastest, which nothing
+//   reads. The query first refits user geometry: ITS TIME HOLDS A SECOND REFIT AND IS NOT TO BE QUOTED.
+//   Bodies of other than triangles are given a triangle (lower, upper, lower) per primitive, whose box is
+//   the primitive's; writing these is part of their update.
+//
+// Threads. Every instance asks for one. In Embree 3 with TBB that limit is process-wide while a device lives.
+// So rtcCollide calls back from the caller's thread, which takes no lock; calls from others would find one.
+//
+// Candidates. rtcCollide compares node boxes, and so those of primitives that have a leaf to themselves. The
+// candidates of larger leaves are all their pairs: these come several at a time, and are filtered by their
+// boxes.
+//
+// Denormals. Embree flushes them. Denormal bounds are widened to the smallest normal number, so that this
+// cannot lose a pair; bounds beyond 1.8e18, which Embree takes for invalid, are clamped. Both are monotone,
+// as is flushing: what touches still does. kbvh's own test follows after the floating-point state is
+// restored.
+//
+// The hierarchy cannot be seen, so there is no audit. Float scenes only.
 #include <embree3/rtcore.h>
 
 #include <atomic>
 #include <cstring>
 #include <mutex>
+#include <span>
 #include <thread>
 #include <type_traits>
+#include <utility>
 #if defined(__SSE__)
 #include <xmmintrin.h>
 #endif
@@ -154,11 +157,13 @@ class EmbreeRefit final : public Strategy<S> {
     for (const BodyPair& pair : this->scene_.pairs()) {
       if (!bodies_[pair.first].boxes.scene || !bodies_[pair.second].boxes.scene) continue;
       collected_.bodies = pair;
-      collected_.of_larger_leaves.clear();
-      rtcCollide(bodies_[pair.first].boxes.scene.get(), bodies_[pair.second].boxes.scene.get(), &collect,
-                 &collected_);
-      append_overlapping(pair, out);
+      collected_.a = &bodies_[pair.first];
+      collected_.b = &bodies_[pair.second];
+      rtcCollide(collected_.a->boxes.scene.get(), collected_.b->boxes.scene.get(), &collect, &collected_);
+      append_overlapping(collected_, collected_.from_others);
+      collected_.from_others.clear();
     }
+    count_.add(Counter::box_tests, std::exchange(collected_.box_tests, 0));
     check();
     return {};
   }
@@ -192,11 +197,13 @@ class EmbreeRefit final : public Strategy<S> {
   };
   struct Collected {
     BodyPair bodies{};
-    std::thread::id thread;  // its calls need no lock
+    const BodyState* a = nullptr;
+    const BodyState* b = nullptr;
     PairBuffer* out = nullptr;
-    PairBuffer of_larger_leaves;
+    std::uint64_t box_tests = 0;
+    std::thread::id thread;  // its calls need no lock
     std::mutex mutex;
-    PairBuffer from_others;
+    std::vector<RTCCollision> from_others;
   };
 
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
@@ -215,7 +222,8 @@ class EmbreeRefit final : public Strategy<S> {
     RTCGeometry geometry = state.boxes.make(device_.get(), RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(geometry, count);
     rtcSetGeometryUserData(geometry, &state);
-    rtcSetGeometryBoundsFunction(geometry, state.only_triangles ? &fit_triangle : &fit, nullptr);
+    rtcSetGeometryBoundsFunction(
+        geometry, state.only_triangles ? &fit<&bounds_of_triangle> : &fit<&bounds_of_any>, nullptr);
     state.boxes.build();
     if (refits_ == Refits::boxes) return;
 
@@ -285,6 +293,15 @@ class EmbreeRefit final : public Strategy<S> {
     return Eigen::Map<const Lanes>(state.positions + std::size_t(3) * v);
   }
   static Bounds bounds(const BodyState& state, std::uint32_t primitive) {
+    return state.only_triangles ? bounds_of_triangle(state, primitive) : bounds_of_any(state, primitive);
+  }
+  static Bounds bounds_of_triangle(const BodyState& state, std::uint32_t primitive) {
+    const std::uint32_t* vertices = state.primitives->vertices.data() + std::size_t(3) * primitive;
+    const Lanes a = position(state, vertices[0]), b = position(state, vertices[1]),
+                c = position(state, vertices[2]);
+    return {a.min(b).min(c), a.max(b).max(c)};
+  }
+  static Bounds bounds_of_any(const BodyState& state, std::uint32_t primitive) {
     const auto vertices = (*state.primitives)[primitive];
     Bounds box{position(state, vertices[0]), position(state, vertices[0])};
     for (std::size_t i = 1; i < vertices.size(); ++i) {
@@ -295,15 +312,10 @@ class EmbreeRefit final : public Strategy<S> {
     return box;
   }
 
+  template <auto bounds_of>
   static void fit(const RTCBoundsFunctionArguments* args) {
-    hand_over(bounds(*static_cast<const BodyState*>(args->geometryUserPtr), args->primID), *args->bounds_o);
-  }
-  static void fit_triangle(const RTCBoundsFunctionArguments* args) {
-    const BodyState& state = *static_cast<const BodyState*>(args->geometryUserPtr);
-    const std::uint32_t* vertices = state.primitives->vertices.data() + std::size_t(3) * args->primID;
-    const Lanes a = position(state, vertices[0]), b = position(state, vertices[1]),
-                c = position(state, vertices[2]);
-    hand_over({a.min(b).min(c), a.max(b).max(c)}, *args->bounds_o);
+    hand_over(bounds_of(*static_cast<const BodyState*>(args->geometryUserPtr), args->primID),
+              *args->bounds_o);
   }
   /// Half of a refit's time is spent here and above: whole registers are stored, with Embree's own padding.
   static void hand_over(const Bounds& tight, RTCBounds& box) {
@@ -327,36 +339,35 @@ class EmbreeRefit final : public Strategy<S> {
            within(boxes.lower_z, triangles.lower_z, triangles.upper_z, boxes.upper_z);
   }
 
-  /// Of the candidates of larger leaves, those whose boxes overlap. All partners of a primitive come in a
-  /// row.
-  void append_overlapping(const BodyPair& pair, PairBuffer& out) {
-    PairBuffer& candidates = collected_.of_larger_leaves;
-    candidates.insert(candidates.end(), collected_.from_others.begin(), collected_.from_others.end());
-    collected_.from_others.clear();
-    const BodyState &a = bodies_[pair.first], &b = bodies_[pair.second];
-    count_.add(Counter::box_tests, candidates.size());
+  static void append(const Collected& to, const RTCCollision& found) {
+    to.out->push_back({to.bodies.first, found.primID0, to.bodies.second, found.primID1});
+  }
+
+  /// Those whose boxes overlap. All partners of a primitive come in a row.
+  static void append_overlapping(Collected& to, std::span<const RTCCollision> candidates) {
+    to.box_tests += candidates.size();
     std::uint32_t current = none;
     Bounds box_a{Lanes::Zero(), Lanes::Zero()};
-    for (const PrimitivePair& candidate : candidates) {
-      if (candidate.primitive_a != current) box_a = bounds(a, current = candidate.primitive_a);
-      const Bounds box_b = bounds(b, candidate.primitive_b);
-      const auto apart = ((box_a.lower > box_b.upper) || (box_b.lower > box_a.upper)).eval();
-      if (!(apart[0] | apart[1] | apart[2])) out.push_back(candidate);
+    for (const RTCCollision& candidate : candidates) {
+      if (candidate.primID0 != current) box_a = bounds(*to.a, current = candidate.primID0);
+      const Bounds box_b = bounds(*to.b, candidate.primID1);
+      bool overlap = true;
+      for (Eigen::Index axis = 0; axis < 3; ++axis)
+        overlap =
+            overlap & (box_a.lower[axis] <= box_b.upper[axis]) & (box_b.lower[axis] <= box_a.upper[axis]);
+      if (overlap) append(to, candidate);
     }
   }
 
   static void collect(void* user, RTCCollision* collisions, unsigned count) {
     auto& collected = *static_cast<Collected*>(user);
-    const auto append = [&](PairBuffer& to) {
-      for (unsigned i = 0; i < count; ++i)
-        to.push_back(
-            {collected.bodies.first, collisions[i].primID0, collected.bodies.second, collisions[i].primID1});
-    };
     if (std::this_thread::get_id() != collected.thread) {
       const std::lock_guard<std::mutex> lock(collected.mutex);
-      append(collected.from_others);
+      collected.from_others.insert(collected.from_others.end(), collisions, collisions + count);
+    } else if (count == 1) {
+      append(collected, *collisions);
     } else {
-      append(count == 1 ? *collected.out : collected.of_larger_leaves);
+      append_overlapping(collected, {collisions, count});
     }
   }
 
