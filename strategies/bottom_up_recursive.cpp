@@ -90,7 +90,10 @@ class BottomUpRecursive final : public Strategy<S> {
 
   void refit(Body& body, std::uint32_t id) {
     const TopologyNode node = body.topology.nodes[id];
-    Box<S> box;
+    // In place: naive, but not unlucky. GCC 12 copies a local box by vector loads of sides just stored one by
+    // one, which stalls every node (30 instead of 18 ns per triangle).
+    Box<S>& box = body.boxes[id];
+    box = Box<S>{};
     if (node.is_leaf()) {
       for (std::uint32_t i = 0; i < node.count(); ++i) {
         const std::uint32_t primitive = body.topology.primitives[node.first() + i];
@@ -103,7 +106,6 @@ class BottomUpRecursive final : public Strategy<S> {
         box.extend(body.boxes[child]);
       }
     }
-    body.boxes[id] = box;
     count_.add(Counter::nodes_visited);
     count_.add(Counter::values_written, 6);
   }
