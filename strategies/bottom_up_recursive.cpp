@@ -91,7 +91,7 @@ class BottomUpRecursive final : public Strategy<S> {
   void refit(Body& body, std::uint32_t id) {
     const TopologyNode node = body.topology.nodes[id];
     // In place: naive, but not unlucky. GCC 12 copies a local box by vector loads of sides just stored one by
-    // one, which stalls every node (30 instead of 18 ns per triangle).
+    // one, which stalls at every node (measured apart: 1.7 times the time).
     Box<S>& box = body.boxes[id];
     box = Box<S>{};
     if (node.is_leaf()) {
