@@ -169,6 +169,30 @@ TEST(Bullet, ScalingKeepsFalsePairsOfSmallMeshesAway) {
   EXPECT_GT(candidates("none"), 3 * candidates("fit"));
 }
 
+/// More than 4096 primitives, which Embree refits subtree by subtree, and one body of other than triangles.
+/// Checked builds also compare the roots of the two hierarchies, of which only one is collided.
+TEST(Embree, RefitsEitherGeometryOfLargerBodies) {
+  const auto found = std::find_if(registry().begin(), registry().end(),
+                                  [](const StrategyEntry& entry) { return entry.info.id == "embree_refit"; });
+  if (found == registry().end()) GTEST_SKIP() << "built without Embree";
+  const auto scene = adapters_test::scene<float>(
+      "passing sheet",
+      {adapters_test::grid<float>(50, .04, 3, {1, .5, -1}),
+       adapters_test::grid<float>(50, .04, 4, {-1, .5, 1}),
+       adapters_test::soup<float>({.primitives = 400, .corners = 3, .size = .1, .seed = 24})});
+  Oracle<float> oracle(scene);
+  const auto frames = frame_times(scene, 4);
+  std::vector<Verification> results;
+  for (const char* geometry : {"user", "triangles"}) {
+    SCOPED_TRACE(geometry);
+    Session<float> session(scene, {&*found, {{"geometry", geometry}}, {}}, CountingPolicy::counting);
+    results.push_back(verify<float>(session, frames, oracle));
+    EXPECT_TRUE(results.back().holds()) << results.back().first_violation;
+    EXPECT_GT(results.back().pairs, 1000u);
+  }
+  EXPECT_EQ(results[0].candidates, results[1].candidates);
+}
+
 /// Embree flushes denormals; nobody after it may notice.
 TEST(Embree, LeavesTheFloatingPointStateAlone) {
   const auto found = std::find_if(registry().begin(), registry().end(),
