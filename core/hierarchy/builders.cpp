@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <optional>
 #include <stdexcept>
 
 namespace kbvh {
@@ -64,60 +63,51 @@ class BinaryBuilder {
   void build() {
     nodes_.push_back({0, std::uint32_t(items_.size())});
     nodes_.reserve(2 * items_.size());
-    // The median tree splits every range of one level equally often, so that it comes out perfect.
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> open{{0, median_levels()}};
+    std::vector<std::uint32_t> open{0};
     while (!open.empty()) {
-      const auto [index, levels] = open.back();
+      const std::uint32_t index = open.back();
       open.pop_back();
       const std::uint32_t begin = nodes_[index].begin, end = nodes_[index].end;
       nodes_[index].weight = weight(begin, end);
-      const std::uint32_t middle = split(begin, end, levels);
+      const std::uint32_t middle = split(begin, end);
       if (middle == begin) continue;
       nodes_[index].left = std::uint32_t(nodes_.size());
       nodes_[index].right = nodes_[index].left + 1;
       nodes_.push_back({begin, middle});
       nodes_.push_back({middle, end});
-      open.push_back({nodes_[index].left, levels - 1});
-      open.push_back({nodes_[index].right, levels - 1});
+      open.push_back(nodes_[index].left);
+      open.push_back(nodes_[index].right);
     }
   }
 
   const std::vector<BinaryNode>& nodes() const { return nodes_; }
   const std::vector<BuildItem>& items() const { return items_; }
 
- private:
-  std::uint32_t median_levels() const {
-    std::uint32_t levels = 0;
-    while ((items_.size() + (std::size_t(1) << levels) - 1) >> levels > config_.leaf_size) ++levels;
-    return levels;
-  }
-
-  /// Where to split; `begin` for a leaf.
-  std::uint32_t split(std::uint32_t begin, std::uint32_t end, std::uint32_t levels) {
-    const std::uint32_t count = end - begin;
-    switch (config_.method) {
-      case BuildMethod::median:
-        return levels == 0 || count < 2 ? begin : median_split(begin, end);
-      case BuildMethod::sah:
-        return count < 2 ? begin : sah_split(begin, end);
-      case BuildMethod::morton:
-        return count <= config_.leaf_size ? begin : morton_split(begin, end);
-    }
-    return begin;
-  }
-
-  std::uint32_t median_split(std::uint32_t begin, std::uint32_t end) {
+  /// Puts the primitives of [begin, end) with the smallest centroids along the longest axis before `middle`.
+  void median_split(std::uint32_t begin, std::uint32_t middle, std::uint32_t end) {
     std::array<double, 3> lower, upper;
     centroid_bounds(begin, end, lower, upper);
     std::size_t axis = 0;
     for (std::size_t a = 1; a < 3; ++a)
       if (upper[a] - lower[a] > upper[axis] - lower[axis]) axis = a;
-    const std::uint32_t middle = begin + (end - begin) / 2;
     std::nth_element(items_.begin() + begin, items_.begin() + middle, items_.begin() + end,
                      [axis](const BuildItem& a, const BuildItem& b) {
                        return a.centroid[axis] != b.centroid[axis] ? a.centroid[axis] < b.centroid[axis]
                                                                    : a.primitive < b.primitive;
                      });
+  }
+
+ private:
+  /// Where to split; `begin` for a leaf.
+  std::uint32_t split(std::uint32_t begin, std::uint32_t end) {
+    const std::uint32_t count = end - begin;
+    if (config_.method == BuildMethod::sah) return count < 2 ? begin : sah_split(begin, end);
+    return count <= config_.leaf_size ? begin : morton_split(begin, end);
+  }
+
+  std::uint32_t halve(std::uint32_t begin, std::uint32_t end) {
+    const std::uint32_t middle = begin + (end - begin) / 2;
+    median_split(begin, middle, end);
     return middle;
   }
 
@@ -158,7 +148,7 @@ class BinaryBuilder {
         if (cost < best_cost) best_cost = cost, best_axis = axis, best_bin = b;
       }
     }
-    if (best_axis == 3) return count <= config_.leaf_size ? begin : median_split(begin, end);
+    if (best_axis == 3) return count <= config_.leaf_size ? begin : halve(begin, end);
     Box<S> whole;
     for (std::uint32_t i = begin; i < end; ++i) whole.extend(boxes_[items_[i].primitive]);
     const double area = surface_area(whole);
@@ -229,47 +219,44 @@ class BinaryBuilder {
   std::vector<double> right_cost_;
 };
 
-/// Depth of all leaves of the binary tree, or nothing if they differ.
-std::optional<std::uint32_t> common_leaf_depth(const std::vector<BinaryNode>& binary) {
-  std::vector<std::uint32_t> depth(binary.size(), 0);
-  std::optional<std::uint32_t> common;
-  for (std::uint32_t i = 0; i < binary.size(); ++i) {
-    if (binary[i].left != 0) {
-      depth[binary[i].left] = depth[binary[i].right] = depth[i] + 1;
-    } else if (!common) {
-      common = depth[i];
-    } else if (*common != depth[i]) {
-      return {};
-    }
-  }
-  return common;
+/// Adds `count` children to a node, in one row; returns the first.
+std::uint32_t add_children(Topology& topology, std::uint32_t parent, std::uint32_t count) {
+  const std::uint32_t first = topology.size();
+  topology.nodes.resize(first + count);
+  topology.parents.resize(first + count, parent);
+  topology.depths.resize(first + count, std::uint8_t(std::min(255, topology.depths[parent] + 1)));
+  topology.nodes[parent] = TopologyNode::inner(first, count);
+  return first;
 }
 
-/// Lays the binary tree out breadth first with up to `width` children per node.
-Topology collapse(const std::vector<BinaryNode>& binary, const std::vector<BuildItem>& items,
-                  const BuilderConfig& config) {
+Topology with_root(const BuilderConfig& config) {
   Topology topology;
   topology.width = config.width;
   topology.leaf_size = config.leaf_size;
-  topology.primitives.reserve(items.size());
-  std::vector<std::uint32_t> source{0};  // binary node of each topology node
+  topology.nodes.resize(1);
   topology.parents.push_back(0);
   topology.depths.push_back(0);
-  // In a perfect tree the root takes the odd levels, so that every other node has `width` children.
-  std::uint32_t root_width = config.width;
-  if (const auto depth = common_leaf_depth(binary)) {
-    const std::uint32_t levels = std::uint32_t(std::countr_zero(config.width));
-    if (*depth % levels != 0) root_width = 1u << (*depth % levels);
-  }
+  return topology;
+}
+
+/// Makes wide nodes of the binary tree, depth first: what lies below a node lies together.
+Topology collapse(const std::vector<BinaryNode>& binary, const BuilderConfig& config) {
+  Topology topology = with_root(config);
+  struct Open {
+    std::uint32_t node, binary;
+  };
+  std::vector<Open> open{{0, 0}};
   std::vector<std::uint32_t> children;
-  for (std::uint32_t i = 0; i < source.size(); ++i) {
-    const BinaryNode& node = binary[source[i]];
+  while (!open.empty()) {
+    const auto [index, source] = open.back();
+    open.pop_back();
+    const BinaryNode& node = binary[source];
     if (node.left == 0) {
-      topology.nodes.push_back(TopologyNode::leaf(node.begin, node.end - node.begin));
+      topology.nodes[index] = TopologyNode::leaf(node.begin, node.end - node.begin);
       continue;
     }
     children = {node.left, node.right};
-    while (children.size() < (i == 0 ? root_width : config.width)) {
+    while (children.size() < config.width) {
       // Open the heaviest inner child, the first of equals, in place: leaf order stays left to right.
       std::size_t heaviest = children.size();
       for (std::size_t c = 0; c < children.size(); ++c)
@@ -281,17 +268,74 @@ Topology collapse(const std::vector<BinaryNode>& binary, const std::vector<Build
       children[heaviest] = opened.left;
       children.insert(children.begin() + std::ptrdiff_t(heaviest) + 1, opened.right);
     }
-    topology.nodes.push_back(
-        TopologyNode::inner(std::uint32_t(source.size()), std::uint32_t(children.size())));
-    for (std::uint32_t child : children) {
-      source.push_back(child);
-      topology.parents.push_back(i);
-      topology.depths.push_back(std::uint8_t(std::min(255, topology.depths[i] + 1)));
-    }
+    const std::uint32_t first = add_children(topology, index, std::uint32_t(children.size()));
+    for (std::size_t c = children.size(); c-- > 0;) open.push_back({first + std::uint32_t(c), children[c]});
   }
-  for (const BuildItem& item : items) topology.primitives.push_back(item.primitive);
   return topology;
 }
+
+/// The median tree, made wide at once: every leaf but the last holds `leaf_size` primitives, every node above
+/// the leaves but the last has `width` of them, all leaves lie at one depth as long as numbers allow, and
+/// nodes are as full as can be. With width^k full leaves it is perfect.
+template <class S>
+class MedianTree {
+ public:
+  MedianTree(BinaryBuilder<S>& builder, const BuilderConfig& config) : builder_(&builder), config_(config) {}
+
+  Topology build(std::uint32_t primitives) {
+    Topology topology = with_root(config_);
+    std::uint64_t reach = 1;
+    std::uint32_t height = 0;
+    for (; reach < units(primitives, block()); reach *= config_.width) ++height;
+    make(topology, 0, 0, primitives, height);
+    return topology;
+  }
+
+ private:
+  /// Primitives below a full node of leaves.
+  std::uint32_t block() const { return config_.leaf_size * config_.width; }
+  static std::uint32_t units(std::uint32_t count, std::uint32_t unit) { return (count + unit - 1) / unit; }
+
+  /// Recursion is as deep as the tree: at most 32.
+  void make(Topology& topology, std::uint32_t index, std::uint32_t begin, std::uint32_t end,
+            std::uint32_t height) {
+    const std::uint32_t count = end - begin;
+    if (count <= config_.leaf_size) {
+      topology.nodes[index] = TopologyNode::leaf(begin, count);
+      return;
+    }
+    std::array<std::uint32_t, 9> bounds;
+    std::uint32_t parts = units(count, config_.leaf_size), unit = config_.leaf_size;
+    if (parts > config_.width) {
+      unit = block();
+      std::uint64_t below = 1;
+      for (std::uint32_t h = 1; h < height; ++h) below *= config_.width;
+      parts = std::uint32_t((units(count, unit) + below - 1) / below);
+      parts = std::clamp(parts, 2U, config_.width);
+    }
+    bounds[0] = begin;
+    bounds[parts] = end;
+    divide(bounds.data(), parts, unit);
+    const std::uint32_t first = add_children(topology, index, parts);
+    for (std::uint32_t p = 0; p < parts; ++p)
+      make(topology, first + p, bounds[p], bounds[p + 1], height > 0 ? height - 1 : 0);
+  }
+
+  /// Sets the inner ones of `parts` + 1 bounds, halving the parts each time; all lie whole units apart but
+  /// the last.
+  void divide(std::uint32_t* bounds, std::uint32_t parts, std::uint32_t unit) {
+    if (parts == 1) return;
+    const std::uint32_t left = (parts + 1) / 2, all = units(bounds[parts] - bounds[0], unit);
+    const auto taken = std::uint32_t((std::uint64_t(all) * left + parts - 1) / parts);
+    bounds[left] = bounds[0] + std::min(taken, all - (parts - left)) * unit;
+    builder_->median_split(bounds[0], bounds[left], bounds[parts]);
+    divide(bounds, left, unit);
+    divide(bounds + left, parts - left, unit);
+  }
+
+  BinaryBuilder<S>* builder_;
+  BuilderConfig config_;
+};
 
 bool is_perfect(const Topology& topology) {
   int leaf_depth = -1;
@@ -324,8 +368,15 @@ Topology build_topology(std::span<const Box<S>> boxes, const BuilderConfig& conf
     return topology;
   }
   BinaryBuilder<S> builder(boxes, config);
-  builder.build();
-  Topology topology = collapse(builder.nodes(), builder.items(), config);
+  Topology topology;
+  if (config.method == BuildMethod::median) {
+    topology = MedianTree<S>(builder, config).build(std::uint32_t(boxes.size()));
+  } else {
+    builder.build();
+    topology = collapse(builder.nodes(), config);
+  }
+  topology.primitives.reserve(boxes.size());
+  for (const BuildItem& item : builder.items()) topology.primitives.push_back(item.primitive);
   topology.perfect = is_perfect(topology);
   return topology;
 }

@@ -8,7 +8,8 @@ namespace kbvh {
 
 /// How a topology is built from primitive boxes at one time.
 enum class BuildMethod : std::uint8_t {
-  median,  ///< exact median along the longest axis of the centroids; perfect (2^d leaves) when sizes allow
+  median,  ///< exact median along the longest axis of the centroids; full leaves and nodes, one depth,
+           ///< perfect when sizes allow
   sah,     ///< binned surface-area heuristic (Wald 2007), cost = traversal + area ratio x primitives
   morton,  ///< linear BVH over 63-bit Morton codes of the centroids (Lauterbach et al. 2009)
 };
@@ -29,7 +30,7 @@ template <class S>
 std::vector<Box<S>> primitive_boxes(const Primitives& primitives, const S* positions);
 
 /// Builds a topology over the boxes. Deterministic: ties are broken by primitive id. O(n log n).
-/// Wide nodes come from collapsing the binary tree, largest child first.
+/// Nodes come depth first. SAH and Morton trees are binary at first and collapsed, largest child first.
 /// Throws std::invalid_argument on a width or leaf size that is not admissible.
 template <class S>
 Topology build_topology(std::span<const Box<S>> boxes, const BuilderConfig& config);

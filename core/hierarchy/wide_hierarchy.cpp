@@ -29,6 +29,26 @@ const WideOverlapKernels<S>& overlap_kernels(KernelSet set) {
     return KBVH_SELECT_KERNELS(set, wide_overlap_double);
 }
 
+/// The length to which shorter lists are padded. A loop whose length changes from node to node is
+/// mispredicted, which costs as much as some 8 more vertices (measured on Zen 3: 65k triangles, 4 per
+/// leaf, 1.4x).
+std::size_t usual_length(const std::vector<std::size_t>& lengths) {
+  constexpr std::size_t misprediction = 8;
+  std::vector<std::size_t> nodes_of(1, 0);
+  for (const std::size_t length : lengths) {
+    if (length >= nodes_of.size()) nodes_of.resize(length + 1, 0);
+    if (length > 0) ++nodes_of[length];
+  }
+  std::size_t best = 0, best_cost = std::numeric_limits<std::size_t>::max();
+  for (std::size_t usual = 0; usual < nodes_of.size() && usual < 256; ++usual) {
+    std::size_t cost = 0;
+    for (std::size_t length = 1; length < nodes_of.size(); ++length)
+      cost += nodes_of[length] * (length <= usual ? usual : length + misprediction);
+    if (cost < best_cost) best_cost = cost, best = usual;
+  }
+  return best;
+}
+
 }  // namespace
 
 template <class S>
@@ -105,12 +125,15 @@ void WideHierarchy<S>::list_vertices() {
   std::vector<std::uint32_t> leaf_of(nodes_.size() * width, none);
   for (std::uint32_t i = 0; i < topology_.size(); ++i)
     if (topology_.nodes[i].is_leaf()) leaf_of[std::size_t(places_[i].node) * width + places_[i].lane] = i;
+  std::vector<std::size_t> lengths(nodes_.size(), 0);
+  for (std::uint32_t n = 0; n < nodes_.size(); ++n)
+    for (std::uint32_t lane = 0; lane < nodes_[n].leaf_count; ++lane)
+      lengths[n] = std::max(lengths[n], leaf_vertices_[leaf_of[std::size_t(n) * width + lane]].size());
+  const std::size_t usual = usual_length(lengths);
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
     WideNode& node = nodes_[n];
     if (node.leaf_count == 0) continue;
-    std::size_t length = 0;
-    for (std::uint32_t lane = 0; lane < node.leaf_count; ++lane)
-      length = std::max(length, leaf_vertices_[leaf_of[std::size_t(n) * width + lane]].size());
+    const std::size_t length = std::max(lengths[n], usual);
     if (length > std::numeric_limits<std::uint16_t>::max() ||
         vertices_.size() + length * width > std::numeric_limits<std::uint32_t>::max())
       throw std::length_error("a leaf with " + std::to_string(length) + " vertices is too large");

@@ -41,6 +41,18 @@ struct Points {
   [[gnu::always_inline]] static void store_largest(S* to, Pack p) { store_smallest(to, p); }
 };
 
+#if defined(__AVX__)
+// GCC 12 makes a load and a shuffle of __builtin_shufflevector; this is one instruction that reads memory.
+[[gnu::always_inline]] inline Vector<float, 8> joined(Vector<float, 4> a, Vector<float, 4> b) {
+  return (Vector<float, 8>)_mm256_insertf128_ps(_mm256_castps128_ps256((__m128)a), (__m128)b, 1);
+}
+#endif
+#if defined(__AVX512F__)
+[[gnu::always_inline]] inline Vector<double, 8> joined(Vector<double, 4> a, Vector<double, 4> b) {
+  return (Vector<double, 8>)_mm512_insertf64x4(_mm512_castpd256_pd512((__m256d)a), (__m256d)b, 1);
+}
+#endif
+
 /// Points in registers; point i < 4 of four packs is their first, point 4 + i their second. `load` reads a
 /// fourth number past each point.
 template <class S, std::size_t wanted_points>
@@ -55,7 +67,7 @@ struct Points<S, wanted_points, true> {
       (void)b;
       return load_lanes<Point>(a);
     } else {
-      return __builtin_shufflevector(load_lanes<Point>(a), load_lanes<Point>(b), 0, 1, 2, 3, 4, 5, 6, 7);
+      return joined(load_lanes<Point>(a), load_lanes<Point>(b));
     }
   }
   [[gnu::always_inline]] static Pack negated(Pack p) { return -p; }

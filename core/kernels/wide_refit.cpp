@@ -53,11 +53,12 @@ struct NodeFit {
     }
   }
 
-  [[gnu::always_inline]] inline void from_boxes(const S* boxes, S* rows) {
+  /// boxes[lane]: a child's box, 8 numbers.
+  [[gnu::always_inline]] inline void from_boxes(const S* const (&boxes)[width], S* rows) {
     for (std::uint32_t first = 0; first < width; first += per_pass) {
       Pack lower[4], upper[4];
       for (std::uint32_t j = 0; j < packs; ++j) {
-        const S *one = boxes + 8 * (first + j), *other = boxes + 8 * ((first + j + 4) % width);
+        const S *one = boxes[first + j], *other = boxes[(first + j + 4) % width];
         lower[j] = P::load(one, other);
         upper[j] = P::load(one + 4, other + 4);
       }
@@ -71,13 +72,21 @@ struct NodeFit {
   }
 };
 
-/// Leaves beside nodes, or empty lanes (SAH trees; the root): one box at a time.
+template <class S>
+constexpr S infinity = S(__builtin_inf());
+/// The box of an empty lane.
+template <class S>
+constexpr S empty_box[8] = {infinity<S>,  infinity<S>,  infinity<S>,  infinity<S>,
+                            -infinity<S>, -infinity<S>, -infinity<S>, -infinity<S>};
+
+/// Few leaves beside nodes (SAH trees; the last nodes of a level): one box at a time.
 template <class S, std::uint32_t width>
-[[gnu::noinline]] void gather_boxes(const WideArrays<S>& h, const WideNode& node, const S* positions,
-                                    S* boxes) {
+[[gnu::noinline]] void fit_single(const WideArrays<S>& h, const WideNode& node, const S* positions, S* rows,
+                                  S* own) {
   using P = Points<S, 1>;
+  alignas(64) S leaves[width][8];
+  const S* boxes[width];
   for (std::uint32_t lane = 0; lane < width; ++lane) {
-    S* box = boxes + 8 * lane;
     if (lane < node.leaf_count) {
       const std::uint32_t* at = h.vertices + node.list + lane;
       auto lower = P::load(positions + *at, positions), upper = lower;
@@ -86,13 +95,30 @@ template <class S, std::uint32_t width>
         lower = smaller(lower, p);
         upper = larger(upper, p);
       }
-      P::store_smallest(box, lower);
-      P::store_largest(box + 4, upper);
-    } else if (lane < node.count) {
-      const S* own = h.own + std::size_t(8) * (node.first_child + lane - node.leaf_count);
-      for (int i = 0; i < 8; ++i) box[i] = own[i];
+      P::store_smallest(leaves[lane], lower);
+      P::store_largest(leaves[lane] + 4, upper);
+      boxes[lane] = leaves[lane];
     } else {
-      for (int i = 0; i < 8; ++i) box[i] = S(i < 4 ? __builtin_inf() : -__builtin_inf());
+      boxes[lane] = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane - node.leaf_count)
+                                      : empty_box<S>;
+    }
+  }
+  NodeFit<S, width> fit;
+  fit.from_boxes(boxes, rows);
+  fit.store_own(own);
+}
+
+/// Many leaves, whose lists fill all lanes: what belongs to nodes, or to nobody, is put right afterwards.
+template <class S, std::uint32_t width>
+[[gnu::noinline]] void put_right(const WideArrays<S>& h, const WideNode& node, S* rows, S* own) {
+  for (std::uint32_t lane = node.leaf_count; lane < width; ++lane) {
+    const S* box = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane - node.leaf_count)
+                                     : empty_box<S>;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      rows[axis * width + lane] = box[axis];
+      rows[(axis + 3) * width + lane] = -box[axis + 4];
+      own[axis] = smaller(own[axis], box[axis]);
+      own[axis + 4] = larger(own[axis + 4], box[axis + 4]);
     }
   }
 }
@@ -102,17 +128,21 @@ void refit(WideArrays<S> h, const S* positions, std::uint32_t begin, std::uint32
   for (std::uint32_t i = end; i-- > begin;) {
     const WideNode node = h.nodes[i];
     S* rows = h.lanes + std::size_t(i) * 6 * width;
+    S* own = h.own + std::size_t(8) * i;
     NodeFit<S, width> fit;
-    if (node.leaf_count == width) {
+    if (2 * node.leaf_count >= width) {
       fit.from_lists(h.vertices + node.list, node.length, positions, rows);
-    } else if (node.leaf_count == 0 && node.count == width) {
-      fit.from_boxes(h.own + std::size_t(8) * node.first_child, rows);
-    } else {
-      alignas(64) S boxes[8 * width];
-      gather_boxes<S, width>(h, node, positions, boxes);
+      fit.store_own(own);
+      if (node.leaf_count != width) put_right<S, width>(h, node, rows, own);
+    } else if (node.leaf_count == 0) {
+      const S* boxes[width];
+      for (std::uint32_t lane = 0; lane < width; ++lane)
+        boxes[lane] = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane) : empty_box<S>;
       fit.from_boxes(boxes, rows);
+      fit.store_own(own);
+    } else {
+      fit_single<S, width>(h, node, positions, rows, own);
     }
-    fit.store_own(h.own + std::size_t(8) * i);
   }
 }
 
