@@ -22,7 +22,7 @@
 ///
 /// What the float filter decides, the double filter of the same determinant would decide, too: beyond 10 u
 /// permanent with at most 8.01 u of error, 1.9 * 2^-24 of the permanent are left, and the other needs less
-/// than 20 * 2^-53; where underflow counts, 2^-147 or so is left, and it needs 1e-220.
+/// than 20 * 2^-53; where underflow counts, 2^-127 is left, and it needs 1e-220.
 ///
 /// orient2d: 4 roundings at most, 6 u covers them; underflow adds at most 2 * 2^-1075 (a normal number stands
 /// for it).
