@@ -1,6 +1,8 @@
 #pragma once
 #include <cmath>
 
+#include "core/geometry/filter_bounds.hpp"
+
 namespace kbvh {
 
 /// The largest coordinate magnitude for which the predicates and the triangle test promise exact answers.
@@ -19,23 +21,6 @@ inline constexpr double admissible_magnitude<double> = 1e100;
 
 /// What a filter returns where its error bound is larger than the value; otherwise signs are -1, 0, +1.
 inline constexpr int undecided_sign = 2;
-
-/// Error bounds of the filters, u = 2^-53. The relative one multiplies the permanent (the sum of the absolute
-/// values of all products in the determinant); the absolute one covers underflow.
-///
-/// orient3d: a product of three differences takes part in at most 8 roundings (3 differences, 2 products, 1
-/// subtraction, 2 additions), so the error is at most ((1 + u)^8 - 1) permanent < 8.01 u permanent. The
-/// permanent is itself computed with a relative error below 16 u; 10 u covers both. Underflow adds at most
-/// 2^-1075 per product; a 2x2 minor's is multiplied by a difference of up to 2e100: together below 1e-221.
-///
-/// orient2d: 4 roundings at most, 6 u covers them; underflow adds at most 2 * 2^-1075 (a normal number stands
-/// for it: denormals are slow).
-namespace filter {
-inline constexpr double relative3d = 10.0 * 0x1p-53;
-inline constexpr double absolute3d = 1e-220;
-inline constexpr double relative2d = 6.0 * 0x1p-53;
-inline constexpr double absolute2d = 1e-300;
-}  // namespace filter
 
 /// The sign of `value` if its magnitude exceeds `bound`, else undecided_sign.
 inline int sign_beyond(double value, double bound) {

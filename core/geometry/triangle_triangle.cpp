@@ -9,12 +9,11 @@
 #include <cmath>
 #include <cstddef>
 
-// Three stages, kept apart so that a batched filter can stand in for the first:
+// Three stages; core/kernels/triangles.cpp has the first two for many pairs at once:
 //   1. signs:    on which sides of each triangle's plane the other's corners lie (filtered), rejecting most
-//   pairs;
+//                pairs;
 //   2. decision: from the 6 signs alone, which 2 edge-edge orientations tell whether the two intervals that
-//   the
-//                triangles cut out of the planes' common line overlap;
+//                the triangles cut out of the planes' common line overlap;
 //   3. the rest: coplanar and degenerate input, by dimension, on exact signs.
 
 namespace kbvh {
