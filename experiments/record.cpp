@@ -62,6 +62,7 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
                       {"degenerate", loaded.meshes[i].degenerate_primitives}});
   }
   return {{"name", scene.name},
+          {"order", word(loaded.order)},
           {"hash", hexadecimal(hash(scene))},
           {"scalar", sizeof(S) == 4 ? "float" : "double"},
           {"per_keyframe", per_keyframe},
