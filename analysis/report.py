@@ -104,6 +104,7 @@ def write(
         targets_facts=targets_table.facts(list(targets)) if targets else "",
         verdicts=targets_table.VERDICTS,
         times=targets_table.times,
+        wanted=targets_table.wanted,
         within=targets_table.within,
         milliseconds=text.milliseconds,
         size=text.size,

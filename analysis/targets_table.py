@@ -148,6 +148,11 @@ def times(value: Optional[float]) -> str:
     return text.MISSING if value is None else f"{text.factor(value)}x"
 
 
+def wanted(value: float) -> str:
+    """What a target asks for, as 60x."""
+    return f"{value:g}x"
+
+
 def within(interval: Optional[tuple[float, float]]) -> str:
     """An interval as [44.1, 46.3], or nothing."""
     return "" if interval is None else f"[{text.factor(interval[0])}, {text.factor(interval[1])}]"
@@ -177,7 +182,7 @@ def markdown(targets: list[Target]) -> str:
     for target in targets:
         measured = f"{times(target.measured)} {within(target.interval)}".rstrip()
         verdict = VERDICTS[target.verdict] + (f": {target.reason}" if target.reason else "")
-        lines.append(_row([target.what, measured, times(target.at_least), times(target.aim), verdict]))
+        lines.append(_row([target.what, measured, wanted(target.at_least), wanted(target.aim), verdict]))
     names = columns(targets)
     lines += ["", facts(targets) + " Each number says how many times slower the other side is, on the worst scene that counts; "
               "below it is given for every scene, in bold where the scene counts.", ""]  # fmt: skip

@@ -66,9 +66,9 @@ class TestMarkdown(TargetsCase):
         self.assertEqual(code, 0)
         lines = out.splitlines()
         self.assertEqual(lines[0], "| what | measured [95 % interval] | at least | aim | verdict |")
-        self.assertEqual(lines[2], "| refit over FCL | 45.2x [44.2, 46.2] | 20.0x | 30.0x | aim reached |")
-        self.assertEqual(lines[3], "| query | 19.9x [18.9, 20.9] | 20.0x | 30.0x | missed |")
-        self.assertEqual(lines[4], "| peer | – | 20.0x | 30.0x | not measured: cloth 65k: no peer |")
+        self.assertEqual(lines[2], "| refit over FCL | 45.2x [44.2, 46.2] | 20x | 30x | aim reached |")
+        self.assertEqual(lines[3], "| query | 19.9x [18.9, 20.9] | 20x | 30x | missed |")
+        self.assertEqual(lines[4], "| peer | – | 20x | 30x | not measured: cloth 65k: no peer |")
         self.assertIn("commit 0123456789ab, 2025-01-31", lines[6])
         self.assertEqual(lines[8], "| what | cloth 2k | cloth 65k | cloth 65k-shuffled |")
         self.assertEqual(lines[10], "| refit over FCL | 12.0x | **45.2x** | – |")
@@ -91,7 +91,7 @@ class TestMarkdown(TargetsCase):
     def test_no_interval(self) -> None:
         lines = rows()
         lines[0]["confidence_interval"] = None
-        self.assertIn("| refit over FCL | 45.2x | 20.0x |", self.run_main(lines)[1])
+        self.assertIn("| refit over FCL | 45.2x | 20x |", self.run_main(lines)[1])
 
 
 class TestWrite(TargetsCase):

@@ -315,9 +315,10 @@ TEST(Targets, TableShowsRowsAndScenes) {
       "\n"
       "All scenes (* counts)\n"
       "\n"
-      "flat over period  ratio  95 % interval   ms                          of  ms                  of\n"
-      "  sheet *             3  0.2667 to 3.333    9  bottom_up_period [leaf=1]   3  bottom_up [leaf=4]\n")
-      << table;
+      "flat over period  ratio    95 % interval  ms                         of  ms                  of\n"
+      "  sheet *             3  0.2667 to 3.333   9  bottom_up_period [leaf=1]   3  bottom_up [leaf=4]\n"
+      "  soup *            2.5         2.5 to 3  10  bottom_up_period [leaf=1]   4  bottom_up [leaf=1]\n"
+      "  other             0.5       0.5 to 0.5   1  bottom_up_period [leaf=1]   2  bottom_up [leaf=1]\n");
 }
 
 TEST(Targets, TheFileIsReplaced) {
