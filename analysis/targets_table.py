@@ -163,7 +163,7 @@ def facts(targets: list[Target]) -> str:
     first = targets[0]
     where = ", ".join(value for value in (first.cpu, first.compiler) if value) or "an unknown machine"
     state = " with uncommitted changes" if first.dirty else ""
-    sentence = f"Plan `{first.plan}` on {where}, one thread, commit {first.commit[:12] or 'unknown'}{state}, {first.when or 'undated'}."
+    sentence = f"Plan {first.plan} on {where}, one thread, commit {first.commit[:12] or 'unknown'}{state}, {first.when or 'undated'}."
     if any(target.runs > 1 for target in targets):
         sentence += " Not all of it in one run."
     return sentence
