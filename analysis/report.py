@@ -290,7 +290,7 @@ def _machine(study: Study) -> list[tuple[str, str]]:
         ("System", _values(runs["os"])),
         ("Compiler", f"{_values(runs['compiler'])}, {_values(runs['build_type'])}"),
         ("Flags", _values(runs["flags"])),
-        ("Vector instructions", _values(runs["simd"])),
+        ("Vector instructions", f"{_values(runs['simd'])}; kernels used: {_values(runs['kernels'])}"),
     ]
 
 

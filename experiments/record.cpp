@@ -114,7 +114,8 @@ std::string configuration_key(Harness harness, const std::string& program, const
       {"repetitions", study.repetitions},
       {"oracle_every", study.oracle_every},
       {"machine",
-       {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type")}}};
+       {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
+        machine.at("kernels")}}};
   return hexadecimal(hash_of(all.dump()));
 }
 

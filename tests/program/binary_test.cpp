@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/kernels/kernel_set.hpp"
 #include "core/registry.hpp"
 #include "temporary_folder.hpp"
 
@@ -334,6 +335,20 @@ TEST_F(Binary, WorksWithoutACache) {
       kbvh("run " + tiny + "--strategies bottom_up", "KBVH_CACHE='" + (folder_ / "file/x").string() + "'");
   EXPECT_EQ(run.code, 0);
   EXPECT_NE(run.err.find("warning: the cache folder"), std::string::npos) << run.err;
+}
+
+TEST_F(Binary, ForcedKernelsAreAnotherConfiguration) {
+  const std::string run = "run " + tiny + "--strategies bottom_up --out out";
+  const std::string widest = name(supported_kernel_sets().back());
+  EXPECT_EQ(kbvh(run, "KBVH_KERNELS=" + widest).code, 0);
+  EXPECT_EQ(kbvh(run, "KBVH_KERNELS=portable").code, 0);
+  const auto list = records();
+  ASSERT_EQ(list.size(), supported_kernel_sets().size() > 1 ? 2u : 1u);
+  EXPECT_EQ(list.front().at("machine").at("kernels"), widest);
+  EXPECT_EQ(list.back().at("machine").at("kernels"), "portable");
+  const Outcome wrong = kbvh(run, "KBVH_KERNELS=mmx");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_EQ(wrong.err, "kbvh: KBVH_KERNELS: unknown kernels 'mmx'; known are portable, sse, avx2, avx512\n");
 }
 
 TEST_F(Binary, NothingMovesAndNothingMeets) {
