@@ -170,7 +170,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         )
     machine = {
         name: str(record.get(f"machine.{name}", ""))
-        for name in ("cpu", "cores", "memory_gb", "os", "compiler", "flags", "build_type", "simd")
+        for name in ("cpu", "cores", "memory_gb", "os", "compiler", "flags", "build_type", "simd", "kernels")
     }
     if isinstance(record.get("machine.simd", ""), list):
         machine["simd"] = ", ".join(map(str, record.get("machine.simd")))
@@ -233,7 +233,9 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         total = record.number(f"counters.{name}", math.nan)
         row[f"{name}_per_frame"] = total if name in LEVELS or not row["frames"] > 0 else total / row["frames"]
     row["contestant"] = _identity(row["id"], params, builder)
-    row["machine"] = " · ".join(machine[name] for name in ("cpu", "os", "compiler", "flags", "build_type", "simd"))
+    row["machine"] = " · ".join(
+        machine[name] for name in ("cpu", "os", "compiler", "flags", "build_type", "simd", "kernels") if machine[name]
+    )
     row["group"] = json.dumps(
         [row["scene_name"], row["hash"], row["primitives"], row["scalar"], row["l"], str(row["frames"]), row["machine"]]
     )

@@ -10,7 +10,7 @@ import re
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Optional
+from typing import Optional, Sequence
 
 import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -19,6 +19,7 @@ from markupsafe import Markup
 import figures
 import ratios
 import tables
+import targets_table
 import text
 from canvas import Picture, picture
 from colours import Look, looks, symbol
@@ -59,7 +60,9 @@ def main(arguments: Optional[list[str]] = None) -> int:
     options = parser.parse_args(arguments)
     try:
         study = load(options.folder)
-        page = write(study, options.folder, options.title, options.figures)
+        file = options.folder / targets_table.FILE_NAME
+        targets = targets_table.load_targets(file) if file.exists() else []
+        page = write(study, options.folder, options.title, options.figures, targets)
     except ResultError as error:
         print(f"report: {error}", file=sys.stderr)
         return 2
@@ -71,6 +74,8 @@ def main(arguments: Optional[list[str]] = None) -> int:
     if options.printed:
         for scene, group in plain_groups(study):
             print(tables.plain(scene, group) + "\n")
+        if targets:
+            print(targets_table.markdown(targets))
     print(page)
     return 0
 
@@ -81,7 +86,9 @@ def plain_groups(study: Study) -> list[tuple[str, tables.Group]]:
     return list(zip(scenes, tables.groups(study, tables.Ratios(study))))
 
 
-def write(study: Study, folder: Path, title: str, which: str = "main") -> Path:
+def write(
+    study: Study, folder: Path, title: str, which: str = "main", targets: Sequence[targets_table.Target] = ()
+) -> Path:
     """Writes the report and its figures; returns the page's path."""
     all_ratios = tables.Ratios(study)
     groups = tables.groups(study, all_ratios)
@@ -93,6 +100,14 @@ def write(study: Study, folder: Path, title: str, which: str = "main") -> Path:
         machine=_machine(study),
         made=_made(study),
         glance=tables.glance(study, all_ratios, groups),
+        targets=targets,
+        targets_facts=targets_table.facts(list(targets)) if targets else "",
+        verdicts=targets_table.VERDICTS,
+        times=targets_table.times,
+        wanted=targets_table.wanted,
+        within=targets_table.within,
+        milliseconds=text.milliseconds,
+        size=text.size,
         sections=_sections(study, groups, all_looks, folder / "figures", which),
         strategies=_strategies(study),
         limits=limits(study),
@@ -275,7 +290,7 @@ def _machine(study: Study) -> list[tuple[str, str]]:
         ("System", _values(runs["os"])),
         ("Compiler", f"{_values(runs['compiler'])}, {_values(runs['build_type'])}"),
         ("Flags", _values(runs["flags"])),
-        ("Vector instructions", _values(runs["simd"])),
+        ("Vector instructions", f"{_values(runs['simd'])}; kernels used: {_values(runs['kernels'])}"),
     ]
 
 

@@ -12,6 +12,13 @@ bool has_parameter(const Info& info, const std::string& key) {
                      [&](const Parameter& parameter) { return parameter.name == key; });
 }
 
+constexpr std::string_view family_prefix = "family:";
+
+/// Is it the id of one strategy, and no word for several?
+bool is_id(const std::string& id) {
+  return id != "all" && id != "default" && !id.starts_with(family_prefix);
+}
+
 struct Selected {
   const StrategyEntry* entry;
   bool by_id;
@@ -19,20 +26,19 @@ struct Selected {
 
 std::vector<Selected> selected(const std::string& id) {
   std::vector<Selected> list;
-  constexpr std::string_view family = "family:";
-  const bool by_family = id.starts_with(family);
-  if (id != "all" && id != "default" && !by_family) return {{&find_strategy(id), true}};
+  const bool by_family = id.starts_with(family_prefix);
+  if (is_id(id)) return {{&find_strategy(id), true}};
   std::string known;
   for (const StrategyEntry& entry : registry()) {
     if (known.find(entry.info.family) == std::string::npos)
       known += (known.empty() ? "" : ", ") + entry.info.family;
     const bool wanted = id == "all" || (id == "default" && entry.info.guarantee != Guarantee::approximate) ||
-                        (by_family && entry.info.family == id.substr(family.size()));
+                        (by_family && entry.info.family == id.substr(family_prefix.size()));
     if (wanted) list.push_back({&entry, false});
   }
   if (list.empty())
-    throw ConfigError("there is no strategy of the family '" + id.substr(family.size()) + "'; families are " +
-                      known);
+    throw ConfigError("there is no strategy of the family '" + id.substr(family_prefix.size()) +
+                      "'; families are " + known);
   return list;
 }
 
@@ -120,6 +126,12 @@ void add_configurations(std::vector<ContestantSpec>& list, const Selected& choic
 
 }  // namespace
 
+const StrategyEntry* known_strategy(const std::string& id) {
+  for (const StrategyEntry& entry : registry())
+    if (entry.info.id == id) return &entry;
+  return nullptr;
+}
+
 std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests, const Sweep& common,
                                    const BuilderRequest& builder, std::vector<std::string>& notes) {
   std::vector<ContestantSpec> list;
@@ -131,6 +143,10 @@ std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests,
       for (const Selected& choice : selected(request.id.substr(1))) excluded.insert(choice.entry);
   for (const StrategyRequest& request : requests) {
     if (request.id.starts_with('!')) continue;
+    if (request.optional && is_id(request.id) && known_strategy(request.id) == nullptr) {
+      notes.push_back("this program was built without the strategy '" + request.id + "': left out");
+      continue;
+    }
     for (const Selected& choice : selected(request.id)) {
       if (excluded.contains(choice.entry)) continue;
       Sweep params = params_for(choice.entry->info, common, unused);

@@ -26,6 +26,7 @@ struct StrategyRequest {
   std::string id;
   Sweep params;
   BuilderRequest builder;
+  bool optional = false;  ///< left out, with a note, if this program was built without it
 };
 
 /// One strategy in one configuration.
@@ -37,6 +38,9 @@ struct ContestantSpec {
   std::string label;                          ///< id, and what is not as it is by default
   Contestant contestant() const { return {entry, given, builder}; }
 };
+
+/// The entry of a strategy, or nullptr if this program has none of that id.
+const StrategyEntry* known_strategy(const std::string& id);
 
 /// Everything the requests stand for, in order, each configuration once. `common` parameters are "key" (for
 /// every strategy that has it) or "strategy.key"; `builder` is for every request without one of its own.

@@ -9,9 +9,12 @@
 #include <fstream>
 #include <iterator>
 #include <sstream>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
+#include "core/kernels/kernel_set.hpp"
+#include "experiments/io/animated_mesh.hpp"
 #include "experiments/text.hpp"
 
 namespace kbvh::experiments {
@@ -69,6 +72,15 @@ std::string compiler() {
 #endif
 }
 
+/// The kernels in use; a wrong word in the environment is wrong use of the program.
+std::string kernels() {
+  try {
+    return name(active_kernel_set());
+  } catch (const std::invalid_argument& problem) {
+    throw io::InputError(std::string("KBVH_KERNELS: ") + problem.what());
+  }
+}
+
 }  // namespace
 
 nlohmann::json machine() {
@@ -80,7 +92,8 @@ nlohmann::json machine() {
           {"compiler", compiler()},
           {"flags", KBVH_BUILD_FLAGS},
           {"build_type", KBVH_BUILD_TYPE},
-          {"simd", simd()}};
+          {"simd", simd()},
+          {"kernels", kernels()}};
 }
 
 std::string commit() {

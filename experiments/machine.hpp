@@ -5,7 +5,8 @@
 namespace kbvh::experiments {
 
 /// Where and how this program runs, as results record it: cpu, cores, memory_gb, os, compiler, flags,
-/// build_type, simd.
+/// build_type, simd, kernels (the set in use). Throws io::InputError if KBVH_KERNELS names none that works
+/// here.
 nlohmann::json machine();
 
 /// The commit that was built, in full, or "unknown".

@@ -18,6 +18,8 @@ std::string value_text(const json& value, const std::string& where) {
   throw io::InputError(where + ": expected a word, a number or a list of them");
 }
 
+}  // namespace
+
 Sweep read_params(const json& object, const std::string& place) {
   if (!object.is_object()) throw io::InputError(place + ": expected an object of parameters");
   Sweep sweep;
@@ -51,6 +53,8 @@ BuilderRequest read_builder(const json& object, const std::string& place) {
   return request;
 }
 
+namespace {
+
 StrategyRequest read_strategy(const json& value, const std::string& place) {
   if (value.is_string()) return {value.get<std::string>(), {}, {}};
   JsonReader keys(value, place);
@@ -60,6 +64,7 @@ StrategyRequest read_strategy(const json& value, const std::string& place) {
   if (const json* params = keys.find("params")) request.params = read_params(*params, place + ": params");
   if (const json* builder = keys.find("builder"))
     request.builder = read_builder(*builder, place + ": builder");
+  request.optional = keys.truth("optional").value_or(false);
   keys.finish();
   return request;
 }
@@ -107,6 +112,7 @@ Plan read_plan(const json& value, const std::string& place, const std::filesyste
   common.name = plan.name;
   read_study(keys, common, folder);
   const auto studies = keys.list("studies");
+  plan.targets = read_targets(keys.list("targets"), place);
   keys.finish();
   for (std::size_t i = 0; i < studies.size(); ++i) {
     JsonReader study_keys(studies[i], place + ": studies[" + std::to_string(i) + "]");
@@ -121,6 +127,7 @@ Plan read_plan(const json& value, const std::string& place, const std::filesyste
     if (study.scenes.empty())
       throw io::InputError(place + ": scenes: is missing" +
                            (studies.empty() ? "" : " in the study '" + study.name + "'"));
+  check_target_scenes(plan);
   return plan;
 }
 

@@ -7,6 +7,7 @@
 
 #include "experiments/contestants.hpp"
 #include "experiments/scene_spec.hpp"
+#include "experiments/targets.hpp"
 
 namespace kbvh::experiments {
 
@@ -28,6 +29,7 @@ struct Study {
 struct Plan {
   std::string name, description;
   std::vector<Study> studies;
+  std::vector<Target> targets;  ///< what its times are held against
 };
 
 /// Reads a plan. Its keys are those of a study, which are then the defaults of those listed in "studies";
@@ -35,6 +37,10 @@ struct Plan {
 /// file's name), `folder` is where relative file names start. Throws io::InputError on unknown keys and wrong
 /// values; ConfigError is left to `expand`.
 Plan read_plan(const nlohmann::json& plan, const std::string& place, const std::filesystem::path& folder);
+
+/// Reads "params" and "builder" wherever they stand. Throw io::InputError that begins with `place`.
+Sweep read_params(const nlohmann::json& object, const std::string& place);
+BuilderRequest read_builder(const nlohmann::json& object, const std::string& place);
 
 /// Reads a plan file.
 Plan load_plan(const std::filesystem::path& file);

@@ -62,6 +62,7 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
                       {"degenerate", loaded.meshes[i].degenerate_primitives}});
   }
   return {{"name", scene.name},
+          {"order", word(loaded.order)},
           {"hash", hexadecimal(hash(scene))},
           {"scalar", sizeof(S) == 4 ? "float" : "double"},
           {"per_keyframe", per_keyframe},
@@ -113,7 +114,8 @@ std::string configuration_key(Harness harness, const std::string& program, const
       {"repetitions", study.repetitions},
       {"oracle_every", study.oracle_every},
       {"machine",
-       {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type")}}};
+       {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
+        machine.at("kernels")}}};
   return hexadecimal(hash_of(all.dump()));
 }
 

@@ -98,7 +98,28 @@ VertexOrder order_of(const std::string& word, const JsonReader& keys) {
   keys.fail("order", "expected given, shuffled or renumbered, got '" + word + "'");
 }
 
+/// What an order adds to the name of a scene.
+std::string suffix(VertexOrder order) {
+  return order == VertexOrder::given ? "" : std::string("-") + word(order);
+}
+
 }  // namespace
+
+const char* word(VertexOrder order) {
+  switch (order) {
+    case VertexOrder::shuffled:
+      return "shuffled";
+    case VertexOrder::renumbered:
+      return "renumbered";
+    case VertexOrder::given:
+      break;
+  }
+  return "given";
+}
+
+std::string given_name(const SceneSpec& spec) {
+  return spec.name.empty() ? "" : spec.name + suffix(spec.order);
+}
 
 json body_from_text(const std::string& text) {
   const std::string where = "body '" + text + "'";
@@ -189,6 +210,7 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
         spec.options.triangles = std::uint32_t(count);
         spec.options.seed = seed;
         spec.order = order_of(order, keys);
+        spec.said = json{object, folder.string(), count, seed, order}.dump();
         scenes.push_back(std::move(spec));
       }
   return scenes;
@@ -309,13 +331,10 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
   if (loaded.name.empty()) loaded.name = joined(names, "+");
   if (!spec.name.empty()) loaded.name = spec.name;
   loaded.order = spec.order;
-  if (spec.order == VertexOrder::shuffled) {
+  loaded.name += suffix(spec.order);
+  if (spec.order == VertexOrder::shuffled)
     for (std::size_t i = 0; i < loaded.meshes.size(); ++i)
       shuffle_vertices(loaded.meshes[i], hash_of(std::to_string(i), spec.options.seed));
-    loaded.name += "-shuffled";
-  } else if (spec.order == VertexOrder::renumbered) {
-    loaded.name += "-renumbered";
-  }
   if (loaded.meshes.empty()) throw io::InputError("the scene has no body");
   return loaded;
 }

@@ -48,7 +48,14 @@ struct SceneSpec {
   std::vector<BodySpec> bodies;
   VertexOrder order = VertexOrder::given;
   bool optional = false;  ///< skipped with a note if a file does not exist
+  std::string said;       ///< all that decides what it is, as text: equal texts are equal scenes
 };
+
+/// The name that results will show if the plan gives one ("cloth", shuffled: "cloth-shuffled"), else "".
+std::string given_name(const SceneSpec& spec);
+
+/// "given", "shuffled" or "renumbered".
+const char* word(VertexOrder order);
 
 /// Turns "cloth.obj,motion=cloth.pc2,translate=0:0:1" or "sphere:triangles=2000,radius=0.5" into the object
 /// that a plan would hold. Numbers in vectors and after axes are separated by colons; a file name with a

@@ -14,6 +14,7 @@
 #include "experiments/record.hpp"
 #include "experiments/results.hpp"
 #include "experiments/table.hpp"
+#include "experiments/targets.hpp"
 #include "experiments/text.hpp"
 
 namespace kbvh::experiments {
@@ -53,6 +54,15 @@ class Runner {
           scene<double>(study, contestants, loaded);
       }
     }
+  }
+
+  /// Holds what was measured against the plan's targets.
+  void targets(const Plan& plan) {
+    if (plan.targets.empty()) return;
+    const json rows = target_rows(plan, groups_);
+    if (store_) write_targets(store_->folder(), rows);
+    std::printf("%s\n", targets_table(rows).c_str());
+    std::fflush(stdout);
   }
 
   StudyOutcome outcome() const { return outcome_; }
@@ -125,6 +135,7 @@ class Runner {
       if (store_) store_->append(record);
     }
     outcome_.skipped += skipped;
+    groups_.push_back({about_scene, records});
     progress_.clear();
     std::printf("%s\n", results_table(records).c_str());
     std::fflush(stdout);
@@ -178,6 +189,7 @@ class Runner {
   Progress progress_;
   std::set<std::string> said_;
   StudyOutcome outcome_;
+  std::vector<TargetGroup> groups_;  // everything that the plan has asked for, for its targets
 };
 
 }  // namespace
@@ -188,9 +200,11 @@ StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::
   std::vector<std::string> notes;
   for (const Study& study : plan.studies)
     contestants.push_back(expand(study.strategies, study.params, study.builder, notes));
+  check_target_contestants(plan, contestants);
   for (const std::string& text : std::set<std::string>(notes.begin(), notes.end())) say("note: " + text);
   Runner runner(harness, out);
   for (std::size_t i = 0; i < plan.studies.size(); ++i) runner.study(plan.studies[i], contestants[i]);
+  runner.targets(plan);
   return runner.outcome();
 }
 

@@ -22,8 +22,8 @@ struct StudyOutcome {
 
 /// Does all studies of the plan: verifies every contestant, then times those that hold, prints a table for
 /// each scene, scalar and l on stdout, and appends to `out`/results.jsonl (nothing is written if `out` is
-/// empty). Configurations that are in the results already are not measured again.
-/// Throws io::InputError and ConfigError.
+/// empty). Configurations that are in the results already are not measured again. If the plan has targets,
+/// their table is printed at the end, and `out`/targets.json written. Throws io::InputError and ConfigError.
 StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::path& out);
 
 }  // namespace kbvh::experiments

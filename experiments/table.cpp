@@ -26,10 +26,6 @@ double phase_of(const json& repetition, const std::string& phase) {
   return get(phase.c_str());
 }
 
-bool has_times(const json& record) {
-  return record.at("times").is_object();
-}
-
 std::string milliseconds(double value) {
   return fmt::format("{:.4g}", value);
 }
@@ -60,13 +56,25 @@ std::string columns(const std::vector<std::vector<std::string>>& rows) {
   return text;
 }
 
-double median_phase(const json& record, const std::string& phase) {
+bool has_times(const json& record) {
+  return record.at("times").is_object();
+}
+
+std::vector<double> phase_values(const json& record, const std::string& phase) {
   std::vector<double> values;
   for (const json& repetition : record.at("times").at("repetitions"))
     values.push_back(phase_of(repetition, phase));
+  return values;
+}
+
+double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const std::size_t n = values.size();
   return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
+
+double median_phase(const json& record, const std::string& phase) {
+  return median(phase_values(record, phase));
 }
 
 const json* best_refit(const std::vector<json>& records) {

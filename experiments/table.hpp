@@ -8,6 +8,15 @@ namespace kbvh::experiments {
 /// Cells laid out in columns: the first column to the left, the others to the right. `rows[0]` is the head.
 std::string columns(const std::vector<std::vector<std::string>>& rows);
 
+/// The times of one phase in every repetition, in ms per frame; phases as in `median_phase`.
+std::vector<double> phase_values(const nlohmann::json& record, const std::string& phase);
+
+/// Of values that are not none; of an even number, the mean of the two in the middle.
+double median(std::vector<double> values);
+
+/// Was the contestant timed, or refused a time?
+bool has_times(const nlohmann::json& record);
+
 /// The median over the repetitions of one phase, in ms per frame ("motion", "update", "query", or "total" for
 /// update, query and plan changes); of a record with times.
 double median_phase(const nlohmann::json& record, const std::string& phase);

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/kernels/kernel_set.hpp"
 #include "core/registry.hpp"
 #include "temporary_folder.hpp"
 
@@ -167,6 +168,102 @@ TEST_F(Binary, BenchTakesEveryContestant) {
   EXPECT_GT(json::parse(text_of_file(folder_ / "out/benchmark.json")).at("benchmarks").size(), 0u);
 }
 
+/// The middle of the times that a record has for a phase.
+double middle(const json& record, const std::string& phase) {
+  std::vector<double> values;
+  for (const json& repetition : record.at("times").at("repetitions"))
+    values.push_back(phase == "query" ? repetition.at("traversal").get<double>() +
+                                            repetition.at("triangle_tests").get<double>()
+                                      : repetition.at(phase).get<double>());
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+TEST_F(Binary, TargetsFollowFromTheRecords) {
+  const json sides = {{"numerator", {{"strategy", "bottom_up_period"}, {"phase", "update"}}},
+                      {"denominator", {{"strategy", "bottom_up"}, {"phase", "update"}}},
+                      {"scenes", {"small", "large"}},
+                      {"scalar", "float"},
+                      {"l", 2}};
+  json first = sides, second = sides, third = sides;
+  first.update({{"what", "update"}, {"at_least", 1e-6}, {"aim", 1e9}});
+  second.update({{"what", "query"}, {"at_least", 1e9}, {"aim", 1e9}, {"scenes", "small-shuffled"}});
+  for (const char* side : {"numerator", "denominator"}) second[side]["phase"] = "query";
+  second["denominator"]["builder"] = {{"leaf_size", 4}};
+  third.update({{"what", "peer"}, {"at_least", 1}, {"aim", 1}});
+  third["numerator"]["strategy"] = "peer";
+  const json plan{{"name", "tiny"},
+                  {"scenes",
+                   {{{"name", "small"},
+                     {"builtin", "waving_sheet"},
+                     {"triangles", 50},
+                     {"keyframes", 2},
+                     {"order", {"given", "shuffled"}}},
+                    {{"name", "large"}, {"builtin", "waving_sheet"}, {"triangles", 98}, {"keyframes", 2}}}},
+                  {"strategies",
+                   {"bottom_up_period",
+                    {{"id", "bottom_up"}, {"builder", {{"leaf_size", {1, 4}}}}},
+                    {{"id", "peer"}, {"optional", true}}}},
+                  {"l", 2},
+                  {"repetitions", 3},
+                  {"targets", {first, second, third}}};
+  write_text(folder_ / "plan.json", plan.dump());
+  for (const std::string command : {"run", "bench", "bench"}) {
+    SCOPED_TRACE(command);
+    const Outcome run = kbvh(command + " --plan plan.json --out out");
+    ASSERT_EQ(run.code, 0) << run.err;  // a missed target is no error
+    EXPECT_NE(run.out.find("Targets"), std::string::npos);
+    EXPECT_NE(run.out.find("peer: not measured: small: this program was built without peer"),
+              std::string::npos)
+        << run.out;
+    const json rows = json::parse(text_of_file(folder_ / "out/targets.json"));
+    ASSERT_TRUE(rows.is_array());
+    ASSERT_EQ(rows.size(), 3u);
+    // The same, from the records; those of the last command are the last of each scene and label.
+    std::map<std::string, std::map<std::string, json>> known;
+    for (const json& record : records())
+      if (record.at("kind") == command)
+        known[record.at("scene").at("name")][record.at("strategy").at("label")] = record;
+    ASSERT_EQ(known.size(), 3u);
+    const auto ratio = [&](const std::string& scene, const std::string& phase, bool any_leaf_size) {
+      double above = 0, below = 1e300;
+      for (const auto& [label, record] : known.at(scene)) {
+        const json& strategy = record.at("strategy");
+        if (strategy.at("id") == "bottom_up_period") above = middle(record, phase);
+        if (strategy.at("id") == "bottom_up" &&
+            (any_leaf_size || strategy.at("builder").at("leaf_size") == 4))
+          below = std::min(below, middle(record, phase));
+      }
+      return above / below;
+    };
+    EXPECT_DOUBLE_EQ(rows[0].at("measured"),
+                     std::min(ratio("small", "update", true), ratio("large", "update", true)));
+    EXPECT_EQ(rows[0].at("verdict"), "reached");
+    EXPECT_EQ(rows[0].at("per_scene").size(), 3u);
+    EXPECT_DOUBLE_EQ(rows[1].at("measured"), ratio("small-shuffled", "query", false));
+    EXPECT_EQ(rows[1].at("verdict"), "missed");
+    EXPECT_EQ(rows[1].at("scene"), "small-shuffled");
+    EXPECT_EQ(rows[2].at("verdict"), "unmeasured");
+    for (const json& row : {rows[0], rows[1]}) {
+      EXPECT_LE(row.at("confidence_interval")[0], row.at("measured"));
+      EXPECT_GE(row.at("confidence_interval")[1], row.at("measured"));
+      EXPECT_EQ(row.at("machine"), records()[0].at("machine"));
+      EXPECT_EQ(row.at("commit"), records()[0].at("commit"));
+    }
+  }
+  // Without a folder the table is all there is; a wrong target ends it before anything is measured.
+  EXPECT_NE(kbvh("run --plan plan.json").out.find("Targets"), std::string::npos);
+  json wrong = plan;
+  wrong["targets"][0]["scenes"] = "nowhere";
+  write_text(folder_ / "plan.json", wrong.dump());
+  const Outcome refused = kbvh("run --plan plan.json --out other");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("plan.json: targets[0]: scenes: no study has a scene of the name 'nowhere'"),
+            std::string::npos)
+      << refused.err;
+  EXPECT_EQ(refused.out, "");
+}
+
 TEST_F(Binary, APlanSaysWhatTheCommandLineSays) {
   const std::string arguments =
       "--body waving_sheet:triangles=50,keyframes=3 --body "
@@ -238,6 +335,20 @@ TEST_F(Binary, WorksWithoutACache) {
       kbvh("run " + tiny + "--strategies bottom_up", "KBVH_CACHE='" + (folder_ / "file/x").string() + "'");
   EXPECT_EQ(run.code, 0);
   EXPECT_NE(run.err.find("warning: the cache folder"), std::string::npos) << run.err;
+}
+
+TEST_F(Binary, ForcedKernelsAreAnotherConfiguration) {
+  const std::string run = "run " + tiny + "--strategies bottom_up --out out";
+  const std::string widest = name(supported_kernel_sets().back());
+  EXPECT_EQ(kbvh(run, "KBVH_KERNELS=" + widest).code, 0);
+  EXPECT_EQ(kbvh(run, "KBVH_KERNELS=portable").code, 0);
+  const auto list = records();
+  ASSERT_EQ(list.size(), supported_kernel_sets().size() > 1 ? 2u : 1u);
+  EXPECT_EQ(list.front().at("machine").at("kernels"), widest);
+  EXPECT_EQ(list.back().at("machine").at("kernels"), "portable");
+  const Outcome wrong = kbvh(run, "KBVH_KERNELS=mmx");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_EQ(wrong.err, "kbvh: KBVH_KERNELS: unknown kernels 'mmx'; known are portable, sse, avx2, avx512\n");
 }
 
 TEST_F(Binary, NothingMovesAndNothingMeets) {

@@ -99,7 +99,7 @@ TEST(Plan, StudiesInheritAndOverride) {
 TEST(Plan, ErrorsNameFileKeyAndValue) {
   EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
             "p.json: there is no key 'repetition'; known are builder, description, frames_limit, l, name, "
-            "oracle_every, params, repetitions, scalars, scenes, strategies, studies");
+            "oracle_every, params, repetitions, scalars, scenes, strategies, studies, targets");
   EXPECT_TRUE(contains(plan_complaint("{\n  \"scenes\": ]\n}"), "p.json: line 2, column 13"));
   EXPECT_TRUE(contains(plan_complaint("[]"), "p.json: expected an object"));
   EXPECT_TRUE(contains(plan_complaint("{}"), "p.json: scenes: is missing"));
@@ -321,8 +321,8 @@ json example_scene() {
 json example_strategy() {
   return {{"id", "x"}, {"params", {{"queue", "avl"}}}, {"builder", {{"width", 2}}}, {"title", "X"}};
 }
-const json example_machine{
-    {"cpu", "c"}, {"compiler", "g"}, {"flags", "-O2"}, {"build_type", "Release"}, {"os", "d"}};
+const json example_machine{{"cpu", "c"},       {"compiler", "g"}, {"flags", "-O2"}, {"build_type", "Release"},
+                           {"kernels", "sse"}, {"os", "d"}};
 
 TEST(Results, KeysAreStableAndSeeWhatMatters) {
   const Study study;
@@ -331,7 +331,7 @@ TEST(Results, KeysAreStableAndSeeWhatMatters) {
   };
   const std::string usual = key(example_scene(), example_strategy());
   // Pinned: a change of this value makes every stored result be measured again.
-  EXPECT_EQ(usual, "db0e3568b3cf32c7");
+  EXPECT_EQ(usual, "c2c743abebce6186");
   json scene = example_scene(), strategy = example_strategy();
   strategy["title"] = "another title";
   scene["name"] = "another name";
@@ -344,6 +344,11 @@ TEST(Results, KeysAreStableAndSeeWhatMatters) {
   more.repetitions = 4;
   EXPECT_NE(
       configuration_key(Harness::rounds, "abc", example_scene(), example_strategy(), more, example_machine),
+      usual);
+  json other_kernels = example_machine;
+  other_kernels["kernels"] = "portable";
+  EXPECT_NE(
+      configuration_key(Harness::rounds, "abc", example_scene(), example_strategy(), study, other_kernels),
       usual);
   EXPECT_NE(
       configuration_key(Harness::rounds, "abd", example_scene(), example_strategy(), study, example_machine),

@@ -1,0 +1,242 @@
+"""The targets of a plan and what was measured, from targets.json, as Markdown tables.
+
+usage: targets_table.py DIR/targets.json [--write README.md]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Optional
+
+import text
+from load import ResultError
+
+SCHEMA = 1
+FILE_NAME = "targets.json"
+BEGIN, END = "<!-- targets -->", "<!-- /targets -->"
+VERDICTS = {"reached_aim": "aim reached", "reached": "reached", "missed": "missed", "unmeasured": "not measured"}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A target's ratio on one scene. Ratio, times and labels are missing where there is a reason."""
+
+    name: str
+    order: str
+    triangles: Optional[float]
+    counts: bool
+    ratio: Optional[float]
+    interval: Optional[tuple[float, float]]
+    numerator: str
+    numerator_ms: Optional[float]
+    denominator: str
+    denominator_ms: Optional[float]
+    reason: str
+
+
+@dataclass(frozen=True)
+class Target:
+    """One row: a ratio that is wanted, and what it came to."""
+
+    what: str
+    measured: Optional[float]
+    interval: Optional[tuple[float, float]]
+    at_least: float
+    aim: float
+    verdict: str
+    scene: str
+    reason: str
+    note: str
+    scenes: list[Scene]
+    plan: str
+    commit: str
+    dirty: bool
+    when: str
+    cpu: str
+    compiler: str
+    runs: int
+
+
+def load_targets(path: Path) -> list[Target]:
+    """Reads targets.json. Raises ResultError."""
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ResultError(f"{path} does not exist: `kbvh bench --plan PLAN --out DIR` writes it for a plan with targets.") from None
+    except OSError as error:
+        raise ResultError(f"{path} cannot be read: {error.strerror}.") from None
+    except ValueError:
+        raise ResultError(f"{path} is not JSON.") from None
+    if not isinstance(rows, list):
+        raise ResultError(f"{path}: a list of targets is expected.")
+    targets = []
+    for number, row in enumerate(rows, 1):
+        try:
+            targets.append(_target(row))
+        except KeyError as error:
+            raise ResultError(f"{path}: row {number}: the field {error.args[0]} is missing.") from None
+        except (AttributeError, TypeError, ValueError) as error:
+            raise ResultError(f"{path}: row {number}: {error}.") from None
+    return targets
+
+
+def _target(row: dict[str, Any]) -> Target:
+    if not isinstance(row, dict):
+        raise ValueError("an object is expected")
+    if row["schema"] != SCHEMA:
+        raise ValueError(f"schema {json.dumps(row['schema'])} is not known, only {SCHEMA}")
+    if row["verdict"] not in VERDICTS:
+        raise ValueError(f"verdict is {json.dumps(row['verdict'])}, but should be one of {', '.join(VERDICTS)}")
+    machine = row.get("machine") or {}
+    return Target(
+        what=str(row["what"]),
+        measured=_number(row, "measured"),
+        interval=_interval(row),
+        at_least=float(row["at_least"]),
+        aim=float(row["aim"]),
+        verdict=row["verdict"],
+        scene=row.get("scene") or "",
+        reason=row.get("reason", ""),
+        note=row.get("note", ""),
+        scenes=[_scene(one) for one in row["per_scene"]],
+        plan=row.get("plan", ""),
+        commit=row.get("commit", ""),
+        dirty=bool(row.get("dirty", False)),
+        when=row.get("when", ""),
+        cpu=str(machine.get("cpu", "")),
+        compiler=str(machine.get("compiler", "")),
+        runs=len(row.get("runs", [])),
+    )
+
+
+def _scene(one: dict[str, Any]) -> Scene:
+    above, below = one["numerator"] or {}, one["denominator"] or {}
+    return Scene(
+        name=str(one["scene"]),
+        order=one["order"] or "",
+        triangles=_number(one, "triangles"),
+        counts=bool(one["counts"]),
+        ratio=_number(one, "ratio"),
+        interval=_interval(one),
+        numerator=above.get("label", ""),
+        numerator_ms=_number(above, "ms") if above else None,
+        denominator=below.get("label", ""),
+        denominator_ms=_number(below, "ms") if below else None,
+        reason=one.get("reason", ""),
+    )
+
+
+def _number(row: dict[str, Any], key: str) -> Optional[float]:
+    value = row[key]
+    return None if value is None else float(value)
+
+
+def _interval(row: dict[str, Any]) -> Optional[tuple[float, float]]:
+    interval = row["confidence_interval"]
+    if interval is None:
+        return None
+    low, high = interval
+    return float(low), float(high)
+
+
+def times(value: Optional[float]) -> str:
+    """A ratio as 45.2x."""
+    return text.MISSING if value is None else f"{text.factor(value)}x"
+
+
+def wanted(value: float) -> str:
+    """What a target asks for, as 60x."""
+    return f"{value:g}x"
+
+
+def within(interval: Optional[tuple[float, float]]) -> str:
+    """An interval as [44.1, 46.3], or nothing."""
+    return "" if interval is None else f"[{text.factor(interval[0])}, {text.factor(interval[1])}]"
+
+
+def facts(targets: list[Target]) -> str:
+    """On what, of which source and when the targets were measured, in one sentence."""
+    first = targets[0]
+    where = ", ".join(value for value in (first.cpu, first.compiler) if value) or "an unknown machine"
+    state = " with uncommitted changes" if first.dirty else ""
+    sentence = f"Plan {first.plan} on {where}, one thread, commit {first.commit[:12] or 'unknown'}{state}, {first.when or 'undated'}."
+    if any(target.runs > 1 for target in targets):
+        sentence += " Not all of it in one run."
+    return sentence
+
+
+def columns(targets: list[Target]) -> list[str]:
+    """The names of all scenes, in the order in which they were measured."""
+    return list(dict.fromkeys(scene.name for target in targets for scene in target.scenes))
+
+
+def markdown(targets: list[Target]) -> str:
+    """Both tables: the targets, then every size and order."""
+    if not targets:
+        return "No targets.\n"
+    lines = [_row(["what", "measured [95 % interval]", "at least", "aim", "verdict"]), _row(["---"] * 5)]
+    for target in targets:
+        measured = f"{times(target.measured)} {within(target.interval)}".rstrip()
+        verdict = VERDICTS[target.verdict] + (f": {target.reason}" if target.reason else "")
+        lines.append(_row([target.what, measured, wanted(target.at_least), wanted(target.aim), verdict]))
+    names = columns(targets)
+    lines += ["", facts(targets) + " Each number says how many times slower the other side is, on the worst scene that counts; "
+              "below it is given for every scene, in bold where the scene counts.", ""]  # fmt: skip
+    lines += [_row(["what", *names]), _row(["---"] * (1 + len(names)))]
+    for target in targets:
+        cells = {scene.name: times(scene.ratio) for scene in target.scenes}
+        counted = {scene.name for scene in target.scenes if scene.counts}
+        shown = [f"**{cells[name]}**" if name in counted else cells.get(name, text.MISSING) for name in names]
+        lines.append(_row([target.what, *shown]))
+    return "\n".join(lines) + "\n"
+
+
+def _row(cells: list[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+
+
+def rewrite(page: str, table: str) -> str:
+    """The page with the table between its markers, each on a line of its own. Raises ValueError without them."""
+    if page.count(BEGIN) != 1 or page.count(END) != 1 or page.index(BEGIN) > page.index(END):
+        raise ValueError(f"{BEGIN} and {END} should be there once, in this order")
+    before, rest = page.split(BEGIN)
+    after = rest.split(END)[1]
+    return f"{before}{BEGIN}\n{table}{END}{after}"
+
+
+def main(arguments: Optional[list[str]] = None) -> int:
+    """The command; returns its exit code: 0, or 2 for a file that cannot be used."""
+    parser = argparse.ArgumentParser(
+        prog="targets_table.py",
+        description="Prints the targets of a plan and what was measured as Markdown.",
+        epilog="example: targets_table.py results/targets.json --write README.md",
+    )
+    parser.add_argument("file", metavar="targets.json", type=Path, help="written by `kbvh bench --plan PLAN --out DIR`")
+    parser.add_argument("--write", metavar="PAGE", type=Path, help=f"put the tables between {BEGIN} and {END} of this file")
+    options = parser.parse_args(arguments)
+    try:
+        table = markdown(load_targets(options.file))
+    except ResultError as error:
+        print(f"targets_table: {error}", file=sys.stderr)
+        return 2
+    if options.write is None:
+        print(table, end="")
+        return 0
+    try:
+        page = rewrite(options.write.read_text(encoding="utf-8"), table)
+        options.write.write_text(page, encoding="utf-8")
+    except OSError as error:
+        print(f"targets_table: {error.filename}: {error.strerror}.", file=sys.stderr)
+        return 2
+    except ValueError as error:
+        print(f"targets_table: {options.write}: {error}.", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

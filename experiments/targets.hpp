@@ -1,0 +1,70 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "experiments/contestants.hpp"
+
+namespace kbvh::experiments {
+
+struct Plan;
+
+/// Contestants by what is said of them, and the phase whose time counts. Several may match (say, several leaf
+/// sizes): the one with the smallest median stands for them all.
+struct TargetSelector {
+  std::string strategy;    ///< id
+  std::string phase;       ///< "motion", "update", "traversal", "triangle_tests", "query" or "total"
+  BuilderRequest builder;  ///< any of these values; empty: whatever was measured
+  Sweep params;            ///< likewise
+};
+
+/// A ratio of two times that a plan wants to reach: how many times slower the numerator is.
+struct Target {
+  std::string what, note;
+  TargetSelector numerator, denominator;
+  std::vector<std::string> scenes;  ///< the worst of these counts
+  std::string scalar;
+  std::uint32_t per_keyframe = 10;
+  double at_least = 0, aim = 0;
+  std::string place;  ///< for messages
+};
+
+/// Version of the rows in targets.json; RESULTS.md documents them.
+inline constexpr int targets_schema = 1;
+
+/// Reads the list "targets" of a plan. Throws io::InputError that begins with `place`.
+std::vector<Target> read_targets(const std::vector<nlohmann::json>& list, const std::string& place);
+
+/// Complains, by io::InputError, about scenes that no study of the plan measures in the target's scalar and
+/// l, or that are not told apart by their names.
+void check_target_scenes(const Plan& plan);
+
+/// Complains, by io::InputError, about strategies that do not exist (unless the plan has them as optional),
+/// and about targets whose two sides are never measured together. `contestants` are those of each study.
+void check_target_contestants(const Plan& plan, const std::vector<std::vector<ContestantSpec>>& contestants);
+
+/// Is the contestant, as "strategy" of a record has it, one that the selector means?
+bool matches(const TargetSelector& selector, const nlohmann::json& strategy);
+
+/// "bottom_up with width 8, leaf_size 1 or 4": what the selector asks of a contestant.
+std::string described(const TargetSelector& selector);
+
+/// Records of one table: one scene, one scalar, one l, in one study.
+struct TargetGroup {
+  nlohmann::json scene;  ///< as in the records
+  std::vector<nlohmann::json> records;
+};
+
+/// One row per target of the plan, from the records of `groups` (in the order in which they were measured).
+/// Intervals are of 95 %, by a bootstrap over the repetitions whose chance is always the same.
+nlohmann::json target_rows(const Plan& plan, const std::vector<TargetGroup>& groups);
+
+/// The tables that `run` and `bench` print for the rows: what counts, then every scene.
+std::string targets_table(const nlohmann::json& rows);
+
+/// Writes the rows as `folder`/targets.json, in place of what was there. Throws io::InputError.
+void write_targets(const std::filesystem::path& folder, const nlohmann::json& rows);
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,178 @@
+"""Targets: the Markdown table, the page it is written into, and the section of the report."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import io
+import json
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Any, Optional
+
+import paths  # noqa: F401  (finds the modules under test)
+import synthetic
+
+import report
+import targets_table
+
+
+def scene(name: str, ratio: Optional[float], counts: bool, **others: Any) -> dict[str, Any]:
+    side = {"label": "flat [leaf=4]", "ms": 2.0, "repetitions": 5, "run": "r"}
+    return {
+        "scene": name, "order": "given", "triangles": 65522, "counts": counts, "ratio": ratio,
+        "confidence_interval": None if ratio is None else [ratio - 1, ratio + 1],
+        "numerator": None if ratio is None else dict(side, label="peer | <b>", ms=2.0 * ratio), "denominator": side, **others,
+    }  # fmt: skip
+
+
+def target(what: str, measured: Optional[float], verdict: str, scenes: list[dict[str, Any]], **others: Any) -> dict[str, Any]:
+    return {
+        "schema": 1, "plan": "baseline", "what": what, "measured": measured, "at_least": 20.0, "aim": 30.0,
+        "confidence_interval": None if measured is None else [measured - 1, measured + 1], "verdict": verdict,
+        "scene": None if measured is None else "cloth 65k", "scenes": ["cloth 65k"], "per_scene": scenes, "note": "",
+        "commit": "0123456789abcdef", "dirty": False, "machine": synthetic.MACHINE, "when": "2025-01-31T12:00:00Z",
+        "runs": ["r"], **others,
+    }  # fmt: skip
+
+
+def rows() -> list[dict[str, Any]]:
+    return [
+        target("refit over FCL", 45.25, "reached_aim", [scene("cloth 2k", 12.0, False), scene("cloth 65k", 45.25, True)]),
+        target("query", 19.9, "missed", [scene("cloth 65k", 19.9, True), scene("cloth 65k-shuffled", 21.0, False)]),
+        target("peer", None, "unmeasured", [scene("cloth 65k", None, True, reason="no peer")], reason="cloth 65k: no peer"),
+    ]
+
+
+class TargetsCase(unittest.TestCase):
+    def setUp(self) -> None:
+        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
+        self.addCleanup(temporary.cleanup)
+        self.folder = Path(temporary.name)
+        self.file = self.folder / "targets.json"
+
+    def run_main(self, value: Any, *arguments: str) -> tuple[int, str, str]:
+        self.file.write_text(value if isinstance(value, str) else json.dumps(value), encoding="utf-8")
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = targets_table.main([str(self.file), *arguments])
+        return code, out.getvalue(), err.getvalue()
+
+
+class TestMarkdown(TargetsCase):
+    def test_both_tables(self) -> None:
+        code, out, _ = self.run_main(rows())
+        self.assertEqual(code, 0)
+        lines = out.splitlines()
+        self.assertEqual(lines[0], "| what | measured [95 % interval] | at least | aim | verdict |")
+        self.assertEqual(lines[2], "| refit over FCL | 45.2x [44.2, 46.2] | 20x | 30x | aim reached |")
+        self.assertEqual(lines[3], "| query | 19.9x [18.9, 20.9] | 20x | 30x | missed |")
+        self.assertEqual(lines[4], "| peer | – | 20x | 30x | not measured: cloth 65k: no peer |")
+        self.assertIn("commit 0123456789ab, 2025-01-31", lines[6])
+        self.assertEqual(lines[8], "| what | cloth 2k | cloth 65k | cloth 65k-shuffled |")
+        self.assertEqual(lines[10], "| refit over FCL | 12.0x | **45.2x** | – |")
+        self.assertEqual(lines[11], "| query | – | **19.9x** | 21.0x |")
+        self.assertEqual(lines[12], "| peer | – | **–** | – |")
+
+    def test_cells_cannot_break_the_table(self) -> None:
+        lines = rows()
+        lines[0]["what"] = "a | b\nc"
+        self.assertIn("| a \\| b c |", self.run_main(lines)[1])
+
+    def test_uncommitted_changes_and_several_runs_are_told(self) -> None:
+        lines = rows()
+        for line in lines:
+            line.update(dirty=True, runs=["a", "b"])
+        out = self.run_main(lines)[1]
+        self.assertIn("with uncommitted changes", out)
+        self.assertIn("Not all of it in one run.", out)
+
+    def test_no_interval(self) -> None:
+        lines = rows()
+        lines[0]["confidence_interval"] = None
+        self.assertIn("| refit over FCL | 45.2x | 20x |", self.run_main(lines)[1])
+
+
+class TestWrite(TargetsCase):
+    def test_only_what_is_between_the_markers_changes(self) -> None:
+        page = self.folder / "README.md"
+        page.write_text("before\n<!-- targets -->\nold\n<!-- /targets -->\nafter ü\n", encoding="utf-8")
+        table = self.run_main(rows())[1]
+        for _ in range(2):
+            code, out, _ = self.run_main(rows(), "--write", str(page))
+            self.assertEqual((code, out), (0, ""))
+            self.assertEqual(
+                page.read_text(encoding="utf-8"), f"before\n<!-- targets -->\n{table}<!-- /targets -->\nafter ü\n"
+            )
+
+    def test_pages_without_markers_stay_as_they_are(self) -> None:
+        page = self.folder / "README.md"
+        for content in ("text\n", "<!-- /targets -->\n<!-- targets -->\n", "<!-- targets -->\n"):
+            page.write_text(content, encoding="utf-8")
+            code, _, err = self.run_main(rows(), "--write", str(page))
+            self.assertEqual(code, 2)
+            self.assertIn("should be there once", err)
+            self.assertEqual(page.read_text(encoding="utf-8"), content)
+
+    def test_the_readme_has_the_markers(self) -> None:
+        readme = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
+        self.assertIn("| refit over FCL |", targets_table.rewrite(readme, self.run_main(rows())[1]))
+
+
+class TestRefusals(TargetsCase):
+    def test_wrong_files_end_in_one_sentence(self) -> None:
+        lacking, schema, verdict, ratio = (copy.deepcopy(rows()) for _ in range(4))
+        del lacking[1]["at_least"]
+        schema[0]["schema"] = 2
+        verdict[0]["verdict"] = "splendid"
+        ratio[2]["per_scene"][0]["ratio"] = "many"
+        for value, words in (
+            ("{", "is not JSON"), ({}, "a list of targets is expected"), ([3], "row 1: an object is expected"),
+            (lacking, "row 2: the field at_least is missing"), (schema, "row 1: schema 2 is not known"),
+            (verdict, 'row 1: verdict is "splendid"'), (ratio, "row 3: "),
+        ):  # fmt: skip
+            with self.subTest(words):
+                code, out, err = self.run_main(value)
+                self.assertEqual((code, out, err.count("\n")), (2, "", 1))
+                self.assertIn(words, err)
+
+    def test_no_file(self) -> None:
+        with self.assertRaisesRegex(targets_table.ResultError, "does not exist"):
+            targets_table.load_targets(self.folder / "nowhere.json")
+
+
+class TestReport(TargetsCase):
+    def page(self) -> tuple[int, str]:
+        wanted = [c for c in synthetic.CONTESTANTS if c["id"] == "bottom_up"]
+        synthetic.write(self.folder, [synthetic.record(c, "tablecloth", 2000, "float", 1) for c in wanted])
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+            code = report.main([str(self.folder), "--figures", "none", "--print"])
+        page = self.folder / "report.html"
+        return code, out.getvalue() + (page.read_text(encoding="utf-8") if page.exists() else "")
+
+    def test_targets_are_shown_and_escaped(self) -> None:
+        self.file.write_text(json.dumps(rows()), encoding="utf-8")
+        code, page = self.page()
+        self.assertEqual(code, 0)
+        self.assertIn('<section id="targets">', page)
+        self.assertIn("aim reached", page)
+        self.assertIn("not measured: cloth 65k: no peer", page)
+        self.assertIn("peer | &lt;b&gt;", page)
+        self.assertIn("| query | 19.9x [18.9, 20.9] |", page, "printed as text, too")
+
+    def test_no_targets_no_section(self) -> None:
+        code, page = self.page()
+        self.assertEqual(code, 0)
+        self.assertNotIn('id="targets"', page)
+
+    def test_a_wrong_file_is_refused(self) -> None:
+        self.file.write_text("[3]", encoding="utf-8")
+        code, page = self.page()
+        self.assertEqual(code, 2)
+        self.assertIn("row 1: an object is expected", page)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,332 @@
+// Targets of plans: what is refused before anything is measured, and what the rows say of given records.
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "experiments/contestants.hpp"
+#include "experiments/json_reader.hpp"
+#include "experiments/plan.hpp"
+#include "experiments/targets.hpp"
+#include "temporary_folder.hpp"
+
+namespace kbvh::experiments {
+namespace {
+
+using nlohmann::json;
+
+template <class Error = io::InputError>
+std::string complaint(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& problem) {
+    return problem.what();
+  }
+  return "nothing was thrown";
+}
+
+/// A plan with one target that is right: period over flat, on "sheet".
+json example_plan() {
+  return json::parse(R"({
+    "name": "example",
+    "scenes": [{"name": "sheet", "builtin": "waving_sheet", "triangles": 50, "order": ["given", "shuffled"]},
+               {"name": "soup", "builtin": "random_soups", "triangles": 50}, "turning_box"],
+    "strategies": ["bottom_up_period", {"id": "bottom_up", "builder": {"leaf_size": [1, 4]}},
+                   {"id": "peer", "optional": true}],
+    "l": [1, 2],
+    "targets": [{"what": "flat over period", "numerator": {"strategy": "bottom_up_period", "phase": "update"},
+      "denominator": {"strategy": "bottom_up", "phase": "update"},
+      "scenes": ["sheet", "soup"], "scalar": "float", "l": 2, "at_least": 2, "aim": 4}]})");
+}
+
+Plan read(const json& plan) {
+  return read_plan(plan, "p.json", {});
+}
+
+/// What is said of the plan when the program starts.
+std::string start_complaint(const json& value) {
+  return complaint([&] {
+    const Plan plan = read(value);
+    std::vector<std::string> notes;
+    std::vector<std::vector<ContestantSpec>> contestants;
+    for (const Study& study : plan.studies)
+      contestants.push_back(expand(study.strategies, study.params, study.builder, notes));
+    check_target_contestants(plan, contestants);
+  });
+}
+
+std::string with(const std::string& key, const json& value) {
+  json plan = example_plan();
+  plan["targets"][0][json::json_pointer(key)] = value;
+  return start_complaint(plan);
+}
+
+std::string without(const std::string& key) {
+  json plan = example_plan();
+  plan["targets"][0].erase(key);
+  return start_complaint(plan);
+}
+
+TEST(Targets, ARightPlanIsAccepted) {
+  EXPECT_EQ(start_complaint(example_plan()), "nothing was thrown");
+  EXPECT_EQ(with("/note", "why"), "nothing was thrown");
+  EXPECT_EQ(with("/aim", 2), "nothing was thrown");
+  EXPECT_EQ(with("/scenes", "sheet-shuffled"), "nothing was thrown");
+  EXPECT_EQ(with("/denominator/builder", {{"leaf_size", {4, 8}}}), "nothing was thrown");
+  EXPECT_EQ(with("/numerator/strategy", "peer"), "nothing was thrown") << "optional, may be away";
+}
+
+TEST(Targets, ErrorsNameFileTargetAndKey) {
+  for (const char* key : {"what", "numerator", "denominator", "scenes", "scalar", "l", "at_least", "aim"})
+    EXPECT_EQ(without(key), std::string("p.json: targets[0]: ") + key + ": is missing");
+  EXPECT_EQ(with("/extra", 1),
+            "p.json: targets[0]: there is no key 'extra'; known are aim, at_least, denominator, l, note, "
+            "numerator, "
+            "scalar, scenes, what");
+  EXPECT_EQ(
+      with("/numerator/extra", 1),
+      "p.json: targets[0]: numerator: there is no key 'extra'; known are builder, params, phase, strategy");
+  EXPECT_EQ(
+      with("/denominator/phase", "lunch"),
+      "p.json: targets[0]: denominator: phase: expected one of motion, update, traversal, triangle_tests, "
+      "query, total, got 'lunch'");
+  EXPECT_EQ(with("/numerator", "bottom_up"),
+            "p.json: targets[0]: numerator: expected an object with named members, got \"bottom_up\"");
+  EXPECT_EQ(with("/scalar", "half"), "p.json: targets[0]: scalar: expected float or double, got 'half'");
+  EXPECT_EQ(with("/at_least", 5), "p.json: targets[0]: at_least: must not be above the aim, 5 is above 4");
+  EXPECT_EQ(with("/at_least", 0), "p.json: targets[0]: at_least: must be above 0, got 0");
+  EXPECT_EQ(with("/at_least", "2"), "p.json: targets[0]: at_least: expected a finite number, got \"2\"");
+  EXPECT_EQ(with("/l", 0), "p.json: targets[0]: l: expected a whole number from 1 to 1000000, got 0");
+  json plan = example_plan();
+  plan["targets"] = json::array();
+  EXPECT_EQ(start_complaint(plan), "p.json: targets: the list is empty");
+  plan = example_plan();
+  plan["studies"] = {{{"targets", plan["targets"]}}};
+  EXPECT_NE(start_complaint(plan).find("p.json: studies[0]: there is no key 'targets'"), std::string::npos);
+}
+
+TEST(Targets, ScenesMustBeMeasuredAndToldApart) {
+  const std::string none = "p.json: targets[0]: scenes: no study has a scene of the name ";
+  EXPECT_EQ(with("/scenes", {"sheet", "cloth"}),
+            none + "'cloth' in float at l = 2; there are sheet, sheet-shuffled, soup");
+  EXPECT_EQ(with("/scenes", "turning_box"),
+            none + "'turning_box' in float at l = 2; there are sheet, sheet-shuffled, soup");
+  EXPECT_EQ(with("/l", 3), none + "'sheet' in float at l = 3; there are none with a name");
+  EXPECT_EQ(with("/scalar", "double"), none + "'sheet' in double at l = 2; there are none with a name");
+  json plan = example_plan();
+  plan["scenes"][0]["triangles"] = {50, 98};
+  EXPECT_EQ(start_complaint(plan),
+            "p.json: targets[0]: scenes: 'sheet' is the name of several scenes, which counts?");
+  plan = example_plan();
+  plan["studies"] = {{{"name", "a"}}, {{"name", "b"}, {"repetitions", 5}}};
+  EXPECT_EQ(start_complaint(plan), "nothing was thrown") << "the same scene in two studies";
+}
+
+TEST(Targets, SidesMustBeMeasuredTogether) {
+  EXPECT_NE(with("/numerator/strategy", "nobody")
+                .find("p.json: targets[0]: numerator: strategy: there is no strategy 'nobody'; known are"),
+            std::string::npos);
+  EXPECT_EQ(with("/numerator/strategy", "rebuild"),
+            "p.json: targets[0]: no study has both rebuild and bottom_up on 'sheet' in float at l = 2");
+  EXPECT_EQ(with("/denominator/builder", {{"leaf_size", 16}, {"width", {2, 4}}}),
+            "p.json: targets[0]: no study has both bottom_up_period and bottom_up with width 2 or 4, "
+            "leaf_size 16 on "
+            "'sheet' in float at l = 2");
+  EXPECT_NE(with("/denominator/params", {{"speed", 3}}).find("p.json: targets[0]: denominator: params: "),
+            std::string::npos);
+  json plan = example_plan();
+  plan["strategies"].push_back("brute_force");
+  plan["targets"][0]["numerator"] = {
+      {"strategy", "brute_force"}, {"phase", "query"}, {"builder", {{"width", 2}}}};
+  EXPECT_EQ(start_complaint(plan),
+            "p.json: targets[0]: numerator: builder: brute_force builds its own hierarchy");
+  plan = example_plan();
+  plan["studies"] = {{{"strategies", "bottom_up"}}, {{"strategies", "bottom_up_period"}}};
+  EXPECT_EQ(
+      start_complaint(plan),
+      "p.json: targets[0]: no study has both bottom_up_period and bottom_up on 'sheet' in float at l = 2");
+}
+
+TEST(Targets, OptionalStrategiesThatAreNotThereAreLeftOut) {
+  std::vector<std::string> notes;
+  const Plan plan = read(example_plan());
+  const auto list = expand(plan.studies[0].strategies, {}, {}, notes);
+  EXPECT_EQ(list.size(), 3u);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0], "this program was built without the strategy 'peer': left out");
+}
+
+// --- rows ---------------------------------------------------------------------------------------------
+
+json scene(const std::string& name, const std::string& hash) {
+  return {{"name", name},
+          {"hash", hash},
+          {"order", "given"},
+          {"scalar", "float"},
+          {"per_keyframe", 2},
+          {"bodies", {{{"moving", true}, {"primitives", 50}}, {{"moving", false}, {"primitives", 7}}}}};
+}
+
+/// A record whose repetitions have these updates.
+json record(const std::string& id, std::uint32_t leaf_size, const std::vector<double>& updates) {
+  json repetitions = json::array();
+  for (const double update : updates)
+    repetitions.push_back({{"motion", 0.0},
+                           {"update", update},
+                           {"traversal", 1.0},
+                           {"triangle_tests", 2.0},
+                           {"plan_changes", 4.0}});
+  return {{"run", "r"},
+          {"strategy",
+           {{"id", id},
+            {"label", id + " [leaf=" + std::to_string(leaf_size) + "]"},
+            {"params", json::object()},
+            {"builder", {{"method", "median"}, {"width", 8}, {"leaf_size", leaf_size}}}}},
+          {"times", {{"repetitions", repetitions}}}};
+}
+
+std::vector<TargetGroup> example_groups() {
+  return {
+      {scene("sheet", "1"),
+       {record("bottom_up_period", 1, {8, 9, 10}), record("bottom_up", 1, {4, 4, 4}),
+        record("bottom_up", 4, {3, 3, 30})}},
+      {scene("soup", "2"), {record("bottom_up_period", 1, {10, 10, 12}), record("bottom_up", 1, {4, 4, 4})}},
+      {scene("other", "3"), {record("bottom_up_period", 1, {1, 1}), record("bottom_up", 1, {2, 2})}}};
+}
+
+json row_of(const json& plan, const std::vector<TargetGroup>& groups) {
+  return target_rows(read(plan), groups).at(0);
+}
+
+TEST(Targets, TheWorstSceneAndTheFastestConfigurationCount) {
+  const json row = row_of(example_plan(), example_groups());
+  EXPECT_EQ(row.at("what"), "flat over period");
+  EXPECT_EQ(row.at("measured"), 2.5);
+  EXPECT_EQ(row.at("scene"), "soup");
+  EXPECT_EQ(row.at("verdict"), "reached");
+  EXPECT_EQ(row.at("plan"), "example");
+  const json& scenes = row.at("per_scene");
+  ASSERT_EQ(scenes.size(), 3u);
+  EXPECT_EQ(scenes[0].at("ratio"), 3.0);
+  EXPECT_EQ(scenes[0].at("denominator").at("label"), "bottom_up [leaf=4]");
+  EXPECT_EQ(scenes[0].at("denominator").at("ms"), 3.0);
+  EXPECT_EQ(scenes[0].at("triangles"), 50);
+  EXPECT_EQ(scenes[0].at("counts"), true);
+  EXPECT_EQ(scenes[2].at("ratio"), 0.5);
+  EXPECT_EQ(scenes[2].at("counts"), false);
+}
+
+TEST(Targets, Verdicts) {
+  json plan = example_plan();
+  const auto verdict = [&](double at_least, double aim) {
+    plan["targets"][0]["at_least"] = at_least;
+    plan["targets"][0]["aim"] = aim;
+    return row_of(plan, example_groups()).at("verdict").get<std::string>();
+  };
+  EXPECT_EQ(verdict(1, 2.5), "reached_aim");
+  EXPECT_EQ(verdict(2.5, 2.6), "reached");
+  EXPECT_EQ(verdict(2.6, 2.6), "missed");
+}
+
+TEST(Targets, IntervalsAreReproducibleAndHoldTheRatio) {
+  const json row = row_of(example_plan(), example_groups()), again = row_of(example_plan(), example_groups());
+  EXPECT_EQ(row.at("confidence_interval"), again.at("confidence_interval"));
+  // Of soup: medians of 10, 10, 12 over a constant 4.
+  EXPECT_EQ(row.at("confidence_interval"), (json{2.5, 3.0}));
+  auto groups = example_groups();
+  groups[1].records[0] = record("bottom_up_period", 1, {10});
+  EXPECT_TRUE(row_of(example_plan(), groups).at("confidence_interval").is_null());
+}
+
+TEST(Targets, SelectorsSeeBuilderParametersAndPhase) {
+  json plan = example_plan();
+  plan["targets"][0]["scenes"] = "sheet";
+  plan["targets"][0]["denominator"]["builder"] = {{"leaf_size", 1}};
+  EXPECT_EQ(row_of(plan, example_groups()).at("measured"), 9.0 / 4.0);
+  plan["targets"][0]["numerator"]["phase"] = "total";
+  plan["targets"][0]["denominator"]["phase"] = "query";
+  EXPECT_EQ(row_of(plan, example_groups()).at("measured"), 16.0 / 3.0);
+  auto groups = example_groups();
+  groups[0].records[1]["strategy"]["params"]["queue"] = "avl";
+  plan["targets"][0]["denominator"] = {
+      {"strategy", "bottom_up"}, {"phase", "update"}, {"params", {{"queue", "avl"}}}};
+  plan["targets"][0]["numerator"]["phase"] = "update";
+  EXPECT_EQ(row_of(plan, groups).at("measured"), 9.0 / 4.0);
+}
+
+TEST(Targets, WhatCannotBeMeasuredSaysWhy) {
+  const auto reason = [](const json& plan, const std::vector<TargetGroup>& groups) {
+    const json row = row_of(plan, groups);
+    EXPECT_TRUE(row.at("measured").is_null());
+    EXPECT_TRUE(row.at("confidence_interval").is_null());
+    EXPECT_EQ(row.at("verdict"), "unmeasured");
+    EXPECT_EQ(row.at("scene"), nullptr);
+    EXPECT_NE(targets_table(json::array({row})).find(row.at("reason").get<std::string>()), std::string::npos);
+    return row.at("reason").get<std::string>();
+  };
+  auto groups = example_groups();
+  groups.erase(groups.begin() + 1);
+  EXPECT_EQ(reason(example_plan(), groups), "soup: the scene was left out");
+  groups = example_groups();
+  groups[1].records[0]["times"] = nullptr;
+  groups[1].records[0]["refused"] = "it lost a pair";
+  EXPECT_EQ(reason(example_plan(), groups),
+            "soup: bottom_up_period [leaf=1] is refused a time: it lost a pair");
+  groups[1].records.erase(groups[1].records.begin());
+  EXPECT_EQ(reason(example_plan(), groups), "soup: bottom_up_period takes no part");
+  json plan = example_plan();
+  plan["targets"][0]["numerator"]["strategy"] = "peer";
+  EXPECT_EQ(reason(plan, example_groups()), "sheet: this program was built without peer");
+  plan = example_plan();
+  plan["targets"][0]["denominator"]["phase"] = "motion";
+  EXPECT_EQ(reason(plan, example_groups()), "sheet: bottom_up [leaf=1] spends no time in 'motion'");
+}
+
+TEST(Targets, ARefusedConfigurationDoesNotCountTheOthersDo) {
+  auto groups = example_groups();
+  groups[0].records[2]["times"] = nullptr;
+  const json row = row_of(example_plan(), groups);
+  EXPECT_EQ(row.at("per_scene")[0].at("ratio"), 9.0 / 4.0);
+}
+
+TEST(Targets, BothSidesComeFromOneStudy) {
+  std::vector<TargetGroup> groups{{scene("sheet", "1"), {record("bottom_up", 1, {1, 1})}}};
+  for (const TargetGroup& group : example_groups()) groups.push_back(group);
+  const json row = row_of(example_plan(), groups);
+  EXPECT_EQ(row.at("per_scene")[0].at("ratio"), 3.0);
+  EXPECT_EQ(row.at("per_scene").size(), 3u);
+}
+
+TEST(Targets, OtherScalarsAndFramesDoNotMix) {
+  auto groups = example_groups();
+  groups[0].scene["per_keyframe"] = 1;
+  EXPECT_EQ(row_of(example_plan(), groups).at("verdict"), "unmeasured");
+  groups = example_groups();
+  groups[0].scene["scalar"] = "double";
+  EXPECT_EQ(row_of(example_plan(), groups).at("verdict"), "unmeasured");
+}
+
+TEST(Targets, TableShowsRowsAndScenes) {
+  const std::string table = targets_table(target_rows(read(example_plan()), example_groups()));
+  EXPECT_EQ(
+      table,
+      "Targets: how many times slower the other is, on the worst scene that counts\n"
+      "target            measured  95 % interval  at least  aim  verdict    on\n"
+      "flat over period       2.5       2.5 to 3         2    4  reached  soup\n"
+      "\n"
+      "All scenes (* counts)\n"
+      "\n"
+      "flat over period  ratio    95 % interval  ms                         of  ms                  of\n"
+      "  sheet *             3  0.2667 to 3.333   9  bottom_up_period [leaf=1]   3  bottom_up [leaf=4]\n"
+      "  soup *            2.5         2.5 to 3  10  bottom_up_period [leaf=1]   4  bottom_up [leaf=1]\n"
+      "  other             0.5       0.5 to 0.5   1  bottom_up_period [leaf=1]   2  bottom_up [leaf=1]\n");
+}
+
+TEST(Targets, TheFileIsReplaced) {
+  const TemporaryFolder folder;
+  write_targets(folder.path(), json::array({1, 2}));
+  write_targets(folder.path(), json::array({3}));
+  EXPECT_EQ(json::parse(text_of_file(folder / "targets.json")), json::array({3}));
+}
+
+}  // namespace
+}  // namespace kbvh::experiments
