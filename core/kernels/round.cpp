@@ -200,12 +200,11 @@ template <TieRule ties>
       const AllFloats result =
           narrowed(moved<ties>(value0, dx0, fraction), moved<ties>(value1, dx1, fraction));
       store_lanes(out + i, result);
-      const AllFloats reach = absolute(result) * spread;
-      const AllFloats least = smaller(size0, size1) * spread;
-      const AllInts open = (AllInts)(smaller(reach, least) < most);
+      const AllFloats reached = absolute(result), least = smaller(size0, size1);
+      const AllInts open = (AllInts)(smaller(reached, least) * spread < most);
       if (__builtin_expect(bits_of(open) != 0, 0)) {
         const AllInts zero = (AllInts)(least == 0.0F);
-        const AllInts still = open & (~zero | (AllInts)(reach < most));
+        const AllInts still = open & (~zero | (AllInts)(reached * spread < most));
         length = append_set(bits_of(still), i, list, length);
       }
     }

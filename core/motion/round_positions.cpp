@@ -204,72 +204,94 @@ S round_one(S x0, S x1, const TimeFraction& f, const Times& times, RoundingStats
   return round_exactly<kind>(x0, x1, times);
 }
 
-/// Rounds one block of `size` values, a multiple of kRoundGroup; `out` overlaps neither input.
+/// Rounds the blocks of one call. What the first stage leaves is gathered over blocks, so that the second
+/// works on whole groups.
 template <PieceKind kind, class S>
-void round_block(const RoundKernels<S>& kernels, const S* x0, const S* x1, std::size_t size,
-                 const TimeFraction& f, const Times& times, S* out, RoundingStats& stats) {
-  std::uint16_t list[kRoundList];
-  const std::size_t count = kind == PieceKind::chord ? kernels.first_chord(x0, x1, f, out, list, size)
-                                                     : kernels.first_ray(x0, x1, f, out, list, size);
-  if (count == 0) return;
-  stats.second_stage += count;
-  const bool second_helps = std::is_same_v<S, float> ? f.single : f.ratio_exact;
-  for (std::size_t k = 0; k < kRoundGroup; ++k) list[count + k] = list[0];
-  for (std::size_t i = 0; i < count; i += kRoundGroup) {
-    alignas(64) S group0[kRoundGroup], group1[kRoundGroup], chosen[kRoundGroup];
-    std::uint8_t hard[kRoundGroup];
-    if (second_helps) {
-      for (std::size_t k = 0; k < kRoundGroup; ++k) {
-        group0[k] = x0[list[i + k]];
-        group1[k] = x1[list[i + k]];
-      }
-      (kind == PieceKind::chord ? kernels.second_chord : kernels.second_ray)(group0, group1, f, chosen, hard);
-    }
-    for (std::size_t k = 0; k < kRoundGroup && i + k < count; ++k) {
-      const std::size_t j = list[i + k];
-      out[j] = second_helps && hard[k] == 0 ? chosen[k] : round_one<kind>(x0[j], x1[j], f, times, stats);
+class BlockRounder {
+ public:
+  BlockRounder(const TimeFraction& fraction, const Times& times, RoundingStats& stats)
+      : fraction_(fraction), times_(times), stats_(stats) {}
+
+  /// Rounds `count` values into `result`, which overlaps neither input; all three have room for whole groups.
+  /// What is left is written to place(i) later, by finish at the latest.
+  template <class Place>
+  void round(const S* x0, const S* second, std::size_t count, S* result, const Place& place) {
+    while (pending_ >= kRoundGroup) decide();  // of earlier calls: the caller may copy `result` first
+    std::uint16_t list[kRoundList];
+    const std::size_t size = (count + kRoundGroup - 1) / kRoundGroup * kRoundGroup;
+    const auto first_stage = kind == PieceKind::chord ? kernels_.first_chord : kernels_.first_ray;
+    const std::size_t left = first_stage(x0, second, fraction_, result, list, size);
+    for (std::size_t k = 0; k < left; ++k) {
+      const std::size_t i = list[k];
+      if (i >= count) continue;
+      x0_[pending_] = x0[i];
+      second_[pending_] = second[i];
+      places_[pending_++] = place(i);
     }
   }
-}
 
-/// A block of less than kRoundBlock values that may end inside a group: start and end have room for whole
-/// groups, which zeros fill up.
-template <PieceKind kind, class S>
-void round_padded(const RoundKernels<S>& kernels, S* start, S* end, std::size_t count, const TimeFraction& f,
-                  const Times& times, S* out, RoundingStats& stats) {
-  const std::size_t size = (count + kRoundGroup - 1) / kRoundGroup * kRoundGroup;
-  std::fill(start + count, start + size, S(0));
-  std::fill(end + count, end + size, S(0));
-  round_block<kind>(kernels, start, end, size, f, times, out, stats);
-}
+  void finish() {
+    while (pending_ > 0) decide();
+  }
 
-template <PieceKind kind, class S>
-void round_each(const S* x0, const S* x1, std::size_t count, const TimeFraction& f, const Times& times,
-                S* out, RoundingStats& stats) {
-  stats.second_stage += count;
-  for (std::size_t i = 0; i < count; ++i) out[i] = round_one<kind>(x0[i], x1[i], f, times, stats);
-}
+ private:
+  /// Decides the last group of those pending.
+  void decide() {
+    const std::size_t first = (pending_ - 1) / kRoundGroup * kRoundGroup;
+    stats_.second_stage += pending_ - first;
+    const bool second_helps = std::is_same_v<S, float> ? fraction_.single : fraction_.ratio_exact;
+    alignas(64) S chosen[kRoundGroup];
+    std::uint8_t hard[kRoundGroup];
+    if (second_helps) {
+      std::fill(x0_ + pending_, x0_ + first + kRoundGroup, S(0));
+      std::fill(second_ + pending_, second_ + first + kRoundGroup, S(0));
+      const auto second_stage = kind == PieceKind::chord ? kernels_.second_chord : kernels_.second_ray;
+      second_stage(x0_ + first, second_ + first, fraction_, chosen, hard);
+    }
+    for (std::size_t i = first; i < pending_; ++i) {
+      *places_[i] = second_helps && hard[i - first] == 0
+                        ? chosen[i - first]
+                        : round_one<kind>(x0_[i], second_[i], fraction_, times_, stats_);
+    }
+    pending_ = first;
+  }
+
+  const RoundKernels<S>& kernels_ = round_kernels<S>();
+  const TimeFraction& fraction_;
+  const Times& times_;
+  RoundingStats& stats_;
+  std::size_t pending_ = 0;
+  alignas(64) S x0_[kRoundList + kRoundGroup];
+  alignas(64) S second_[kRoundList + kRoundGroup];
+  S* places_[kRoundList + kRoundGroup];
+};
 
 template <PieceKind kind, class S>
 void round_all(const S* x0, const S* x1, std::size_t count, const TimeFraction& f, const Times& times, S* out,
                RoundingStats& stats) {
   stats.values += count;
-  if (!f.in_range) return round_each<kind>(x0, x1, count, f, times, out, stats);
-  const RoundKernels<S>& kernels = round_kernels<S>();
+  if (!f.in_range) {
+    stats.second_stage += count;
+    for (std::size_t i = 0; i < count; ++i) out[i] = round_one<kind>(x0[i], x1[i], f, times, stats);
+    return;
+  }
+  BlockRounder<kind, S> rounder(f, times, stats);
   const bool in_place = out == x0 || out == x1;
   alignas(64) S result[kRoundBlock];
   std::size_t begin = 0;
+  const auto place = [&](std::size_t i) { return out + begin + i; };
   for (; begin + kRoundBlock <= count; begin += kRoundBlock) {
-    S* to = in_place ? result : out + begin;
-    round_block<kind>(kernels, x0 + begin, x1 + begin, kRoundBlock, f, times, to, stats);
+    rounder.round(x0 + begin, x1 + begin, kRoundBlock, in_place ? result : out + begin, place);
     if (in_place) std::memcpy(out + begin, result, sizeof result);
   }
-  if (begin == count) return;
-  S start[kRoundBlock], end[kRoundBlock];
-  std::copy(x0 + begin, x0 + count, start);
-  std::copy(x1 + begin, x1 + count, end);
-  round_padded<kind>(kernels, start, end, count - begin, f, times, result, stats);
-  std::copy(result, result + (count - begin), out + begin);
+  if (begin < count) {
+    alignas(64) S start[kRoundBlock]{}, end[kRoundBlock]{};
+    std::copy(x0 + begin, x0 + count, start);
+    std::copy(x1 + begin, x1 + count, end);
+    rounder.round(start, end, count - begin, result, place);
+    std::copy(result, result + (count - begin), out + begin);
+  }
+  rounder.finish();
 }
 
 template <class S>
@@ -330,30 +352,37 @@ void round_chord_vertices(const S* p0, const S* p1, const std::uint32_t* vertice
     return;
   }
   sums.values += 3 * count;
-  const TimeFraction f = chord_fraction<S>(t0, t1, t, 3 * count);
-  const RoundKernels<S>& kernels = round_kernels<S>();
   const Times times{t0, t1, t};
+  const TimeFraction f = chord_fraction<S>(t0, t1, t, 3 * count);
+  if (!f.in_range) {
+    sums.second_stage += 3 * count;
+    for (std::size_t i = 0; i < 3 * count; ++i) {
+      const std::size_t at = std::size_t{3} * vertices[i / 3] + i % 3;
+      out[at] = round_one<PieceKind::chord>(p0[at], p1[at], f, times, sums);
+    }
+    return;
+  }
+  BlockRounder<PieceKind::chord, S> rounder(f, times, sums);
   constexpr std::size_t per_block = kRoundBlock / 3;
-  alignas(64) S start[kRoundBlock], end[kRoundBlock], result[kRoundBlock];
+  alignas(64) S start[kRoundBlock]{}, end[kRoundBlock]{}, result[kRoundBlock];
   for (std::size_t begin = 0; begin < count; begin += per_block) {
     const std::size_t many = std::min(per_block, count - begin);
+    const std::uint32_t* block = vertices + begin;
     for (std::size_t i = 0; i < many; ++i) {
-      const std::size_t first = std::size_t{3} * vertices[begin + i];
+      const std::size_t first = std::size_t{3} * block[i];
       for (std::size_t axis = 0; axis < 3; ++axis) {
         start[3 * i + axis] = p0[first + axis];
         end[3 * i + axis] = p1[first + axis];
       }
     }
-    if (f.in_range) {
-      round_padded<PieceKind::chord>(kernels, start, end, 3 * many, f, times, result, sums);
-    } else {
-      round_each<PieceKind::chord>(start, end, 3 * many, f, times, result, sums);
-    }
+    rounder.round(start, end, 3 * many, result,
+                  [&](std::size_t i) { return out + std::size_t{3} * block[i / 3] + i % 3; });
     for (std::size_t i = 0; i < many; ++i) {
-      const std::size_t first = std::size_t{3} * vertices[begin + i];
+      const std::size_t first = std::size_t{3} * block[i];
       for (std::size_t axis = 0; axis < 3; ++axis) out[first + axis] = result[3 * i + axis];
     }
   }
+  rounder.finish();
 }
 
 template <class S>
