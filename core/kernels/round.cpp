@@ -152,23 +152,33 @@ template <class V>
 //   q C (2.03 * 2^-48 + 4.01 |delta|) < 2^-26.02  (h, as M <= 2.001 C |V|, |w| > 0.999 |V|),
 // which choose_tie_rule in round_positions.cpp checks when it chooses C.
 //
-// even: delta = 0, v* = w. With E = 2^floor(log2 |V|), adding and taking away T = 1.5 * 2^(5 + log2 C) E
-// rounds V to a multiple of the spacing of doubles around T, 2^-47 C E. Half of that exceeds (1), as |V| < 2
-// E. If w is a midpoint, it is a multiple of h >= 2^-26 E and so of that spacing: it is the nearest; rounding
-// it to float is the rounding of a tie to even. If it is no midpoint, V'' is off w by less than (1) + 2^-48 C
-// E < 2 b |V| < g: it stays on its side.
+// even: delta = 0, v* = w. V is rounded to V'', the nearest multiple of G = 2^5 C ulps of V (fraction.grid;
+// the bits of a double count its ulps, across powers of two, too). With E = 2^floor(log2 |V|), G = 2^-47 C E,
+// and half of that exceeds (1), as |V| < 2 E. If w is a midpoint, it is a multiple of h >= 2^-26 E and so of
+// G: it is the nearest; rounding it to float is the rounding of a tie to even. If it is no midpoint, V'' is
+// off w by less than (1) + G / 2 < G <= 2 b |V| < g: it stays on its side.
 //
 // Zero ends are multiples of any u: (3) need not hold for them, (2) must. If x0 = x1, V = x0 and all hold.
+
+/// `factor` with the sign flipped where sign < 0.
+[[gnu::always_inline]] inline Doubles signed_by(Longs sign, double factor) {
+  const Doubles plus = Doubles{} + factor;
+#if defined(KBVH_KERNELS_avx2)
+  return (Doubles)_mm256_blendv_pd((__m256d)plus, (__m256d)-plus, (__m256d)sign);
+#elif defined(KBVH_KERNELS_sse)
+  return (Doubles)_mm_blendv_pd((__m128d)plus, (__m128d)-plus, (__m128d)sign);
+#else
+  return (Doubles)((sign & INT64_MIN) ^ (Longs)plus);
+#endif
+}
 
 template <TieRule ties>
 [[gnu::always_inline]] inline Doubles moved(Doubles value, Doubles dx, const TimeFraction& fraction) {
   if constexpr (ties == TieRule::toward) {
-    const Longs sign = ((Longs)value ^ (Longs)dx) & INT64_MIN;
-    return product_plus(value, (Doubles)(sign ^ (Longs)(Doubles{} + fraction.bias)), value);
+    return product_plus(value, signed_by((Longs)value ^ (Longs)dx, fraction.bias), value);
   } else {
-    const Doubles power = (Doubles)((Longs)value & INT64_C(0x7ff0000000000000));
-    const Doubles far = power * fraction.grid;
-    return (value + far) - far;
+    const std::int64_t grid = fraction.grid;
+    return (Doubles)(((Longs)value + grid / 2) & -grid);
   }
 }
 

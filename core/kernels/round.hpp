@@ -32,10 +32,10 @@ struct TimeFraction {
 
   // Chords of floats; core/kernels/round.cpp derives the numbers.
   TieRule ties = TieRule::undecided;
-  double bias = 0;  ///< toward: relative nudge off the tie, with the sign of delta
-  double grid =
-      0;  ///< even: this times a value's power of two, added and taken away, rounds it to a tie nearby
-  float spread = 0;  ///< most that the larger end may exceed the smaller one and the result
+  /// undecided: half width of the filter. toward: nudge off the tie, with the sign of delta. Both relative.
+  double bias = 0;
+  std::int64_t grid = 0;  ///< even: a value is taken for a multiple of so many of its ulps, a power of two
+  float spread = 0;       ///< most that the larger end may exceed the smaller one and the result
 };
 
 /// Most values per block.

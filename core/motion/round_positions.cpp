@@ -111,7 +111,7 @@ void choose_tie_rule(TimeFraction& f, std::size_t count) {
   f.ties = side.sign() == 0 ? TieRule::even : TieRule::toward;
   f.spread = static_cast<float>(spread);
   f.bias = 0x1p-48 * spread * side.sign();
-  f.grid = 48 * spread;
+  f.grid = static_cast<std::int64_t>(32 * spread);
 }
 
 TimeFraction chord_fraction(double t0, double t1, double t) {
