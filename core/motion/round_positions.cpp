@@ -204,6 +204,12 @@ S round_one(S x0, S x1, const TimeFraction& f, const Times& times, RoundingStats
   return round_exactly<kind>(x0, x1, times);
 }
 
+/// Zeros from `count` to the end of its group.
+template <class S>
+void fill_group(S* values, std::size_t count) {
+  std::fill(values + count, values + (count + kRoundGroup - 1) / kRoundGroup * kRoundGroup, S(0));
+}
+
 /// Rounds the blocks of one call. What the first stage leaves is gathered over blocks, so that the second
 /// works on whole groups.
 template <PieceKind kind, class S>
@@ -285,9 +291,11 @@ void round_all(const S* x0, const S* x1, std::size_t count, const TimeFraction& 
     if (in_place) std::memcpy(out + begin, result, sizeof result);
   }
   if (begin < count) {
-    alignas(64) S start[kRoundBlock]{}, end[kRoundBlock]{};
+    alignas(64) S start[kRoundBlock], end[kRoundBlock];
     std::copy(x0 + begin, x0 + count, start);
     std::copy(x1 + begin, x1 + count, end);
+    fill_group(start, count - begin);
+    fill_group(end, count - begin);
     rounder.round(start, end, count - begin, result, place);
     std::copy(result, result + (count - begin), out + begin);
   }
@@ -364,7 +372,7 @@ void round_chord_vertices(const S* p0, const S* p1, const std::uint32_t* vertice
   }
   BlockRounder<PieceKind::chord, S> rounder(f, times, sums);
   constexpr std::size_t per_block = kRoundBlock / 3;
-  alignas(64) S start[kRoundBlock]{}, end[kRoundBlock]{}, result[kRoundBlock];
+  alignas(64) S start[kRoundBlock], end[kRoundBlock], result[kRoundBlock];
   for (std::size_t begin = 0; begin < count; begin += per_block) {
     const std::size_t many = std::min(per_block, count - begin);
     const std::uint32_t* block = vertices + begin;
@@ -375,6 +383,8 @@ void round_chord_vertices(const S* p0, const S* p1, const std::uint32_t* vertice
         end[3 * i + axis] = p1[first + axis];
       }
     }
+    fill_group(start, 3 * many);
+    fill_group(end, 3 * many);
     rounder.round(start, end, 3 * many, result,
                   [&](std::size_t i) { return out + std::size_t{3} * block[i / 3] + i % 3; });
     for (std::size_t i = 0; i < many; ++i) {
