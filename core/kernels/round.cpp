@@ -117,16 +117,14 @@ template <class V>
   return length;
 }
 
-// ---- Chords of floats
-// ------------------------------------------------------------------------------------------
+// ---- Chords of floats ----
 //
 // Let v* = x0 + dx f be the exact value, M = max(|x0|, |x1|), so |dx| <= 2 M, |v*| <= M, |dx f| <= 2 M. In
 // double, V = x0 + dx r with r = f (1 + e), |e| <= 2^-53 (1 + 2^-46): difference, ratio and product each
 // contribute at most 2 M 2^-53, the sum M 2^-53, and therefore
 //   (1)  |V - v*| <= 7.01 * 2^-53 M.
-// Nothing underflows: the least float is 2^-149, ratios are at least 2^-250. x0 = -0 gives V = +0 or V = x1
-// r, as
-// (-0) + (+0) = +0, and dx is +0 unless x0 = +0: no result is -0 but those that underflow.
+// Nothing underflows: the least float is 2^-149, ratios are at least 2^-250. Where both ends are zeros, V =
+// +0: dx is -0 only if x0 = +0, and then (+0) + (-0) = +0; otherwise dx is +0.
 //
 // z is the result. A lane counts only if, C being fraction.spread,
 //   (2)  C |z| >= M,
@@ -235,8 +233,7 @@ template <TieRule ties>
   }
 }
 
-// ---- Rays of floats, and what chords leave
-// ---------------------------------------------------------------------
+// ---- Rays of floats, and what chords leave ----
 
 /// Relative half width of the float filter: rounding of dx, ratio, product and sum, 2^-53 each, on |x0| + |dx
 /// ratio|; half as much again pays for the rounding of the filter itself.
@@ -330,8 +327,7 @@ template <PieceKind kind>
   }
 }
 
-// ---- Doubles
-// ---------------------------------------------------------------------------------------------------
+// ---- Doubles ----
 
 /// The filter's relative half width for double-double: each of about 12 errors is below 2^-104 of |x0| + |dx
 /// ratio|.
