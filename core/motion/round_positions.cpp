@@ -10,14 +10,28 @@
 #include <string>
 #include <type_traits>
 
+#include "core/kernels/kernel_set.hpp"
+#include "core/kernels/round.hpp"
 #include "core/motion/exact_arithmetic.hpp"
-#include "core/motion/round_kernels.hpp"
 
 namespace kbvh {
 namespace {
 
+/// Covers the double-double evaluation of round_one: each of about 12 errors is below 2^-104 of |x0| + |dx
+/// ratio|, and underflow of error terms.
+constexpr double kRelativeError = 0x1p-97, kUnderflowError = 0x1p-1040;
+/// Calls for fewer values do without choose_tie_rule: it costs more than the second stage of a few ties.
+constexpr std::size_t kChoiceWorthwhile = 48;
+
 template <class S>
-using Mask = std::conditional_t<std::is_same_v<S, float>, std::int32_t, std::int64_t>;
+const RoundKernels<S>& round_kernels() {
+  const KernelSet set = active_kernel_set();
+  if constexpr (std::is_same_v<S, float>) {
+    return KBVH_SELECT_KERNELS(set, round_float);
+  } else {
+    return KBVH_SELECT_KERNELS(set, round_double);
+  }
+}
 
 [[noreturn]] void refuse_times(const char* rule, double t0, double t1, double t) {
   char text[160];
@@ -53,6 +67,53 @@ void complete(TimeFraction& f, PieceKind kind) {
   f.ratio_halves = split_halves(f.ratio.hi);
 }
 
+/// The largest power of two that `spread` may be where the fraction is p / q + delta, or 0: the conditions
+/// that core/kernels/round.cpp derives.
+double largest_spread(double q, double delta) {
+  for (double spread = 0x1p12; spread >= 4; spread /= 2) {
+    const double reach = 0x1.04p-47 * spread;  // 2.03 * 2^-48
+    if (q * spread * (reach + 2 * delta) < 0x1p-24 && q * (reach + 4.01 * spread * delta) < 0x1.f8p-27)
+      return spread;
+  }
+  return 0;
+}
+
+/// Chooses how the first stage of a chord of floats treats ties: looks for a fraction p / q so near that only
+/// its ties come near ties. Frames of a clip have one: l frames to a keyframe make q a divisor of l, but for
+/// the rounding of t.
+void choose_tie_rule(TimeFraction& f, std::size_t count) {
+  constexpr double largest_q = 1024;
+  f.ties = TieRule::undecided;
+  f.spread = 0x1p7F;
+  f.bias = 0x1p-49 * 0x1p7;
+  if (count < kChoiceWorthwhile) return;
+  // Convergents of the continued fraction p / q of the ratio.
+  double p = 1, q = 0, p_before = 0, q_before = 1;
+  for (double rest = f.ratio.hi;;) {
+    const double whole = std::floor(rest);
+    const double p_next = whole * p + p_before, q_next = whole * q + q_before;
+    if (!(q_next <= largest_q)) return;
+    p_before = p, q_before = q, p = p_next, q = q_next;
+    if (std::fabs(f.ratio.hi * q - p) < 0x1p-30 * q) break;  // no other has so small a q and is that near
+    rest = 1 / (rest - whole);
+  }
+  // delta = (elapsed * q - p * duration) / (q * duration)
+  ExpansionSum<8> side;
+  side.add_product(f.elapsed, {q, 0}, 1);
+  side.add_product(f.duration, {p, 0}, -1);
+  if (!side.in_range()) return;
+  const DoubleDouble minuend = two_product(f.elapsed.hi, q), subtrahend = two_product(f.duration.hi, p);
+  const double difference =
+      (minuend.hi - subtrahend.hi) + ((minuend.lo - subtrahend.lo) + (f.elapsed.lo * q - f.duration.lo * p));
+  const double delta = side.sign() == 0 ? 0 : std::fabs(difference) / (q * f.duration.hi) * 1.01 + 0x1p-90;
+  const double spread = largest_spread(q, delta);
+  if (spread == 0) return;
+  f.ties = side.sign() == 0 ? TieRule::even : TieRule::toward;
+  f.spread = static_cast<float>(spread);
+  f.bias = 0x1p-48 * spread * side.sign();
+  f.grid = static_cast<std::int64_t>(32 * spread);
+}
+
 TimeFraction chord_fraction(double t0, double t1, double t) {
   TimeFraction f;
   f.elapsed = two_diff(t, t0);
@@ -61,6 +122,14 @@ TimeFraction chord_fraction(double t0, double t1, double t) {
   const int scale = -std::ilogb(f.duration.hi);
   for (double* x : {&f.elapsed.hi, &f.elapsed.lo, &f.duration.hi, &f.duration.lo}) *x = std::ldexp(*x, scale);
   complete(f, PieceKind::chord);
+  return f;
+}
+
+/// The fraction for `count` values at once.
+template <class S>
+TimeFraction chord_fraction(double t0, double t1, double t, std::size_t count) {
+  TimeFraction f = chord_fraction(t0, t1, t);
+  if (std::is_same_v<S, float> && f.in_range) choose_tie_rule(f, count);
   return f;
 }
 
@@ -99,7 +168,7 @@ S round_one(S x0, S x1, const TimeFraction& f, const Times& times, RoundingStats
     const DoubleDouble sum = two_sum(start, way.hi);
     const double tail = (sum.lo + way.lo) + (dx.hi * f.ratio.lo + dx.lo * f.ratio.hi);
     const DoubleDouble value = two_sum(sum.hi, tail);
-    const double error = (std::fabs(start) + std::fabs(way.hi)) * kDoubleFilter + kUnderflowFilter;
+    const double error = (std::fabs(start) + std::fabs(way.hi)) * kRelativeError + kUnderflowError;
     S lower, upper;
     if constexpr (std::is_same_v<S, float>) {
       // Rounding hi to float is right unless hi is a midpoint; then, and near cancellation, lo and error
@@ -135,34 +204,73 @@ S round_one(S x0, S x1, const TimeFraction& f, const Times& times, RoundingStats
   return round_exactly<kind>(x0, x1, times);
 }
 
-/// Rounds one block of `size` values, a multiple of kGroup; x0, x1 and out may be the same array.
+/// Zeros from `count` to the end of its group.
+template <class S>
+void fill_group(S* values, std::size_t count) {
+  std::fill(values + count, values + (count + kRoundGroup - 1) / kRoundGroup * kRoundGroup, S(0));
+}
+
+/// Rounds the blocks of one call. What the first stage leaves is gathered over blocks, so that the second
+/// works on whole groups.
 template <PieceKind kind, class S>
-[[gnu::always_inline]] inline void round_block(const S* x0, const S* x1, std::size_t size,
-                                               const TimeFraction& f, const Times& times, S* out,
-                                               RoundingStats& stats) {
-  alignas(64) S result[kBlock];
-  std::uint16_t list[kBlock + kGroup];
-  const std::size_t count = first_stage<kind>(x0, x1, f, result, list, size);
-  stats.second_stage += count;
-  const bool second_helps = std::is_same_v<S, float> ? f.single : f.ratio_exact;
-  for (std::size_t k = 0; k < kGroup; ++k) list[count + k] = 0;
-  for (std::size_t i = 0; i < count; i += kGroup) {
-    alignas(64) S group0[kGroup], group1[kGroup], chosen[kGroup];
-    alignas(64) Mask<S> hard[kGroup];
-    if (second_helps) {
-      for (std::size_t k = 0; k < kGroup; ++k) {
-        group0[k] = x0[list[i + k]];
-        group1[k] = x1[list[i + k]];
-      }
-      second_stage<kind>(group0, group1, f, chosen, hard);
-    }
-    for (std::size_t k = 0; k < kGroup && i + k < count; ++k) {
-      const std::size_t j = list[i + k];
-      result[j] = second_helps && hard[k] == 0 ? chosen[k] : round_one<kind>(x0[j], x1[j], f, times, stats);
+class BlockRounder {
+ public:
+  BlockRounder(const TimeFraction& fraction, const Times& times, RoundingStats& stats)
+      : fraction_(fraction), times_(times), stats_(stats) {}
+
+  /// Rounds `count` values into `result`, which overlaps neither input; all three have room for whole groups.
+  /// What is left is written to place(i) later, by finish at the latest.
+  template <class Place>
+  void round(const S* x0, const S* second, std::size_t count, S* result, const Place& place) {
+    while (pending_ >= kRoundGroup) decide();  // of earlier calls: the caller may copy `result` first
+    std::uint16_t list[kRoundList];
+    const std::size_t size = (count + kRoundGroup - 1) / kRoundGroup * kRoundGroup;
+    const auto first_stage = kind == PieceKind::chord ? kernels_.first_chord : kernels_.first_ray;
+    const std::size_t left = first_stage(x0, second, fraction_, result, list, size);
+    for (std::size_t k = 0; k < left; ++k) {
+      const std::size_t i = list[k];
+      if (i >= count) continue;
+      x0_[pending_] = x0[i];
+      second_[pending_] = second[i];
+      places_[pending_++] = place(i);
     }
   }
-  std::memcpy(out, result, size * sizeof(S));
-}
+
+  void finish() {
+    while (pending_ > 0) decide();
+  }
+
+ private:
+  /// Decides the last group of those pending.
+  void decide() {
+    const std::size_t first = (pending_ - 1) / kRoundGroup * kRoundGroup;
+    stats_.second_stage += pending_ - first;
+    const bool second_helps = std::is_same_v<S, float> ? fraction_.single : fraction_.ratio_exact;
+    alignas(64) S chosen[kRoundGroup];
+    std::uint8_t hard[kRoundGroup];
+    if (second_helps) {
+      std::fill(x0_ + pending_, x0_ + first + kRoundGroup, S(0));
+      std::fill(second_ + pending_, second_ + first + kRoundGroup, S(0));
+      const auto second_stage = kind == PieceKind::chord ? kernels_.second_chord : kernels_.second_ray;
+      second_stage(x0_ + first, second_ + first, fraction_, chosen, hard);
+    }
+    for (std::size_t i = first; i < pending_; ++i) {
+      *places_[i] = second_helps && hard[i - first] == 0
+                        ? chosen[i - first]
+                        : round_one<kind>(x0_[i], second_[i], fraction_, times_, stats_);
+    }
+    pending_ = first;
+  }
+
+  const RoundKernels<S>& kernels_ = round_kernels<S>();
+  const TimeFraction& fraction_;
+  const Times& times_;
+  RoundingStats& stats_;
+  std::size_t pending_ = 0;
+  alignas(64) S x0_[kRoundList + kRoundGroup];
+  alignas(64) S second_[kRoundList + kRoundGroup];
+  S* places_[kRoundList + kRoundGroup];
+};
 
 template <PieceKind kind, class S>
 void round_all(const S* x0, const S* x1, std::size_t count, const TimeFraction& f, const Times& times, S* out,
@@ -173,19 +281,25 @@ void round_all(const S* x0, const S* x1, std::size_t count, const TimeFraction& 
     for (std::size_t i = 0; i < count; ++i) out[i] = round_one<kind>(x0[i], x1[i], f, times, stats);
     return;
   }
+  BlockRounder<kind, S> rounder(f, times, stats);
+  const bool in_place = out == x0 || out == x1;
+  alignas(64) S result[kRoundBlock];
   std::size_t begin = 0;
-  for (; begin + kBlock <= count; begin += kBlock) {
-    round_block<kind>(x0 + begin, x1 + begin, kBlock, f, times, out + begin, stats);
+  const auto place = [&](std::size_t i) { return out + begin + i; };
+  for (; begin + kRoundBlock <= count; begin += kRoundBlock) {
+    rounder.round(x0 + begin, x1 + begin, kRoundBlock, in_place ? result : out + begin, place);
+    if (in_place) std::memcpy(out + begin, result, sizeof result);
   }
-  if (begin == count) return;
-  const std::size_t rest = count - begin, size = (rest + kGroup - 1) / kGroup * kGroup;
-  S start[kBlock], end[kBlock];
-  std::copy(x0 + begin, x0 + count, start);
-  std::copy(x1 + begin, x1 + count, end);
-  std::fill(start + rest, start + size, S(0));
-  std::fill(end + rest, end + size, S(0));
-  round_block<kind>(start, end, size, f, times, start, stats);
-  std::copy(start, start + (count - begin), out + begin);
+  if (begin < count) {
+    alignas(64) S start[kRoundBlock], end[kRoundBlock];
+    std::copy(x0 + begin, x0 + count, start);
+    std::copy(x1 + begin, x1 + count, end);
+    fill_group(start, count - begin);
+    fill_group(end, count - begin);
+    rounder.round(start, end, count - begin, result, place);
+    std::copy(result, result + (count - begin), out + begin);
+  }
+  rounder.finish();
 }
 
 template <class S>
@@ -216,7 +330,8 @@ void round_chord(const S* x0, const S* x1, std::size_t count, double t0, double 
   RoundingStats& sums = stats != nullptr ? *stats : unused;
   if (t == t0) return copy_stored(x0, count, out, sums);
   if (t == t1) return copy_stored(x1, count, out, sums);
-  round_all<PieceKind::chord>(x0, x1, count, chord_fraction(t0, t1, t), {t0, t1, t}, out, sums);
+  const TimeFraction f = chord_fraction<S>(t0, t1, t, count);
+  round_all<PieceKind::chord>(x0, x1, count, f, {t0, t1, t}, out, sums);
 }
 
 template <class S>
@@ -244,25 +359,40 @@ void round_chord_vertices(const S* p0, const S* p1, const std::uint32_t* vertice
     }
     return;
   }
-  const TimeFraction f = chord_fraction(t0, t1, t);
-  constexpr std::size_t per_block = kBlock / 3;
-  S start[kBlock], end[kBlock];
+  sums.values += 3 * count;
+  const Times times{t0, t1, t};
+  const TimeFraction f = chord_fraction<S>(t0, t1, t, 3 * count);
+  if (!f.in_range) {
+    sums.second_stage += 3 * count;
+    for (std::size_t i = 0; i < 3 * count; ++i) {
+      const std::size_t at = std::size_t{3} * vertices[i / 3] + i % 3;
+      out[at] = round_one<PieceKind::chord>(p0[at], p1[at], f, times, sums);
+    }
+    return;
+  }
+  BlockRounder<PieceKind::chord, S> rounder(f, times, sums);
+  constexpr std::size_t per_block = kRoundBlock / 3;
+  alignas(64) S start[kRoundBlock], end[kRoundBlock], result[kRoundBlock];
   for (std::size_t begin = 0; begin < count; begin += per_block) {
     const std::size_t many = std::min(per_block, count - begin);
+    const std::uint32_t* block = vertices + begin;
     for (std::size_t i = 0; i < many; ++i) {
-      const std::size_t first = std::size_t{3} * vertices[begin + i];
+      const std::size_t first = std::size_t{3} * block[i];
       for (std::size_t axis = 0; axis < 3; ++axis) {
         start[3 * i + axis] = p0[first + axis];
         end[3 * i + axis] = p1[first + axis];
       }
     }
-    S result[kBlock];
-    round_all<PieceKind::chord>(start, end, 3 * many, f, {t0, t1, t}, result, sums);
+    fill_group(start, 3 * many);
+    fill_group(end, 3 * many);
+    rounder.round(start, end, 3 * many, result,
+                  [&](std::size_t i) { return out + std::size_t{3} * block[i / 3] + i % 3; });
     for (std::size_t i = 0; i < many; ++i) {
-      const std::size_t first = std::size_t{3} * vertices[begin + i];
+      const std::size_t first = std::size_t{3} * block[i];
       for (std::size_t axis = 0; axis < 3; ++axis) out[first + axis] = result[3 * i + axis];
     }
   }
+  rounder.finish();
 }
 
 template <class S>

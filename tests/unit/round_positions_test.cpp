@@ -1,5 +1,5 @@
-// Correct rounding of positions against rational arithmetic. KBVH_SLOW=1 checks 10 million values instead of
-// 200,000.
+// Correct rounding of positions against rational arithmetic, with every kernel set. KBVH_SLOW=1 checks 10
+// million values and as many at frames of clips instead of 200,000 and 300,000.
 #include "core/motion/round_positions.hpp"
 
 #include <gtest/gtest.h>
@@ -7,24 +7,23 @@
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "tests/support/rounding.hpp"
+
 namespace {
 
 using kbvh::Piece;
 using kbvh::PieceKind;
 using kbvh::RoundingStats;
+using kbvh::testing_support::is_nearest_even_by;
+using kbvh::testing_support::slow;
+using kbvh::testing_support::with_all_kernels;
 using Rational = boost::multiprecision::cpp_rational;
-
-bool slow() {
-  const char* value = std::getenv("KBVH_SLOW");
-  return value != nullptr && std::strcmp(value, "0") != 0 && *value != '\0';
-}
 
 Rational exact(double x) {
   return Rational(x);
@@ -38,24 +37,10 @@ Rational ray_value(double x0, double v, double t0, double t) {
   return exact(x0) + exact(v) * (exact(t) - exact(t0));
 }
 
-/// Whether `rounded` is `value` to nearest even: no neighbour is nearer, and none as near with an even last
-/// bit unless ours is even. Halfway points are enough for that. Finite results only.
 template <class S>
 bool is_nearest_even(S rounded, const Rational& value) {
-  if (!std::isfinite(rounded) || (rounded == 0 && std::signbit(rounded))) return false;
-  const S infinity = std::numeric_limits<S>::infinity();
-  const S below = std::nextafter(rounded, -infinity), above = std::nextafter(rounded, infinity);
-  const Rational own = exact(rounded);
   const Rational twice = value * 2;
-  const int against_lower = twice.compare(own + exact(below));
-  const int against_upper = twice.compare(own + exact(above));
-  int exponent = 0;
-  const double fraction = std::frexp(static_cast<double>(rounded), &exponent);
-  const int lowest = std::numeric_limits<S>::min_exponent;  // subnormals lose bits
-  const int digits = std::numeric_limits<S>::digits - (exponent < lowest ? lowest - exponent : 0);
-  const bool even = rounded == 0 || std::fmod(std::ldexp(fraction, digits), 2.0) == 0;
-  return (against_lower > 0 || (against_lower == 0 && even)) &&
-         (against_upper < 0 || (against_upper == 0 && even));
+  return is_nearest_even_by(rounded, [&](S a, S b) { return twice.compare(exact(a) + exact(b)); });
 }
 
 TEST(RoundPositionsChecker, KnowsRightFromWrong) {
@@ -218,14 +203,17 @@ TYPED_TEST(RoundPositions, AreTheExactValuesRounded) {
     const bool ray = round % 5 == 4;
     if (ray) {
       if (time_kind == 12) t = std::ldexp(t, -150);  // keep positions finite
-      kbvh::round_ray(x0.data(), x1.data(), count, t0, t, out.data(), &stats);
+      out = with_all_kernels<S>(
+          count, [&](S* to) { kbvh::round_ray(x0.data(), x1.data(), count, t0, t, to, &stats); });
     } else {
-      kbvh::round_chord(x0.data(), x1.data(), count, t0, t1, t, out.data(), &stats);
+      out = with_all_kernels<S>(
+          count, [&](S* to) { kbvh::round_chord(x0.data(), x1.data(), count, t0, t1, t, to, &stats); });
       std::vector<std::uint32_t> vertices;
       for (std::uint32_t v = 0; 3 * v < count; ++v)
         vertices.push_back(static_cast<std::uint32_t>(count / 3) - 1 - v);
-      kbvh::round_chord_vertices(x0.data(), x1.data(), vertices.data(), vertices.size(), t0, t1, t,
-                                 scattered.data());
+      scattered = with_all_kernels<S>(count, [&](S* to) {
+        kbvh::round_chord_vertices(x0.data(), x1.data(), vertices.data(), vertices.size(), t0, t1, t, to);
+      });
       ASSERT_EQ(out, scattered);
     }
     for (std::size_t i = 0; i < count; ++i) {
