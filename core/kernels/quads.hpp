@@ -49,7 +49,7 @@ struct Points {
 #endif
 #if defined(__AVX512F__)
 [[gnu::always_inline]] inline Vector<double, 8> joined(Vector<double, 4> a, Vector<double, 4> b) {
-  return (Vector<double, 8>)_mm512_insertf64x4(_mm512_castpd256_pd512((__m256d)a), (__m256d)b, 1);
+  return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 #endif
 

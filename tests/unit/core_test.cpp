@@ -35,9 +35,22 @@ TEST(Builders, MakeSoundTopologiesOfEveryShape) {
                 build_topology<float>(boxes, {.method = method, .width = width, .leaf_size = leaf});
             EXPECT_EQ(check_topology(topology, body.primitives.count()), "")
                 << name << " " << kbvh::name(method) << " width " << width << " leaf " << leaf;
-            if (method == BuildMethod::median && leaf >= 2) {
-              EXPECT_TRUE(topology.perfect || topology.empty())
-                  << name << " width " << width << " leaf " << leaf;
+            if (method == BuildMethod::median) {
+              // All leaves but the last are full; with width^k full leaves the tree is perfect.
+              const std::uint32_t primitives = body.primitives.count(),
+                                  leaves = (primitives + leaf - 1) / leaf;
+              std::uint32_t found = 0, full = 0, power = 1;
+              for (const TopologyNode node : topology.nodes)
+                if (node.is_leaf()) {
+                  ++found;
+                  full += node.count() == leaf ? 1 : 0;
+                }
+              while (power < leaves) power *= width;
+              EXPECT_EQ(found, leaves) << name << " width " << width << " leaf " << leaf;
+              EXPECT_GE(full + 1, leaves) << name << " width " << width << " leaf " << leaf;
+              if (leaves > 0 && power == leaves) {
+                EXPECT_TRUE(topology.perfect) << name << " width " << width << " leaf " << leaf;
+              }
             }
           }
     }
