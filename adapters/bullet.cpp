@@ -91,17 +91,13 @@ class Bullet : public Strategy<float> {
   }
 
   void reset(double t) final {
-    this->clear_triangle_stats();
-    time_ = t;
+    this->start_at(t);
     update_all();
     count_.table = {};
   }
 
   void advance(double t) final {
-    if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
-                                  std::to_string(t));
-    time_ = t;
+    this->move_to(t);
     update_moving();
   }
 
@@ -121,7 +117,6 @@ class Bullet : public Strategy<float> {
 
   std::vector<std::uint8_t> moves_;
   Count count_;
-  double time_ = 0;
 };
 
 /// Collects what one box overlaps in a quantised tree.

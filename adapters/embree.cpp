@@ -130,17 +130,13 @@ class EmbreeRefit final : public Strategy<S> {
   }
 
   void reset(double t) override {
-    this->clear_triangle_stats();
-    time_ = t;
+    this->start_at(t);
     for (BodyState& state : bodies_) update(state);
     count_.table = {};
   }
 
   void advance(double t) override {
-    if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
-                                  std::to_string(t));
-    time_ = t;
+    this->move_to(t);
     for (BodyState& state : bodies_)
       if (state.moves) update(state);
   }
@@ -388,7 +384,6 @@ class EmbreeRefit final : public Strategy<S> {
   std::vector<BodyState> bodies_;
   Collected collected_;
   Count count_;
-  double time_ = 0;
 
  protected:
   Counters counted() const override { return count_.table; }

@@ -80,17 +80,13 @@ class Fcl final : public Strategy<S> {
   }
 
   void reset(double t) override {
-    this->clear_triangle_stats();
-    time_ = t;
+    this->start_at(t);
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
     count_.table = {};
   }
 
   void advance(double t) override {
-    if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
-                                  std::to_string(t));
-    time_ = t;
+    this->move_to(t);
     for (std::uint32_t body = 0; body < bodies_.size(); ++body)
       if (bodies_[body].moves) update(body);
   }
@@ -272,7 +268,6 @@ class Fcl final : public Strategy<S> {
   fcl::CollisionResult<Own> result_;  // stays empty: no leaf is tested by FCL
   std::vector<std::unique_ptr<LeafCollector<Own>>> collectors_;
   Count count_;
-  double time_ = 0;
 
  protected:
   Counters counted() const override { return count_.table; }

@@ -172,8 +172,20 @@ class Strategy {
 
  protected:
   virtual Counters counted() const { return {}; }
-  /// For `reset` of derived classes.
-  void clear_triangle_stats() { triangle_stats_ = {}; }
+  /// To be called first by every `reset`.
+  void start_at(double t) {
+    triangle_stats_ = {};
+    time_ = t;
+  }
+  /// To be called first by every `advance`. Throws std::invalid_argument if t is before the last time.
+  void move_to(double t) {
+    if (t < time_)
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
+                                  std::to_string(t));
+    time_ = t;
+  }
+  /// Of the last `start_at` or `move_to`.
+  double time() const { return time_; }
   [[noreturn]] static void unsupported(const char* what) {
     throw std::logic_error(std::string("this strategy does not declare ") + what);
   }
@@ -181,6 +193,9 @@ class Strategy {
   SceneView<S> scene_;
   SampledMotion<S> sampled_;
   TriangleTestStats triangle_stats_;
+
+ private:
+  double time_ = 0;
 };
 
 /// One topology per body; empty for strategies that build their own.

@@ -6,8 +6,7 @@
 #include "core/registry.hpp"
 
 #if defined(KBVH_WITH_TBB)
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
 #include <tbb/task_arena.h>
 #endif
 
@@ -65,22 +64,20 @@ class BottomUp final : public StoredHierarchyStrategy<S, Count> {
     this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
   }
 
-  /// Level by level, the deepest first: the nodes of one level do not depend on each other.
   void refit_in_parallel(WideHierarchy<S>& hierarchy, const S* positions) {
-    const std::vector<std::uint32_t>& levels = hierarchy.levels();
-    if (levels.empty()) return hierarchy.refit(positions);
 #if defined(KBVH_WITH_TBB)
-    constexpr std::uint32_t grain = 256;  // nodes: a few microseconds
-    for (std::size_t level = levels.size() - 1; level-- > 0;) {
-      const std::uint32_t begin = levels[level], end = levels[level + 1];
-      if (end - begin < 2 * grain) return hierarchy.refit_nodes(positions, 0, end);
+    if (!hierarchy.subtrees().empty()) {
       arena_.execute([&] {
-        tbb::parallel_for(tbb::blocked_range<std::uint32_t>(begin, end, grain), [&](const auto& range) {
-          hierarchy.refit_nodes(positions, range.begin(), range.end());
+        tbb::parallel_for_each(hierarchy.subtrees(), [&](const auto& subtree) {
+          hierarchy.refit_nodes(positions, subtree.begin, subtree.end);
         });
       });
+      for (const std::uint32_t node : hierarchy.above_subtrees())
+        hierarchy.refit_nodes(positions, node, node + 1);
+      return;
     }
 #endif
+    hierarchy.refit(positions);
   }
 
   int threads_;

@@ -40,17 +40,13 @@ class BottomUpRecursive final : public Strategy<S> {
   }
 
   void reset(double t) override {
-    this->clear_triangle_stats();
-    time_ = t;
+    this->start_at(t);
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
     count_.table = {};
   }
 
   void advance(double t) override {
-    if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
-                                  std::to_string(t));
-    time_ = t;
+    this->move_to(t);
     for (std::uint32_t body = 0; body < bodies_.size(); ++body)
       if (this->scene_.moving(body) || plans_changed_) update(body);
   }
@@ -147,7 +143,6 @@ class BottomUpRecursive final : public Strategy<S> {
 
   std::vector<Body> bodies_;
   Count count_;
-  double time_ = 0;
   bool plans_changed_ = false;
 };
 

@@ -17,17 +17,13 @@ class BruteForce final : public Strategy<S> {
   }
 
   void reset(double t) override {
-    this->clear_triangle_stats();
-    time_ = t;
+    this->start_at(t);
     update();
     count_.table = {};
   }
 
   void advance(double t) override {
-    if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
-                                  std::to_string(t));
-    time_ = t;
+    this->move_to(t);
     update();
   }
 
@@ -74,7 +70,6 @@ class BruteForce final : public Strategy<S> {
 
   std::vector<std::vector<Box<S>>> boxes_;
   Count count_;
-  double time_ = 0;
 };
 
 }  // namespace

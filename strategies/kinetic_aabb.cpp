@@ -28,8 +28,7 @@ class KineticAabb final : public Strategy<S> {
   }
 
   void reset(double t) override {
-    this->clear_triangle_stats();
-    time_ = t;
+    this->start_at(t);
     on_forest([&](auto& forest) { forest.reset(t); });
     // What starting costs is not what running costs: counts begin here.
     count_.table = {};
@@ -39,10 +38,7 @@ class KineticAabb final : public Strategy<S> {
   }
 
   void advance(double t) override {
-    if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
-                                  std::to_string(t));
-    time_ = t;
+    this->move_to(t);
     on_forest([&](auto& forest) { forest.advance(t); });
     new_frame();
   }
@@ -64,9 +60,9 @@ class KineticAabb final : public Strategy<S> {
   }
 
   void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    if (t != time_)
+    if (t != this->time())
       throw std::invalid_argument("plans changed at t = " + std::to_string(t) +
-                                  ", but the hierarchy stands at " + std::to_string(time_));
+                                  ", but the hierarchy stands at " + std::to_string(this->time()));
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
       changed_.clear();
       for (const PlanChange<S>& change : changes)
@@ -126,7 +122,6 @@ class KineticAabb final : public Strategy<S> {
   std::vector<BoxCache<S>> caches_;
   std::vector<NodePair> stack_;
   std::vector<std::uint32_t> changed_;
-  double time_ = 0;
   std::uint64_t first_step_ = 0, first_fetch_ = 0;
 };
 

@@ -21,14 +21,11 @@ class Limit : public Strategy<S> {
       : Strategy<S>(scene, motion), kernels_(&limit_kernels(active_kernel_set())) {}
 
   void reset(double t) override {
-    time_ = t;
+    this->start_at(t);
     update_all(t);
   }
   void advance(double t) override {
-    if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
-                                  std::to_string(t));
-    time_ = t;
+    this->move_to(t);
     update_all(t);
   }
   QueryStatus candidates_at(double /*t*/, PairBuffer& /*out*/, const Budget& /*budget*/) override {
@@ -45,7 +42,6 @@ class Limit : public Strategy<S> {
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body)
       if (this->scene_.moving(body)) update(body, t);
   }
-  double time_ = 0;
 };
 
 template <class S, class Count>

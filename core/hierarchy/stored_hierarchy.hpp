@@ -24,8 +24,7 @@ class StoredHierarchyStrategy : public Strategy<S> {
   }
 
   void reset(double t) override {
-    this->clear_triangle_stats();
-    time_ = t;
+    this->start_at(t);
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
       hierarchies_[body].positions_changed();
       refit(body);
@@ -34,10 +33,7 @@ class StoredHierarchyStrategy : public Strategy<S> {
   }
 
   void advance(double t) override {
-    if (t < time_)
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
-                                  std::to_string(t));
-    time_ = t;
+    this->move_to(t);
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body)
       if (this->scene_.moving(body) || plans_changed_) {
         hierarchies_[body].positions_changed();
@@ -85,7 +81,6 @@ class StoredHierarchyStrategy : public Strategy<S> {
   std::vector<WideHierarchy<S>> hierarchies_;
   WideQuery<S> query_;
   Count count_;
-  double time_ = 0;
   bool plans_changed_ = false;
 };
 

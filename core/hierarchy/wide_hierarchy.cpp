@@ -29,26 +29,6 @@ const WideOverlapKernels<S>& overlap_kernels(KernelSet set) {
     return KBVH_SELECT_KERNELS(set, wide_overlap_double);
 }
 
-/// The length to which shorter lists are padded. A loop whose length changes from node to node is
-/// mispredicted, which costs as much as some 8 more vertices (measured on Zen 3: 65k triangles, 4 per
-/// leaf, 1.4x).
-std::size_t usual_length(const std::vector<std::size_t>& lengths) {
-  constexpr std::size_t misprediction = 8;
-  std::vector<std::size_t> nodes_of(1, 0);
-  for (const std::size_t length : lengths) {
-    if (length >= nodes_of.size()) nodes_of.resize(length + 1, 0);
-    if (length > 0) ++nodes_of[length];
-  }
-  std::size_t best = 0, best_cost = std::numeric_limits<std::size_t>::max();
-  for (std::size_t usual = 0; usual < nodes_of.size() && usual < 256; ++usual) {
-    std::size_t cost = 0;
-    for (std::size_t length = 1; length < nodes_of.size(); ++length)
-      cost += nodes_of[length] * (length <= usual ? usual : length + misprediction);
-    if (cost < best_cost) best_cost = cost, best = usual;
-  }
-  return best;
-}
-
 }  // namespace
 
 template <class S>
@@ -58,6 +38,7 @@ void WideHierarchy<S>::assign(Topology topology, const Primitives& primitives, K
   kernels_ = kernels;
   refit_ = refit_kernels<S>(kernels).of(topology_.width);
   place_nodes();
+  find_subtrees();
   list_vertices();
   list_leaves(primitives);
 }
@@ -65,8 +46,8 @@ void WideHierarchy<S>::assign(Topology topology, const Primitives& primitives, K
 template <class S>
 void WideHierarchy<S>::place_nodes() {
   places_.assign(topology_.size(), Place{});
+  parent_.assign(1, 0);
   nodes_.clear();
-  levels_.clear();
   if (topology_.empty()) return;
   // A root that is a leaf still needs a wide node to lie in.
   std::uint32_t inner = 0, leaves = 0;
@@ -77,11 +58,10 @@ void WideHierarchy<S>::place_nodes() {
     WideNode node;
     node.leaf_count = node.count = 1;
     nodes_.push_back(node);
-    levels_ = {0, 1};
     return;
   }
   nodes_.reserve(inner);
-  bool by_depth = true;
+  parent_.assign(inner, 0);
   for (std::uint32_t i = 0; i < topology_.size(); ++i) {
     const TopologyNode source = topology_.nodes[i];
     if (source.is_leaf()) continue;
@@ -101,18 +81,39 @@ void WideHierarchy<S>::place_nodes() {
       if (lane == node.leaf_count) node.first_child = places_[c].wide;
       places_[c].node = wide;
       places_[c].lane = lane++;
+      parent_[places_[c].wide] = wide;
     }
     nodes_.push_back(node);
-    const std::uint8_t depth = topology_.depths[i];
-    if (depth == levels_.size())
-      levels_.push_back(wide);
-    else
-      by_depth = by_depth && depth + 1U == levels_.size();
   }
-  levels_.push_back(std::uint32_t(nodes_.size()));
-  if (!by_depth) levels_.clear();
   if (nodes_.size() > (WidePair::leaf_bit >> 3))
     throw std::length_error("a hierarchy of more than 2^28 nodes");
+}
+
+template <class S>
+void WideHierarchy<S>::find_subtrees() {
+  subtrees_.clear();
+  above_subtrees_.clear();
+  // Descendants lie together if nodes are numbered depth first, siblings in one row; others are not divided.
+  std::vector<std::uint32_t> size(nodes_.size(), 1);
+  for (std::uint32_t n = node_count(); n-- > 0;) {
+    const WideNode& node = nodes_[n];
+    const std::uint32_t inner = node.count - node.leaf_count;
+    std::uint32_t next = node.first_child + inner;
+    for (std::uint32_t c = node.first_child; c < node.first_child + inner; ++c) {
+      if (nodes_[c].count != nodes_[c].leaf_count && nodes_[c].first_child != next) return;
+      next += size[c] - 1;
+      size[n] += size[c];
+    }
+  }
+  const std::uint32_t largest = std::max<std::uint32_t>(256, node_count() / 64);
+  for (std::uint32_t n = node_count(); n-- > 0;) {
+    const bool below_largest = size[n] <= largest;
+    if (below_largest && n != 0 && size[parent_[n]] <= largest) continue;
+    above_subtrees_.push_back(n);
+    if (below_largest && size[n] > 1)
+      subtrees_.push_back({nodes_[n].first_child, nodes_[n].first_child + size[n] - 1});
+  }
+  if (subtrees_.size() < 2) subtrees_.clear();
 }
 
 template <class S>
@@ -129,22 +130,21 @@ void WideHierarchy<S>::list_vertices() {
   for (std::uint32_t n = 0; n < nodes_.size(); ++n)
     for (std::uint32_t lane = 0; lane < nodes_[n].leaf_count; ++lane)
       lengths[n] = std::max(lengths[n], leaf_vertices_[leaf_of[std::size_t(n) * width + lane]].size());
-  const std::size_t usual = usual_length(lengths);
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
     WideNode& node = nodes_[n];
     if (node.leaf_count == 0) continue;
-    const std::size_t length = std::max(lengths[n], usual);
+    const std::size_t length = lengths[n];
     if (length > std::numeric_limits<std::uint16_t>::max() ||
         vertices_.size() + length * width > std::numeric_limits<std::uint32_t>::max())
       throw std::length_error("a leaf with " + std::to_string(length) + " vertices is too large");
     node.list = std::uint32_t(vertices_.size());
     node.length = std::uint16_t(length);
-    for (std::size_t i = 0; i < length; ++i)
-      for (std::uint32_t lane = 0; lane < width; ++lane) {
-        const auto list =
-            leaf_vertices_[leaf_of[std::size_t(n) * width + (lane < node.leaf_count ? lane : 0)]];
-        vertices_.push_back(3 * list[std::min(i, list.size() - 1)]);
-      }
+    vertices_.resize(vertices_.size() + length * width);
+    for (std::uint32_t lane = 0; lane < width; ++lane) {
+      const auto list = leaf_vertices_[leaf_of[std::size_t(n) * width + (lane < node.leaf_count ? lane : 0)]];
+      for (std::size_t i = 0; i < length; ++i)
+        vertices_[node.list + i * width + list_place(lane, width)] = 3 * list[std::min(i, list.size() - 1)];
+    }
   }
 }
 

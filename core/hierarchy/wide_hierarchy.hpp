@@ -38,9 +38,13 @@ class WideHierarchy {
     refit_(arrays(), positions, begin, end);
   }
   std::uint32_t node_count() const { return std::uint32_t(nodes_.size()); }
-  /// Wide nodes of depth d are [levels()[d], levels()[d + 1]); they depend on deeper ones only. Empty if the
-  /// topology does not list its nodes by depth.
-  const std::vector<std::uint32_t>& levels() const { return levels_; }
+  /// Ranges of wide nodes that do not depend on each other, and the nodes above them, children first: what
+  /// threads can share. No ranges where it would not pay, or where the topology is not numbered depth first.
+  struct Subtree {
+    std::uint32_t begin, end;
+  };
+  const std::vector<Subtree>& subtrees() const { return subtrees_; }
+  const std::vector<std::uint32_t>& above_subtrees() const { return above_subtrees_; }
 
   /// The box of a node of the topology.
   Box<S> box(std::uint32_t node) const;
@@ -87,6 +91,7 @@ class WideHierarchy {
   };
   static constexpr std::uint32_t none = ~std::uint32_t(0);
   void place_nodes();
+  void find_subtrees();
   void list_vertices();
   void list_leaves(const Primitives& primitives);
 
@@ -94,8 +99,10 @@ class WideHierarchy {
   LeafVertices leaf_vertices_;
   KernelSet kernels_ = KernelSet::portable;
   typename WideRefitKernels<S>::Refit refit_ = nullptr;
-  std::vector<Place> places_;  // of the topology's nodes
-  std::vector<std::uint32_t> levels_;
+  std::vector<Place> places_;          // of the topology's nodes
+  std::vector<std::uint32_t> parent_;  // of wide nodes
+  std::vector<Subtree> subtrees_;
+  std::vector<std::uint32_t> above_subtrees_;
   AlignedArray<WideNode> nodes_;
   AlignedArray<S> lanes_, own_;
   AlignedArray<std::uint32_t> vertices_;

@@ -27,13 +27,14 @@ struct Points {
   using Pack = PlainPoint<S>;
   /// The point at `a`; a second one, where a pack holds two, at `b`.
   [[gnu::always_inline]] static Pack load(const S* a, const S* /*b*/) { return {{a[0], a[1], a[2]}}; }
-  /// Writes four packs as rows: rows[axis * stride + i] for the points i < many.
+  /// Writes four packs as rows: rows[axis * stride + i] for the points i < many, each number with its sign
+  /// turned if `turned`.
+  template <bool turned>
   [[gnu::always_inline]] static void store_rows(const Pack (&p)[4], S* rows, std::size_t stride,
                                                 std::size_t many) {
     for (std::size_t axis = 0; axis < 3; ++axis)
-      for (std::size_t i = 0; i < many; ++i) rows[axis * stride + i] = p[i].v[axis];
+      for (std::size_t i = 0; i < many; ++i) rows[axis * stride + i] = turned ? -p[i].v[axis] : p[i].v[axis];
   }
-  [[gnu::always_inline]] static Pack negated(Pack p) { return {{-p.v[0], -p.v[1], -p.v[2]}}; }
   /// Smallest and largest of a pack's points; may write a fourth number.
   [[gnu::always_inline]] static void store_smallest(S* to, Pack p) {
     for (int i = 0; i < 3; ++i) to[i] = p.v[i];
@@ -70,8 +71,7 @@ struct Points<S, wanted_points, true> {
       return joined(load_lanes<Point>(a), load_lanes<Point>(b));
     }
   }
-  [[gnu::always_inline]] static Pack negated(Pack p) { return -p; }
-
+  template <bool turned>
   [[gnu::always_inline]] static void store_rows(const Pack (&p)[4], S* rows, std::size_t stride,
                                                 std::size_t many) {
     Pack x, y, z;
@@ -108,6 +108,11 @@ struct Points<S, wanted_points, true> {
       x = __builtin_shufflevector(xz01, xz23, 0, 1, 4, 5);
       y = __builtin_shufflevector(y01, y23, 0, 1, 4, 5);
       z = __builtin_shufflevector(xz01, xz23, 2, 3, 6, 7);
+    }
+    if constexpr (turned) {
+      x = -x;
+      y = -y;
+      z = -z;
     }
     if (many >= lanes) {
       store_lanes(rows, x);

@@ -46,6 +46,12 @@ struct WidePair {
   static constexpr std::uint32_t leaf_bit = std::uint32_t(1) << 31;
 };
 
+/// Where a lane's vertex stands in a row of a list: lanes that share a register of two points are neighbours,
+/// so that one load gets both.
+constexpr std::uint32_t list_place(std::uint32_t lane, std::uint32_t width) {
+  return width < 8 ? lane : lane < 4 ? 2 * lane : 2 * lane - 7;
+}
+
 /// Scalars per node in WideArrays::lanes.
 constexpr std::size_t lane_scalars(std::uint32_t width) {
   return std::size_t(6) * width;

@@ -126,9 +126,8 @@ template <class S, std::size_t padded>
         upper[j] = larger(upper[j], p);
       }
     }
-    P::store_rows(lower, rows + quad, padded, 4);
-    for (Pack& pack : upper) pack = P::negated(pack);
-    P::store_rows(upper, rows + 3 * padded + quad, padded, 4);
+    P::template store_rows<false>(lower, rows + quad, padded, 4);
+    P::template store_rows<true>(upper, rows + 3 * padded + quad, padded, 4);
   }
   for (std::size_t row = 0; row < 6; ++row)
     for (std::size_t i = end - begin; i < padded; ++i) rows[row * padded + i] = S(__builtin_inf());

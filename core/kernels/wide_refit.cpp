@@ -29,22 +29,36 @@ struct NodeFit {
     }
     smallest = first == 0 ? low : smaller(smallest, low);
     largest = first == 0 ? high : larger(largest, high);
-    P::store_rows(lower, rows + first, width, per_pass);
-    for (Pack& pack : upper) pack = P::negated(pack);
-    P::store_rows(upper, rows + 3 * width + first, width, per_pass);
+    P::template store_rows<false>(lower, rows + first, width, per_pass);
+    P::template store_rows<true>(upper, rows + 3 * width + first, width, per_pass);
+  }
+
+  /// The pack j of the lanes from `first` on, in one row of the lists.
+  [[gnu::always_inline]] static Pack listed(const std::uint32_t* row, std::uint32_t first, std::uint32_t j,
+                                            const S* positions) {
+    if constexpr (P::points == 2) {
+      std::uint64_t two;  // one load for two numbers: loads are what limits this loop
+      __builtin_memcpy(&two, row + 2 * j, sizeof two);
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+      return P::load(positions + std::uint32_t(two), positions + (two >> 32));
+#else
+      return P::load(positions + (two >> 32), positions + std::uint32_t(two));
+#endif
+    } else {
+      return P::load(positions + row[list_place(first + j, width)], positions);
+    }
   }
 
   [[gnu::always_inline]] inline void from_lists(const std::uint32_t* vertices, std::uint32_t length,
                                                 const S* positions, S* rows) {
     for (std::uint32_t first = 0; first < width; first += per_pass) {
       Pack lower[4], upper[4];
-      const std::uint32_t* at = vertices + first;
-      for (std::uint32_t j = 0; j < packs; ++j)
-        lower[j] = upper[j] = P::load(positions + at[j], positions + at[(j + 4) % width]);
+      const std::uint32_t* row = vertices;
+      for (std::uint32_t j = 0; j < packs; ++j) lower[j] = upper[j] = listed(row, first, j, positions);
       for (std::uint32_t i = 1; i < length; ++i) {
-        at += width;
+        row += width;
         for (std::uint32_t j = 0; j < packs; ++j) {
-          const Pack p = P::load(positions + at[j], positions + at[(j + 4) % width]);
+          const Pack p = listed(row, first, j, positions);
           lower[j] = smaller(lower[j], p);
           upper[j] = larger(upper[j], p);
         }
@@ -88,7 +102,7 @@ template <class S, std::uint32_t width>
   const S* boxes[width];
   for (std::uint32_t lane = 0; lane < width; ++lane) {
     if (lane < node.leaf_count) {
-      const std::uint32_t* at = h.vertices + node.list + lane;
+      const std::uint32_t* at = h.vertices + node.list + list_place(lane, width);
       auto lower = P::load(positions + *at, positions), upper = lower;
       for (std::uint32_t i = 1; i < node.length; ++i) {
         const auto p = P::load(positions + at[i * width], positions);
@@ -126,7 +140,7 @@ template <class S, std::uint32_t width>
 template <class S, std::uint32_t width>
 void refit(WideArrays<S> h, const S* positions, std::uint32_t begin, std::uint32_t end) {
   for (std::uint32_t i = end; i-- > begin;) {
-    const WideNode node = h.nodes[i];
+    const WideNode& node = h.nodes[i];
     S* rows = h.lanes + std::size_t(i) * 6 * width;
     S* own = h.own + std::size_t(8) * i;
     NodeFit<S, width> fit;

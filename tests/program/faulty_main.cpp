@@ -15,7 +15,7 @@ class EveryPair : public Strategy<S> {
   static constexpr Foresight foresight = Foresight::none;
   EveryPair(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies, const Params&)
       : Strategy<S>(scene, motion) {}
-  void reset(double) override { this->clear_triangle_stats(); }
+  void reset(double t) override { this->start_at(t); }
   void advance(double) override {
     if (fault == Fault::throws) throw std::runtime_error("out of luck");
   }

@@ -164,6 +164,27 @@ TEST(WideHierarchy, ABudgetLeavesWorkUndone) {
   EXPECT_LT(some.size(), all.size());
 }
 
+TEST(WideHierarchy, SubtreesAndWhatIsAboveMakeAllBoxes) {
+  for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton}) {
+    const Scene<float> scene = soups<float>(20000, 7);
+    const SceneView<float> view(scene);
+    Playback<float> playback(scene);
+    playback.evaluate_all();
+    const auto boxes = primitive_boxes(view.primitives(0), playback.positions(0));
+    const Topology topology = build_topology<float>(boxes, {.method = method, .width = 8, .leaf_size = 2});
+    WideHierarchy<float> whole, parts;
+    whole.assign(topology, view.primitives(0), active_kernel_set());
+    parts.assign(topology, view.primitives(0), active_kernel_set());
+    whole.refit(playback.positions(0));
+    EXPECT_GE(parts.subtrees().size(), 4u) << name(method);
+    for (const auto& subtree : parts.subtrees())
+      parts.refit_nodes(playback.positions(0), subtree.begin, subtree.end);
+    for (const std::uint32_t node : parts.above_subtrees())
+      parts.refit_nodes(playback.positions(0), node, node + 1);
+    for (std::uint32_t node = 0; node < topology.size(); ++node) ASSERT_EQ(parts.box(node), whole.box(node));
+  }
+}
+
 TEST(KernelSets, AreNamedAndChecked) {
   EXPECT_EQ(supported_kernel_sets().front(), KernelSet::portable);
   EXPECT_THROW(kernel_set("mmx"), std::invalid_argument);
