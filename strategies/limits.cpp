@@ -123,7 +123,7 @@ Info limit(const char* id, const char* title) {
 KBVH_STRATEGY(limits) {
   using namespace kbvh;
   Info bytes = limit("limit_moved_bytes", "limit: moving the bytes of a refit");
-  bytes.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
+  bytes.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16};
   Info motion = limit("limit_plain_motion", "limit: plain interpolation of all positions");
   motion.positions = PositionUse::fetched;
   motion.topology.own = true;

@@ -49,7 +49,7 @@ KBVH_STRATEGY(rebuild) {
       .family = "rebuild",
       .citation = "van den Bergen 1997 (as the alternative to refitting)",
       .can = {.restructures = true, .plan_changes = true, .time_budget = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 4}},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"method", "median", {"median", "sah", "morton"}, "how the new topology is built"}},
   })};
 }

@@ -74,6 +74,6 @@ KBVH_STRATEGY(top_down) {
       .family = "refit",
       .citation = "van den Bergen 1998; Larsson & Akenine-Möller 2001",
       .can = {.plan_changes = true, .time_budget = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 4}},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
   })};
 }

@@ -139,15 +139,28 @@ template <class S, std::uint32_t width>
 
 template <class S, std::uint32_t width>
 void refit(WideArrays<S> h, const S* positions, std::uint32_t begin, std::uint32_t end) {
+  // Nodes that have leaves only depend on nothing: they come in the order in which memory is fetched best,
+  // which is ascending (1.1 to 1.25 times faster on Zen 3). Those above follow, children first.
+  for (std::uint32_t i = begin; i < end; ++i) {
+    const WideNode& node = h.nodes[i];
+    if (node.leaf_count != node.count) continue;
+    S* rows = h.lanes + std::size_t(i) * 6 * width;
+    S* own = h.own + std::size_t(8) * i;
+    NodeFit<S, width> fit;
+    fit.from_lists(h.vertices + node.list, node.length, positions, rows);
+    fit.store_own(own);
+    if (node.leaf_count != width) put_right<S, width>(h, node, rows, own);
+  }
   for (std::uint32_t i = end; i-- > begin;) {
     const WideNode& node = h.nodes[i];
+    if (node.leaf_count == node.count) continue;
     S* rows = h.lanes + std::size_t(i) * 6 * width;
     S* own = h.own + std::size_t(8) * i;
     NodeFit<S, width> fit;
     if (2 * node.leaf_count >= width) {
       fit.from_lists(h.vertices + node.list, node.length, positions, rows);
       fit.store_own(own);
-      if (node.leaf_count != width) put_right<S, width>(h, node, rows, own);
+      put_right<S, width>(h, node, rows, own);
     } else if (node.leaf_count == 0) {
       const S* boxes[width];
       for (std::uint32_t lane = 0; lane < width; ++lane)
