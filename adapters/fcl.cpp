@@ -248,7 +248,10 @@ class Fcl final : public Strategy<S> {
     for (std::size_t i = 0; i < fan(a); ++i)
       for (std::size_t j = 0; j < fan(b); ++j) {
         const auto p = fan_triangle(pair.body_a, a, i), q = fan_triangle(pair.body_b, b, j);
-        if (!fcl::AABB<Own>(p[0], p[1], p[2]).overlap(fcl::AABB<Own>(q[0], q[1], q[2]))) continue;
+        // Boxes of triangles have been compared already.
+        if (fan(a) * fan(b) > 1 &&
+            !fcl::AABB<Own>(p[0], p[1], p[2]).overlap(fcl::AABB<Own>(q[0], q[1], q[2])))
+          continue;
         ++this->triangle_stats_.tests;
         if (fcl::detail::Intersect<Own>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2])) return true;
       }

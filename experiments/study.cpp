@@ -90,6 +90,10 @@ class Runner {
              const Scene<S>& scene, Oracle<S>& oracle, std::uint32_t l, const std::vector<double>& frames) {
     const json about_scene = scene_record(scene, loaded, l, frames.size());
     const std::string title = scene.name + ", l = " + std::to_string(l);
+    if (l > 1 && study.oracle_every % l == 0)
+      note("warning: with oracle_every " + std::to_string(study.oracle_every) +
+           " and l = " + std::to_string(l) +
+           " only keyframes are compared with the truth; take a number without common factors");
     Measurement<S> measurement(scene, frames, oracle);
     std::vector<json> records;           // in the order of the contestants
     std::vector<std::size_t> record_of;  // of each one that is measured

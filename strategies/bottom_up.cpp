@@ -18,6 +18,15 @@ KernelSet chosen_kernels(const Params& params) {
   return word == "auto" ? active_kernel_set() : kernel_set(word);
 }
 
+/// Any number, or without TBB just one.
+std::vector<std::string> thread_words() {
+#if defined(KBVH_WITH_TBB)
+  return {};
+#else
+  return {"1"};
+#endif
+}
+
 std::vector<std::string> kernel_words() {
   std::vector<std::string> words{"auto"};
   for (const KernelSet set : supported_kernel_sets()) words.push_back(name(set));
@@ -29,10 +38,6 @@ int chosen_threads(const Params& params) {
   if (wanted < 1 || wanted > 1024 || wanted != double(int(wanted)))
     throw ConfigError("bottom_up: threads must be a whole number from 1 to 1024, got " +
                       params.word("threads"));
-#if !defined(KBVH_WITH_TBB)
-  if (wanted > 1)
-    throw ConfigError("bottom_up: built without TBB, which threads=" + params.word("threads") + " needs");
-#endif
   return int(wanted);
 }
 
@@ -100,10 +105,7 @@ KBVH_STRATEGY(bottom_up) {
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"kernels", "auto", kernel_words(),
                       "instruction set of refit and query; auto: the widest of this machine"},
-                     {"threads",
-                      "1",
-                      {},
-                      "threads of the refit (TBB); times with more than one are reported apart",
-                      1}},
+                     {"threads", "1", thread_words(),
+                      "threads of the refit (TBB); times with more than one are reported apart", 1}},
   })};
 }

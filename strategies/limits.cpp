@@ -1,10 +1,9 @@
 // Not contestants but limits to hold contestants against, in the same run and over the same frames. They
 // answer no query (guarantee: approximate, every pair is missed); only their update time means something.
-//   limit_moved_bytes   an update reads and writes the bytes of a wide refit, in order, and computes nothing:
-//                       positions and vertex lists are read once, nodes are written once.
-//   limit_plain_motion  an update interpolates every position in the scene's scalar, however it rounds: what
-//   the
-//                       correctly rounded evaluation (phase "motion") is compared with.
+// - limit_moved_bytes: an update reads and writes the bytes of a wide refit, in order, and computes nothing.
+//   Positions and vertex lists are read once, nodes are written once.
+// - limit_plain_motion: an update interpolates every position in the scene's scalar, however it rounds. The
+//   correctly rounded evaluation (phase "motion") is compared with it.
 
 #include "core/kernels/limits.hpp"
 #include "core/hierarchy/wide_hierarchy.hpp"
@@ -31,7 +30,6 @@ class Limit : public Strategy<S> {
   QueryStatus candidates_at(double /*t*/, PairBuffer& /*out*/, const Budget& /*budget*/) override {
     return {};
   }
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}
 
  protected:
   virtual void update(std::uint32_t body, double t) = 0;
@@ -60,7 +58,7 @@ class MovedBytes final : public Limit<S, Foresight::none> {
 
  private:
   void update(std::uint32_t body, double) override {
-    const auto& hierarchy = hierarchies_[body];
+    auto& hierarchy = hierarchies_[body];
     const WideArrays<S> arrays = hierarchy.arrays();
     const std::size_t nodes = hierarchy.node_count();
     sum_ ^= this->kernels_->read(this->sampled_.positions(body),
@@ -113,7 +111,6 @@ Info limit(const char* id, const char* title) {
   info.citation = "kbvh: a bound for others, not a contestant";
   info.tightness = Tightness::none;
   info.guarantee = Guarantee::approximate;
-  info.can.plan_changes = true;
   return info;
 }
 

@@ -9,17 +9,6 @@
 
 namespace kbvh {
 
-/// A bounds view tells the traversal how a hierarchy's bounds are read:
-///   void ensure(std::uint32_t node)    makes the node's bounds valid at the query's time (lazy strategies)
-///   Box<S> operator()(std::uint32_t node)   its box
-/// Bounds are read only after `ensure`. Views of the two bodies may differ.
-template <class S>
-struct StoredBoxes {
-  const Box<S>* boxes;
-  void ensure(std::uint32_t) const {}
-  const Box<S>& operator()(std::uint32_t node) const { return boxes[node]; }
-};
-
 /// How much work a query may do; counted, so that a budget means the same on every machine.
 struct Budget {
   std::uint64_t box_tests = std::numeric_limits<std::uint64_t>::max();
@@ -38,8 +27,12 @@ struct NodePair {
 
 /// The simultaneous traversal of two hierarchies (Z&W Algorithm 2): visits every pair of leaves whose boxes,
 /// and whose ancestors' boxes on both sides, overlap, and calls on_leaves(leaf of a, leaf of b) once for
-/// each. Both inner: descend both; one leaf: descend the other. The stack grows as needed and is the
-/// caller's, so that no work is dropped and a frame allocates nothing. `Count` is a counting policy.
+/// each. A bounds view tells how a hierarchy's bounds are read:
+///   void ensure(std::uint32_t node)         makes the node's bounds valid at the query's time
+///   Box<S> operator()(std::uint32_t node)   its box, read only after `ensure`
+/// Views of the two bodies may differ. (Stored boxes have a query of their own: wide_hierarchy.hpp.) Both
+/// inner: descend both; one leaf: descend the other. The stack grows as needed and is the caller's, so that
+/// no work is dropped and a frame allocates nothing. `Count` is a counting policy.
 template <class ViewA, class ViewB, class Count, class OnLeaves>
 QueryStatus traverse(const Topology& a, ViewA&& bounds_a, const Topology& b, ViewB&& bounds_b,
                      std::vector<NodePair>& stack, Count& count, const Budget& budget, OnLeaves&& on_leaves) {

@@ -134,9 +134,10 @@ void WideHierarchy<S>::list_vertices() {
     WideNode& node = nodes_[n];
     if (node.leaf_count == 0) continue;
     const std::size_t length = lengths[n];
-    if (length > std::numeric_limits<std::uint16_t>::max() ||
-        vertices_.size() + length * width > std::numeric_limits<std::uint32_t>::max())
-      throw std::length_error("a leaf with " + std::to_string(length) + " vertices is too large");
+    if (length > std::numeric_limits<std::uint16_t>::max())
+      throw std::length_error("a leaf has " + std::to_string(length) + " vertices; 65535 are possible");
+    if (vertices_.size() + length * width > std::numeric_limits<std::uint32_t>::max())
+      throw std::length_error("the vertex lists of a hierarchy exceed 2^32 entries");
     node.list = std::uint32_t(vertices_.size());
     node.length = std::uint16_t(length);
     vertices_.resize(vertices_.size() + length * width);
@@ -172,7 +173,7 @@ void WideHierarchy<S>::list_leaves(const Primitives& primitives) {
   stamps_.assign(leaves, 0);
   stamp_ = 1;
   // Leaves of one primitive need no boxes besides their own.
-  rows_.assign(topology_.leaf_size == 1 ? 0 : leaves * lane_scalars(padded_leaf_size()), S(0));
+  rows_.assign(padded_leaf_size() == 1 ? 0 : leaves * lane_scalars(padded_leaf_size()), S(0));
 }
 
 template <class S>
@@ -221,7 +222,7 @@ std::size_t WideHierarchy<S>::bytes() const {
           first_entry_.size() + first_corner_.size() + corners_.size() + primitives_.size() +
           stamps_.size()) *
              sizeof(std::uint32_t) +
-         places_.size() * sizeof(Place);
+         places_.size() * sizeof(Place) + subtrees_.size() * sizeof(Subtree);
 }
 
 template <class S>
@@ -229,8 +230,7 @@ QueryStatus WideQuery<S>::run(WideHierarchy<S>& a, std::uint32_t body_a, WideHie
                               std::uint32_t body_b, const SceneView<S>& scene, const SampledMotion<S>& motion,
                               const Budget& budget, PairBuffer& out, std::uint64_t& tests) {
   if (a.empty() || b.empty()) return {};
-  if (a.topology().width != b.topology().width || a.padded_leaf_size() != b.padded_leaf_size())
-    throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
+  if (!a.suits(b)) throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
   stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
   leaf_pairs_.resize(2 * leaf_pair_room);
   WideTraversal state{stack_.data(),  0, stack_.size(),   leaf_pairs_.data(), 0,
@@ -256,7 +256,7 @@ void WideQuery<S>::leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, Wi
                                    std::uint32_t body_b, const SceneView<S>& scene,
                                    const SampledMotion<S>& motion, std::size_t count, PairBuffer& out,
                                    std::uint64_t& tests) {
-  if (a.topology().leaf_size == 1 && b.topology().leaf_size == 1) {
+  if (a.padded_leaf_size() == 1) {
     for (std::size_t i = 0; i < count; ++i)
       out.push_back({body_a, a.leaf_primitives(a.leaf_number(leaf_pairs_[2 * i]))[0], body_b,
                      b.leaf_primitives(b.leaf_number(leaf_pairs_[2 * i + 1]))[0]});
@@ -283,16 +283,17 @@ void WideQuery<S>::leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, Wi
                          count,
                          body_a,
                          body_b,
-                         &chunk_.data()->body_a,
+                         chunk_.data(),
                          0,
                          chunk_room,
                          0};
-  static_assert(std::is_standard_layout_v<PrimitivePair> &&
-                sizeof(PrimitivePair) == 4 * sizeof(std::uint32_t));
   const auto kernel = overlap_kernels<S>(a.kernels()).pairs(a.topology().width, a.padded_leaf_size());
   while (state.next < state.count) {
     kernel(state);
-    out.insert(out.end(), chunk_.begin(), chunk_.begin() + std::ptrdiff_t(state.found));
+    const std::size_t before = out.size();
+    out.resize(before + state.found);
+    for (std::size_t i = 0; i < state.found; ++i)
+      out[before + i] = {chunk_[i].body_a, chunk_[i].primitive_a, chunk_[i].body_b, chunk_[i].primitive_b};
     state.found = 0;
   }
   tests += state.tests;

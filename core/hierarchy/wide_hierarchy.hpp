@@ -25,7 +25,8 @@ template <class S>
 class WideHierarchy {
  public:
   /// Takes a topology over the primitives; boxes mean nothing until they are made. Allocates; nothing else
-  /// does.
+  /// does. Throws std::length_error beyond 2^28 nodes, 65,535 vertices in a leaf, or 2^32 entries of vertex
+  /// lists.
   void assign(Topology topology, const Primitives& primitives, KernelSet kernels);
 
   const Topology& topology() const { return topology_; }
@@ -61,9 +62,7 @@ class WideHierarchy {
     }
   }
 
-  WideArrays<S> arrays() const {
-    return {nodes_.data(), const_cast<S*>(lanes_.data()), const_cast<S*>(own_.data()), vertices_.data()};
-  }
+  WideArrays<S> arrays() { return {nodes_.data(), lanes_.data(), own_.data(), vertices_.data()}; }
   WideLeaves<S> leaves(const S* positions) {
     return {first_entry_.data(), first_corner_.data(), corners_.data(), primitives_.data(),
             rows_.data(),        stamps_.data(),       stamp_,          positions};
@@ -74,10 +73,16 @@ class WideHierarchy {
   std::span<const std::uint32_t> leaf_primitives(std::uint32_t leaf) const {
     return {primitives_.data() + first_entry_[leaf], primitives_.data() + first_entry_[leaf + 1]};
   }
+  /// Lanes for the primitives of a leaf in a query; 1: the leaf's box is that of its primitive.
   std::uint32_t padded_leaf_size() const {
-    return topology_.leaf_size <= 4 ? 4 : topology_.leaf_size <= 8 ? 8 : 16;
+    return topology_.leaf_size == 1 ? 1 : topology_.leaf_size <= 4 ? 4 : topology_.leaf_size <= 8 ? 8 : 16;
   }
   KernelSet kernels() const { return kernels_; }
+  /// Whether one query can take both.
+  bool suits(const WideHierarchy& other) const {
+    return empty() || other.empty() ||
+           (topology_.width == other.topology_.width && padded_leaf_size() == other.padded_leaf_size());
+  }
 
   /// Memory in bytes.
   std::size_t bytes() const;
@@ -128,7 +133,7 @@ class WideQuery {
                        PairBuffer& out, std::uint64_t& tests);
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
-  PairBuffer chunk_;
+  std::vector<FoundPair> chunk_;
 };
 
 extern template class WideHierarchy<float>;

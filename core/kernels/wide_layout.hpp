@@ -34,9 +34,11 @@ struct WideArrays {
 /// A leaf as its parent node and lane there.
 struct LeafSlot {
   std::uint32_t word;
-  static constexpr std::uint32_t of(std::uint32_t node, std::uint32_t lane) { return node * 8 + lane; }
-  std::uint32_t node() const { return word / 8; }
-  std::uint32_t lane() const { return word % 8; }
+  [[gnu::always_inline]] static constexpr std::uint32_t of(std::uint32_t node, std::uint32_t lane) {
+    return node * 8 + lane;
+  }
+  [[gnu::always_inline]] std::uint32_t node() const { return word / 8; }
+  [[gnu::always_inline]] std::uint32_t lane() const { return word % 8; }
 };
 
 /// What one step of a traversal compares: two nodes, a node and a leaf (bit 31 set: 8 * node + lane), or two
@@ -48,12 +50,12 @@ struct WidePair {
 
 /// Where a lane's vertex stands in a row of a list: lanes that share a register of two points are neighbours,
 /// so that one load gets both.
-constexpr std::uint32_t list_place(std::uint32_t lane, std::uint32_t width) {
+[[gnu::always_inline]] constexpr std::uint32_t list_place(std::uint32_t lane, std::uint32_t width) {
   return width < 8 ? lane : lane < 4 ? 2 * lane : 2 * lane - 7;
 }
 
 /// Scalars per node in WideArrays::lanes.
-constexpr std::size_t lane_scalars(std::uint32_t width) {
+[[gnu::always_inline]] constexpr std::size_t lane_scalars(std::uint32_t width) {
   return std::size_t(6) * width;
 }
 

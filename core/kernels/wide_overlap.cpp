@@ -159,11 +159,8 @@ void leaf_pairs(WideLeafPairs<S>& shared) {
       const std::uint32_t i = lowest(first), primitive_a = state.leaves_a.primitives[begin_a + i];
       unsigned second = overlapping<S, padded>(rows_b, lane_box(rows_a, padded, i));
       for (; second != 0; second &= second - 1) {
-        std::uint32_t* out = state.out + 4 * state.found++;
-        out[0] = state.body_a;
-        out[1] = primitive_a;
-        out[2] = state.body_b;
-        out[3] = state.leaves_b.primitives[begin_b + lowest(second)];
+        state.out[state.found++] = {state.body_a, primitive_a, state.body_b,
+                                    state.leaves_b.primitives[begin_b + lowest(second)]};
       }
     }
   }

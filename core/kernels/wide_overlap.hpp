@@ -28,6 +28,11 @@ struct WideLeaves {
   const S* positions;
 };
 
+/// Two primitives whose boxes overlap.
+struct FoundPair {
+  std::uint32_t body_a, primitive_a, body_b, primitive_b;
+};
+
 /// Turns pairs of leaves into pairs of primitives whose boxes overlap.
 template <class S>
 struct WideLeafPairs {
@@ -36,7 +41,7 @@ struct WideLeafPairs {
   const LeafSlot* pairs;  ///< first, second, ...
   std::size_t next, count;
   std::uint32_t body_a, body_b;
-  std::uint32_t* out;  ///< [found][4]: body a, primitive a, body b, primitive b
+  FoundPair* out;
   std::size_t found, out_room;
   std::uint64_t tests;
 };

@@ -106,8 +106,6 @@ TEST_P(Kernels, Conform) {
                                   std::to_string(width) + ", leaf " + std::to_string(leaf);
         expect_conforms(check(refit, in_float, 7, {}, builder), where + ", float");
         expect_conforms(check(refit, in_double, 7, {}, builder), where + ", double");
-        if (GetParam() == before)
-          expect_conforms(check(refit, in_float, 7, {{"threads", "2"}}, builder), where + ", 2 threads");
       }
   }
   use_kernel_set(before);
@@ -115,6 +113,56 @@ TEST_P(Kernels, Conform) {
 
 INSTANTIATE_TEST_SUITE_P(Registry, Kernels, testing::ValuesIn(supported_kernel_sets()),
                          [](const auto& test) { return std::string(name(test.param)); });
+
+/// A grid of 2 side^2 triangles that bends from one keyframe to the next, and one at rest that it cuts.
+template <class S>
+TestScene<S> bending_grid(std::uint32_t side) {
+  TestScene<S> test;
+  test.scene.name = "bending grid";
+  for (int body = 0; body < 2; ++body) {
+    Body<S> made;
+    made.name = "grid";
+    std::vector<S> positions;
+    for (int keyframe = 0; keyframe < (body == 0 ? 2 : 1); ++keyframe)
+      for (std::uint32_t j = 0; j <= side; ++j)
+        for (std::uint32_t i = 0; i <= side; ++i) {
+          const S x = S(i) / S(side), y = S(j) / S(side);
+          positions.push_back(x);
+          positions.push_back(y);
+          positions.push_back(body == 0 ? (x - S(0.4)) * (S(0.1) + S(keyframe) * y) : S(0.01));
+        }
+    for (std::uint32_t j = 0; j < side; ++j)
+      for (std::uint32_t i = 0; i < side; ++i) {
+        const std::uint32_t a = j * (side + 1) + i, b = a + side + 1;
+        made.primitives.add(std::vector<std::uint32_t>{a, a + 1, b});
+        made.primitives.add(std::vector<std::uint32_t>{b, a + 1, b + 1});
+      }
+    const std::vector<double> times = body == 0 ? std::vector<double>{0, 1} : std::vector<double>{0};
+    made.plans = FlightPlans<S>((side + 1) * (side + 1), times, std::move(positions));
+    test.scene.bodies.push_back(std::move(made));
+  }
+  test.scene.pairs = all_pairs(test.scene.bodies);
+  return test;
+}
+
+// Large enough to be divided among threads.
+TEST(Threads, GiveTheSameAnswers) {
+  const auto found = std::find_if(registry().begin(), registry().end(),
+                                  [](const StrategyEntry& entry) { return entry.info.id == "bottom_up"; });
+  if (found == registry().end()) GTEST_SKIP() << "bottom_up is not in this suite";
+  const auto& parameters = found->info.parameters;
+  const auto threads = std::find_if(parameters.begin(), parameters.end(),
+                                    [](const Parameter& parameter) { return parameter.name == "threads"; });
+  if (!threads->allowed.empty()) GTEST_SKIP() << "built without TBB";
+  for (const std::string count : {"2", "5"})
+    for (const std::uint32_t leaf : {1u, 4u}) {
+      const BuilderConfig builder{.method = BuildMethod::median, .width = 8, .leaf_size = leaf};
+      expect_conforms(check(*found, bending_grid<float>(110), 3, {{"threads", count}}, builder),
+                      count + " threads, float");
+      expect_conforms(check(*found, bending_grid<double>(110), 3, {{"threads", count}}, builder),
+                      count + " threads, double");
+    }
+}
 
 TEST(Registry, DescribesEveryStrategy) {
   EXPECT_GE(registry().size(), 1u);

@@ -63,7 +63,7 @@ std::vector<Shape> shapes() {
   std::vector<Shape> list;
   for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
     for (const std::uint32_t width : {2u, 4u, 8u})
-      for (std::uint32_t leaf = 1; leaf <= 16; leaf += leaf < 5 ? 1 : 3)
+      for (const std::uint32_t leaf : {1u, 2u, 3u, 4u, 5u, 8u, 9u, 13u, 16u})
         for (const std::uint32_t primitives : {1u, 2u, 7u, 64u, 300u})
           list.push_back({primitives, {.method = method, .width = width, .leaf_size = leaf}});
   return list;
@@ -162,6 +162,91 @@ TEST(WideHierarchy, ABudgetLeavesWorkUndone) {
       query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{tests / 2}, some, tests);
   EXPECT_FALSE(status.complete());
   EXPECT_LT(some.size(), all.size());
+}
+
+/// Two bodies of `count` equal triangles; those of the second fly away by the second keyframe.
+template <class S>
+Scene<S> coincident(std::uint32_t count) {
+  Scene<S> scene;
+  for (int body = 0; body < 2; ++body) {
+    Body<S> made;
+    std::vector<S> positions;
+    for (int keyframe = 0; keyframe < 2; ++keyframe)
+      for (std::uint32_t p = 0; p < count; ++p)
+        for (int corner = 0; corner < 3; ++corner) {
+          positions.push_back(S(corner == 1) + S(9 * body * keyframe));
+          positions.push_back(S(corner == 2));
+          positions.push_back(S(0));
+        }
+    for (std::uint32_t p = 0; p < count; ++p)
+      made.primitives.add(std::vector<std::uint32_t>{3 * p, 3 * p + 1, 3 * p + 2});
+    made.plans = FlightPlans<S>(3 * count, {0, 1}, std::move(positions));
+    scene.bodies.push_back(std::move(made));
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  return scene;
+}
+
+/// All pairs of many overlap: every buffer is filled more than once. Then none does, then all again.
+template <class S>
+void check_overflowing_buffers(std::uint32_t leaf_size) {
+  const std::uint32_t count = 300;
+  const Scene<S> scene = coincident<S>(count);
+  const SceneView<S> view(scene);
+  Playback<S> playback(scene);
+  const SampledMotion<S> motion(playback);
+  playback.evaluate_all();
+  for (const KernelSet set : supported_kernel_sets())
+    for (const std::uint32_t width : {2u, 8u}) {
+      WideHierarchy<S> hierarchies[2];
+      for (std::uint32_t body = 0; body < 2; ++body) {
+        const auto boxes = primitive_boxes(view.primitives(body), playback.positions(body));
+        hierarchies[body].assign(build_topology<S>(boxes, {.width = width, .leaf_size = leaf_size}),
+                                 view.primitives(body), set);
+      }
+      WideQuery<S> query;
+      for (const double t : {0.0, 1.0, 0.0}) {
+        playback.seek(t);
+        playback.evaluate_all();
+        for (std::uint32_t body = 0; body < 2; ++body) {
+          hierarchies[body].positions_changed();
+          hierarchies[body].refit(playback.positions(body));
+        }
+        PairBuffer pairs;
+        std::uint64_t tests = 0;
+        query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{}, pairs, tests);
+        std::sort(pairs.begin(), pairs.end());
+        EXPECT_EQ(std::adjacent_find(pairs.begin(), pairs.end()), pairs.end());
+        EXPECT_EQ(pairs.size(), t == 0 ? std::size_t(count) * count : 0) << name(set) << ", width " << width;
+      }
+    }
+}
+
+TEST(WideHierarchy, BuffersMayOverflowAndPositionsChange) {
+  for (const std::uint32_t leaf_size : {1u, 4u, 16u}) {
+    check_overflowing_buffers<float>(leaf_size);
+    check_overflowing_buffers<double>(leaf_size);
+  }
+}
+
+TEST(WideHierarchy, AQueryRefusesUnlikeHierarchies) {
+  const Scene<float> scene = soups<float>(40, 8);
+  const SceneView<float> view(scene);
+  Playback<float> playback(scene);
+  playback.evaluate_all();
+  const SampledMotion<float> motion(playback);
+  WideHierarchy<float> hierarchies[2];
+  for (std::uint32_t body = 0; body < 2; ++body) {
+    const auto boxes = primitive_boxes(view.primitives(body), playback.positions(body));
+    hierarchies[body].assign(build_topology<float>(boxes, {.width = 8, .leaf_size = body == 0 ? 1u : 4u}),
+                             view.primitives(body), active_kernel_set());
+    hierarchies[body].refit(playback.positions(body));
+  }
+  WideQuery<float> query;
+  PairBuffer pairs;
+  std::uint64_t tests = 0;
+  EXPECT_THROW(query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{}, pairs, tests),
+               std::invalid_argument);
 }
 
 TEST(WideHierarchy, SubtreesAndWhatIsAboveMakeAllBoxes) {
