@@ -206,7 +206,8 @@ def glance(study: Study, all_ratios: Ratios, shown: list[Group]) -> list[Glance]
         reference = timed[timed["run"] == references[-1]].iloc[0]
         others = timed[timed["family"] != "refit"]
         exact = _first(others[others["guarantee"] != "approximate"])
-        loose = _first(others[others["guarantee"] == "approximate"])
+        # Limits (moved bytes, plain interpolation) answer nothing: they are no contestants.
+        loose = _first(others[(others["guarantee"] == "approximate") & (others["family"] != "limit")])
         exact_ratio = all_ratios.with_motion.get(exact["run"]) if exact is not None else None
         loose_ratio = all_ratios.with_motion.get(loose["run"]) if loose is not None else None
         result.append(
