@@ -100,22 +100,21 @@ json strategy_record(const ContestantSpec& spec) {
 std::string configuration_key(Harness harness, const std::string& program, const json& scene,
                               const json& strategy, const Study& study, const json& machine) {
   // nlohmann's objects are sorted by key, so the text does not depend on the order of insertion.
-  const json all{
-      {"schema", results_schema},
-      {"kind", word(harness)},
-      {"program", program},
-      {"scene", scene.at("hash")},
-      {"scalar", scene.at("scalar")},
-      {"per_keyframe", scene.at("per_keyframe")},
-      {"frames", scene.at("frames")},
-      {"strategy", strategy.at("id")},
-      {"params", strategy.at("params")},
-      {"builder", strategy.at("builder")},
-      {"repetitions", study.repetitions},
-      {"oracle_every", study.oracle_every},
-      {"machine",
-       {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
-        machine.at("kernels")}}};
+  const json all{{"schema", results_schema},
+                 {"kind", word(harness)},
+                 {"program", program},
+                 {"scene", scene.at("hash")},
+                 {"scalar", scene.at("scalar")},
+                 {"per_keyframe", scene.at("per_keyframe")},
+                 {"frames", scene.at("frames")},
+                 {"strategy", strategy.at("id")},
+                 {"params", strategy.at("params")},
+                 {"builder", strategy.at("builder")},
+                 {"repetitions", study.repetitions},
+                 {"oracle_every", study.oracle_every},
+                 {"machine",
+                  {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
+                   machine.at("kernels")}}};
   return hexadecimal(hash_of(all.dump()));
 }
 
