@@ -29,6 +29,25 @@ class KineticCollision {
     while (due(t)) handle_next();
   }
   bool due(double t) const { return forest_.due(t) || list_.due(t); }
+  /// Is the first event of all one of a tree? At one instant trees come first: the list is then decided with
+  /// their new realisers.
+  bool tree_is_first() const {
+    if (list_.empty()) return true;
+    if (forest_.queue().empty()) return false;
+    const Event& tree = forest_.queue().top();
+    const OverlapEvent<S>& pair = list_.top();
+    const double error = tree.error + pair.error;
+    if (tree.hint + error < pair.hint) return true;
+    if (pair.hint + error < tree.hint) return false;
+    return compare_crossings(forest_.clock().crossing(tree), pair.crossing) <= 0;
+  }
+
+  /// A double after the first event of all, if by little.
+  double after_next() const {
+    if (!tree_is_first()) return list_.top().not_before();
+    const Event& event = forest_.queue().top();
+    return std::nextafter(event.hint + event.error, std::numeric_limits<double>::infinity());
+  }
   /// Handles the first event of all; `due` for some time.
   void handle_next() {
     if (!tree_is_first()) {
@@ -58,18 +77,6 @@ class KineticCollision {
   std::size_t bytes() const { return forest_.bytes() + list_.bytes(); }
 
  private:
-  /// At one instant trees come first: the list is then decided with their new realisers.
-  bool tree_is_first() const {
-    if (list_.empty()) return true;
-    if (forest_.queue().empty()) return false;
-    const Event& tree = forest_.queue().top();
-    const OverlapEvent<S>& pair = list_.top();
-    const double error = tree.error + pair.error;
-    if (tree.hint + error < pair.hint) return true;
-    if (pair.hint + error < tree.hint) return false;
-    return compare_crossings(forest_.clock().crossing(tree), pair.crossing) <= 0;
-  }
-
   std::vector<ChangedBoxes::Box> changed_;
   Forest forest_;
   List list_;

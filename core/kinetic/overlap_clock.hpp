@@ -1,8 +1,10 @@
 #pragma once
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "core/kinetic/event.hpp"
@@ -11,17 +13,20 @@ namespace kbvh {
 
 /// What is added to a bound before it is compared with another body's. Rounding keeps <= but not <: two
 /// bounds that are apart on the flight plans may be equal as rounded positions, by a gap of at most one ulp.
-/// Widened by some four ulps at its knots, a bound is apart from another only if their rounded positions are,
-/// too: between knots the margin is linear, and thus at least four ulps of the value in between.
+/// Widened by at least four ulps at its knots, a bound is apart from another only if their rounded positions
+/// are, too: between knots the margin is linear, and thus at least four ulps of the value in between.
 enum class Widening : std::uint8_t { none, up, down };
 
-/// The least value of S that is above x + 4 ulps of x (2^-21 or 2^-50 of |x|, and never nothing).
+/// A value of S that is above x by 4 to 8 ulps (some 2^-21 or 2^-50 of |x|), and by something at zero.
 template <class S>
 S widened_up(S x) {
-  constexpr S infinity = std::numeric_limits<S>::infinity();
-  constexpr double share = sizeof(S) == 4 ? 0x1p-21 : 0x1p-50;
-  const S sum = S(double(x) + std::abs(double(x)) * share);
-  return std::nextafter(std::nextafter(sum, infinity), infinity);
+  using Bits = std::conditional_t<sizeof(S) == 4, std::uint32_t, std::uint64_t>;
+  constexpr S share = sizeof(S) == 4 ? S(0x1p-21) : S(0x1p-50);
+  const S sum = x + std::abs(x) * share;
+  if (sum == 0) return 2 * std::numeric_limits<S>::denorm_min();
+  // Two units up, for the roundings of product and sum.
+  const Bits bits = std::bit_cast<Bits>(sum);
+  return std::bit_cast<S>(sum > 0 ? bits + 2 : bits > std::bit_cast<Bits>(S(-0.0)) + 2 ? bits - 2 : Bits(0));
 }
 
 /// One coordinate of a vertex, piece by piece from an instant on.
@@ -137,6 +142,7 @@ class OverlapClock {
     const double error = a.error + b.error;
     if (a.hint + error < b.hint) return -1;
     if (b.hint + error < a.hint) return 1;
+    if (a.crossing == b.crossing) return 0;  // pairs often share their realisers
     return compare_crossings(a.crossing, b.crossing);
   }
   /// Does the event happen at or before t?
@@ -207,8 +213,11 @@ class OverlapClock {
     /// Sign of the gap right after the instant at which the walk stands.
     int sign_after(const Instant<S>& now) const {
       const Piece<S>&u = upper_.piece(), &l = lower_.piece();
-      const int sign =
-          now.exact != nullptr ? compare_at_crossing(u, l, *now.exact) : compare_at(u, l, now.begin);
+      int sign = 0;  // as for the gap that closes or opens at this very instant
+      if (now.exact == nullptr)
+        sign = compare_at(u, l, now.begin);
+      else if (!is_crossing(*now.exact, u, l))
+        sign = compare_at_crossing(u, l, *now.exact);
       return sign != 0 ? sign : compare_slopes(u, l);
     }
 
@@ -247,6 +256,9 @@ class OverlapClock {
     }
 
    private:
+    static bool is_crossing(const Crossing<S>& crossing, const Piece<S>& u, const Piece<S>& l) {
+      return (crossing.winner == u && crossing.loser == l) || (crossing.winner == l && crossing.loser == u);
+    }
     double end() const { return std::min(upper_.piece().t1, lower_.piece().t1); }
     void next(double end) {
       if (upper_.piece().t1 <= end) upper_.next();
