@@ -204,15 +204,19 @@ TEST(SeparationListFaults, MissedNotices) {
     Auditor<float, Collision> auditor(collision, view);
     bool found = false;
     std::uint64_t events = 0;
-    for (const double t : frame_times(test.scene, 4)) {
-      while (collision.due(t))
-        if (collision.tree_is_first() && ++events % missed == 0)
-          collision.forest().handle_next();  // of which the list hears nothing
-        else
-          collision.handle_next();
-      const double after = std::nextafter(t, 1e300);
-      if (!collision.due(after) && !auditor.compare(after).empty()) found = true;
-      if (found) break;
+    try {
+      for (const double t : frame_times(test.scene, 4)) {
+        while (collision.due(t))
+          if (collision.tree_is_first() && ++events % missed == 0)
+            collision.forest().handle_next();  // of which the list hears nothing
+          else
+            collision.handle_next();
+        const double after = std::nextafter(t, 1e300);
+        if (!collision.due(after) && !auditor.compare(after).empty()) found = true;
+        if (found) break;
+      }
+    } catch (const std::invalid_argument&) {  // an event that cannot be
+      found = true;
     }
     EXPECT_TRUE(found) << "every notice of " << missed;
   }
