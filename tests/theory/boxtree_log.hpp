@@ -223,6 +223,7 @@ class BoxTreeProof {
 
   /// Rebuilds up to three parts of each body: large ones, small ones, one below the other.
   void rebuild(double t) {
+    forest_->advance(t);  // new plans may cross at once
     close(t);
     for (std::uint32_t body = 0; body < view_.body_count(); ++body)
       for (std::uint32_t i = random_.below(4); i > 0; --i) {
