@@ -48,14 +48,6 @@ struct LazyBody {
   std::uint64_t boxes_above = 0, reads_above = 0;  // what refitting `above` costs
 };
 
-template <class S>
-const BoundsKernels<S>& bounds_kernels(KernelSet set) {
-  if constexpr (std::is_same_v<S, float>)
-    return KBVH_SELECT_KERNELS(set, bounds_float);
-  else
-    return KBVH_SELECT_KERNELS(set, bounds_double);
-}
-
 template <class S, class Count>
 class Hybrid final : public StoredHierarchyStrategy<S, Count> {
   using Base = StoredHierarchyStrategy<S, Count>;

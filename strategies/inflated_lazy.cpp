@@ -15,14 +15,6 @@ namespace {
 
 enum class MarginKind : std::uint8_t { tuned, absolute, relative };
 
-template <class S>
-const WideInflateKernels<S>& inflate_kernels(KernelSet set) {
-  if constexpr (std::is_same_v<S, float>)
-    return KBVH_SELECT_KERNELS(set, wide_inflate_float);
-  else
-    return KBVH_SELECT_KERNELS(set, wide_inflate_double);
-}
-
 /// The smallest number above, so that sums of bounds stay bounds.
 double above(double value) {
   return std::nextafter(value, std::numeric_limits<double>::infinity());
@@ -180,7 +172,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
       state.keep_from = body.margin - used;
       state.keep_to = body.margin + used;
     }
-    inflate_kernels<S>(hierarchy.kernels()).of(hierarchy.topology().width)(state);
+    wide_inflate_kernels<S>(hierarchy.kernels()).of(hierarchy.topology().width)(state);
     if (!bounded_) {
       // The most that a side came nearer in one frame.
       const double room_before = double(state.room_before);

@@ -4,6 +4,8 @@
 
 namespace kbvh {
 
+enum class KernelSet : std::uint8_t;
+
 /// Vertices [first, first + count), which lie together in memory.
 struct VertexRun {
   std::uint32_t first, count;
@@ -18,5 +20,13 @@ struct BoundsKernels {
 };
 KBVH_DECLARE_KERNELS(BoundsKernels<float>, bounds_float)
 KBVH_DECLARE_KERNELS(BoundsKernels<double>, bounds_double)
+
+/// Those of one instruction set.
+template <class S>
+const BoundsKernels<S>& bounds_kernels(KernelSet set);
+template <>
+const BoundsKernels<float>& bounds_kernels(KernelSet set);
+template <>
+const BoundsKernels<double>& bounds_kernels(KernelSet set);
 
 }  // namespace kbvh

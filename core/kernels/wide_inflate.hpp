@@ -4,6 +4,8 @@
 
 namespace kbvh {
 
+enum class KernelSet : std::uint8_t;
+
 /// One look at a hierarchy whose leaf boxes were inflated by a margin: which of them still hold their
 /// vertices, with how much room, and which are to be made anew.
 template <class S>
@@ -33,5 +35,13 @@ struct WideInflateKernels {
 };
 KBVH_DECLARE_KERNELS(WideInflateKernels<float>, wide_inflate_float)
 KBVH_DECLARE_KERNELS(WideInflateKernels<double>, wide_inflate_double)
+
+/// Those of one instruction set.
+template <class S>
+const WideInflateKernels<S>& wide_inflate_kernels(KernelSet set);
+template <>
+const WideInflateKernels<float>& wide_inflate_kernels(KernelSet set);
+template <>
+const WideInflateKernels<double>& wide_inflate_kernels(KernelSet set);
 
 }  // namespace kbvh
