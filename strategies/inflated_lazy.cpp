@@ -30,8 +30,10 @@ struct InflatedBody {
   double rounding = 0;   // a stored position differs from the plan by at most this
   double step = 0;       // motion from one frame to the next, as a bound or as observed
   std::uint64_t leaves = 0;
-  std::uint64_t tests = 0;  // box tests of the last query that had to do with it
-  bool changed = false;     // plans of its own: it is no body at rest any more
+  std::uint64_t tests = 0;       // box tests of the last query that had to do with it
+  bool looked = false;           // at this frame
+  bool query_takes_all = false;  // the last query after a frame without a look evaluated all positions itself
+  bool changed = false;          // plans of its own: it is no body at rest any more
   std::vector<std::uint8_t> remade;
 };
 
@@ -64,6 +66,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
       body.step = 0;
       body.tests = 0;
       body.margin = 0;
+      body.query_takes_all = false;
       look(index, WhichStay::none);
       measure_leaves(index);
       if (!may_move(index)) continue;  // boxes of bodies at rest stay tight
@@ -78,6 +81,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     const double before = this->time();
     this->move_to(t);
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+      bodies_[index].looked = false;
       if (!may_move(index)) continue;
       this->hierarchies_[index].positions_changed();
       if (bounded_)
@@ -100,6 +104,8 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
       bodies_[pair.second].tests += tests;
       this->count_.add(Counter::box_tests, tests);
     }
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index)
+      if (!bodies_[index].looked) bodies_[index].query_takes_all = this->sampled_.all_current(index);
     return status;
   }
 
@@ -181,6 +187,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     constexpr double unit = std::numeric_limits<S>::epsilon() / 2;
     body.room = double(state.room) * (1 - 4 * unit);
     body.moved = 0;
+    body.looked = true;
     const Box<S> root = hierarchy.box(0);
     double largest = 0;
     for (int axis = 0; axis < 3; ++axis)
@@ -218,22 +225,22 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     return steps == 0 ? 0 : (steps * body.step + 4 * body.rounding) * (1 + 1.0 / 16);
   }
 
-  // The tuned margin weighs what a look costs against what larger boxes cost the query, both counted, so that
-  // it does not depend on the machine or its load. A margin of k steps needs one look in k + 1 frames. Leaf
-  // boxes of mean side a that grow by 2m meet about (1 + 2m / a)^2 as many others where surfaces meet, which
-  // also says what the query at hand would have done without the present margin.
+  // The tuned margin weighs what a look costs against what larger boxes cost the query, both by counts, so
+  // that it does not depend on a machine or its load. A margin of k steps needs one look in k + 1 frames.
+  // Where surfaces of leaves with mean side a meet, boxes that are larger by m on every side cost about (1 +
+  // m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the rest is leaves that
+  // are opened in vain).
 
-  /// How much a look costs, in box tests: per vertex of the body, its position included, which nobody else
-  /// asks for; a look that is due at every frame only costs what it writes.
+  /// What a look costs, in box tests. Positions count only if the query would not ask for them all anyhow. A
+  /// look that is due at every frame only costs what it writes.
   double look_cost(std::uint32_t index) const {
-    return (bounded_ ? tests_per_vertex : tests_per_vertex / 8) * this->scene_.vertex_count(index);
+    constexpr double reading = 0.6, evaluating = 1.2, writing = 0.2;  // per vertex
+    const double each = !bounded_ ? writing : bodies_[index].query_takes_all ? reading : reading + evaluating;
+    return each * this->scene_.vertex_count(index);
   }
-  static double growth(const Body& body, double margin) {
-    const double side = 1 + 2 * margin / body.leaf_size;
-    return side * side;
-  }
-  double query_cost(const Body& body, double margin) const {
-    return double(body.tests) / growth(body, double(body.margin)) * growth(body, margin);
+  static double query_cost(const Body& body, double margin) {
+    const double side = 1 + margin / body.leaf_size;
+    return double(body.tests) / (1 + 0.4 * double(body.margin) / body.leaf_size) * side * side;
   }
   double best_steps(std::uint32_t index) const {
     const Body& body = bodies_[index];
@@ -251,10 +258,9 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
   bool too_large(std::uint32_t index) const {
     const Body& body = bodies_[index];
     if (!(body.leaf_size > 0)) return false;
-    return double(body.tests) - query_cost(body, margin_for(body, best_steps(index))) > look_cost(index);
+    return query_cost(body, double(body.margin)) - query_cost(body, margin_for(body, best_steps(index))) >
+           look_cost(index);
   }
-
-  static constexpr double tests_per_vertex = 2;  // measured: see the table in README
 
   SteppedMotion<S> stepped_;
   MarginKind kind_;

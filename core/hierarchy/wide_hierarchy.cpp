@@ -175,6 +175,7 @@ void WideHierarchy<S>::list_leaves(const Primitives& primitives) {
     first_entry_.push_back(std::uint32_t(primitives_.size()));
   }
   stamps_.assign(leaves, 0);
+  fetched_.assign(leaves, 0);
   stamp_ = 1;
   // Leaves of one primitive need no boxes besides their own.
   rows_.assign(padded_leaf_size() == 1 ? 0 : leaves * lane_scalars(padded_leaf_size()), S(0));
@@ -224,7 +225,7 @@ std::size_t WideHierarchy<S>::bytes() const {
          (lanes_.size() + own_.size() + rows_.size()) * sizeof(S) +
          (vertices_.size() + leaf_vertices_.offsets.size() + leaf_vertices_.vertices.size() +
           first_entry_.size() + first_corner_.size() + corners_.size() + primitives_.size() + stamps_.size() +
-          parent_.size() + listed_.size()) *
+          fetched_.size() + parent_.size() + listed_.size()) *
              sizeof(std::uint32_t) +
          places_.size() * sizeof(Place) + subtrees_.size() * sizeof(Subtree);
 }
@@ -313,14 +314,24 @@ void WideQuery<S>::leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, Wi
                      b.leaf_primitives(b.leaf_number(leaf_pairs_[2 * i + 1]))[0]});
     return;
   }
-  const auto fetch = [&](const WideHierarchy<S>& h, std::uint32_t body, std::size_t side) {
+  // Positions that are not there yet, all at once: calls with a few vertices each cost more than the
+  // vertices.
+  const auto fetch = [&](WideHierarchy<S>& h, std::uint32_t body, std::size_t side) {
     if (motion.all_current(body)) return;
+    to_fetch_.clear();
     for (std::size_t i = 0; i < count; ++i) {
       const std::uint32_t leaf = h.leaf_number(leaf_pairs_[2 * i + side]);
-      if (h.leaf_is_current(leaf)) continue;
-      for (const std::uint32_t primitive : h.leaf_primitives(leaf))
-        motion.fetch(body, scene.primitives(body)[primitive]);
+      if (!h.to_be_fetched(leaf)) continue;
+      for (const std::uint32_t primitive : h.leaf_primitives(leaf)) {
+        const auto vertices = scene.primitives(body)[primitive];
+        to_fetch_.insert(to_fetch_.end(), vertices.begin(), vertices.end());
+      }
     }
+    // As in Playback: beyond so many, all of them cost less.
+    if (std::uint64_t(4) * to_fetch_.size() > scene.vertex_count(body))
+      motion.fetch_all(body);
+    else
+      motion.fetch(body, to_fetch_);
   };
   fetch(a, body_a, 0);
   fetch(b, body_b, 1);

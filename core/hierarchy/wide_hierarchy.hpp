@@ -66,6 +66,7 @@ class WideHierarchy {
   void positions_changed() {
     if (++stamp_ == 0) {
       std::fill(stamps_.begin(), stamps_.end(), 0);
+      std::fill(fetched_.begin(), fetched_.end(), 0);
       stamp_ = 1;
     }
   }
@@ -75,8 +76,12 @@ class WideHierarchy {
     return {first_entry_.data(), first_corner_.data(), corners_.data(), primitives_.data(),
             rows_.data(),        stamps_.data(),       stamp_,          positions};
   }
-  /// The leaf numbered by `WideNode::first_leaf`: is its cache of primitive boxes of these positions?
-  bool leaf_is_current(std::uint32_t leaf) const { return stamps_[leaf] == stamp_; }
+  /// The leaf numbered by `WideNode::first_leaf`: true when first asked since `positions_changed`.
+  bool to_be_fetched(std::uint32_t leaf) {
+    const bool first = fetched_[leaf] != stamp_;
+    fetched_[leaf] = stamp_;
+    return first;
+  }
   std::uint32_t leaf_number(LeafSlot slot) const { return nodes_[slot.node()].first_leaf + slot.lane(); }
   std::span<const std::uint32_t> leaf_primitives(std::uint32_t leaf) const {
     return {primitives_.data() + first_entry_[leaf], primitives_.data() + first_entry_[leaf + 1]};
@@ -120,7 +125,7 @@ class WideHierarchy {
   AlignedArray<WideNode> nodes_;
   AlignedArray<S> lanes_, own_;
   AlignedArray<std::uint32_t> vertices_;
-  std::vector<std::uint32_t> first_entry_, first_corner_, corners_, primitives_, stamps_;
+  std::vector<std::uint32_t> first_entry_, first_corner_, corners_, primitives_, stamps_, fetched_;
   AlignedArray<S> rows_;
   std::uint32_t stamp_ = 1;
 };
@@ -171,6 +176,7 @@ class WideQuery {
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
   std::vector<FoundPair> chunk_;
+  std::vector<std::uint32_t> to_fetch_;
   WideTraversal lazy_{};
 };
 
