@@ -38,6 +38,7 @@ FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> time
     check_value(positions[i], "coordinate", point / vertex_count, point % vertex_count, int(i % 3));
     if (positions[i] == S(0)) positions[i] = S(0);  // truth B holds no negative zero
   }
+  longest_steps_.assign(times.size(), -1.0);
   keyframes_ = std::make_shared<const Keyframes>(Keyframes{std::move(times), std::move(positions)});
 }
 
@@ -135,6 +136,7 @@ void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* posi
     check_value(change.velocity[axis], "velocity", change.times.size(), change.vertex, axis);
     plan.velocity[axis] = change.velocity[axis];
   }
+  own_speed_until_ = own_speed_from_;  // to be computed anew
   if (own_of_vertex_.empty()) own_of_vertex_.assign(vertex_count_, none);
   std::uint32_t& slot = own_of_vertex_[change.vertex];
   if (slot == none) {
@@ -145,41 +147,104 @@ void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* posi
   }
 }
 
+namespace {
+/// Above every rounding of the few operations on positive numbers that went before, underflow included.
+double rounded_up(double value) {
+  return value * (1 + 1e-12) + std::numeric_limits<double>::min();
+}
+}  // namespace
+
+/// The furthest that any vertex moves in a segment, rounded up; 0 only if none moves.
+template <class S>
+double FlightPlans<S>::longest_step(std::size_t segment) const {
+  double& known = longest_steps_[segment];
+  if (known >= 0) return known;
+  const S *from = keyframe(segment), *to = keyframe(segment + 1);
+  double square = 0, largest = 0;
+  for (std::size_t i = 0; i < std::size_t(3) * vertex_count_; i += 3) {
+    double sum = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double step = double(to[i + axis]) - double(from[i + axis]);
+      sum += step * step;
+      largest = std::max(largest, std::abs(step));
+    }
+    square = std::max(square, sum);
+  }
+  // Squares of small numbers vanish: what that can hide is added.
+  known = largest == 0 ? 0 : rounded_up(std::sqrt(square + 1e-300));
+  return known;
+}
+
+/// Of the piece that holds at t.
+template <class S>
+double FlightPlans<S>::own_speed(const OwnPlan& plan, double t) const {
+  double step[3], seconds = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Piece<S> piece = own_piece(plan, axis, t);
+    step[axis] = piece.kind == PieceKind::chord ? double(piece.x1) - double(piece.x0) : double(piece.x1);
+    if (piece.kind == PieceKind::chord) seconds = piece.t1 - piece.t0;
+  }
+  if (step[0] == 0 && step[1] == 0 && step[2] == 0) return 0;
+  return rounded_up(std::hypot(step[0], step[1], step[2]) / seconds);
+}
+
+template <class S>
+double FlightPlans<S>::own_speed_bound(double t) const {
+  if (t < own_speed_from_ || t >= own_speed_until_) {
+    own_speed_ = 0;
+    own_speed_from_ = t;
+    own_speed_until_ = std::numeric_limits<double>::infinity();
+    for (const OwnPlan& plan : own_) {
+      own_speed_ = std::max(own_speed_, own_speed(plan, t));
+      own_speed_until_ = std::min(own_speed_until_, piece_end(plan.vertex, t));
+    }
+  }
+  return own_speed_;
+}
+
 template <class S>
 double FlightPlans<S>::speed_bound(double t) const {
-  const auto speed = [](const double* step, double seconds) {
-    return std::sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2]) / seconds;
-  };
   const auto& times = keyframes_->times;
   const std::size_t k = segment_at(t);
-  if (k != bounded_segment_) {
-    segment_speed_ = 0;
-    if (k + 1 < times.size() && t >= times[0])
-      for (std::size_t i = 0; i < std::size_t(3) * vertex_count_; i += 3) {
-        double step[3];
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          step[axis] = double(keyframe(k + 1)[i + axis]) - double(keyframe(k)[i + axis]);
-        segment_speed_ = std::max(segment_speed_, speed(step, times[k + 1] - times[k]));
-      }
-    bounded_segment_ = k;
+  double bound = own_.empty() ? 0 : own_speed_bound(t);
+  if (k + 1 < times.size() && t >= times[0] && longest_step(k) > 0)
+    bound = std::max(bound, rounded_up(longest_step(k) / (times[k + 1] - times[k])));
+  return bound;
+}
+
+template <class S>
+double FlightPlans<S>::displacement_bound(double t0, double t1) const {
+  if (!(t0 < t1)) return 0;
+  const auto& times = keyframes_->times;
+  double common = 0;
+  for (std::size_t k = segment_at(t0); k + 1 < times.size() && times[k] < t1; ++k) {
+    const double begin = std::max(t0, times[k]), end = std::min(t1, times[k + 1]);
+    if (!(begin < end) || longest_step(k) == 0) continue;
+    const double share = (end - begin) / (times[k + 1] - times[k]);
+    common = rounded_up(common + longest_step(k) * std::min(1.0, rounded_up(share)));
   }
-  double bound = segment_speed_;
+  if (own_.empty()) return common;
+  double own = own_speed_bound(t0);
+  if (t1 <= own_speed_until_) return std::max(common, own == 0 ? 0 : rounded_up(own * (t1 - t0)));
+  // Some plan has a knot between: each along its own pieces.
+  own = 0;
   for (const OwnPlan& plan : own_) {
-    double step[3], seconds = 1;
-    for (int axis = 0; axis < 3; ++axis) {
-      const Piece<S> piece = own_piece(plan, axis, t);
-      step[axis] = piece.kind == PieceKind::chord ? double(piece.x1) - double(piece.x0) : double(piece.x1);
-      if (piece.kind == PieceKind::chord) seconds = piece.t1 - piece.t0;
+    double way = 0;
+    for (double begin = t0; begin < t1;) {
+      const double end = std::min(t1, piece_end(plan.vertex, begin)), speed = own_speed(plan, begin);
+      if (speed > 0) way = rounded_up(way + speed * (end - begin));
+      begin = end;
     }
-    bound = std::max(bound, speed(step, seconds));
+    own = std::max(own, way);
   }
-  return bound * (1 + 1e-12);  // above every rounding of the few operations here
+  return std::max(common, own);
 }
 
 template <class S>
 std::size_t FlightPlans<S>::bytes() const {
   std::size_t total = keyframes_->times.size() * sizeof(double) + keyframes_->positions.size() * sizeof(S) +
-                      own_of_vertex_.size() * sizeof(std::uint32_t) + own_.size() * sizeof(OwnPlan);
+                      longest_steps_.size() * sizeof(double) + own_of_vertex_.size() * sizeof(std::uint32_t) +
+                      own_.size() * sizeof(OwnPlan);
   for (const OwnPlan& plan : own_) total += plan.times.size() * (sizeof(double) + 3 * sizeof(S));
   return total;
 }

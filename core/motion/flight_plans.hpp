@@ -57,8 +57,12 @@ class FlightPlans {
   double piece_end(std::uint32_t vertex, double t) const;
 
   /// No vertex is faster than this on the segment that holds at t (units per second, rounded up); own plans
-  /// included. O(vertices) the first time a segment is asked for, O(own plans) after.
+  /// included. O(vertices) the first time a segment is asked for; O(own plans) after a change, or a knot of
+  /// one.
   double speed_bound(double t) const;
+  /// No vertex moves further than this on its way from t0 to t1 (Euclidean, rounded up), whatever segments
+  /// lie between; 0 only if none moves at all. Not for times before the last change. Costs as `speed_bound`.
+  double displacement_bound(double t0, double t1) const;
 
   /// Starts the vertex's new plan at t from its stored position at t (`position`, 3 scalars).
   /// Throws std::invalid_argument on non-finite values, knots not after t, or an unknown vertex.
@@ -79,13 +83,16 @@ class FlightPlans {
     S velocity[3];
   };
   Piece<S> own_piece(const OwnPlan& plan, int axis, double t) const;
+  double longest_step(std::size_t segment) const;
+  double own_speed(const OwnPlan& plan, double t) const;
+  double own_speed_bound(double t) const;
 
   std::uint32_t vertex_count_ = 0;
   std::shared_ptr<const Keyframes> keyframes_;
   std::vector<std::uint32_t> own_of_vertex_;
   std::vector<OwnPlan> own_;
-  mutable std::size_t bounded_segment_ = std::numeric_limits<std::size_t>::max();
-  mutable double segment_speed_ = 0;
+  mutable std::vector<double> longest_steps_;  // by segment; negative until it is asked for
+  mutable double own_speed_ = 0, own_speed_from_ = 0, own_speed_until_ = 0;  // holds in [from, until)
 };
 
 extern template class FlightPlans<float>;

@@ -48,9 +48,7 @@ template <class S>
 void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices) {
   // A static body is evaluated once, for good.
   if (!state.plans.moving() || std::uint64_t(16) * state.fetched > state.plans.vertex_count()) {
-    if (state.plans.moving()) fetched_ += state.plans.vertex_count() - state.fetched;
-    state.plans.evaluate(time_, state.positions.data(), &rounding_);
-    state.all_current = true;
+    fetch_all(state);
     return;
   }
   stale_.clear();
@@ -63,6 +61,13 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
   fetched_ += stale_.size();
   state.fetched += std::uint32_t(stale_.size());
   state.plans.evaluate(time_, stale_, state.positions.data(), &rounding_);
+}
+
+template <class S>
+void Playback<S>::fetch_all(BodyState& state) {
+  if (state.plans.moving()) fetched_ += state.plans.vertex_count() - state.fetched;
+  state.plans.evaluate(time_, state.positions.data(), &rounding_);
+  state.all_current = true;
 }
 
 template <class S>

@@ -27,6 +27,10 @@ class Playback {
     if (state.all_current) return;
     fetch_stale(state, vertices);
   }
+  /// Evaluates all vertices of one body, unless they are current.
+  void fetch_all(std::uint32_t body) {
+    if (!bodies_[body].all_current) fetch_all(bodies_[body]);
+  }
   /// Position of one vertex at the current time: 3 scalars.
   const S* position(std::uint32_t body, std::uint32_t vertex) {
     BodyState& state = bodies_[body];
@@ -58,6 +62,7 @@ class Playback {
     bool all_current = false;
   };
   void fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices);
+  void fetch_all(BodyState& state);
 
   double time_ = 0;
   std::uint32_t epoch_ = 0;
