@@ -69,6 +69,7 @@ json scene_of(const StudyOptions& options) {
   if (options.keyframes > 0) scene["keyframes"] = options.keyframes;
   if (options.obstacle > 0) scene["obstacle"] = options.obstacle;
   if (!options.name.empty()) scene["name"] = options.name;
+  if (!options.script.empty()) scene["script"] = options.script;
   if (!options.order.empty()) scene["order"] = split(options.order, ',');
   return scene;
 }
@@ -128,6 +129,8 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
           ->check(CLI::PositiveNumber),
       command.add_option("--keyframes", o->keyframes, "of a built-in scene (60)")->check(CLI::PositiveNumber),
       command.add_option("--seed", o->seeds, "of what chance decides (1); a list sweeps")->delimiter(','),
+      command.add_option("--script", o->script,
+                         "changes of plans while the scene runs: a file, see RESULTS.md"),
       command.add_option("--order", o->order, "vertex order: given, shuffled, renumbered; a list sweeps"),
       command
           .add_option("--strategies", o->strategies,

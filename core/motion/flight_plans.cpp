@@ -112,29 +112,41 @@ Piece<S> FlightPlans<S>::own_piece(const OwnPlan& plan, int axis, double t) cons
 }
 
 template <class S>
-void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* position) {
-  if (change.vertex >= vertex_count_)
-    throw std::invalid_argument("plan change for vertex " + std::to_string(change.vertex) +
-                                " of a body with " + std::to_string(vertex_count_) + " vertices");
+void FlightPlans<S>::check_vertex(std::uint32_t vertex) const {
+  if (vertex >= vertex_count_)
+    throw std::invalid_argument("plan change for vertex " + std::to_string(vertex) + " of a body with " +
+                                std::to_string(vertex_count_) + " vertices");
+}
+
+template <class S>
+void FlightPlans<S>::check_change(double t, const PlanChange<S>& change, const S* position) const {
+  check_vertex(change.vertex);
+  if (!std::isfinite(t)) throw std::invalid_argument("plan change at t = " + std::to_string(t));
   if (change.positions.size() != 3 * change.times.size())
     throw std::invalid_argument("plan change with " + std::to_string(change.times.size()) + " knots and " +
                                 std::to_string(change.positions.size()) + " coordinates");
-  OwnPlan plan{change.vertex, {t}, {position[0], position[1], position[2]}, {}};
+  for (int axis = 0; axis < 3; ++axis) {
+    check_value(position[axis], "coordinate", 0, change.vertex, axis);
+    check_value(change.velocity[axis], "velocity", change.times.size(), change.vertex, axis);
+  }
+  double before = t;
   for (std::size_t k = 0; k < change.times.size(); ++k) {
-    if (!std::isfinite(change.times[k]) || !(plan.times.back() < change.times[k]))
+    if (!std::isfinite(change.times[k]) || !(before < change.times[k]))
       throw std::invalid_argument("knot " + std::to_string(k) + " of a plan change at " + std::to_string(t) +
                                   " has time " + std::to_string(change.times[k]) + ", which does not follow");
-    plan.times.push_back(change.times[k]);
-    for (int axis = 0; axis < 3; ++axis) {
-      const S value = change.positions[3 * k + std::size_t(axis)];
-      check_value(value, "coordinate", k + 1, change.vertex, axis);
-      plan.positions.push_back(value == S(0) ? S(0) : value);
-    }
+    before = change.times[k];
+    for (int axis = 0; axis < 3; ++axis)
+      check_value(change.positions[3 * k + std::size_t(axis)], "coordinate", k + 1, change.vertex, axis);
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    check_value(change.velocity[axis], "velocity", change.times.size(), change.vertex, axis);
-    plan.velocity[axis] = change.velocity[axis];
-  }
+}
+
+template <class S>
+void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* position) {
+  check_change(t, change, position);
+  OwnPlan plan{change.vertex, {t}, {position[0], position[1], position[2]}, {}};
+  plan.times.insert(plan.times.end(), change.times.begin(), change.times.end());
+  for (const S value : change.positions) plan.positions.push_back(value == S(0) ? S(0) : value);
+  std::copy_n(change.velocity, 3, plan.velocity);
   if (own_of_vertex_.empty()) own_of_vertex_.assign(vertex_count_, none);
   std::uint32_t& slot = own_of_vertex_[change.vertex];
   if (slot == none) {

@@ -60,8 +60,13 @@ class FlightPlans {
   /// included. O(vertices) the first time a segment is asked for, O(own plans) after.
   double speed_bound(double t) const;
 
-  /// Starts the vertex's new plan at t from its stored position at t (`position`, 3 scalars).
-  /// Throws std::invalid_argument on non-finite values, knots not after t, or an unknown vertex.
+  /// Throws std::invalid_argument if there is no such vertex.
+  void check_vertex(std::uint32_t vertex) const;
+  /// Throws std::invalid_argument, saying what is wrong, if `change` would.
+  void check_change(double t, const PlanChange<S>& change, const S* position) const;
+  /// Starts the vertex's new plan at t from its stored position at t (`position`, 3 scalars). Throws
+  /// std::invalid_argument, with nothing changed: on values that are not finite or beyond the admissible
+  /// range (the position, too: a vertex can have flown out of it), knots not after t, or an unknown vertex.
   void change(double t, const PlanChange<S>& change, const S* position);
 
   std::size_t bytes() const;
