@@ -82,13 +82,25 @@ class FlightPlans {
     std::vector<double> times;  // first knot: the change itself
     std::vector<S> positions;
     S velocity[3];
+    std::uint32_t group = none, place = 0;  ///< in rays_, of plans without a further knot
   };
+  /// Vertices that fly on for ever from one time on, laid out to be evaluated together: a field of velocities
+  /// that change at run time has thousands of them.
+  struct Rays {
+    double t0;
+    std::vector<std::uint32_t> vertices;
+    std::vector<S> origins, velocities;  ///< [vertex][3]
+  };
+  void join_rays(OwnPlan& plan);
+  void leave_rays(const OwnPlan& plan);
+  void evaluate_rays(double t, S* out, RoundingStats* stats) const;
   Piece<S> own_piece(const OwnPlan& plan, int axis, double t) const;
 
   std::uint32_t vertex_count_ = 0;
   std::shared_ptr<const Keyframes> keyframes_;
   std::vector<std::uint32_t> own_of_vertex_;
   std::vector<OwnPlan> own_;
+  std::vector<Rays> rays_;  ///< none is empty
   mutable std::size_t bounded_segment_ = std::numeric_limits<std::size_t>::max();
   mutable double segment_speed_ = 0;
 };

@@ -282,6 +282,46 @@ TEST(PlanChange, BeyondTheAdmissibleRange) {
   EXPECT_FALSE(plans.moving());
 }
 
+// Plans that begin together are evaluated together; whoever joins and leaves, positions are those of the
+// pieces.
+template <class S>
+void evaluated_as_pieces() {
+  constexpr std::uint32_t vertices = 300;
+  Random random(9);
+  std::vector<S> keyframes;
+  for (std::uint32_t i = 0; i < 6 * vertices; ++i) keyframes.push_back(S(random.unit()));
+  FlightPlans<S> plans(vertices, {0, 10}, keyframes);
+  std::vector<S> all(3 * vertices + 1), some(3 * vertices + 1);
+  std::vector<std::uint32_t> list;
+  for (std::uint32_t v = 0; v < vertices; v += 2) list.push_back(v);
+  for (int frame = 0; frame < 120; ++frame) {
+    const double t = 0.1 * frame;
+    plans.evaluate(t, all.data());
+    plans.evaluate(t, list, some.data());
+    for (std::uint32_t v = 0; v < vertices; ++v)
+      for (int axis = 0; axis < 3; ++axis) {
+        const std::size_t at = std::size_t(3) * v + std::size_t(axis);
+        ASSERT_EQ(all[at], round_piece(plans.piece_after(v, axis, t), t)) << "vertex " << v << " at " << t;
+        if (v % 2 == 0) {
+          ASSERT_EQ(all[at], some[at]) << "vertex " << v << " at " << t;
+        }
+      }
+    for (std::uint32_t changes = random.below(frame % 10 == 0 ? 2 * vertices : 12); changes > 0; --changes) {
+      PlanChange<S> change = flies<S>(0, random.below(vertices), S(random.unit()), S(random.unit()), 0);
+      if (random.below(5) == 0) {
+        change.times = {t + 0.25};
+        change.positions = {S(random.unit()), 0, S(random.unit())};
+      }
+      plans.change(t, change, all.data() + std::size_t(3) * change.vertex);
+    }
+  }
+}
+
+TEST(PlanChange, EvaluatedTogetherAsOneByOne) {
+  evaluated_as_pieces<float>();
+  evaluated_as_pieces<double>();
+}
+
 TEST(Script, TimesMustBeFrames) {
   PlanScript<float> script;
   script.steps = {{0.5, {flies<float>(0, 0, 1, 0, 0)}}, {1.5, {flies<float>(0, 0, 0, 0, 0)}}};
