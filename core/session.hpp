@@ -4,19 +4,10 @@
 #include <vector>
 
 #include "core/hierarchy/oracle.hpp"
+#include "core/plan_script.hpp"
 #include "core/registry.hpp"
 
 namespace kbvh {
-
-/// Plan changes to be made at run time, at frames: the same script is replayed to every contestant.
-template <class S>
-struct PlanScript {
-  struct Step {
-    double time;  ///< of a frame; the changes are made after its query
-    std::vector<PlanChange<S>> changes;
-  };
-  std::vector<Step> steps;  ///< ascending times
-};
 
 /// How one contestant is to be run.
 struct Contestant {
@@ -47,8 +38,9 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Starts at time t; phase times so far are forgotten.
+  /// Starts at time t, with the scene's own plans again.
   void reset(double t) {
+    playback_.restore_plans();
     playback_.seek(t);
     playback_.evaluate_all();
     strategy_->reset(t);
@@ -73,7 +65,8 @@ class Session {
     playback_.seek(t);
     strategy_->spans(from, t, out);
   }
-  /// Makes the changes at the current time.
+  /// Makes the changes at the current time, all of them or, if one is not valid, none
+  /// (Playback::change_plans).
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
     playback_.change_plans(playback_.time(), changes);
     timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });

@@ -59,8 +59,60 @@ void FlightPlans<S>::evaluate(double t, S* out, RoundingStats* stats) const {
     round_chord(keyframe(k), keyframe(k + 1), scalars, times[k], times[k + 1], t, out, stats);
   }
   for (const OwnPlan& plan : own_)
-    for (int axis = 0; axis < 3; ++axis)
-      out[3 * std::size_t(plan.vertex) + std::size_t(axis)] = round_piece(own_piece(plan, axis, t), t);
+    for (int axis = 0; plan.group == none && axis < 3; ++axis)
+      out[3 * std::size_t(plan.vertex) + std::size_t(axis)] = round_piece(own_piece(plan, axis, t), t, stats);
+  evaluate_rays(t, out, stats);
+}
+
+template <class S>
+void FlightPlans<S>::evaluate_rays(double t, S* out, RoundingStats* stats) const {
+  constexpr std::size_t block = 128;  // vertices
+  S positions[3 * block];
+  for (const Rays& rays : rays_)
+    for (std::size_t first = 0; first < rays.vertices.size(); first += block) {
+      const std::size_t count = std::min(block, rays.vertices.size() - first);
+      round_ray(rays.origins.data() + 3 * first, rays.velocities.data() + 3 * first, 3 * count, rays.t0, t,
+                positions, stats);
+      for (std::size_t i = 0; i < count; ++i)
+        std::copy_n(positions + 3 * i, 3, out + std::size_t(3) * rays.vertices[first + i]);
+    }
+}
+
+template <class S>
+void FlightPlans<S>::join_rays(OwnPlan& plan) {
+  if (plan.times.size() > 1) return;
+  // Changes of one time come together: nearly always the newest group is the right one.
+  auto rays = std::find_if(rays_.rbegin(), rays_.rend(),
+                           [&](const Rays& group) { return group.t0 == plan.times[0]; });
+  if (rays == rays_.rend()) {
+    rays_.push_back({plan.times[0], {}, {}, {}});
+    rays = rays_.rbegin();
+  }
+  plan.group = std::uint32_t(rays_.rend() - rays - 1);
+  plan.place = std::uint32_t(rays->vertices.size());
+  rays->vertices.push_back(plan.vertex);
+  rays->origins.insert(rays->origins.end(), plan.positions.begin(), plan.positions.end());
+  rays->velocities.insert(rays->velocities.end(), plan.velocity, plan.velocity + 3);
+}
+
+template <class S>
+void FlightPlans<S>::leave_rays(const OwnPlan& plan) {
+  if (plan.group == none) return;
+  Rays& rays = rays_[plan.group];
+  const std::size_t last = rays.vertices.size() - 1;
+  own_[own_of_vertex_[rays.vertices[last]]].place = plan.place;
+  rays.vertices[plan.place] = rays.vertices[last];
+  for (std::vector<S>* values : {&rays.origins, &rays.velocities}) {
+    std::copy_n(values->begin() + std::ptrdiff_t(3 * last), 3,
+                values->begin() + std::ptrdiff_t(3) * plan.place);
+    values->resize(3 * last);
+  }
+  rays.vertices.pop_back();
+  if (!rays.vertices.empty()) return;
+  const std::uint32_t group = plan.group;
+  for (const std::uint32_t vertex : rays_.back().vertices) own_[own_of_vertex_[vertex]].group = group;
+  if (group + 1 < rays_.size()) rays_[group] = std::move(rays_.back());
+  rays_.pop_back();
 }
 
 template <class S>
@@ -113,29 +165,44 @@ Piece<S> FlightPlans<S>::own_piece(const OwnPlan& plan, int axis, double t) cons
 }
 
 template <class S>
-void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* position) {
-  if (change.vertex >= vertex_count_)
-    throw std::invalid_argument("plan change for vertex " + std::to_string(change.vertex) +
-                                " of a body with " + std::to_string(vertex_count_) + " vertices");
+void FlightPlans<S>::check_vertex(std::uint32_t vertex) const {
+  if (vertex >= vertex_count_)
+    throw std::invalid_argument("plan change for vertex " + std::to_string(vertex) + " of a body with " +
+                                std::to_string(vertex_count_) + " vertices");
+}
+
+template <class S>
+void FlightPlans<S>::check_change(double t, const PlanChange<S>& change, const S* position) const {
+  check_vertex(change.vertex);
+  if (!std::isfinite(t)) throw std::invalid_argument("plan change at t = " + std::to_string(t));
   if (change.positions.size() != 3 * change.times.size())
     throw std::invalid_argument("plan change with " + std::to_string(change.times.size()) + " knots and " +
                                 std::to_string(change.positions.size()) + " coordinates");
-  OwnPlan plan{change.vertex, {t}, {position[0], position[1], position[2]}, {}};
+  for (int axis = 0; axis < 3; ++axis) {
+    check_value(position[axis], "coordinate", 0, change.vertex, axis);
+    check_value(change.velocity[axis], "velocity", change.times.size(), change.vertex, axis);
+  }
+  double before = t;
   for (std::size_t k = 0; k < change.times.size(); ++k) {
-    if (!std::isfinite(change.times[k]) || !(plan.times.back() < change.times[k]))
+    if (!std::isfinite(change.times[k]) || !(before < change.times[k]))
       throw std::invalid_argument("knot " + std::to_string(k) + " of a plan change at " + std::to_string(t) +
                                   " has time " + std::to_string(change.times[k]) + ", which does not follow");
-    plan.times.push_back(change.times[k]);
-    for (int axis = 0; axis < 3; ++axis) {
-      const S value = change.positions[3 * k + std::size_t(axis)];
-      check_value(value, "coordinate", k + 1, change.vertex, axis);
-      plan.positions.push_back(value == S(0) ? S(0) : value);
-    }
+    before = change.times[k];
+    for (int axis = 0; axis < 3; ++axis)
+      check_value(change.positions[3 * k + std::size_t(axis)], "coordinate", k + 1, change.vertex, axis);
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    check_value(change.velocity[axis], "velocity", change.times.size(), change.vertex, axis);
-    plan.velocity[axis] = change.velocity[axis];
-  }
+}
+
+template <class S>
+void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* position) {
+  check_change(t, change, position);
+  OwnPlan plan;
+  plan.vertex = change.vertex;
+  plan.times = {t};
+  plan.positions.assign(position, position + 3);
+  plan.times.insert(plan.times.end(), change.times.begin(), change.times.end());
+  for (const S value : change.positions) plan.positions.push_back(value == S(0) ? S(0) : value);
+  std::copy_n(change.velocity, 3, plan.velocity);
   own_speed_until_ = own_speed_from_;  // to be computed anew
   if (own_of_vertex_.empty()) own_of_vertex_.assign(vertex_count_, none);
   std::uint32_t& slot = own_of_vertex_[change.vertex];
@@ -143,8 +210,10 @@ void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* posi
     slot = std::uint32_t(own_.size());
     own_.push_back(std::move(plan));
   } else {
+    leave_rays(own_[slot]);
     own_[slot] = std::move(plan);
   }
+  join_rays(own_[slot]);
 }
 
 namespace {
@@ -246,6 +315,8 @@ std::size_t FlightPlans<S>::bytes() const {
                       longest_steps_.size() * sizeof(double) + own_of_vertex_.size() * sizeof(std::uint32_t) +
                       own_.size() * sizeof(OwnPlan);
   for (const OwnPlan& plan : own_) total += plan.times.size() * (sizeof(double) + 3 * sizeof(S));
+  for (const Rays& rays : rays_)
+    total += sizeof(Rays) + rays.vertices.size() * (sizeof(std::uint32_t) + 6 * sizeof(S));
   return total;
 }
 

@@ -64,8 +64,13 @@ class FlightPlans {
   /// lie between; 0 only if none moves at all. Not for times before the last change. Costs as `speed_bound`.
   double displacement_bound(double t0, double t1) const;
 
-  /// Starts the vertex's new plan at t from its stored position at t (`position`, 3 scalars).
-  /// Throws std::invalid_argument on non-finite values, knots not after t, or an unknown vertex.
+  /// Throws std::invalid_argument if there is no such vertex.
+  void check_vertex(std::uint32_t vertex) const;
+  /// Throws std::invalid_argument, saying what is wrong, if `change` would.
+  void check_change(double t, const PlanChange<S>& change, const S* position) const;
+  /// Starts the vertex's new plan at t from its stored position at t (`position`, 3 scalars). Throws
+  /// std::invalid_argument, with nothing changed: on values that are not finite or beyond the admissible
+  /// range (the position, too: a vertex can have flown out of it), knots not after t, or an unknown vertex.
   void change(double t, const PlanChange<S>& change, const S* position);
 
   std::size_t bytes() const;
@@ -81,7 +86,18 @@ class FlightPlans {
     std::vector<double> times;  // first knot: the change itself
     std::vector<S> positions;
     S velocity[3];
+    std::uint32_t group = none, place = 0;  ///< in rays_, of plans without a further knot
   };
+  /// Vertices that fly on for ever from one time on, laid out to be evaluated together: a field of velocities
+  /// that change at run time has thousands of them.
+  struct Rays {
+    double t0;
+    std::vector<std::uint32_t> vertices;
+    std::vector<S> origins, velocities;  ///< [vertex][3]
+  };
+  void join_rays(OwnPlan& plan);
+  void leave_rays(const OwnPlan& plan);
+  void evaluate_rays(double t, S* out, RoundingStats* stats) const;
   Piece<S> own_piece(const OwnPlan& plan, int axis, double t) const;
   double longest_step(std::size_t segment) const;
   double own_speed(const OwnPlan& plan, double t) const;
@@ -91,6 +107,7 @@ class FlightPlans {
   std::shared_ptr<const Keyframes> keyframes_;
   std::vector<std::uint32_t> own_of_vertex_;
   std::vector<OwnPlan> own_;
+  std::vector<Rays> rays_;                     ///< none is empty
   mutable std::vector<double> longest_steps_;  // by segment; negative until it is asked for
   mutable double own_speed_ = 0, own_speed_from_ = 0, own_speed_until_ = 0;  // holds in [from, until)
 };

@@ -43,9 +43,12 @@ class Playback {
   bool all_current(std::uint32_t body) const { return bodies_[body].all_current; }
 
   /// Each changed vertex starts its new plan at the current time from its stored position.
-  /// Throws std::invalid_argument, with nothing changed, if t is not the current time or a change is not
-  /// valid.
+  /// Of several changes of one vertex the last counts. Throws std::invalid_argument, with nothing changed, if
+  /// t is not the current time or a change is not valid.
   void change_plans(double t, std::span<const PlanChange<S>> changes);
+  /// Forgets every change: the plans are the scene's again, and positions are to be evaluated anew after the
+  /// next `seek`.
+  void restore_plans();
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return bodies_[body].plans; }
   std::uint32_t body_count() const { return std::uint32_t(bodies_.size()); }
@@ -55,7 +58,7 @@ class Playback {
 
  private:
   struct BodyState {
-    FlightPlans<S> plans;
+    FlightPlans<S> plans, scene_plans;  ///< as changed, and as the scene has them
     std::vector<S> positions;
     std::vector<std::uint32_t> stamp;
     std::uint32_t fetched = 0;  ///< at the current time

@@ -95,7 +95,8 @@ Recording<S> record(const TestScene<S>& test, const Play& play) {
   using Forest = KineticForest<S, Queue<S>, Counting, Recorder<S>>;
   const Scene<S>& scene = test.scene;
   const SceneView<S> view(scene);
-  std::vector<double> frames = frame_times(scene, play.frames_per_keyframe);
+  std::vector<double> frames =
+      test.frames.empty() ? frame_times(scene, play.frames_per_keyframe) : test.frames;
   const double first = frames.front() + play.start_after * (frames.back() - frames.front());
   std::erase_if(frames, [&](double t) { return t <= first; });
 
