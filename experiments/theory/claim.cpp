@@ -22,6 +22,7 @@ const char* symbol(Relation relation) {
 std::string wrapped(const std::string& text, std::size_t indent) {
   std::string result, line(indent, ' ');
   for (const std::string& word : experiments::split(text, ' ')) {
+    if (word.empty()) continue;
     if (line.size() > indent && line.size() + 1 + word.size() > columns) {
       result += line + "\n";
       line.assign(indent, ' ');

@@ -304,6 +304,7 @@ Claim judge_translation(const std::vector<TranslationRun>& translations) {
           run.scene, number(run.vertices), keyframes, number(run.rounded), number(run.events),
           number(run.separated_ties));
   }
+  claim.why.pop_back();
   return claim;
 }
 

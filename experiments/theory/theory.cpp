@@ -247,6 +247,9 @@ TheoryReport run_theory(const TheoryOptions& options, MeasurementStore& store,
 json to_json(const TheoryReport& report, const TheoryOptions& options) {
   json claims = json::array();
   for (const Claim& claim : report.claims) claims.push_back(to_json(claim));
+  json counts = report.counts;
+  for (std::size_t i = 0; i < report.counts.size(); ++i)
+    counts[i]["queue_steps_bound"] = queue_steps_bound(report.counts[i]);
   return {{"schema", "kbvh-theory-1"},
           {"commit", experiments::commit()},
           {"dirty", experiments::dirty()},
@@ -261,7 +264,7 @@ json to_json(const TheoryReport& report, const TheoryOptions& options) {
             {"sequences", options.sequences},
             {"sequence_keyframes", options.sequence_keyframes}}},
           {"claims", claims},
-          {"counts", report.counts},
+          {"counts", counts},
           {"fits", report.fits},
           {"frames", report.frames},
           {"notes", report.notes}};

@@ -148,8 +148,12 @@ PlanScript<float> velocity_script(const Scene<float>& scene, std::uint32_t frame
   const std::vector<double> frames = frame_times(scene, frames_per_keyframe);
   const std::vector<double> keyframes = overlaid_keyframes(scene);
   for (std::size_t f = 1; f + 1 < frames.size(); ++f) {
-    const bool at_keyframe = std::binary_search(keyframes.begin(), keyframes.end(), frames[f]);
-    if (!at_keyframe && f % frames_per_keyframe != frames_per_keyframe / 2) continue;
+    const auto after = std::upper_bound(keyframes.begin(), keyframes.end(), frames[f]);
+    const std::size_t k = std::size_t(after - keyframes.begin()) - 1;
+    const bool at_keyframe = keyframes[k] == frames[f];
+    const std::size_t half = frames_per_keyframe / 2;
+    const bool in_the_middle = !at_keyframe && f >= half && frames[f - half] == keyframes[k];
+    if (!(at_keyframe && k % 4 == 2) && !(in_the_middle && k % 4 == 0)) continue;
     PlanScript<float>::Step step{frames[f], {}};
     std::vector<std::vector<bool>> taken;
     for (const auto& body : scene.bodies) taken.emplace_back(body.plans.vertex_count(), false);

@@ -32,8 +32,8 @@ struct Translation {
 Translation near_translation(std::uint32_t triangles, std::uint32_t keyframes);
 Translation far_translation(std::uint32_t triangles, std::uint32_t keyframes);
 
-/// Velocities that change at run time: at every keyframe, and at a frame in between, `changed` vertices get a
-/// plan of their own. Deterministic.
+/// Velocities that change at run time: at every fourth keyframe, and in the middle of every fourth interval,
+/// up to `changed` vertices get a plan of their own. Deterministic.
 PlanScript<float> velocity_script(const Scene<float>& scene, std::uint32_t frames_per_keyframe,
                                   std::uint32_t changed);
 
