@@ -41,7 +41,7 @@ class KineticAabbTree {
         observer_(observer),
         realisers_(std::size_t(6) * topology_.size(), 0) {}
 
-  static std::uint32_t slot_count(const Topology& topology) { return 6 * topology.size(); }
+  static std::uint64_t slot_count(const Topology& topology) { return std::uint64_t(6) * topology.size(); }
   std::uint32_t first_slot() const { return first_slot_; }
   const Topology& topology() const { return topology_; }
   const LeafVertices& leaf_vertices() const { return leaf_vertices_; }

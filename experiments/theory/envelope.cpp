@@ -443,6 +443,7 @@ EnvelopeReport check_envelopes(const ExactMotion& motion, const VerticesBelow& b
   for (std::uint32_t node = 0; node < below.size(); ++node)
     for (std::uint32_t side = 0; side < 6; ++side) {
       const std::size_t at = 6 * std::size_t(node) + side;
+      if (start[at] == no_bound && end[at] == no_bound && by_bound[at].empty()) continue;
       BoundCheck(motion, below[node], node, side, report).run(start[at], by_bound[at], end[at]);
     }
   return report;
