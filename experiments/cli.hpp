@@ -17,6 +17,7 @@ void add_list(CLI::App& program, Action& action);
 void add_run(CLI::App& program, Action& action);
 void add_bench(CLI::App& program, Action& action);
 void add_report(CLI::App& program, Action& action);
+void add_theory(CLI::App& program, Action& action);
 
 /// `run` and `bench` as said on the command line. Strings are kept as given, until `plan_of` turns them into
 /// the plan that a file would hold.

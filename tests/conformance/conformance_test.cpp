@@ -223,7 +223,7 @@ void expect_spans_enclose(const StrategyEntry& entry, const TestScene<S>& test, 
   const SceneView<S> view(test.scene);
   Playback<S> playback(test.scene);
   const SampledMotion<S> motion(playback);
-  const std::vector<double> frames = frame_times(test.scene, l);
+  const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, l) : test.frames;
   session.reset(frames.front());
   PhaseTimes ignored;
   SpanBuffer spans;

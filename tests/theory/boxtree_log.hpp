@@ -3,9 +3,12 @@
 #include <memory>
 
 #include "core/kinetic/kinetic_boxtree.hpp"
-#include "tests/theory/kinetic_log.hpp"
+#include "experiments/theory/kinetic_log.hpp"
+#include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
+
+using namespace kbvh::theory;
 
 /// A change notice of a BoxTree as it came, with the numbers of its instant copied.
 template <class S>
@@ -94,7 +97,7 @@ class BoxTreeProof {
         play_(play),
         view_(test.scene),
         playback_(test.scene),
-        frames_(frame_times(test.scene, play.frames_per_keyframe)),
+        frames_(test.frames.empty() ? frame_times(test.scene, play.frames_per_keyframe) : test.frames),
         first_(frames_.front() + play.start_after * (frames_.back() - frames_.front())),
         random_(play.rebuild_seed) {
     std::erase_if(frames_, [&](double t) { return t <= first_; });

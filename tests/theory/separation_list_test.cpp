@@ -7,15 +7,18 @@
 
 #include "core/kinetic/kinetic_collision.hpp"
 #include "core/registry.hpp"
+#include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
-#include "tests/theory/kinetic_log.hpp"
 
 namespace kbvh::test {
 namespace {
 
+using theory::exact;
+using theory::Rational;
+
 template <class S>
 Rational value_at(const Piece<S>& piece, const Rational& t) {
-  const ExactLine line = exact_line(piece);
+  const theory::ExactLine line = theory::exact_line(piece);
   return line.x0 + line.slope * (t - line.t0);
 }
 
@@ -108,7 +111,7 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
   using Collision = KineticCollision<S, Queue, Counting>;
   const auto test = synthetic_scene<S>(name, 2);
   const SceneView<S> view(test.scene);
-  const std::vector<double> frames = frame_times(test.scene, 2);
+  const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 2) : test.frames;
   Kinds kinds;
   std::uint64_t every = 1, compared = 0;
   bool wanted = false;
