@@ -19,7 +19,7 @@ using namespace kbvh::theory;
 template <class S, template <class> class Queue>
 Recording<S> record(const TestScene<S>& test, const Play& play) {
   Play with_frames = play;
-  with_frames.frames = test.frames;
+  if (!test.script.steps.empty()) with_frames.frames = test.frames;  // changes are at frames
   return theory::record<S, Queue>(test.scene, test.script, with_frames);
 }
 
