@@ -1,6 +1,8 @@
 #pragma once
+#include <algorithm>
 #include <chrono>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "core/hierarchy/oracle.hpp"
@@ -8,14 +10,22 @@
 
 namespace kbvh {
 
-/// Plan changes to be made at run time, at frames: the same script is replayed to every contestant.
+/// Changes of plans and geometry to be made at run time, at frames: the same script is replayed to every
+/// contestant.
 template <class S>
 struct PlanScript {
   struct Step {
     double time;  ///< of a frame; the changes are made after its query
-    std::vector<PlanChange<S>> changes;
+    std::vector<PlanChange<S>> changes{};
+    GeometryChange<S> geometry{};  ///< after the plans
   };
   std::vector<Step> steps;  ///< ascending times
+  bool changes_plans() const {
+    return std::any_of(steps.begin(), steps.end(), [](const Step& step) { return !step.changes.empty(); });
+  }
+  bool changes_geometry() const {
+    return std::any_of(steps.begin(), steps.end(), [](const Step& step) { return !step.geometry.empty(); });
+  }
 };
 
 /// How one contestant is to be run.
@@ -27,9 +37,9 @@ struct Contestant {
 
 /// Seconds of one frame by phase (design, measuring policy).
 struct PhaseTimes {
-  double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0;
+  double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0, geometry_changes = 0;
   double query() const { return traversal + triangle_tests; }
-  double total() const { return update + traversal + triangle_tests + plan_changes; }
+  double total() const { return update + traversal + triangle_tests + plan_changes + geometry_changes; }
 };
 
 /// One contestant on one scene: the only driver there is; verification, benchmarks and lessons all use it.
@@ -38,7 +48,11 @@ class Session {
  public:
   /// Builds topologies at the first frame and makes the instance. Throws ConfigError.
   Session(const Scene<S>& scene, const Contestant& contestant, CountingPolicy policy)
-      : scene_(&scene), view_(scene), info_(&contestant.entry->info), playback_(scene) {
+      : info_(&contestant.entry->info),
+        changing_(info_->can.geometry_changes ? std::optional<ChangingScene<S>>(scene) : std::nullopt),
+        scene_(changing_ ? &changing_->scene() : &scene),
+        view_(*scene_),
+        playback_(scene) {
     const Params params(info_->id, info_->parameters, contestant.params);
     Topologies topologies;
     if (!info_->topology.own) topologies = build_topologies(view_, playback_, contestant.builder);
@@ -47,7 +61,7 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Starts at time t; phase times so far are forgotten.
+  /// Starts at time t; phase times so far are forgotten. Plans and geometry stay as the changes left them.
   void reset(double t) {
     playback_.seek(t);
     playback_.evaluate_all();
@@ -69,13 +83,23 @@ class Session {
   }
   /// Makes the changes at the current time.
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
+    if (changing_) changing_->check_plans(changes);
     playback_.change_plans(playback_.time(), changes);
     timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });
+  }
+  /// Inserts and deletes at the current time; the scene given to the constructor stays as it is. Throws
+  /// std::logic_error if the strategy does not declare geometry changes, std::invalid_argument (see
+  /// ChangingScene) with nothing changed.
+  void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
+    if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
+    changing_->apply(change, playback_);
+    timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
   }
 
   Strategy<S>& strategy() { return *strategy_; }
   Playback<S>& playback() { return playback_; }
   const Info& info() const { return *info_; }
+  /// The scene as it is now.
   const Scene<S>& scene() const { return *scene_; }
 
  private:
@@ -85,9 +109,10 @@ class Session {
     work();
     seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
+  const Info* info_;
+  std::optional<ChangingScene<S>> changing_;  ///< for strategies that can follow
   const Scene<S>* scene_;
   SceneView<S> view_;
-  const Info* info_;
   Playback<S> playback_;
   std::unique_ptr<Strategy<S>> strategy_;
 };

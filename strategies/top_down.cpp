@@ -28,6 +28,10 @@ class TopDown final : public StoredHierarchyStrategy<S, Count> {
     std::uint32_t begin, end;
   };
 
+  void topology_changed(std::uint32_t body) override {
+    ranges_[body] = primitive_ranges(this->hierarchies_[body].topology());
+  }
+
   void update(std::uint32_t body) override {
     auto& hierarchy = this->hierarchies_[body];
     const S* positions = this->sampled_.positions(body);
@@ -73,7 +77,7 @@ KBVH_STRATEGY(top_down) {
       .title = "top-down refit",
       .family = "refit",
       .citation = "van den Bergen 1998; Larsson & Akenine-Möller 2001",
-      .can = {.plan_changes = true, .time_budget = true},
+      .can = {.plan_changes = true, .geometry_changes = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
   })};
 }

@@ -21,7 +21,7 @@ void check_value(S value, const char* what, std::size_t keyframe, std::size_t ve
 
 template <class S>
 FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> times, std::vector<S> positions)
-    : vertex_count_(vertex_count) {
+    : vertex_count_(vertex_count), keyframed_count_(vertex_count) {
   if (times.empty()) throw std::invalid_argument("flight plans need at least one keyframe");
   for (std::size_t k = 0; k < times.size(); ++k) {
     if (!std::isfinite(times[k]))
@@ -51,7 +51,7 @@ std::size_t FlightPlans<S>::segment_at(double t) const {
 template <class S>
 void FlightPlans<S>::evaluate(double t, S* out, RoundingStats* stats) const {
   const auto& times = keyframes_->times;
-  const std::size_t k = segment_at(t), scalars = std::size_t(3) * vertex_count_;
+  const std::size_t k = segment_at(t), scalars = std::size_t(3) * keyframed_count_;
   if (t <= times[k] || k + 1 == times.size()) {
     std::copy_n(keyframe(k), scalars, out);
   } else {
@@ -63,8 +63,8 @@ void FlightPlans<S>::evaluate(double t, S* out, RoundingStats* stats) const {
 }
 
 template <class S>
-void FlightPlans<S>::evaluate(double t, std::span<const std::uint32_t> vertices, S* out,
-                              RoundingStats* stats) const {
+void FlightPlans<S>::evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out,
+                                        RoundingStats* stats) const {
   const auto& times = keyframes_->times;
   const std::size_t k = segment_at(t);
   if (t <= times[k] || k + 1 == times.size()) {
@@ -73,6 +73,22 @@ void FlightPlans<S>::evaluate(double t, std::span<const std::uint32_t> vertices,
   } else {
     round_chord_vertices(keyframe(k), keyframe(k + 1), vertices.data(), vertices.size(), times[k],
                          times[k + 1], t, out, stats);
+  }
+}
+
+template <class S>
+void FlightPlans<S>::evaluate(double t, std::span<const std::uint32_t> vertices, S* out,
+                              RoundingStats* stats) const {
+  if (vertex_count_ == keyframed_count_) {
+    evaluate_keyframed(t, vertices, out, stats);
+  } else {
+    // Vertices added at run time have no keyframes: only the runs between them are looked up there.
+    const auto added = [this](std::uint32_t v) { return v >= keyframed_count_; };
+    for (auto begin = vertices.begin(); begin != vertices.end();) {
+      const auto end = std::find_if(begin, vertices.end(), added);
+      evaluate_keyframed(t, {begin, end}, out, stats);
+      begin = std::find_if_not(end, vertices.end(), added);
+    }
   }
   if (own_.empty()) return;
   for (std::uint32_t v : vertices)
@@ -112,14 +128,12 @@ Piece<S> FlightPlans<S>::own_piece(const OwnPlan& plan, int axis, double t) cons
 }
 
 template <class S>
-void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* position) {
-  if (change.vertex >= vertex_count_)
-    throw std::invalid_argument("plan change for vertex " + std::to_string(change.vertex) +
-                                " of a body with " + std::to_string(vertex_count_) + " vertices");
+auto FlightPlans<S>::checked_plan(double t, const PlanChange<S>& change, std::uint32_t vertex,
+                                  const S* position) -> OwnPlan {
   if (change.positions.size() != 3 * change.times.size())
     throw std::invalid_argument("plan change with " + std::to_string(change.times.size()) + " knots and " +
                                 std::to_string(change.positions.size()) + " coordinates");
-  OwnPlan plan{change.vertex, {t}, {position[0], position[1], position[2]}, {}};
+  OwnPlan plan{vertex, {t}, {position[0], position[1], position[2]}, {}};
   for (std::size_t k = 0; k < change.times.size(); ++k) {
     if (!std::isfinite(change.times[k]) || !(plan.times.back() < change.times[k]))
       throw std::invalid_argument("knot " + std::to_string(k) + " of a plan change at " + std::to_string(t) +
@@ -127,14 +141,23 @@ void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* posi
     plan.times.push_back(change.times[k]);
     for (int axis = 0; axis < 3; ++axis) {
       const S value = change.positions[3 * k + std::size_t(axis)];
-      check_value(value, "coordinate", k + 1, change.vertex, axis);
+      check_value(value, "coordinate", k + 1, vertex, axis);
       plan.positions.push_back(value == S(0) ? S(0) : value);
     }
   }
   for (int axis = 0; axis < 3; ++axis) {
-    check_value(change.velocity[axis], "velocity", change.times.size(), change.vertex, axis);
+    check_value(change.velocity[axis], "velocity", change.times.size(), vertex, axis);
     plan.velocity[axis] = change.velocity[axis];
   }
+  return plan;
+}
+
+template <class S>
+void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* position) {
+  if (change.vertex >= vertex_count_)
+    throw std::invalid_argument("plan change for vertex " + std::to_string(change.vertex) +
+                                " of a body with " + std::to_string(vertex_count_) + " vertices");
+  OwnPlan plan = checked_plan(t, change, change.vertex, position);
   if (own_of_vertex_.empty()) own_of_vertex_.assign(vertex_count_, none);
   std::uint32_t& slot = own_of_vertex_[change.vertex];
   if (slot == none) {
@@ -143,6 +166,24 @@ void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* posi
   } else {
     own_[slot] = std::move(plan);
   }
+}
+
+template <class S>
+void FlightPlans<S>::check_new_vertex(double t, const PlanChange<S>& plan, const S* position,
+                                      std::uint32_t vertex) {
+  for (int axis = 0; axis < 3; ++axis) check_value(position[axis], "coordinate", 0, vertex, axis);
+  checked_plan(t, plan, vertex, position);
+}
+
+template <class S>
+void FlightPlans<S>::add_vertex(double t, const PlanChange<S>& plan, const S* position) {
+  check_new_vertex(t, plan, position, vertex_count_);
+  S start[3];
+  for (int axis = 0; axis < 3; ++axis) start[axis] = position[axis] == S(0) ? S(0) : position[axis];
+  own_of_vertex_.resize(vertex_count_, none);
+  own_of_vertex_.push_back(std::uint32_t(own_.size()));
+  own_.push_back(checked_plan(t, plan, vertex_count_, start));
+  ++vertex_count_;
 }
 
 template <class S>
@@ -155,7 +196,7 @@ double FlightPlans<S>::speed_bound(double t) const {
   if (k != bounded_segment_) {
     segment_speed_ = 0;
     if (k + 1 < times.size() && t >= times[0])
-      for (std::size_t i = 0; i < std::size_t(3) * vertex_count_; i += 3) {
+      for (std::size_t i = 0; i < std::size_t(3) * keyframed_count_; i += 3) {
         double step[3];
         for (std::size_t axis = 0; axis < 3; ++axis)
           step[axis] = double(keyframe(k + 1)[i + axis]) - double(keyframe(k)[i + axis]);

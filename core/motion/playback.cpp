@@ -90,6 +90,19 @@ void Playback<S>::change_plans(double t, std::span<const PlanChange<S>> changes)
   for (auto& [body, plans] : changed) bodies_[body].plans = std::move(plans);
 }
 
+template <class S>
+void Playback<S>::add_vertex(std::uint32_t body, const PlanChange<S>& plan, const S* position) {
+  BodyState& state = bodies_[body];
+  state.plans.add_vertex(time_, plan, position);
+  // The last scalar is padding.
+  for (int axis = 0; axis < 3; ++axis) {
+    state.positions.back() = position[axis] == S(0) ? S(0) : position[axis];
+    state.positions.push_back(S(0));
+  }
+  state.stamp.push_back(epoch_);
+  if (stale_.capacity() < state.stamp.size()) stale_.reserve(2 * state.stamp.size());
+}
+
 template class Playback<float>;
 template class Playback<double>;
 

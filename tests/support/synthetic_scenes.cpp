@@ -1,7 +1,10 @@
 #include "tests/support/synthetic_scenes.hpp"
 
 #include <functional>
+#include <optional>
 #include <stdexcept>
+
+#include "tests/support/geometry_scripts.hpp"
 
 namespace kbvh::test {
 
@@ -80,6 +83,7 @@ void make_polygons(RawBody& body, std::uint32_t smallest, std::uint32_t largest,
 struct RawScene {
   std::vector<RawBody> bodies;
   bool script = false;
+  std::optional<GeometryScriptStyle> geometry{};
 };
 
 RawScene raw_scene(const std::string& name) {
@@ -186,6 +190,21 @@ RawScene raw_scene(const std::string& name) {
     scene.script = true;
     return scene;
   }
+  const auto with_geometry = [](const char* base, const GeometryScriptStyle& style) {
+    RawScene scene = raw_scene(base);
+    scene.geometry = style;
+    return scene;
+  };
+  if (name == "geometry_changes") return with_geometry("soups", {.seed = 31, .plans = true});
+  if (name == "geometry_changes_shared") return with_geometry("sheets", {.seed = 32});
+  if (name == "geometry_changes_ties")
+    return with_geometry("integer_ties", {.seed = 33, .integers = true, .plans = true});
+  if (name == "geometry_to_nothing")
+    return with_geometry("one_triangle_and_none", {.seed = 34, .to_nothing = true});
+  if (name == "geometry_changes_at_rest") return with_geometry("static_obstacle", {.seed = 35});
+  if (name == "geometry_changes_polygons") return with_geometry("polygons", {.seed = 36, .plans = true});
+  if (name == "geometry_changes_points")
+    return with_geometry("points_against_nets", {.seed = 37, .to_nothing = true});
   throw std::invalid_argument("no synthetic scene '" + name + "'");
 }
 
@@ -242,7 +261,14 @@ const std::vector<std::string>& synthetic_scene_names() {
                                               "polygons",
                                               "points_against_nets",
                                               "plan_changes",
-                                              "plan_changes_ties"};
+                                              "plan_changes_ties",
+                                              "geometry_changes",
+                                              "geometry_changes_shared",
+                                              "geometry_changes_ties",
+                                              "geometry_to_nothing",
+                                              "geometry_changes_at_rest",
+                                              "geometry_changes_polygons",
+                                              "geometry_changes_points"};
   return names;
 }
 
@@ -259,6 +285,7 @@ TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_k
   }
   result.scene.pairs = all_pairs(result.scene.bodies);
   validate(result.scene);
+  if (raw.geometry) result.script = make_geometry_script(result.scene, frames_per_keyframe, *raw.geometry);
   if (raw.script) result.script = make_script(result.scene, frames_per_keyframe);
   return result;
 }
