@@ -169,7 +169,8 @@ void TopologyEditor::remove(Topology& topology, std::uint32_t primitive, Topolog
   free_pairs_.push_back(siblings.first());
 }
 
-std::uint32_t TopologyEditor::unbalanced_above(const Topology& topology, std::uint32_t leaf) const {
+std::uint32_t TopologyEditor::unbalanced_above(const Topology& topology, std::uint32_t primitive) const {
+  const std::uint32_t leaf = leaf_of_[primitive];
   std::uint32_t depth = 0;
   for (std::uint32_t node = leaf; node != 0; node = topology.parents[node]) ++depth;
   if (double(depth) <= 2 * std::log2(double(leaf_count_))) return none;
@@ -338,16 +339,16 @@ Topology edited_topology(Topology topology, std::vector<Box<S>> boxes, const Bod
       boxes[node].extend(box);
       if (node == 0) break;
     }
-    const std::uint32_t top = editor.unbalanced_above(topology, leaf);
-    if (top == TopologyEditor::none) continue;
-    editor.rebalance(topology, top, edit, [&](std::uint32_t n) { return to_double(boxes[n]); });
-    carry_boxes();
-    // Children were placed before their own: inner boxes come from behind.
-    for (std::size_t i = edit.fresh.size(); i-- > 0;) {
-      const TopologyNode node = topology.nodes[edit.fresh[i]];
-      if (node.is_leaf()) continue;
-      boxes[edit.fresh[i]] = boxes[node.first()];
-      boxes[edit.fresh[i]].extend(boxes[node.first() + 1]);
+    for (std::uint32_t top; (top = editor.unbalanced_above(topology, p)) != TopologyEditor::none;) {
+      editor.rebalance(topology, top, edit, [&](std::uint32_t n) { return to_double(boxes[n]); });
+      carry_boxes();
+      // Parents were placed before their children: inner boxes come from behind.
+      for (std::size_t i = edit.fresh.size(); i-- > 0;) {
+        const TopologyNode node = topology.nodes[edit.fresh[i]];
+        if (node.is_leaf()) continue;
+        boxes[edit.fresh[i]] = boxes[node.first()];
+        boxes[edit.fresh[i]].extend(boxes[node.first() + 1]);
+      }
     }
   }
   std::vector<std::uint32_t> order;

@@ -55,10 +55,11 @@ class TopologyEditor {
   /// Takes a primitive out of its leaf.
   void remove(Topology& topology, std::uint32_t primitive, TopologyEdit& edit);
 
-  /// The lowest ancestor of a leaf that is so unbalanced that one child has more than 1/sqrt(2) of its
-  /// leaves; `none` unless the leaf lies deeper than 2 log2(leaves), when there must be one (Galperin &
-  /// Rivest 1993). O(depth), and O(leaves below the result) if there is one.
-  std::uint32_t unbalanced_above(const Topology& topology, std::uint32_t leaf) const;
+  /// The lowest node above a primitive that is so unbalanced that one child has more than 1/sqrt(2) of its
+  /// leaves; `none` unless the primitive's leaf lies deeper than 2 log2(leaves), when there must be one
+  /// (Galperin & Rivest 1993). To be asked again after `rebalance`: removals may have left several. O(depth),
+  /// and O(leaves below the result) if there is one.
+  std::uint32_t unbalanced_above(const Topology& topology, std::uint32_t primitive) const;
   /// Lays out everything below an inner node anew as a balanced binary subtree over its leaves, by medians of
   /// their boxes' centres. `box_of(leaf)` returns a Box<double>. O(leaves log leaves).
   template <class BoxOf>

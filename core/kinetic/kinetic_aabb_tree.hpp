@@ -160,12 +160,14 @@ class KineticAabbTree {
     else
       notify_leaf_changed(leaf);
     repair(t, {});
-    const std::uint32_t top = editor_->unbalanced_above(topology_, leaf);
-    if (top == TopologyEditor::none) return;
-    editor_->rebalance(topology_, top, edit_, [&](std::uint32_t node) { return to_double(box_of(node)); });
-    follow_edit();
-    if constexpr (requires { observer_.subtree_rebuilt(body_, top); }) observer_.subtree_rebuilt(body_, top);
-    repair(t, {});
+    for (std::uint32_t top;
+         (top = editor_->unbalanced_above(topology_, primitive)) != TopologyEditor::none;) {
+      editor_->rebalance(topology_, top, edit_, [&](std::uint32_t node) { return to_double(box_of(node)); });
+      follow_edit();
+      if constexpr (requires { observer_.subtree_rebuilt(body_, top); })
+        observer_.subtree_rebuilt(body_, top);
+      repair(t, {});
+    }
   }
 
   /// Takes a primitive out at t. O(depth) certificates, and O(nodes) the first time.

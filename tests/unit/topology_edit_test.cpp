@@ -46,12 +46,13 @@ class Edited {
     const std::uint32_t leaf = editor_->insert(topology_, at, p, edit_);
     refit();
     EXPECT_EQ(editor_->leaf_of(p), leaf);
-    const std::uint32_t top = editor_->unbalanced_above(topology_, leaf);
-    if (top == TopologyEditor::none) return 0;
-    editor_->rebalance(topology_, top, edit_, [&](std::uint32_t n) { return node_boxes_[n]; });
-    refit();
-    EXPECT_EQ(editor_->unbalanced_above(topology_, editor_->leaf_of(p)), TopologyEditor::none);
-    return edit_.moved.size();
+    std::size_t relaid = 0;
+    for (std::uint32_t top; (top = editor_->unbalanced_above(topology_, p)) != TopologyEditor::none;) {
+      editor_->rebalance(topology_, top, edit_, [&](std::uint32_t n) { return node_boxes_[n]; });
+      refit();
+      relaid += edit_.moved.size();
+    }
+    return relaid;
   }
   void remove(std::uint32_t p) {
     living_.erase(std::find(living_.begin(), living_.end(), p));
