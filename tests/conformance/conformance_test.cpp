@@ -57,7 +57,7 @@ TEST_P(Configurations, AllConform) {
                                                                          ", width " + std::to_string(width) +
                                                                          ", leaf " + std::to_string(leaf));
   };
-  for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes"}) {
+  for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes", "geometry_changes"}) {
     const auto in_float = synthetic_scene<float>(scene_name, 7);
     const auto in_double = synthetic_scene<double>(scene_name, 7);
     sweep(scene_name, [&](const BuilderConfig& builder, const std::string& where) {
@@ -206,6 +206,46 @@ TEST_P(Configurations, TimeRunsForwardAndResetStartsOver) {
     std::sort(first.begin(), first.end());
     std::sort(again.begin(), again.end());
     EXPECT_EQ(first, again) << GetParam();
+  };
+  run(synthetic_scene<float>("sheets"));
+  run(synthetic_scene<double>("sheets"));
+}
+
+// Changes of geometry are made as a whole or refused as a whole, before the strategy hears of them.
+TEST_P(Configurations, ChangesOfGeometryAreRefusedAsAWhole) {
+  const StrategyEntry& entry = find_strategy(GetParam());
+  const auto run = [&](const auto& test) {
+    using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
+    if (entry.factory<S>() == nullptr) return;
+    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    PhaseTimes times;
+    session.reset(0);
+    session.advance(1, times);
+    GeometryChange<S> change;
+    change.removed_primitives = {{0, 5}};
+    if (!entry.info.can.geometry_changes) {
+      EXPECT_THROW(session.change_geometry(change, times), std::logic_error) << GetParam();
+      EXPECT_THROW(session.strategy().geometry_changed(1, change), std::logic_error) << GetParam();
+      return;
+    }
+    PairBuffer before, after;
+    session.query(before, times);
+    change.removed_vertices = {{1, 0}};
+    EXPECT_THROW(session.change_geometry(change, times), std::invalid_argument) << GetParam();
+    EXPECT_TRUE(session.scene().bodies[0].primitives.alive(5));
+    session.query(after, times);
+    EXPECT_EQ(before, after) << GetParam();
+    // What was inserted and deleted stays so over a reset.
+    change.removed_vertices.clear();
+    change.primitives = {{0, {0, 1, 2}}};
+    session.change_geometry(change, times);
+    session.reset(0);
+    session.advance(1, times);
+    session.query(after, times);
+    std::sort(after.begin(), after.end());
+    EXPECT_EQ(after, sweep_pairs(session.scene(), session.playback())) << GetParam();
+    EXPECT_FALSE(session.scene().bodies[0].primitives.alive(5));
+    EXPECT_TRUE(test.scene.bodies[0].primitives.alive(5)) << "the caller's scene stays as it was";
   };
   run(synthetic_scene<float>("sheets"));
   run(synthetic_scene<double>("sheets"));
