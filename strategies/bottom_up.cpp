@@ -56,6 +56,10 @@ class BottomUp final : public StoredHierarchyStrategy<S, Count> {
 #endif
   }
 
+  void geometry_changed(double /*t*/, const GeometryChange<S>& change) override {
+    this->edit_geometry(change);
+  }
+
  private:
   void update(std::uint32_t body) override {
     auto& hierarchy = this->hierarchies_[body];

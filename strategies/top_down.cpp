@@ -21,6 +21,10 @@ class TopDown final : public StoredHierarchyStrategy<S, Count> {
       ranges_.push_back(primitive_ranges(this->hierarchies_[body].topology()));
   }
 
+  void geometry_changed(double /*t*/, const GeometryChange<S>& change) override {
+    this->edit_geometry(change);
+  }
+
  private:
   /// Entries of the topology's primitive list below each node: contiguous, since leaves are laid out left to
   /// right.

@@ -3,8 +3,6 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "core/counters.hpp"
@@ -16,15 +14,9 @@ namespace kbvh {
 ///   schedule(event)   inserts, or replaces the event of the same slot
 ///   cancel(slot)      removes the slot's event if there is one; says whether there was
 ///   top(), pop(), empty(), size(), clear(), bytes()
-///   grow(more)        adds slots and returns the first of them; amortised O(more), events stay scheduled
+///   grow(slots)       makes room for slots below this number, amortised O(1) each; events stay scheduled
+///   slots()           how many there is room for
 /// `steps()` counts comparisons. Order comes from an EventClock: exact time, deeper node, slot.
-
-/// The first of `more` slots after `slots`. Throws std::length_error if they cannot be numbered.
-inline std::uint32_t grown_slots(std::size_t slots, std::uint32_t more) {
-  if (slots + more > std::numeric_limits<std::uint32_t>::max())
-    throw std::length_error(std::to_string(slots + more) + " certificates are more than a queue can number");
-  return std::uint32_t(slots);
-}
 
 /// The paper's queue: an AVL tree (Z&W s.3), on Boost.Intrusive; all operations O(log events).
 template <class S>
@@ -72,16 +64,16 @@ class AvlQueue {
     tree_.clear();
     for (Node& node : nodes_) node.scheduled = false;
   }
-  std::uint32_t grow(std::uint32_t more) {
-    const std::uint32_t first = grown_slots(nodes_.size(), more);
-    if (nodes_.size() + more <= nodes_.capacity()) {
-      nodes_.resize(nodes_.size() + more);
-      return first;
+  std::uint32_t slots() const { return std::uint32_t(nodes_.size()); }
+  void grow(std::uint32_t slots) {
+    if (slots <= nodes_.capacity()) {
+      if (slots > nodes_.size()) nodes_.resize(slots);
+      return;
     }
     // The tree is threaded through the nodes: each takes the place of the one it was, without comparisons.
     std::vector<Node> larger;
-    larger.reserve(2 * (nodes_.size() + more));
-    larger.resize(nodes_.size() + more);
+    larger.reserve(std::size_t(2) * slots);
+    larger.resize(slots);
     for (std::size_t slot = 0; slot < nodes_.size(); ++slot) {
       if (!nodes_[slot].scheduled) continue;
       larger[slot].event = nodes_[slot].event;
@@ -89,7 +81,6 @@ class AvlQueue {
       tree_.replace_node(tree_.iterator_to(nodes_[slot]), larger[slot]);
     }
     nodes_.swap(larger);
-    return first;
   }
   std::uint64_t steps() const { return *steps_; }
   std::size_t bytes() const { return nodes_.size() * sizeof(Node); }
@@ -143,11 +134,11 @@ class BinaryHeapQueue {
     heap_.clear();
     std::fill(place_.begin(), place_.end(), none);
   }
-  std::uint32_t grow(std::uint32_t more) {
-    const std::uint32_t first = grown_slots(events_.size(), more);
-    events_.resize(first + more);
-    place_.resize(first + more, none);
-    return first;
+  std::uint32_t slots() const { return std::uint32_t(events_.size()); }
+  void grow(std::uint32_t slots) {
+    if (slots <= events_.size()) return;
+    events_.resize(slots);
+    place_.resize(slots, none);
   }
   std::uint64_t steps() const { return steps_; }
   std::size_t bytes() const { return events_.size() * (sizeof(Event) + 2 * sizeof(std::uint32_t)); }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <numeric>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include "core/assert.hpp"
@@ -323,8 +324,12 @@ class KineticAabbTree {
       }
     }
     const std::uint32_t nodes = topology_.size();
-    while (packed_nodes_ + late_chunks_.size() * chunk_nodes < nodes)
-      late_chunks_.push_back(queue_->grow(6 * chunk_nodes));
+    while (packed_nodes_ + late_chunks_.size() * chunk_nodes < nodes) {
+      late_chunks_.push_back(queue_->slots());
+      if (late_chunks_.back() > std::numeric_limits<std::uint32_t>::max() - 6 * chunk_nodes)
+        throw std::length_error("more certificates than a queue can number");
+      queue_->grow(late_chunks_.back() + 6 * chunk_nodes);
+    }
     realisers_.resize(std::size_t(6) * nodes, no_vertex);
     leaf_vertices_.resize(nodes);
     for (const auto& [to, list] : lists) {

@@ -35,9 +35,15 @@ std::vector<std::string> strategy_ids() {
   return ids;
 }
 
+std::vector<std::string> all_scene_names() {
+  std::vector<std::string> names = synthetic_scene_names();
+  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
+  return names;
+}
+
 INSTANTIATE_TEST_SUITE_P(Registry, Conformance,
                          testing::Combine(testing::ValuesIn(strategy_ids()),
-                                          testing::ValuesIn(synthetic_scene_names())),
+                                          testing::ValuesIn(all_scene_names())),
                          [](const auto& test) {
                            return std::get<0>(test.param) + "_on_" + std::get<1>(test.param);
                          });
@@ -83,7 +89,7 @@ TEST_P(Kernels, Conform) {
   for (const StrategyEntry& entry : registry()) {
     if (entry.info.topology.own || entry.info.max_primitive_pairs != 0) continue;
     const std::string& id = entry.info.id;
-    for (const std::string& scene_name : synthetic_scene_names()) {
+    for (const std::string& scene_name : all_scene_names()) {
       const std::string where = id + " on " + scene_name + " with " + name(GetParam());
       const BuilderConfig builder = entry.info.topology.preferred;
       expect_conforms(check(entry, synthetic_scene<float>(scene_name, 10), 10, {}, builder),

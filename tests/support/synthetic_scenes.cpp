@@ -261,13 +261,14 @@ const std::vector<std::string>& synthetic_scene_names() {
                                               "polygons",
                                               "points_against_nets",
                                               "plan_changes",
-                                              "plan_changes_ties",
-                                              "geometry_changes",
-                                              "geometry_changes_shared",
-                                              "geometry_changes_ties",
-                                              "geometry_to_nothing",
-                                              "geometry_changes_at_rest",
-                                              "geometry_changes_polygons",
+                                              "plan_changes_ties"};
+  return names;
+}
+
+const std::vector<std::string>& geometry_scene_names() {
+  static const std::vector<std::string> names{"geometry_changes",         "geometry_changes_shared",
+                                              "geometry_changes_ties",    "geometry_to_nothing",
+                                              "geometry_changes_at_rest", "geometry_changes_polygons",
                                               "geometry_changes_points"};
   return names;
 }
