@@ -26,8 +26,7 @@ Topologies build_topologies(const SceneView<S>& scene, Playback<S>& playback, co
   playback.evaluate_all();
   Topologies topologies;
   for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
-    const auto boxes = primitive_boxes(scene.primitives(body), playback.positions(body));
-    topologies.push_back(build_topology<S>(boxes, config));
+    topologies.push_back(build_topology(scene.primitives(body), playback.positions(body), config));
   }
   return topologies;
 }

@@ -40,10 +40,11 @@ std::uint64_t hash(const Scene<S>& scene) {
     hasher.mix(std::uint64_t(body.primitives.kind));
     hasher.list(body.primitives.offsets);
     hasher.list(body.primitives.vertices);
+    if (body.primitives.removed_count != 0) hasher.list(body.primitives.removed);
     const auto times = body.plans.keyframe_times();
     hasher.bytes(times.data(), times.size_bytes());
     hasher.bytes(body.plans.keyframe(0),
-                 body.plans.keyframe_count() * 3 * body.plans.vertex_count() * sizeof(S));
+                 body.plans.keyframe_count() * 3 * body.plans.keyframed_count() * sizeof(S));
   }
   for (const BodyPair& pair : scene.pairs) hasher.mix((std::uint64_t(pair.first) << 32) | pair.second);
   return hasher.value();

@@ -17,18 +17,32 @@ enum class PrimitiveKind : std::uint8_t {
 };
 
 /// Primitives of one body as CSR lists: primitive p has vertices[offsets[p] .. offsets[p + 1]).
+/// A primitive that was removed at run time (geometry_change.hpp) keeps its id and its list, but no hierarchy
+/// holds it and no answer names it.
 struct Primitives {
   PrimitiveKind kind = PrimitiveKind::polygons;
   std::vector<std::uint32_t> offsets{0};
   std::vector<std::uint32_t> vertices;
+  std::vector<std::uint8_t> removed;  ///< 1 for each removed primitive; empty as long as there is none
+  std::uint32_t removed_count = 0;
 
+  /// All ids, those of removed primitives included.
   std::uint32_t count() const { return std::uint32_t(offsets.size() - 1); }
+  std::uint32_t live_count() const { return count() - removed_count; }
+  bool alive(std::uint32_t p) const { return removed.empty() || removed[p] == 0; }
   std::span<const std::uint32_t> operator[](std::uint32_t p) const {
     return {vertices.data() + offsets[p], vertices.data() + offsets[p + 1]};
   }
   void add(std::span<const std::uint32_t> primitive) {
     vertices.insert(vertices.end(), primitive.begin(), primitive.end());
     offsets.push_back(std::uint32_t(vertices.size()));
+    if (!removed.empty()) removed.push_back(0);
+  }
+  /// Takes a living primitive out of the body; its id is never used again.
+  void remove(std::uint32_t p) {
+    removed.resize(count(), 0);
+    removed[p] = 1;
+    ++removed_count;
   }
 };
 

@@ -1,6 +1,8 @@
 #pragma once
+#include <algorithm>
 #include <chrono>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "core/hierarchy/oracle.hpp"
@@ -18,9 +20,9 @@ struct Contestant {
 
 /// Seconds of one frame by phase (design, measuring policy).
 struct PhaseTimes {
-  double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0;
+  double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0, geometry_changes = 0;
   double query() const { return traversal + triangle_tests; }
-  double total() const { return update + traversal + triangle_tests + plan_changes; }
+  double total() const { return update + traversal + triangle_tests + plan_changes + geometry_changes; }
 };
 
 /// One contestant on one scene: the only driver there is; verification, benchmarks and lessons all use it.
@@ -29,18 +31,28 @@ class Session {
  public:
   /// Builds topologies at the first frame and makes the instance. Throws ConfigError.
   Session(const Scene<S>& scene, const Contestant& contestant, CountingPolicy policy)
-      : scene_(&scene), view_(scene), info_(&contestant.entry->info), playback_(scene) {
-    const Params params(info_->id, info_->parameters, contestant.params);
-    Topologies topologies;
-    if (!info_->topology.own) topologies = build_topologies(view_, playback_, contestant.builder);
-    strategy_ = create(*contestant.entry, view_, playback_, std::move(topologies), params, policy);
+      : original_(&scene),
+        contestant_(contestant),
+        policy_(policy),
+        info_(&contestant.entry->info),
+        changing_(info_->can.geometry_changes ? std::optional<ChangingScene<S>>(scene) : std::nullopt),
+        scene_(changing_ ? &changing_->scene() : &scene),
+        view_(*scene_),
+        playback_(scene) {
+    make_strategy();
   }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Starts at time t, with the scene's own plans again.
+  /// Starts at time t, with the scene's own plans and geometry again: where geometry has changed, with a new
+  /// instance of the strategy.
   void reset(double t) {
     playback_.restore_plans();
+    if (geometry_changed_) {
+      changing_.emplace(*original_);
+      make_strategy();
+      geometry_changed_ = false;
+    }
     playback_.seek(t);
     playback_.evaluate_all();
     strategy_->reset(t);
@@ -68,27 +80,56 @@ class Session {
   /// Makes the changes at the current time, all of them or, if one is not valid, none
   /// (Playback::change_plans).
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
+    if (changing_) changing_->check_plans(changes);
     playback_.change_plans(playback_.time(), changes);
     timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });
+  }
+  /// Inserts and deletes at the current time; the scene given to the constructor stays as it is. Throws
+  /// std::logic_error if the strategy does not declare geometry changes, std::invalid_argument (see
+  /// ChangingScene) with nothing changed.
+  void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
+    if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
+    changing_->apply(change, playback_);
+    geometry_changed_ = true;
+    timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
+  }
+
+  /// Makes a script's changes at the current time; nullptr: there are none.
+  void follow(const typename PlanScript<S>::Step* step, PhaseTimes& times) {
+    if (step == nullptr) return;
+    if (!step->changes.empty()) change_plans(step->changes, times);
+    if (!step->geometry.empty()) change_geometry(step->geometry, times);
   }
 
   Strategy<S>& strategy() { return *strategy_; }
   Playback<S>& playback() { return playback_; }
   const Info& info() const { return *info_; }
+  /// The scene as it is now.
   const Scene<S>& scene() const { return *scene_; }
 
  private:
+  void make_strategy() {
+    const Params params(info_->id, info_->parameters, contestant_.params);
+    Topologies topologies;
+    if (!info_->topology.own) topologies = build_topologies(view_, playback_, contestant_.builder);
+    strategy_ = create(*contestant_.entry, view_, playback_, std::move(topologies), params, policy_);
+  }
   template <class Work>
   static void timed(double& seconds, Work&& work) {
     const auto begin = std::chrono::steady_clock::now();
     work();
     seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
+  const Scene<S>* original_;
+  Contestant contestant_;
+  CountingPolicy policy_;
+  const Info* info_;
+  std::optional<ChangingScene<S>> changing_;  ///< for strategies that can follow
   const Scene<S>* scene_;
   SceneView<S> view_;
-  const Info* info_;
   Playback<S> playback_;
   std::unique_ptr<Strategy<S>> strategy_;
+  bool geometry_changed_ = false;
 };
 
 }  // namespace kbvh

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/counters.hpp"
+#include "core/geometry_change.hpp"
 #include "core/hierarchy/builders.hpp"
 #include "core/hierarchy/topology.hpp"
 #include "core/hierarchy/traversal.hpp"
@@ -74,27 +75,6 @@ struct Info {
   bool has_float = false, has_double = false;
 };
 
-/// One strategy-owned change of geometry by stable ids (see Strategy::geometry_changed).
-template <class S>
-struct GeometryChange {
-  struct NewVertex {
-    std::uint32_t body;
-    S position[3];       ///< at the change
-    PlanChange<S> plan;  ///< its motion from there
-  };
-  struct NewPrimitive {
-    std::uint32_t body;
-    std::vector<std::uint32_t> vertices;
-  };
-  struct Removed {
-    std::uint32_t body, id;
-  };
-  std::vector<NewVertex> vertices;       ///< get the next free ids of their bodies, in order
-  std::vector<NewPrimitive> primitives;  ///< get the next free ids of their bodies, in order
-  std::vector<Removed> removed_primitives;
-  std::vector<Removed> removed_vertices;  ///< must not be used by a primitive any more
-};
-
 /// What an audit sees of one body's hierarchy after a query: bounds in double (exact for float), per node.
 struct AuditView {
   Topology topology;               ///< a copy, at the strategy's present version
@@ -152,7 +132,9 @@ class Strategy {
     unsupported("flight-plan changes");
   }
 
-  /// Vertices and primitives were inserted or deleted at t; ids are stable.
+  /// Vertices and primitives were inserted or deleted at t; ids are stable, and the scene and motion views
+  /// show the new geometry (`body_changes` says what that means for each body). The strategy has been
+  /// advanced to t before; afterwards everything is valid at t. A later `reset` keeps the present geometry.
   virtual void geometry_changed(double /*t*/, const GeometryChange<S>& /*change*/) {
     unsupported("geometry changes");
   }

@@ -16,8 +16,11 @@ bool well_formed(const Scene<S>& scene, const PrimitivePair& pair) {
   const std::uint32_t bodies = std::uint32_t(scene.bodies.size());
   if (pair.body_a >= bodies || pair.body_b >= bodies || pair.body_a > pair.body_b) return false;
   if (pair.body_a == pair.body_b && pair.primitive_a >= pair.primitive_b) return false;
-  return pair.primitive_a < scene.bodies[pair.body_a].primitives.count() &&
-         pair.primitive_b < scene.bodies[pair.body_b].primitives.count();
+  const auto known = [&](std::uint32_t body, std::uint32_t primitive) {
+    const Primitives& primitives = scene.bodies[body].primitives;
+    return primitive < primitives.count() && primitives.alive(primitive);
+  };
+  return known(pair.body_a, pair.primitive_a) && known(pair.body_b, pair.primitive_b);
 }
 
 /// Sorts, counts and removes repetitions.
@@ -85,6 +88,9 @@ class FrameChecker {
     }
   }
 
+  /// What was sound need not be any more.
+  void geometry_changed() { std::fill(sound_.begin(), sound_.end(), Topology{}); }
+
  private:
   void violate(const std::string& what) {
     if (result_.first_violation.empty())
@@ -105,26 +111,37 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
   PairBuffer pairs;
   PhaseTimes ignored;
   ScriptCursor<S> cursor(script);
-  const bool known_truth = oracle.script() == (script ? hash(*script) : 0);
+  // The oracle knows one truth for each time, of the scene that it was made for.
+  const bool known_truth =
+      oracle.script() == (script ? hash(*script) : 0) && !(script && script->changes_geometry());
+  const auto query = [&](bool compared) {
+    const double t = session.playback().time();
+    pairs.clear();
+    session.strategy().candidates_at(t, pairs, Budget{});
+    if (!compared) return;
+    const PairBuffer candidates = pairs;
+    session.strategy().confirm(t, pairs);
+    // Only after the answer may positions be completed for the oracle and the audit.
+    session.playback().evaluate_all();
+    checker.check_pairs(
+        candidates, pairs,
+        known_truth ? oracle.pairs(session.playback()) : sweep_pairs(session.scene(), session.playback()));
+    checker.check_bounds();
+  };
   for (std::size_t f = 0; f < frames.size(); ++f) {
     if (f == 0)
       session.reset(frames[0]);
     else
       session.advance(frames[f], ignored);
     const bool compared = f % options.every_nth_frame == 0 || f + 1 == frames.size();
-    pairs.clear();
-    session.strategy().candidates_at(frames[f], pairs, Budget{});
-    if (compared) {
-      const PairBuffer candidates = pairs;
-      session.strategy().confirm(frames[f], pairs);
-      // Only after the answer may positions be completed for the oracle and the audit.
-      session.playback().evaluate_all();
-      checker.check_pairs(
-          candidates, pairs,
-          known_truth ? oracle.pairs(session.playback()) : sweep_pairs(session.scene(), session.playback()));
-      checker.check_bounds();
-    }
-    if (const auto due = cursor.at(frames[f]); !due.empty()) session.change_plans(due, ignored);
+    query(compared);
+    const auto* step = cursor.at(frames[f]);
+    if (step == nullptr) continue;
+    if (!step->changes.empty()) session.change_plans(step->changes, ignored);
+    if (step->geometry.empty()) continue;
+    session.change_geometry(step->geometry, ignored);
+    checker.geometry_changed();
+    query(compared);  // what is valid afterwards is valid at once
   }
   return result;
 }

@@ -164,7 +164,8 @@ template <class S>
 std::string unsuitable(const Info& info, const Scene<S>& scene, const PlanScript<S>& script) {
   if (!(sizeof(S) == 4 ? info.has_float : info.has_double))
     return std::string("has no ") + (sizeof(S) == 4 ? "float" : "double") + " version";
-  if (!script.empty() && !info.can.plan_changes) return "cannot take changes of plans";
+  if (script.changes_plans() && !info.can.plan_changes) return "cannot take changes of plans";
+  if (script.changes_geometry() && !info.can.geometry_changes) return "cannot take changes of geometry";
   if (info.max_primitive_pairs == 0) return {};
   for (const BodyPair& pair : scene.pairs) {
     const std::uint64_t pairs = std::uint64_t(scene.bodies[pair.first].primitives.count()) *

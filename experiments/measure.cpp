@@ -32,13 +32,13 @@ ClipTimes play_clip(Session<S>& session, std::span<const double> frames, const P
     // same, since lazy strategies work there.
     PhaseTimes ignored;
     session.query(pairs, ignored);
-    if (const auto due = cursor.at(frames[0]); !due.empty()) session.change_plans(due, ignored);
+    session.follow(cursor.at(frames[0]), ignored);
   }
   for (std::size_t f = frames.size() > 1 ? 1 : 0; f < frames.size(); ++f) {
     PhaseTimes frame;
     session.advance(frames[f], frame);
     session.query(pairs, frame);
-    if (const auto due = cursor.at(frames[f]); !due.empty()) session.change_plans(due, frame);
+    session.follow(cursor.at(frames[f]), frame);
     times.frames.push_back(frame);
   }
   return times;
@@ -54,7 +54,7 @@ void warm_up(Session<S>& session, std::span<const double> frames, const PlanScri
   for (std::size_t f = 0; f < frames.size() && (f == 0 || seconds_since(begin) < warm_up_seconds); ++f) {
     if (f > 0) session.advance(frames[f], ignored);
     session.query(pairs, ignored);
-    if (const auto due = cursor.at(frames[f]); !due.empty()) session.change_plans(due, ignored);
+    session.follow(cursor.at(frames[f]), ignored);
   }
 }
 

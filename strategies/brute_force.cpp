@@ -48,6 +48,8 @@ class BruteForce final : public Strategy<S> {
 
   void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}
 
+  void geometry_changed(double /*t*/, const GeometryChange<S>& /*change*/) override { update(); }
+
   std::size_t bytes() const override {
     std::size_t total = 0;
     for (const auto& boxes : boxes_) total += boxes.size() * sizeof(Box<S>);
@@ -61,8 +63,11 @@ class BruteForce final : public Strategy<S> {
   void update() {
     for (std::uint32_t body = 0; body < boxes_.size(); ++body) {
       const Primitives& primitives = this->scene_.primitives(body);
+      boxes_[body].resize(primitives.count());
+      // Removed primitives have the empty box, which overlaps nothing.
       for (std::uint32_t p = 0; p < primitives.count(); ++p)
-        boxes_[body][p] = primitive_box(primitives[p], this->sampled_.positions(body));
+        boxes_[body][p] =
+            primitives.alive(p) ? primitive_box(primitives[p], this->sampled_.positions(body)) : Box<S>{};
       count_.add(Counter::values_written, std::uint64_t(6) * primitives.count());
       count_.add(Counter::vertex_reads, primitives.vertices.size());
     }
@@ -83,7 +88,7 @@ KBVH_STRATEGY(brute_force) {
       .family = "oracle",
       .citation = "all pairs",
       .tightness = Tightness::none,
-      .can = {.plan_changes = true, .time_budget = true},
+      .can = {.plan_changes = true, .geometry_changes = true, .time_budget = true},
       .topology = {.own = true},
       .max_primitive_pairs = 100'000'000,
   })};

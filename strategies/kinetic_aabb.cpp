@@ -75,11 +75,21 @@ class KineticAabb final : public Strategy<S> {
     new_frame();  // realisers may differ now
   }
 
+  void geometry_changed(double t, const GeometryChange<S>& change) override {
+    const std::vector<BodyChange> changes = body_changes(this->scene_, change);
+    on_forest([&](auto& forest) {
+      forest.geometry_changed(t, this->scene_, this->sampled_, changes);
+      for (const BodyChange& own : changes) caches_[own.body].resize(forest.tree(own.body).topology().size());
+    });
+    new_frame();
+  }
+
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     return on_forest([&](auto& forest) {
       const auto& tree = forest.tree(body);
-      AuditView view{tree.topology(), {}, {}};
-      for (std::uint32_t node = 0; node < tree.topology().size(); ++node) {
+      std::vector<std::uint32_t> order;
+      AuditView view{tree.compacted_topology(order), {}, {}};
+      for (const std::uint32_t node : order) {
         const Box<S> box = caches_[body].current(node)
                                ? caches_[body].box(node)
                                : box_of_realisers(tree.realisers(node), this->sampled_, body);
@@ -136,7 +146,11 @@ KBVH_STRATEGY(kinetic_aabb) {
       .family = "kinetic",
       .citation = "Zachmann & Weller 2006, s.4",
       .positions = PositionUse::fetched,
-      .can = {.event_driven = true, .continuous = true, .plan_changes = true, .time_budget = true},
+      .can = {.event_driven = true,
+              .continuous = true,
+              .plan_changes = true,
+              .geometry_changes = true,
+              .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"queue",
                       "avl",

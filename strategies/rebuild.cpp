@@ -23,12 +23,18 @@ class Rebuild final : public StoredHierarchyStrategy<S, Count> {
     }
   }
 
+  /// A body at rest is built anew, too.
+  void geometry_changed(double /*t*/, const GeometryChange<S>& change) override {
+    this->plans_changed_ = true;
+    for (const BodyChange& own : body_changes(this->scene_, change)) update(own.body);
+  }
+
  private:
   void update(std::uint32_t body) override {
     const Primitives& primitives = this->scene_.primitives(body);
-    const auto boxes = primitive_boxes(primitives, this->sampled_.positions(body));
     auto& hierarchy = this->hierarchies_[body];
-    hierarchy.assign(build_topology<S>(boxes, config_), primitives, hierarchy.kernels());
+    hierarchy.assign(build_topology(primitives, this->sampled_.positions(body), config_), primitives,
+                     hierarchy.kernels());
     this->refit(body);
     this->count_.add(Counter::nodes_visited, hierarchy.topology().size());
     this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology().size());
@@ -48,7 +54,7 @@ KBVH_STRATEGY(rebuild) {
       .title = "rebuild",
       .family = "rebuild",
       .citation = "van den Bergen 1997 (as the alternative to refitting)",
-      .can = {.restructures = true, .plan_changes = true, .time_budget = true},
+      .can = {.restructures = true, .plan_changes = true, .geometry_changes = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"method", "median", {"median", "sah", "morton"}, "how the new topology is built"}},
   })};

@@ -21,12 +21,20 @@ class TopDown final : public StoredHierarchyStrategy<S, Count> {
       ranges_.push_back(primitive_ranges(this->hierarchies_[body].topology()));
   }
 
+  void geometry_changed(double /*t*/, const GeometryChange<S>& change) override {
+    this->edit_geometry(change);
+  }
+
  private:
   /// Entries of the topology's primitive list below each node: contiguous, since leaves are laid out left to
   /// right.
   struct Range {
     std::uint32_t begin, end;
   };
+
+  void topology_changed(std::uint32_t body) override {
+    ranges_[body] = primitive_ranges(this->hierarchies_[body].topology());
+  }
 
   void update(std::uint32_t body) override {
     auto& hierarchy = this->hierarchies_[body];
@@ -73,7 +81,7 @@ KBVH_STRATEGY(top_down) {
       .title = "top-down refit",
       .family = "refit",
       .citation = "van den Bergen 1998; Larsson & Akenine-Möller 2001",
-      .can = {.plan_changes = true, .time_budget = true},
+      .can = {.plan_changes = true, .geometry_changes = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
   })};
 }

@@ -52,7 +52,7 @@ Audit audit(const AuditView& view, const Primitives& primitives, const S* positi
   Audit result;
   result.nodes = view.topology.size();
   if (sound == nullptr || !(view.topology == *sound))
-    result.topology_error = check_topology(view.topology, primitives.count());
+    result.topology_error = check_topology(view.topology, primitives);
   if (!result.topology_error.empty()) return result;
   if (view.boxes.size() != view.topology.size()) {
     result.topology_error =

@@ -29,7 +29,8 @@ template <class S>
 std::vector<Box<S>> primitive_boxes(const Primitives& primitives, const S* positions) {
   std::vector<Box<S>> boxes(primitives.count());
   for (std::uint32_t p = 0; p < primitives.count(); ++p)
-    for (std::uint32_t v : primitives[p]) boxes[p].extend(positions + std::size_t(3) * v);
+    if (primitives.alive(p))
+      for (std::uint32_t v : primitives[p]) boxes[p].extend(positions + std::size_t(3) * v);
   return boxes;
 }
 
@@ -381,9 +382,26 @@ Topology build_topology(std::span<const Box<S>> boxes, const BuilderConfig& conf
   return topology;
 }
 
-#define KBVH_INSTANTIATE(S)                                                  \
-  template std::vector<Box<S>> primitive_boxes(const Primitives&, const S*); \
-  template Topology build_topology(std::span<const Box<S>>, const BuilderConfig&);
+template <class S>
+Topology build_topology(const Primitives& primitives, const S* positions, const BuilderConfig& config) {
+  auto boxes = primitive_boxes(primitives, positions);
+  if (primitives.removed_count == 0) return build_topology<S>(boxes, config);
+  std::vector<std::uint32_t> living;
+  for (std::uint32_t p = 0; p < primitives.count(); ++p)
+    if (primitives.alive(p)) {
+      boxes[living.size()] = boxes[p];
+      living.push_back(p);
+    }
+  boxes.resize(living.size());
+  Topology topology = build_topology<S>(boxes, config);
+  for (std::uint32_t& p : topology.primitives) p = living[p];
+  return topology;
+}
+
+#define KBVH_INSTANTIATE(S)                                                        \
+  template std::vector<Box<S>> primitive_boxes(const Primitives&, const S*);       \
+  template Topology build_topology(std::span<const Box<S>>, const BuilderConfig&); \
+  template Topology build_topology(const Primitives&, const S*, const BuilderConfig&);
 KBVH_INSTANTIATE(float)
 KBVH_INSTANTIATE(double)
 #undef KBVH_INSTANTIATE

@@ -25,7 +25,7 @@ struct BuilderConfig {
   double sah_traversal_cost = 1.0;  ///< of one node, in units of one primitive test
 };
 
-/// Boxes of all primitives: O(primitives).
+/// Boxes of all primitives; empty for removed ones. O(primitives).
 template <class S>
 std::vector<Box<S>> primitive_boxes(const Primitives& primitives, const S* positions);
 
@@ -34,5 +34,9 @@ std::vector<Box<S>> primitive_boxes(const Primitives& primitives, const S* posit
 /// Throws std::invalid_argument on a width or leaf size that is not admissible.
 template <class S>
 Topology build_topology(std::span<const Box<S>> boxes, const BuilderConfig& config);
+
+/// Builds a topology over the living primitives of one body from positions [vertex][3].
+template <class S>
+Topology build_topology(const Primitives& primitives, const S* positions, const BuilderConfig& config);
 
 }  // namespace kbvh

@@ -34,7 +34,8 @@ std::vector<PrimitivePair> brute_force_pairs(const Scene<S>& scene, Playback<S>&
     const Body<S>&a = scene.bodies[pair.first], &b = scene.bodies[pair.second];
     for (std::uint32_t i = 0; i < a.primitives.count(); ++i)
       for (std::uint32_t j = 0; j < b.primitives.count(); ++j)
-        if (truly_meet(a, i, playback.positions(pair.first), b, j, playback.positions(pair.second)))
+        if (a.primitives.alive(i) && b.primitives.alive(j) &&
+            truly_meet(a, i, playback.positions(pair.first), b, j, playback.positions(pair.second)))
           result.push_back({pair.first, i, pair.second, j});
   }
   std::sort(result.begin(), result.end());

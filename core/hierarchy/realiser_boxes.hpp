@@ -38,6 +38,11 @@ class BoxCache {
     boxes_[node] = box;
     stamps_[node] = frame_;
   }
+  /// For a hierarchy that has more nodes now; boxes made before stay.
+  void resize(std::uint32_t nodes) {
+    boxes_.resize(nodes);
+    stamps_.resize(nodes, 0);
+  }
   std::size_t bytes() const { return boxes_.size() * (sizeof(Box<S>) + sizeof(std::uint32_t)); }
 
  private:

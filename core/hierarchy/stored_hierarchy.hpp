@@ -1,4 +1,5 @@
 #pragma once
+#include "core/hierarchy/topology_edit.hpp"
 #include "core/hierarchy/wide_hierarchy.hpp"
 #include "core/strategy.hpp"
 
@@ -79,6 +80,24 @@ class StoredHierarchyStrategy : public Strategy<S> {
  protected:
   /// Brings one moving body's bounds to the current time.
   virtual void update(std::uint32_t body) = 0;
+  /// Edits the topologies locally and lays the hierarchies out anew: O(nodes) for each body that changes.
+  /// What a strategy that declares geometry changes does when they come, unless it builds anew.
+  void edit_geometry(const GeometryChange<S>& change) {
+    plans_changed_ = true;  // new vertices have plans of their own
+    for (const BodyChange& own : body_changes(this->scene_, change)) {
+      WideHierarchy<S>& hierarchy = hierarchies_[own.body];
+      const Primitives& primitives = this->scene_.primitives(own.body);
+      const S* positions = this->sampled_.positions(own.body);
+      std::vector<Box<S>> boxes(hierarchy.topology().size());
+      for (std::uint32_t node = 0; node < boxes.size(); ++node) boxes[node] = hierarchy.box(node);
+      hierarchy.assign(edited_topology(hierarchy.topology(), std::move(boxes), own, primitives, positions),
+                       primitives, hierarchy.kernels());
+      topology_changed(own.body);
+      update(own.body);
+    }
+  }
+  /// Called when a body's hierarchy has another topology than before, for what is kept beside it.
+  virtual void topology_changed(std::uint32_t /*body*/) {}
   void refit(std::uint32_t body) { hierarchies_[body].refit(this->sampled_.positions(body)); }
   Counters counted() const override { return count_.table; }
 

@@ -24,19 +24,20 @@ LeafVertices unique_leaf_vertices(const Topology& topology, const Primitives& pr
   return result;
 }
 
-std::string check_topology(const Topology& topology, std::uint32_t primitive_count) {
+namespace {
+/// `ids`: how many primitive ids there are; `count`: how many of them are `alive`.
+template <class Alive>
+std::string check(const Topology& topology, std::uint32_t ids, std::uint32_t count, const Alive& alive) {
   const std::size_t n = topology.nodes.size();
-  if (n == 0)
-    return primitive_count == 0 ? "" : "no nodes for " + std::to_string(primitive_count) + " primitives";
+  if (n == 0) return count == 0 ? "" : "no nodes for " + std::to_string(count) + " primitives";
   if (topology.parents.size() != n || topology.depths.size() != n)
     return "parents or depths have a wrong size";
-  if (topology.primitives.size() != primitive_count)
-    return std::to_string(topology.primitives.size()) + " leaf entries for " +
-           std::to_string(primitive_count) + " primitives";
+  if (topology.primitives.size() != count)
+    return std::to_string(topology.primitives.size()) + " leaf entries for " + std::to_string(count) +
+           " primitives";
   if (topology.width != 2 && topology.width != 4 && topology.width != 8)
     return "width " + std::to_string(topology.width);
-  std::vector<std::uint8_t> seen_node(n, 0), seen_entry(primitive_count, 0),
-      seen_primitive(primitive_count, 0);
+  std::vector<std::uint8_t> seen_node(n, 0), seen_entry(count, 0), seen_primitive(ids, 0);
   if (topology.parents[0] != 0 || topology.depths[0] != 0) return "the root is not its own parent at depth 0";
   seen_node[0] = 1;
   std::uint32_t leaf_depth = 0;
@@ -53,10 +54,9 @@ std::string check_topology(const Topology& topology, std::uint32_t primitive_cou
       first_leaf = false;
       perfect = perfect && topology.depths[i] == leaf_depth;
       for (std::uint32_t k = node.first(); k < node.first() + node.count(); ++k) {
-        if (k >= primitive_count || seen_entry[k]++)
-          return fault("leaf entry " + std::to_string(k) + " is shared");
+        if (k >= count || seen_entry[k]++) return fault("leaf entry " + std::to_string(k) + " is shared");
         const std::uint32_t primitive = topology.primitives[k];
-        if (primitive >= primitive_count || seen_primitive[primitive]++)
+        if (primitive >= ids || !alive(primitive) || seen_primitive[primitive]++)
           return fault("primitive " + std::to_string(primitive) + " is in two leaves or does not exist");
       }
     } else {
@@ -75,6 +75,16 @@ std::string check_topology(const Topology& topology, std::uint32_t primitive_cou
   }
   if (topology.perfect && !perfect) return "declared perfect, but is not";
   return "";
+}
+}  // namespace
+
+std::string check_topology(const Topology& topology, std::uint32_t primitive_count) {
+  return check(topology, primitive_count, primitive_count, [](std::uint32_t) { return true; });
+}
+
+std::string check_topology(const Topology& topology, const Primitives& primitives) {
+  return check(topology, primitives.count(), primitives.live_count(),
+               [&](std::uint32_t p) { return primitives.alive(p); });
 }
 
 }  // namespace kbvh

@@ -66,5 +66,7 @@ LeafVertices unique_leaf_vertices(const Topology& topology, const Primitives& pr
 /// parent, every primitive lies in exactly one leaf, counts respect width and leaf size, parents precede
 /// children, `parents`, `depths` and `perfect` are right. Returns an empty text, or the first violation.
 std::string check_topology(const Topology& topology, std::uint32_t primitive_count);
+/// The same where exactly the living primitives must be in leaves.
+std::string check_topology(const Topology& topology, const Primitives& primitives);
 
 }  // namespace kbvh

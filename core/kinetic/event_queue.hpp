@@ -1,7 +1,6 @@
 #pragma once
 #include <boost/intrusive/avl_set.hpp>
 #include <cstdint>
-#include <deque>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -11,11 +10,12 @@
 
 namespace kbvh {
 
-/// An event queue holds at most one event per slot and can be shared by several structures:
-///   grow(slots)       makes room for slots below this number; events stay
+/// An event queue holds at most one event per certificate slot and can be shared by several structures:
 ///   schedule(event)   inserts, or replaces the event of the same slot
 ///   cancel(slot)      removes the slot's event if there is one; says whether there was
 ///   top(), pop(), empty(), size(), clear(), bytes()
+///   grow(slots)       makes room for slots below this number, amortised O(1) each; events stay scheduled
+///   slots()           how many there is room for
 /// `steps()` counts comparisons. Events and their order come from a clock: Clock::Event has a `slot`, and
 /// clock.earlier(a, b) orders by exact time first (EventClock, OverlapClock).
 
@@ -43,9 +43,6 @@ class AvlEventQueue {
       : steps_(std::make_unique<std::uint64_t>(0)), nodes_(slots), tree_(Less{&clock, steps_.get()}) {}
   ~AvlEventQueue() { tree_.clear(); }
 
-  void grow(std::uint32_t slots) {
-    if (slots > nodes_.size()) nodes_.resize(slots);
-  }
   void schedule(const Event& event) {
     Node& node = nodes_[event.slot];
     if (node.scheduled) tree_.erase(tree_.iterator_to(node));
@@ -69,12 +66,30 @@ class AvlEventQueue {
     tree_.clear();
     for (Node& node : nodes_) node.scheduled = false;
   }
+  std::uint32_t slots() const { return std::uint32_t(nodes_.size()); }
+  void grow(std::uint32_t slots) {
+    if (slots <= nodes_.capacity()) {
+      if (slots > nodes_.size()) nodes_.resize(slots);
+      return;
+    }
+    // The tree is threaded through the nodes: each takes the place of the one it was, without comparisons.
+    std::vector<Node> larger;
+    larger.reserve(std::size_t(2) * slots);
+    larger.resize(slots);
+    for (std::size_t slot = 0; slot < nodes_.size(); ++slot) {
+      if (!nodes_[slot].scheduled) continue;
+      larger[slot].event = nodes_[slot].event;
+      larger[slot].scheduled = true;
+      tree_.replace_node(tree_.iterator_to(nodes_[slot]), larger[slot]);
+    }
+    nodes_.swap(larger);
+  }
   std::uint64_t steps() const { return *steps_; }
   std::size_t bytes() const { return nodes_.size() * sizeof(Node); }
 
  private:
   std::unique_ptr<std::uint64_t> steps_;
-  std::deque<Node> nodes_;  ///< by slot; the tree points to them, so they stay where they are
+  std::vector<Node> nodes_;
   Tree tree_;
 };
 
@@ -90,12 +105,6 @@ class BinaryHeapEventQueue {
     heap_.reserve(slots);
   }
 
-  void grow(std::uint32_t slots) {
-    if (slots <= events_.size()) return;
-    events_.resize(slots);
-    place_.resize(slots, none);
-    heap_.reserve(events_.capacity());
-  }
   void schedule(const Event& event) {
     const std::uint32_t slot = event.slot;
     events_[slot] = event;
@@ -128,6 +137,12 @@ class BinaryHeapEventQueue {
   void clear() {
     heap_.clear();
     std::fill(place_.begin(), place_.end(), none);
+  }
+  std::uint32_t slots() const { return std::uint32_t(events_.size()); }
+  void grow(std::uint32_t slots) {
+    if (slots <= events_.size()) return;
+    events_.resize(slots);
+    place_.resize(slots, none);
   }
   std::uint64_t steps() const { return steps_; }
   std::size_t bytes() const { return events_.size() * (sizeof(Event) + 2 * sizeof(std::uint32_t)); }

@@ -49,6 +49,19 @@ class KineticForest {
     trees_[event.body].handle(event);
   }
 
+  /// Follows a change of geometry at t that scene and motion show already. O(depth) certificates for each
+  /// primitive, and O(nodes) the first time.
+  void geometry_changed(double t, const SceneView<S>& scene, const SampledMotion<S>& motion,
+                        std::span<const BodyChange> changes) {
+    for (const BodyChange& change : changes) {
+      const Primitives& primitives = scene.primitives(change.body);
+      Tree& tree = trees_[change.body];
+      for (const std::uint32_t p : change.removed_primitives) tree.remove(t, p, primitives);
+      for (std::uint32_t p = change.first_primitive; p < primitives.count(); ++p)
+        tree.insert(t, p, primitives, motion);
+    }
+  }
+
   Tree& tree(std::uint32_t body) { return trees_[body]; }
   const Tree& tree(std::uint32_t body) const { return trees_[body]; }
   EventClock<S>& clock() { return clock_; }

@@ -21,7 +21,7 @@ void check_value(S value, const char* what, std::size_t keyframe, std::size_t ve
 
 template <class S>
 FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> times, std::vector<S> positions)
-    : vertex_count_(vertex_count) {
+    : vertex_count_(vertex_count), keyframed_count_(vertex_count) {
   if (times.empty()) throw std::invalid_argument("flight plans need at least one keyframe");
   for (std::size_t k = 0; k < times.size(); ++k) {
     if (!std::isfinite(times[k]))
@@ -52,7 +52,7 @@ std::size_t FlightPlans<S>::segment_at(double t) const {
 template <class S>
 void FlightPlans<S>::evaluate(double t, S* out, RoundingStats* stats) const {
   const auto& times = keyframes_->times;
-  const std::size_t k = segment_at(t), scalars = std::size_t(3) * vertex_count_;
+  const std::size_t k = segment_at(t), scalars = std::size_t(3) * keyframed_count_;
   if (t <= times[k] || k + 1 == times.size()) {
     std::copy_n(keyframe(k), scalars, out);
   } else {
@@ -116,8 +116,8 @@ void FlightPlans<S>::leave_rays(const OwnPlan& plan) {
 }
 
 template <class S>
-void FlightPlans<S>::evaluate(double t, std::span<const std::uint32_t> vertices, S* out,
-                              RoundingStats* stats) const {
+void FlightPlans<S>::evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out,
+                                        RoundingStats* stats) const {
   const auto& times = keyframes_->times;
   const std::size_t k = segment_at(t);
   if (t <= times[k] || k + 1 == times.size()) {
@@ -126,6 +126,22 @@ void FlightPlans<S>::evaluate(double t, std::span<const std::uint32_t> vertices,
   } else {
     round_chord_vertices(keyframe(k), keyframe(k + 1), vertices.data(), vertices.size(), times[k],
                          times[k + 1], t, out, stats);
+  }
+}
+
+template <class S>
+void FlightPlans<S>::evaluate(double t, std::span<const std::uint32_t> vertices, S* out,
+                              RoundingStats* stats) const {
+  if (vertex_count_ == keyframed_count_) {
+    evaluate_keyframed(t, vertices, out, stats);
+  } else {
+    // Vertices added at run time have no keyframes: only the runs between them are looked up there.
+    const auto added = [this](std::uint32_t v) { return v >= keyframed_count_; };
+    for (auto begin = vertices.begin(); begin != vertices.end();) {
+      const auto end = std::find_if(begin, vertices.end(), added);
+      evaluate_keyframed(t, {begin, end}, out, stats);
+      begin = std::find_if_not(end, vertices.end(), added);
+    }
   }
   if (own_.empty()) return;
   for (std::uint32_t v : vertices)
@@ -172,15 +188,15 @@ void FlightPlans<S>::check_vertex(std::uint32_t vertex) const {
 }
 
 template <class S>
-void FlightPlans<S>::check_change(double t, const PlanChange<S>& change, const S* position) const {
-  check_vertex(change.vertex);
+void FlightPlans<S>::check_plan(double t, const PlanChange<S>& change, std::uint32_t vertex,
+                                const S* position) {
   if (!std::isfinite(t)) throw std::invalid_argument("plan change at t = " + std::to_string(t));
   if (change.positions.size() != 3 * change.times.size())
     throw std::invalid_argument("plan change with " + std::to_string(change.times.size()) + " knots and " +
                                 std::to_string(change.positions.size()) + " coordinates");
   for (int axis = 0; axis < 3; ++axis) {
-    check_value(position[axis], "coordinate", 0, change.vertex, axis);
-    check_value(change.velocity[axis], "velocity", change.times.size(), change.vertex, axis);
+    check_value(position[axis], "coordinate", 0, vertex, axis);
+    check_value(change.velocity[axis], "velocity", change.times.size(), vertex, axis);
   }
   double before = t;
   for (std::size_t k = 0; k < change.times.size(); ++k) {
@@ -189,20 +205,34 @@ void FlightPlans<S>::check_change(double t, const PlanChange<S>& change, const S
                                   " has time " + std::to_string(change.times[k]) + ", which does not follow");
     before = change.times[k];
     for (int axis = 0; axis < 3; ++axis)
-      check_value(change.positions[3 * k + std::size_t(axis)], "coordinate", k + 1, change.vertex, axis);
+      check_value(change.positions[3 * k + std::size_t(axis)], "coordinate", k + 1, vertex, axis);
   }
+}
+
+template <class S>
+void FlightPlans<S>::check_change(double t, const PlanChange<S>& change, const S* position) const {
+  check_vertex(change.vertex);
+  check_plan(t, change, change.vertex, position);
+}
+
+template <class S>
+auto FlightPlans<S>::own_plan(double t, const PlanChange<S>& change, std::uint32_t vertex, const S* position)
+    -> OwnPlan {
+  const auto without_sign = [](S value) { return value == S(0) ? S(0) : value; };
+  OwnPlan plan;
+  plan.vertex = vertex;
+  plan.times = {t};
+  plan.times.insert(plan.times.end(), change.times.begin(), change.times.end());
+  for (int axis = 0; axis < 3; ++axis) plan.positions.push_back(without_sign(position[axis]));
+  for (const S value : change.positions) plan.positions.push_back(without_sign(value));
+  std::copy_n(change.velocity, 3, plan.velocity);
+  return plan;
 }
 
 template <class S>
 void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* position) {
   check_change(t, change, position);
-  OwnPlan plan;
-  plan.vertex = change.vertex;
-  plan.times = {t};
-  plan.positions.assign(position, position + 3);
-  plan.times.insert(plan.times.end(), change.times.begin(), change.times.end());
-  for (const S value : change.positions) plan.positions.push_back(value == S(0) ? S(0) : value);
-  std::copy_n(change.velocity, 3, plan.velocity);
+  OwnPlan plan = own_plan(t, change, change.vertex, position);
   own_speed_until_ = own_speed_from_;  // to be computed anew
   if (own_of_vertex_.empty()) own_of_vertex_.assign(vertex_count_, none);
   std::uint32_t& slot = own_of_vertex_[change.vertex];
@@ -214,6 +244,23 @@ void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* posi
     own_[slot] = std::move(plan);
   }
   join_rays(own_[slot]);
+}
+
+template <class S>
+void FlightPlans<S>::check_new_vertex(double t, const PlanChange<S>& plan, const S* position,
+                                      std::uint32_t vertex) {
+  check_plan(t, plan, vertex, position);
+}
+
+template <class S>
+void FlightPlans<S>::add_vertex(double t, const PlanChange<S>& plan, const S* position) {
+  check_plan(t, plan, vertex_count_, position);
+  own_speed_until_ = own_speed_from_;  // to be computed anew
+  own_of_vertex_.resize(vertex_count_, none);
+  own_of_vertex_.push_back(std::uint32_t(own_.size()));
+  own_.push_back(own_plan(t, plan, vertex_count_, position));
+  ++vertex_count_;
+  join_rays(own_.back());
 }
 
 namespace {
@@ -230,7 +277,7 @@ double FlightPlans<S>::longest_step(std::size_t segment) const {
   if (known >= 0) return known;
   const S *from = keyframe(segment), *to = keyframe(segment + 1);
   double square = 0, largest = 0;
-  for (std::size_t i = 0; i < std::size_t(3) * vertex_count_; i += 3) {
+  for (std::size_t i = 0; i < std::size_t(3) * keyframed_count_; i += 3) {
     double sum = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double step = double(to[i + axis]) - double(from[i + axis]);

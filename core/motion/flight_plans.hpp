@@ -34,11 +34,14 @@ class FlightPlans {
   /// range.
   FlightPlans(std::uint32_t vertex_count, std::vector<double> times, std::vector<S> positions);
 
+  /// All vertices, those added at run time included.
   std::uint32_t vertex_count() const { return vertex_count_; }
+  /// Vertices that have keyframes: the first ones. The others have plans of their own.
+  std::uint32_t keyframed_count() const { return keyframed_count_; }
   std::size_t keyframe_count() const { return keyframes_->times.size(); }
   std::span<const double> keyframe_times() const { return keyframes_->times; }
-  /// Positions of keyframe k, [vertex][3]; own plans are not in them.
-  const S* keyframe(std::size_t k) const { return keyframes_->positions.data() + 3 * k * vertex_count_; }
+  /// Positions of keyframe k, [keyframed vertex][3]; own plans are not in them.
+  const S* keyframe(std::size_t k) const { return keyframes_->positions.data() + 3 * k * keyframed_count_; }
   bool moving() const { return keyframe_count() > 1 || !own_.empty(); }
   bool has_own_plans() const { return !own_.empty(); }
   bool has_own_plan(std::uint32_t vertex) const { return !own_.empty() && own_of_vertex_[vertex] != none; }
@@ -72,6 +75,13 @@ class FlightPlans {
   /// std::invalid_argument, with nothing changed: on values that are not finite or beyond the admissible
   /// range (the position, too: a vertex can have flown out of it), knots not after t, or an unknown vertex.
   void change(double t, const PlanChange<S>& change, const S* position);
+  /// Adds a vertex, with the next free id, that is at `position` (3 scalars) at t and follows the plan from
+  /// there (before t its first line means nothing, but is defined). `plan.body` and `plan.vertex` are
+  /// ignored. Throws std::invalid_argument like `change`, and on a position that is not admissible. Amortised
+  /// O(knots).
+  void add_vertex(double t, const PlanChange<S>& plan, const S* position);
+  /// Throws what `add_vertex` would throw for a vertex with that id, and does nothing else.
+  static void check_new_vertex(double t, const PlanChange<S>& plan, const S* position, std::uint32_t vertex);
 
   std::size_t bytes() const;
 
@@ -102,8 +112,12 @@ class FlightPlans {
   double longest_step(std::size_t segment) const;
   double own_speed(const OwnPlan& plan, double t) const;
   double own_speed_bound(double t) const;
+  static void check_plan(double t, const PlanChange<S>& change, std::uint32_t vertex, const S* position);
+  static OwnPlan own_plan(double t, const PlanChange<S>& change, std::uint32_t vertex, const S* position);
+  void evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out,
+                          RoundingStats* stats) const;
 
-  std::uint32_t vertex_count_ = 0;
+  std::uint32_t vertex_count_ = 0, keyframed_count_ = 0;
   std::shared_ptr<const Keyframes> keyframes_;
   std::vector<std::uint32_t> own_of_vertex_;
   std::vector<OwnPlan> own_;

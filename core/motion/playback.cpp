@@ -93,8 +93,23 @@ void Playback<S>::restore_plans() {
   for (auto& state : bodies_) {
     if (!state.plans.has_own_plans()) continue;
     state.plans = state.scene_plans;
+    state.positions.resize(std::size_t(3) * state.plans.vertex_count() + 1);
+    state.stamp.resize(state.plans.vertex_count());
     state.all_current = false;
   }
+}
+
+template <class S>
+void Playback<S>::add_vertex(std::uint32_t body, const PlanChange<S>& plan, const S* position) {
+  BodyState& state = bodies_[body];
+  state.plans.add_vertex(time_, plan, position);
+  // The last scalar is padding.
+  for (int axis = 0; axis < 3; ++axis) {
+    state.positions.back() = position[axis] == S(0) ? S(0) : position[axis];
+    state.positions.push_back(S(0));
+  }
+  state.stamp.push_back(epoch_);
+  if (stale_.capacity() < state.stamp.size()) stale_.reserve(2 * state.stamp.size());
 }
 
 template class Playback<float>;

@@ -10,7 +10,8 @@ namespace kbvh {
 /// Plays a scene's motion for one strategy: holds the current time, the current positions (truth B), and the
 /// plans with their run-time changes. The driver owns it; strategies see it through the view that their
 /// declared foresight allows (motion_view.hpp). Positions are evaluated all at once by the driver, or vertex
-/// by vertex on demand; each vertex at most once per frame. No allocation after construction.
+/// by vertex on demand; each vertex at most once per frame. No allocation after construction but for added
+/// vertices.
 template <class S>
 class Playback {
  public:
@@ -49,6 +50,10 @@ class Playback {
   /// Forgets every change: the plans are the scene's again, and positions are to be evaluated anew after the
   /// next `seek`.
   void restore_plans();
+
+  /// Adds a vertex to a body at the current time; see FlightPlans::add_vertex. Its position is current.
+  /// Amortised O(1); `positions` may move.
+  void add_vertex(std::uint32_t body, const PlanChange<S>& plan, const S* position);
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return bodies_[body].plans; }
   std::uint32_t body_count() const { return std::uint32_t(bodies_.size()); }

@@ -75,8 +75,7 @@ std::uint64_t most_events_of_a_node(const Forest& forest, std::uint32_t bodies) 
     const Tree& tree = forest.tree(body);
     for (std::uint32_t node = 0; node < tree.topology().size(); ++node) {
       std::uint64_t scheduled = 0;
-      for (Side side = 0; side < 6; ++side)
-        scheduled += forest.queue().scheduled(tree.first_slot() + 6 * node + side);
+      for (Side side = 0; side < 6; ++side) scheduled += forest.queue().scheduled(tree.slot(node, side));
       most = std::max(most, scheduled);
     }
   }

@@ -55,7 +55,7 @@ class Auditor {
     const auto& tree = forest.tree(event.body);
     const ExactMotion& motion = motions_[event.body];
     const When when = when_of(forest.clock().crossing(event), motion);
-    std::uint32_t node = (event.slot - tree.first_slot()) / 6;
+    std::uint32_t node = tree.node_of(event.slot);
     for (;;) {
       const bool passed = tree.realiser(node, event.side) == event.loser;
       run_->path_faults += exceeded(tree, motion, when, node, event.side, run_->path_bounds);

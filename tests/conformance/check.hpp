@@ -11,7 +11,9 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
                   const std::map<std::string, std::string>& params, const BuilderConfig& builder,
                   const VerifyOptions& options = {}) {
   if (entry.factory<S>() == nullptr) return "skipped: no such scalar";
-  if (!test.script.steps.empty() && !entry.info.can.plan_changes) return "skipped: plans cannot change";
+  if (test.script.changes_plans() && !entry.info.can.plan_changes) return "skipped: plans cannot change";
+  if (test.script.changes_geometry() && !entry.info.can.geometry_changes)
+    return "skipped: geometry cannot change";
   if (entry.info.max_primitive_pairs != 0)
     for (const BodyPair& pair : test.scene.pairs)
       if (std::uint64_t(test.scene.bodies[pair.first].primitives.count()) *

@@ -35,9 +35,15 @@ std::vector<std::string> strategy_ids() {
   return ids;
 }
 
+std::vector<std::string> all_scene_names() {
+  std::vector<std::string> names = synthetic_scene_names();
+  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
+  return names;
+}
+
 INSTANTIATE_TEST_SUITE_P(Registry, Conformance,
                          testing::Combine(testing::ValuesIn(strategy_ids()),
-                                          testing::ValuesIn(synthetic_scene_names())),
+                                          testing::ValuesIn(all_scene_names())),
                          [](const auto& test) {
                            return std::get<0>(test.param) + "_on_" + std::get<1>(test.param);
                          });
@@ -57,7 +63,7 @@ TEST_P(Configurations, AllConform) {
                                                                          ", width " + std::to_string(width) +
                                                                          ", leaf " + std::to_string(leaf));
   };
-  for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes"}) {
+  for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes", "geometry_changes"}) {
     const auto in_float = synthetic_scene<float>(scene_name, 7);
     const auto in_double = synthetic_scene<double>(scene_name, 7);
     sweep(scene_name, [&](const BuilderConfig& builder, const std::string& where) {
@@ -83,7 +89,7 @@ TEST_P(Kernels, Conform) {
   for (const StrategyEntry& entry : registry()) {
     if (entry.info.topology.own || entry.info.max_primitive_pairs != 0) continue;
     const std::string& id = entry.info.id;
-    for (const std::string& scene_name : synthetic_scene_names()) {
+    for (const std::string& scene_name : all_scene_names()) {
       const std::string where = id + " on " + scene_name + " with " + name(GetParam());
       const BuilderConfig builder = entry.info.topology.preferred;
       expect_conforms(check(entry, synthetic_scene<float>(scene_name, 10), 10, {}, builder),
@@ -287,6 +293,48 @@ INSTANTIATE_TEST_SUITE_P(Registry, Spans,
                          [](const auto& test) {
                            return std::get<0>(test.param) + "_on_" + std::get<1>(test.param);
                          });
+
+// Changes of geometry are made as a whole or refused as a whole, before the strategy hears of them.
+TEST_P(Configurations, ChangesOfGeometryAreRefusedAsAWhole) {
+  const StrategyEntry& entry = find_strategy(GetParam());
+  const auto run = [&](const auto& test) {
+    using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
+    if (entry.factory<S>() == nullptr) return;
+    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    PhaseTimes times;
+    session.reset(0);
+    session.advance(1, times);
+    GeometryChange<S> change;
+    change.removed_primitives = {{0, 5}};
+    if (!entry.info.can.geometry_changes) {
+      EXPECT_THROW(session.change_geometry(change, times), std::logic_error) << GetParam();
+      EXPECT_THROW(session.strategy().geometry_changed(1, change), std::logic_error) << GetParam();
+      return;
+    }
+    PairBuffer before, after;
+    session.query(before, times);
+    change.removed_vertices = {{1, 0}};
+    EXPECT_THROW(session.change_geometry(change, times), std::invalid_argument) << GetParam();
+    EXPECT_TRUE(session.scene().bodies[0].primitives.alive(5));
+    session.query(after, times);
+    EXPECT_EQ(before, after) << GetParam();
+    change.removed_vertices.clear();
+    change.primitives = {{0, {0, 1, 2}}};
+    session.change_geometry(change, times);
+    EXPECT_FALSE(session.scene().bodies[0].primitives.alive(5));
+    EXPECT_TRUE(test.scene.bodies[0].primitives.alive(5)) << "the caller's scene stays as it was";
+    // A reset starts over, with the geometry that there was.
+    session.reset(0);
+    session.advance(1, times);
+    session.query(after, times);
+    std::sort(before.begin(), before.end());
+    std::sort(after.begin(), after.end());
+    EXPECT_EQ(before, after) << GetParam();
+    EXPECT_TRUE(session.scene().bodies[0].primitives.alive(5));
+  };
+  run(synthetic_scene<float>("sheets"));
+  run(synthetic_scene<double>("sheets"));
+}
 
 }  // namespace
 }  // namespace kbvh::test

@@ -89,6 +89,23 @@ using TooLoose = FaultyRefit<S, C, Fault::too_loose>;
 template <class S, class C>
 using WrongOrder = FaultyRefit<S, C, Fault::wrong_order>;
 
+/// Pairs of leaves from boxes read off the realisers, without anything kept from frame to frame.
+template <class S, class Count, class Forest>
+QueryStatus implicit_candidates(const Forest& forest, const SceneView<S>& scene,
+                                const SampledMotion<S>& motion, std::vector<NodePair>& stack, Count& count,
+                                PairBuffer& out, const Budget& budget) {
+  for (const BodyPair& pair : scene.pairs()) {
+    const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
+    BoxCache<S> cache_a(a.topology().size()), cache_b(b.topology().size());
+    LeafPairs<S, Count> leaves(scene, motion, pair.first, a.topology(), pair.second, b.topology(), count,
+                               out);
+    RealiserBoxes<S> boxes_a(a.realisers(0), motion, pair.first, cache_a);
+    RealiserBoxes<S> boxes_b(b.realisers(0), motion, pair.second, cache_b);
+    traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack, count, budget, leaves);
+  }
+  return {};
+}
+
 /// A kinetic tree that loses one event: it leaves the queue and nobody handles it.
 template <class S, class Count>
 class LostEvent : public Strategy<S> {
@@ -105,16 +122,7 @@ class LostEvent : public Strategy<S> {
         forest_.handle_next();
   }
   QueryStatus candidates_at(double, PairBuffer& out, const Budget& budget) override {
-    for (const BodyPair& pair : this->scene_.pairs()) {
-      const auto &a = forest_.tree(pair.first), &b = forest_.tree(pair.second);
-      BoxCache<S> cache_a(a.topology().size()), cache_b(b.topology().size());
-      LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
-                                 b.topology(), count_, out);
-      RealiserBoxes<S> boxes_a(a.realisers(0), this->sampled_, pair.first, cache_a);
-      RealiserBoxes<S> boxes_b(b.realisers(0), this->sampled_, pair.second, cache_b);
-      traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack_, count_, budget, leaves);
-    }
-    return {};
+    return implicit_candidates<S, Count>(forest_, this->scene_, this->sampled_, stack_, count_, out, budget);
   }
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     AuditView view{forest_.tree(body).topology(), {}, {}};
@@ -249,6 +257,55 @@ template <class S, class C>
 using SoundLazy = FaultyLazy<S, C, LazyFault::none>;
 template <class S, class C>
 using ForgetfulLazy = FaultyLazy<S, C, LazyFault::half_bound>;
+/// Forgets certificates near the root while the switch is on: nobody watches them from then on.
+template <class S>
+class ForgetfulQueue : public AvlQueue<S> {
+ public:
+  using AvlQueue<S>::AvlQueue;
+  void schedule(const Event& event) {
+    if (!forgets || event.depth > 3) AvlQueue<S>::schedule(event);
+  }
+  bool forgets = false;
+};
+
+/// A kinetic tree that, when geometry changes, repairs leaves and what is near them, but not the certificates
+/// of the ancestors far above.
+template <class S, class Count, bool faulty>
+class LocalRepair : public Strategy<S> {
+ public:
+  static constexpr Foresight foresight = Foresight::whole_clip;
+  LocalRepair(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params&)
+      : Strategy<S>(scene, motion), motion_(motion), forest_(scene, motion, std::move(topologies), count_) {}
+  void reset(double t) override { forest_.reset(t); }
+  void advance(double t) override { forest_.advance(t); }
+  void geometry_changed(double t, const GeometryChange<S>& change) override {
+    forest_.queue().forgets = faulty;
+    forest_.geometry_changed(t, this->scene_, motion_, body_changes(this->scene_, change));
+    forest_.queue().forgets = false;
+  }
+  QueryStatus candidates_at(double, PairBuffer& out, const Budget& budget) override {
+    return implicit_candidates<S, Count>(forest_, this->scene_, this->sampled_, stack_, count_, out, budget);
+  }
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    std::vector<std::uint32_t> order;
+    AuditView view{forest_.tree(body).compacted_topology(order), {}, {}};
+    for (const std::uint32_t node : order)
+      view.boxes.push_back(
+          to_double(box_of_realisers(forest_.tree(body).realisers(node), this->sampled_, body)));
+    return view;
+  }
+  std::size_t bytes() const override { return forest_.bytes(); }
+
+ private:
+  ClipMotion<S> motion_;
+  Count count_;
+  KineticForest<S, ForgetfulQueue<S>, Count> forest_;
+  std::vector<NodePair> stack_;
+};
+template <class S, class C>
+using RepairsAll = LocalRepair<S, C, false>;
+template <class S, class C>
+using ForgetsAncestors = LocalRepair<S, C, true>;
 
 Info info(const char* id) {
   Info result;
@@ -324,6 +381,23 @@ TEST(Faults, BoxesNotMadeWhenAsked) {
 }
 TEST(Faults, LostEvent) {
   expect_caught(violation<LostEvent>("lost_event"), "protrudes");
+}
+
+template <template <class, class> class Strategy>
+std::string violation_with_changing_geometry(const char* id) {
+  Info described = info(id);
+  described.can.geometry_changes = true;
+  described.topology.preferred.leaf_size = 1;
+  const StrategyEntry entry = make_entry<Strategy>(described);
+  const BuilderConfig builder = entry.info.topology.preferred;
+  return check(entry, synthetic_scene<float>("geometry_changes_shared", 7), 7, {}, builder) + "|" +
+         check(entry, synthetic_scene<double>("geometry_changes_shared", 7), 7, {}, builder);
+}
+TEST(Faults, LocalRepairOfGeometryPasses) {
+  EXPECT_EQ(violation_with_changing_geometry<RepairsAll>("repairs_all"), "|");
+}
+TEST(Faults, AncestorsForgottenWhenGeometryChanges) {
+  expect_caught(violation_with_changing_geometry<ForgetsAncestors>("forgets_ancestors"), "protrudes");
 }
 
 }  // namespace

@@ -326,9 +326,9 @@ TEST(Script, TimesMustBeFrames) {
   PlanScript<float> script;
   script.steps = {{0.5, {flies<float>(0, 0, 1, 0, 0)}}, {1.5, {flies<float>(0, 0, 0, 0, 0)}}};
   ScriptCursor<float> cursor(&script);
-  EXPECT_TRUE(cursor.at(0).empty());
-  EXPECT_EQ(cursor.at(0.5).size(), 1u);
-  EXPECT_TRUE(cursor.at(1).empty());
+  EXPECT_EQ(cursor.at(0), nullptr);
+  EXPECT_EQ(cursor.at(0.5), &script.steps[0]);
+  EXPECT_EQ(cursor.at(1), nullptr);
   EXPECT_THROW(cursor.at(2), std::invalid_argument);
   EXPECT_NE(hash(script), 0u);
   EXPECT_EQ(hash(PlanScript<float>{}), 0u);

@@ -2,9 +2,11 @@
 
 #include <functional>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "core/geometry/predicates.hpp"
+#include "tests/support/geometry_scripts.hpp"
 
 namespace kbvh::test {
 
@@ -91,6 +93,7 @@ enum class Script : std::uint8_t {
 struct RawScene {
   std::vector<RawBody> bodies;
   Script script = Script::none;
+  std::optional<GeometryScriptStyle> geometry{};
 };
 
 /// The scalar's largest admissible coordinate or velocity, and the smallest above zero.
@@ -249,6 +252,21 @@ RawScene raw_scene(const std::string& name, const Range& range) {
     return {{soup(70, 32, 1, 0.3, 0), soup(60, 33, 1, 0.3, 0)}, Script::takes_off};
   if (name == "plans_move_the_obstacle")
     return {{soup(70, 34, 5, 0.3, 0.3), soup(60, 35, 1, 0.3, 0), soup(20, 36, 1, 0.3, 0)}, Script::random};
+  const auto with_geometry = [&range](const char* base, const GeometryScriptStyle& style) {
+    RawScene scene = raw_scene(base, range);
+    scene.geometry = style;
+    return scene;
+  };
+  if (name == "geometry_changes") return with_geometry("soups", {.seed = 31, .plans = true});
+  if (name == "geometry_changes_shared") return with_geometry("sheets", {.seed = 32});
+  if (name == "geometry_changes_ties")
+    return with_geometry("integer_ties", {.seed = 33, .integers = true, .plans = true});
+  if (name == "geometry_to_nothing")
+    return with_geometry("one_triangle_and_none", {.seed = 34, .to_nothing = true});
+  if (name == "geometry_changes_at_rest") return with_geometry("static_obstacle", {.seed = 35});
+  if (name == "geometry_changes_polygons") return with_geometry("polygons", {.seed = 36, .plans = true});
+  if (name == "geometry_changes_points")
+    return with_geometry("points_against_nets", {.seed = 37, .to_nothing = true});
   throw std::invalid_argument("no synthetic scene '" + name + "'");
 }
 
@@ -336,6 +354,14 @@ const std::vector<std::string>& synthetic_scene_names() {
   return names;
 }
 
+const std::vector<std::string>& geometry_scene_names() {
+  static const std::vector<std::string> names{"geometry_changes",         "geometry_changes_shared",
+                                              "geometry_changes_ties",    "geometry_to_nothing",
+                                              "geometry_changes_at_rest", "geometry_changes_polygons",
+                                              "geometry_changes_points"};
+  return names;
+}
+
 template <class S>
 TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_keyframe) {
   const Range range{double(admissible_magnitude<S>), double(std::numeric_limits<S>::denorm_min())};
@@ -360,6 +386,7 @@ TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_k
     result.script = extreme_script(result.scene, result.frames, range);
   else if (raw.script != Script::none)
     result.script = make_script(result.scene, result.frames);
+  if (raw.geometry) result.script = make_geometry_script(result.scene, frames_per_keyframe, *raw.geometry);
   return result;
 }
 

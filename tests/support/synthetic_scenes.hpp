@@ -19,6 +19,9 @@ struct TestScene {
 /// Names of all synthetic scenes, each aimed at one thing that goes wrong in practice.
 const std::vector<std::string>& synthetic_scene_names();
 
+/// The same where geometry changes, at every frame or every second one: for those who can follow.
+const std::vector<std::string>& geometry_scene_names();
+
 /// Makes one by name; deterministic. `frames_per_keyframe` places the script's changes at frames, keyframes
 /// and events.
 template <class S>

@@ -1,0 +1,115 @@
+#pragma once
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace kbvh {
+
+/// Many short lists of numbers under the keys 0, 1, ...: packed like CSR lists as long as nobody changes
+/// them, with room of their own once they grow. Reading costs what CSR lists cost; changing one is O(its
+/// length), and abandoned room is used again.
+class ListPool {
+ public:
+  /// Lists as CSR: list k is values[offsets[k] .. offsets[k + 1]).
+  ListPool(std::span<const std::uint32_t> offsets, std::vector<std::uint32_t> values)
+      : values_(std::move(values)) {
+    if (offsets.empty()) return;
+    lists_.reserve(offsets.size() - 1);
+    for (std::size_t k = 0; k + 1 < offsets.size(); ++k)
+      lists_.push_back({offsets[k], offsets[k + 1] - offsets[k]});
+  }
+  ListPool() = default;
+
+  std::span<const std::uint32_t> operator[](std::uint32_t key) const {
+    const List list = lists_[key];
+    return {values_.data() + list.begin, list.count};
+  }
+  std::uint32_t keys() const { return std::uint32_t(lists_.size()); }
+  /// Adds empty lists, or drops the last ones.
+  void resize(std::uint32_t keys) {
+    for (std::uint32_t key = keys; key < lists_.size(); ++key) release(lists_[key]);
+    lists_.resize(keys);
+  }
+
+  /// Replaces a list; `list` must not be one of the pool's.
+  void assign(std::uint32_t key, std::span<const std::uint32_t> list) {
+    if (list.size() > room(lists_[key])) {
+      release(lists_[key]);
+      lists_[key] = reserve(std::uint32_t(list.size()));
+    }
+    std::copy(list.begin(), list.end(), values_.begin() + lists_[key].begin);
+    lists_[key].count = std::uint32_t(list.size());
+  }
+  void push(std::uint32_t key, std::uint32_t value) {
+    List list = lists_[key];
+    if (list.count == room(list)) {
+      List larger = reserve(list.count + 1);
+      std::copy_n(values_.begin() + list.begin, list.count, values_.begin() + larger.begin);
+      larger.count = list.count;
+      release(list);
+      list = larger;
+    }
+    values_[list.begin + list.count++] = value;
+    lists_[key] = list;
+  }
+  /// Takes one occurrence of a value out, if there is any; the order may change.
+  void erase(std::uint32_t key, std::uint32_t value) {
+    List& list = lists_[key];
+    const auto begin = values_.begin() + list.begin, end = begin + list.count;
+    const auto at = std::find(begin, end, value);
+    if (at == end) return;
+    *at = *(end - 1);
+    --list.count;
+  }
+  /// Puts another value in the place of one that is in the list.
+  void replace(std::uint32_t key, std::uint32_t value, std::uint32_t by) {
+    const List list = lists_[key];
+    const auto begin = values_.begin() + list.begin;
+    std::replace(begin, begin + list.count, value, by);
+  }
+  void clear(std::uint32_t key) {
+    release(lists_[key]);
+    lists_[key] = {};
+  }
+
+  std::size_t value_count() const { return values_.size(); }
+  std::size_t bytes() const {
+    std::size_t total = lists_.size() * sizeof(List) + values_.size() * sizeof(std::uint32_t);
+    for (const auto& list : free_) total += list.size() * sizeof(std::uint32_t);
+    return total;
+  }
+
+ private:
+  struct List {
+    std::uint32_t begin = 0, count = 0;
+    std::uint32_t room = 0;  ///< of those that have been moved, a power of two; 0: as packed
+  };
+  static constexpr std::uint32_t smallest = 4;
+  static std::uint32_t room(const List& list) { return list.room != 0 ? list.room : list.count; }
+  List reserve(std::uint32_t count) {
+    const std::uint32_t wanted = std::max(smallest, std::bit_ceil(count));
+    const auto size_class = std::size_t(std::countr_zero(wanted));
+    if (size_class < free_.size() && !free_[size_class].empty()) {
+      const std::uint32_t begin = free_[size_class].back();
+      free_[size_class].pop_back();
+      return {begin, 0, wanted};
+    }
+    const auto begin = std::uint32_t(values_.size());
+    values_.resize(values_.size() + wanted, 0);
+    return {begin, 0, wanted};
+  }
+  void release(const List& list) {
+    if (list.room == 0) return;
+    const auto size_class = std::size_t(std::countr_zero(list.room));
+    if (free_.size() <= size_class) free_.resize(size_class + 1);
+    free_[size_class].push_back(list.begin);
+  }
+
+  std::vector<List> lists_;
+  std::vector<std::uint32_t> values_;
+  std::vector<std::vector<std::uint32_t>> free_;  ///< begins of abandoned room, by its power of two
+};
+
+}  // namespace kbvh

@@ -1,0 +1,202 @@
+// Insertion and deletion while a kinetic AABB tree runs: between any two changes its log of bound changes is
+// proved to be the exact envelopes of what then is below each node, at all times and from the first instant.
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "experiments/theory/kinetic_log.hpp"
+#include "tests/support/synthetic_scenes.hpp"
+
+namespace kbvh::test {
+namespace {
+
+using namespace kbvh::theory;
+
+/// A change of a bound at an event, as it was told.
+template <class S>
+struct Told {
+  std::uint32_t body, node, side, old_vertex, new_vertex;
+  double begin;
+  Crossing<S> crossing;
+};
+
+template <class S>
+struct Listener {
+  std::vector<Told<S>>* log;
+  template <class T>
+  void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t old_vertex,
+                        std::uint32_t new_vertex, const Instant<T>& now) {
+    if (now.exact != nullptr)
+      log->push_back({body, node, side, old_vertex, new_vertex, now.begin, *now.exact});
+  }
+  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
+};
+
+/// Plans with new vertices at the end: their keyframes mean nothing, for they have plans of their own.
+void add_vertices(StoredPlans& plans, std::uint32_t count) {
+  StoredPlans grown = plans;
+  grown.vertex_count += count;
+  grown.positions.clear();
+  for (std::size_t k = 0; k < plans.times.size(); ++k) {
+    const auto begin = plans.positions.begin() + std::ptrdiff_t(3 * k * plans.vertex_count);
+    grown.positions.insert(grown.positions.end(), begin, begin + std::ptrdiff_t(3) * plans.vertex_count);
+    grown.positions.resize(grown.positions.size() + std::size_t(3) * count, 0.0);
+  }
+  plans = std::move(grown);
+}
+
+template <class S>
+OwnKnots own_knots(double t, const PlanChange<S>& change, const S* position) {
+  OwnKnots knots;
+  knots.times = {t};
+  knots.positions.assign(position, position + 3);
+  knots.times.insert(knots.times.end(), change.times.begin(), change.times.end());
+  knots.positions.insert(knots.positions.end(), change.positions.begin(), change.positions.end());
+  std::copy(change.velocity, change.velocity + 3, knots.velocity);
+  return knots;
+}
+
+template <class S>
+class Prover {
+ public:
+  using Forest = KineticForest<S, AvlQueue<S>, Counting, Listener<S>>;
+
+  Prover(const TestScene<S>& test, const BuilderConfig& builder)
+      : script_(test.script),
+        frames_(frame_times(test.scene, 2)),
+        changing_(test.scene),
+        view_(changing_.scene()),
+        playback_(test.scene) {
+    playback_.seek(frames_.front());
+    forest_.emplace(view_, ClipMotion<S>(playback_), build_topologies(view_, playback_, builder), count_,
+                    Listener<S>{&log_});
+    forest_->reset(frames_.front());
+    for (const auto& body : test.scene.bodies) plans_.push_back(stored_plans(body.plans));
+    begin_epoch(frames_.front());
+  }
+
+  EnvelopeReport run() {
+    auto step = script_.steps.begin();
+    for (const double t : frames_) {
+      playback_.seek(t);
+      forest_->advance(t);
+      for (; step != script_.steps.end() && step->time == t; ++step) {
+        end_epoch(t);
+        change(t, *step);
+        begin_epoch(t);
+      }
+    }
+    forest_->advance(frames_.back() + 3);
+    end_epoch(frames_.back() + 3);
+    return total_;
+  }
+
+ private:
+  void change(double t, const typename PlanScript<S>::Step& step) {
+    for (const PlanChange<S>& plan : step.changes)
+      plans_[plan.body].own[plan.vertex] = own_knots(t, plan, playback_.position(plan.body, plan.vertex));
+    playback_.change_plans(t, step.changes);
+    for (std::uint32_t body = 0; body < plans_.size(); ++body) {
+      std::vector<std::uint32_t> changed;
+      for (const PlanChange<S>& plan : step.changes)
+        if (plan.body == body) changed.push_back(plan.vertex);
+      std::sort(changed.begin(), changed.end());
+      if (!changed.empty()) forest_->tree(body).plans_changed(t, changed);
+    }
+    changing_.apply(step.geometry, playback_);
+    for (const auto& vertex : step.geometry.vertices) {
+      StoredPlans& plans = plans_[vertex.body];
+      add_vertices(plans, 1);
+      plans.own[plans.vertex_count - 1] = own_knots(t, vertex.plan, vertex.position);
+    }
+    forest_->geometry_changed(t, view_, ClipMotion<S>(playback_), body_changes(view_, step.geometry));
+  }
+
+  /// Realisers in the order of the compacted topology.
+  std::vector<std::uint32_t> realisers(std::uint32_t body) const {
+    std::vector<std::uint32_t> all;
+    for (const std::uint32_t node : order_[body])
+      all.insert(all.end(), forest_->tree(body).realisers(node), forest_->tree(body).realisers(node) + 6);
+    return all;
+  }
+  void begin_epoch(double t) {
+    begin_ = t;
+    log_.clear();
+    order_.assign(plans_.size(), {});
+    topologies_.clear();
+    start_.clear();
+    for (std::uint32_t body = 0; body < plans_.size(); ++body) {
+      topologies_.push_back(forest_->tree(body).compacted_topology(order_[body]));
+      EXPECT_EQ(check_topology(topologies_.back(), view_.primitives(body)), "");
+      start_.push_back(realisers(body));
+    }
+  }
+  void end_epoch(double t) {
+    for (std::uint32_t body = 0; body < plans_.size(); ++body) {
+      EnvelopeReport report = prove(t, body);
+      if (!report.violation.empty())
+        report.violation =
+            "from " + std::to_string(begin_) + " body " + std::to_string(body) + ": " + report.violation;
+      total_.add(report);
+    }
+  }
+  EnvelopeReport prove(double until, std::uint32_t body) const {
+    const ExactMotion motion(plans_[body], begin_, until);
+    std::vector<std::uint32_t> place(forest_->tree(body).topology().size(), 0);
+    for (std::uint32_t i = 0; i < order_[body].size(); ++i) place[order_[body][i]] = i;
+    std::vector<BoundChange> log;
+    for (const Told<S>& told : log_)
+      if (told.body == body)
+        log.push_back(
+            {place[told.node], told.side, told.old_vertex, told.new_vertex, when_of(told.crossing, motion)});
+    return check_envelopes(motion, vertices_below(topologies_[body], view_.primitives(body)), start_[body],
+                           log, realisers(body));
+  }
+
+  const PlanScript<S>& script_;
+  std::vector<double> frames_;
+  ChangingScene<S> changing_;
+  SceneView<S> view_;
+  Playback<S> playback_;
+  Counting count_;
+  std::vector<Told<S>> log_;
+  std::optional<Forest> forest_;
+  std::vector<StoredPlans> plans_;
+  double begin_ = 0;
+  std::vector<std::vector<std::uint32_t>> order_, start_;
+  std::vector<Topology> topologies_;
+  EnvelopeReport total_;
+};
+
+class GeometryEnvelopes : public testing::TestWithParam<std::string> {};
+
+template <class S>
+void prove_scene(const std::string& name) {
+  const auto test = synthetic_scene<S>(name, 2);
+  EnvelopeReport total;
+  for (const std::uint32_t width : {2u, 8u})
+    for (const std::uint32_t leaf_size : {1u, 4u}) {
+      const EnvelopeReport report = Prover<S>(test, {.width = width, .leaf_size = leaf_size}).run();
+      EXPECT_EQ(report.violation, "") << name << ", width " << width << ", leaf size " << leaf_size;
+      EXPECT_EQ(report.net, report.envelope);
+      total.add(report);
+    }
+  std::printf("%s, %s: %llu bounds, %llu entries, %llu net changes, %llu envelope breakpoints\n",
+              name.c_str(), sizeof(S) == 4 ? "float" : "double", (unsigned long long)total.bounds,
+              (unsigned long long)total.logged, (unsigned long long)total.net,
+              (unsigned long long)total.envelope);
+  EXPECT_GT(total.net, 0u);
+}
+
+TEST_P(GeometryEnvelopes, Float) {
+  prove_scene<float>(GetParam());
+}
+TEST_P(GeometryEnvelopes, Double) {
+  prove_scene<double>(GetParam());
+}
+INSTANTIATE_TEST_SUITE_P(Scenes, GeometryEnvelopes, testing::ValuesIn(geometry_scene_names()),
+                         [](const auto& param_info) { return param_info.param; });
+
+}  // namespace
+}  // namespace kbvh::test
