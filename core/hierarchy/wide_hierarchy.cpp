@@ -327,11 +327,7 @@ void WideQuery<S>::leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, Wi
         to_fetch_.insert(to_fetch_.end(), vertices.begin(), vertices.end());
       }
     }
-    // As in Playback: beyond so many, all of them cost less.
-    if (std::uint64_t(4) * to_fetch_.size() > scene.vertex_count(body))
-      motion.fetch_all(body);
-    else
-      motion.fetch(body, to_fetch_);
+    motion.fetch(body, to_fetch_);
   };
   fetch(a, body_a, 0);
   fetch(b, body_b, 1);

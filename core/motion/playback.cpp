@@ -58,6 +58,12 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
       stale_.push_back(v);
     }
   if (stale_.empty()) return;
+  // A long list at once may be too many already: one by one, a vertex costs 10 to 40 times as much.
+  if (stale_.size() > 64 &&
+      std::uint64_t(16) * (state.fetched + stale_.size()) > state.plans.vertex_count()) {
+    fetch_all(state);
+    return;
+  }
   fetched_ += stale_.size();
   state.fetched += std::uint32_t(stale_.size());
   state.plans.evaluate(time_, stale_, state.positions.data(), &rounding_);
