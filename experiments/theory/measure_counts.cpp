@@ -16,6 +16,7 @@ struct CountNotices {
   void realiser_changed(std::uint32_t, std::uint32_t, Side, std::uint32_t, std::uint32_t, const Instant<S>&) {
     ++*notices;
   }
+  void realiser_plan_changed(std::uint32_t, std::uint32_t) {}
 };
 
 using Forest = KineticForest<float, AvlQueue<float>, Counting, CountNotices>;
@@ -45,7 +46,7 @@ void for_all_certificates(const Tree& tree, Part part) {
       members.clear();
       const TopologyNode n = topology.nodes[node];
       if (n.is_leaf())
-        members.assign(tree.leaf_vertices()[node].begin(), tree.leaf_vertices()[node].end());
+        members.assign(tree.leaf_vertices(node).begin(), tree.leaf_vertices(node).end());
       else
         for (std::uint32_t child = n.first(); child < n.first() + n.count(); ++child)
           members.push_back(tree.realiser(child, side));
@@ -133,7 +134,7 @@ void measure_updates(const Scene<float>& scene, const Topologies& topologies, Co
       above.erase(std::unique(above.begin(), above.end()), above.end());
       double candidates = 0;
       for (const std::uint32_t node : above)
-        candidates += topology.nodes[node].is_leaf() ? double(forest.tree(body).leaf_vertices()[node].size())
+        candidates += topology.nodes[node].is_leaf() ? double(forest.tree(body).leaf_vertices(node).size())
                                                      : double(topology.nodes[node].count());
       PlanChange<float> change;
       change.body = body;

@@ -33,7 +33,7 @@ std::uint64_t exceeded(const Tree& tree, const ExactMotion& motion, const Where&
   };
   const TopologyNode n = tree.topology().nodes[node];
   if (n.is_leaf())
-    for (const std::uint32_t v : tree.leaf_vertices()[node]) look(v);
+    for (const std::uint32_t v : tree.leaf_vertices(node)) look(v);
   else
     for (std::uint32_t child = n.first(); child < n.first() + n.count(); ++child)
       look(tree.realiser(child, side));
