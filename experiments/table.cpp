@@ -105,12 +105,13 @@ std::string results_table(const std::vector<json>& records) {
     phases.push_back("plan_changes");
     head.push_back("plans");
   }
-  for (const char* kind : {"points", "control_nets"})
-    if (std::any_of(scene.at("bodies").begin(), scene.at("bodies").end(),
+  const json bodies = scene.value("bodies", json::array());
+  for (const std::string kind : {"points", "control_nets"})
+    if (std::any_of(bodies.begin(), bodies.end(),
                     [&](const json& body) { return body.value("kind", std::string()) == kind; }))
       text +=
           fmt::format("  pairs with {} are candidates: boxes that overlap, which says nothing of contact\n",
-                      kind == std::string("points") ? "points" : "control nets");
+                      kind == "points" ? "points" : "control nets");
   for (const char* column : {"x refit", "with motion", "missed", "extra", "protrusion", "looseness"})
     head.push_back(column);
   std::vector<std::vector<std::string>> rows{head};
