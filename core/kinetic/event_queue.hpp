@@ -15,6 +15,7 @@ namespace kbvh {
 ///   grow(slots)       makes room for slots below this number; events stay
 ///   schedule(event)   inserts, or replaces the event of the same slot
 ///   cancel(slot)      removes the slot's event if there is one; says whether there was
+///   scheduled(slot), event(slot)  whether the slot has an event, and which
 ///   top(), pop(), empty(), size(), clear(), bytes()
 /// `steps()` counts comparisons. Events and their order come from a clock: Clock::Event has a `slot`, and
 /// clock.earlier(a, b) orders by exact time first (EventClock, OverlapClock).
@@ -61,6 +62,7 @@ class AvlEventQueue {
     return true;
   }
   bool scheduled(std::uint32_t slot) const { return nodes_[slot].scheduled; }
+  const Event& event(std::uint32_t slot) const { return nodes_[slot].event; }
   const Event& top() const { return tree_.begin()->event; }
   void pop() { cancel(top().slot); }
   bool empty() const { return tree_.empty(); }
@@ -121,6 +123,7 @@ class BinaryHeapEventQueue {
     return true;
   }
   bool scheduled(std::uint32_t slot) const { return place_[slot] != none; }
+  const Event& event(std::uint32_t slot) const { return events_[slot]; }
   const Event& top() const { return events_[heap_.front()]; }
   void pop() { cancel(heap_.front()); }
   bool empty() const { return heap_.empty(); }
