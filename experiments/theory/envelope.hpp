@@ -136,8 +136,8 @@ using VerticesBelow = std::vector<std::vector<std::uint32_t>>;
 /// changes all coordinates are linear, so a realiser that nobody exceeds at both ends is exceeded nowhere in
 /// between. Apart from that, the envelope is computed anew by gift wrapping, from `start` alone, staying with
 /// a vertex until it is strictly beaten; its breakpoints must be the log's, at equal rational times.
-/// `log` is in the order of happening. O(vertices below) per row and change. A bound that starts as `no_bound`
-/// does not exist (BoxTrees store but one per node): it may not change.
+/// `log` is in the order of happening. O(vertices below) per row and change. A bound that starts as
+/// `no_bound` does not exist (BoxTrees store but one per node): it may not change.
 EnvelopeReport check_envelopes(const ExactMotion& motion, const VerticesBelow& below,
                                std::span<const std::uint32_t> start, std::span<const BoundChange> log,
                                std::span<const std::uint32_t> end);

@@ -43,6 +43,7 @@ struct Recorder {
     log->push_back({body, node, side, old_vertex, new_vertex, now.begin, now.exact != nullptr,
                     now.exact != nullptr ? *now.exact : Crossing<S>{}, *event});
   }
+  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
 };
 
 /// What happened between two changes of plans (or the ends of the clip): the plans that held, the notices of
