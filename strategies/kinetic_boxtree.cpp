@@ -19,6 +19,7 @@ class KineticBox final : public Strategy<S> {
   KineticBox(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
              const Params& params)
       : Strategy<S>(scene, motion),
+        leaf_boxes_(params.word("leaf_boxes") == "tight" ? LeafBoxes::tight : LeafBoxes::inherited),
         rebuilds_(params.word("rebuild") != "never"),
         threshold_(params.number("degradation")),
         frames_per_check_(std::uint64_t(params.number("check_every"))) {
@@ -65,10 +66,10 @@ class KineticBox final : public Strategy<S> {
         const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
         LeafPairs<S, Count> several(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
                                     b.topology(), count_, out);
-        // Boxes of leaves are not tight: primitives have to show that theirs overlap.
+        // Inherited boxes of leaves are not tight: primitives have to show that theirs overlap.
         const auto leaves = [&](std::uint32_t leaf_a, std::uint32_t leaf_b) {
           const TopologyNode na = a.topology().nodes[leaf_a], nb = b.topology().nodes[leaf_b];
-          if (na.count() == 1 && nb.count() == 1) {
+          if (leaf_boxes_ == LeafBoxes::inherited && na.count() == 1 && nb.count() == 1) {
             count_.add(Counter::box_tests);
             if (!tight_box(a, na, pair.first).overlaps(tight_box(b, nb, pair.second))) return;
           }
@@ -104,7 +105,8 @@ class KineticBox final : public Strategy<S> {
       const auto& tree = forest.tree(body);
       AuditView view{tree.topology(), {}, {}};
       BoxCache<S> cache = caches_[body];  // what a query read counts; the rest is made from it
-      InheritedBoxes<S, std::remove_cvref_t<decltype(tree)>> boxes(tree, this->sampled_, body, cache);
+      InheritedBoxes<S, std::remove_cvref_t<decltype(tree)>> boxes(tree, this->sampled_, body, cache,
+                                                                   leaf_boxes_);
       for (std::uint32_t node = 0; node < tree.topology().size(); ++node) {
         boxes.ensure(node);
         view.boxes.push_back(to_double(boxes(node)));
@@ -141,7 +143,7 @@ class KineticBox final : public Strategy<S> {
   }
   template <class Tree>
   InheritedBoxes<S, Tree> boxes(const Tree& tree, std::uint32_t body) {
-    return {tree, this->sampled_, body, caches_[body]};
+    return {tree, this->sampled_, body, caches_[body], leaf_boxes_};
   }
   template <class Tree>
   InheritedBoxes<S, Tree> all_boxes(const Tree& tree, std::uint32_t body) {
@@ -179,6 +181,7 @@ class KineticBox final : public Strategy<S> {
   std::vector<NodePair> stack_;
   std::vector<std::uint32_t> changed_;
   std::uint64_t first_step_ = 0, first_fetch_ = 0;
+  LeafBoxes leaf_boxes_;
   bool rebuilds_;
   bool plans_changed_ = false;
   BuildMethod method_ = BuildMethod::median;
@@ -210,6 +213,10 @@ KBVH_STRATEGY(kinetic_boxtree) {
             "avl",
             {"avl", "binary_heap"},
             "event queue: the paper's AVL tree, or an indexed binary heap"},
+           {"leaf_boxes",
+            "inherited",
+            {"inherited", "tight"},
+            "boxes of leaves in queries: inherited like all others, or made of the leaf's vertices"},
            {"rebuild",
             "never",
             {"never", "median", "sah"},

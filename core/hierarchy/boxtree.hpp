@@ -128,35 +128,47 @@ class BoxTreePlanes {
   std::vector<std::uint32_t> weights_;  ///< primitives below
 };
 
+/// Where a query finds the boxes of a BoxTree's leaves.
+enum class LeafBoxes : std::uint8_t {
+  inherited,  ///< as those of inner nodes: nothing but realisers is read
+  tight,      ///< made of the leaf's vertices
+};
+
 /// A bounds view (traversal.hpp) of a kinetic BoxTree: a node's box is its parent's with the own side read
 /// from the realising vertex. Extents are reconstructed on the way down, each once per frame: a query asks
 /// for a parent first.
 template <class S, class Tree>
 class InheritedBoxes {
  public:
-  InheritedBoxes(const Tree& tree, const SampledMotion<S>& motion, std::uint32_t body, BoxCache<S>& cache)
-      : tree_(&tree), motion_(&motion), body_(body), cache_(&cache) {}
+  InheritedBoxes(const Tree& tree, const SampledMotion<S>& motion, std::uint32_t body, BoxCache<S>& cache,
+                 LeafBoxes leaf_boxes = LeafBoxes::inherited)
+      : tree_(&tree), motion_(&motion), body_(body), cache_(&cache), leaf_boxes_(leaf_boxes) {}
 
   void ensure(std::uint32_t node) {
-    if (cache_->current(node)) return;
-    if (node == 0) {
-      cache_->store(0, box_of_realisers(tree_->root_realisers(), *motion_, body_));
-      return;
-    }
-    Box<S> box = cache_->box(tree_->topology().parents[node]);
-    const std::uint32_t side = tree_->own_side(node);
-    const std::size_t axis = side >> 1;
-    const S value = motion_->position(body_, tree_->realiser(node))[axis];
-    ((side & 1) != 0 ? box.upper : box.lower)[axis] = value;
-    cache_->store(node, box);
+    if (!cache_->current(node)) cache_->store(node, make(node));
   }
   const Box<S>& operator()(std::uint32_t node) const { return cache_->box(node); }
 
  private:
+  Box<S> make(std::uint32_t node) const {
+    if (leaf_boxes_ == LeafBoxes::tight && tree_->topology().nodes[node].is_leaf()) {
+      const auto vertices = tree_->leaf_vertices(node);
+      motion_->fetch(body_, vertices);
+      return LaneBox<S>::of(vertices, motion_->positions(body_)).box();
+    }
+    if (node == 0) return box_of_realisers(tree_->root_realisers(), *motion_, body_);
+    Box<S> box = cache_->box(tree_->topology().parents[node]);
+    const std::uint32_t side = tree_->own_side(node), axis = side >> 1;
+    const S value = motion_->position(body_, tree_->realiser(node))[axis];
+    ((side & 1) != 0 ? box.upper : box.lower)[axis] = value;
+    return box;
+  }
+
   const Tree* tree_;
   const SampledMotion<S>* motion_;
   std::uint32_t body_;
   BoxCache<S>* cache_;
+  LeafBoxes leaf_boxes_;
 };
 
 }  // namespace kbvh

@@ -93,12 +93,14 @@ class EventClock {
   /// is not behind now (Z&W Algorithm 3 with its errata: walk the segments forward, each with its own end
   /// points; in a bounded segment the end points decide, on an unbounded one the slopes). Fills hint, error,
   /// begin and end of `event` (its winner, loser, side, body and slot are given) and returns true, or false:
-  /// never. `own` gets the crossing if a plan of its own takes part, for `remember`.
-  bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own) const {
+  /// never, or surely not before `until`: who looks for the earliest of several need not look beyond one.
+  /// `own` gets the crossing if a plan of its own takes part, for `remember`.
+  bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own,
+                     double until = std::numeric_limits<double>::infinity()) const {
     own.reset();
     const FlightPlans<S>& plan = *plans_[event.body];
     if (plan.has_own_plan(event.winner) || plan.has_own_plan(event.loser))
-      return first_own_failure(event, now, own);
+      return first_own_failure(event, now, own, until);
     const auto times = plan.keyframe_times();
     const int axis = axis_of(event.side);
     const std::size_t w = std::size_t(3) * event.winner + std::size_t(axis);
@@ -109,7 +111,7 @@ class EventClock {
     while (now.exact != nullptr && k + 1 < times.size() && times[k + 1] < now.end &&
            compare_crossing_to(*now.exact, times[k + 1]) >= 0)
       ++k;
-    for (; k + 1 < times.size(); ++k) {
+    for (; k + 1 < times.size() && times[k] < until; ++k) {
       const double ahead = sign * (double(plan.keyframe(k + 1)[l]) - double(plan.keyframe(k + 1)[w]));
       if (!(ahead > 0)) continue;
       const double behind = sign * (double(plan.keyframe(k)[w]) - double(plan.keyframe(k)[l]));
@@ -180,7 +182,8 @@ class EventClock {
     return piece;
   }
 
-  bool first_own_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own) const {
+  bool first_own_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own,
+                         double until) const {
     const int axis = axis_of(event.side);
     Piece<S> winner = piece_at(event.body, event.winner, axis, now);
     Piece<S> loser = piece_at(event.body, event.loser, axis, now);
@@ -199,7 +202,7 @@ class EventClock {
         own = crossing;
         return true;
       }
-      if (std::isinf(end)) return false;
+      if (std::isinf(end) || end >= until) return false;
       if (winner.t1 <= end) winner = plans_[event.body]->piece_after(event.winner, axis, end);
       if (loser.t1 <= end) loser = plans_[event.body]->piece_after(event.loser, axis, end);
       begin = end;

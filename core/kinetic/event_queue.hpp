@@ -13,6 +13,7 @@ namespace kbvh {
 /// An event queue holds at most one event per certificate slot and can be shared by several structures:
 ///   schedule(event)   inserts, or replaces the event of the same slot
 ///   cancel(slot)      removes the slot's event if there is one; says whether there was
+///   scheduled(slot), event(slot)  whether the slot has an event, and which
 ///   top(), pop(), empty(), size(), clear(), bytes()
 /// `steps()` counts comparisons. Order comes from an EventClock: exact time, deeper node, slot.
 
@@ -54,6 +55,7 @@ class AvlQueue {
     return true;
   }
   bool scheduled(std::uint32_t slot) const { return nodes_[slot].scheduled; }
+  const Event& event(std::uint32_t slot) const { return nodes_[slot].event; }
   const Event& top() const { return tree_.begin()->event; }
   void pop() { cancel(top().slot); }
   bool empty() const { return tree_.empty(); }
@@ -106,6 +108,7 @@ class BinaryHeapQueue {
     return true;
   }
   bool scheduled(std::uint32_t slot) const { return place_[slot] != none; }
+  const Event& event(std::uint32_t slot) const { return events_[slot]; }
   const Event& top() const { return events_[heap_.front()]; }
   void pop() { cancel(heap_.front()); }
   bool empty() const { return heap_.empty(); }

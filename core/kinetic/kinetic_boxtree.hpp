@@ -45,8 +45,9 @@ struct SearchCost {
 /// leaf every vertex is a candidate. So each stored realiser is a candidate of exactly one certificate, that
 /// of the nearest ancestor with the same own side (or of the root), and so is each vertex of a leaf per side:
 /// for each side, certificates are the inner nodes of a tree whose leaves are the leaves' vertices. If all
-/// hold, every realiser is extremal; when one is replaced, that one certificate above must be made anew, and
-/// none other.
+/// hold, every realiser is extremal; when one is replaced, that one certificate above is concerned, and none
+/// other; and there, if its own realiser stays, the search is needed only if it was the replaced vertex that
+/// would have come next.
 ///
 /// Slots of the queue are first_slot + side at the root, else first_slot + 5 + node. Events are handled and
 /// observers told as by KineticAabbTree, but for nodes' own sides only.
@@ -66,7 +67,8 @@ class KineticBoxTree {
         count_(&count),
         observer_(observer),
         own_sides_(topology_.size(), 0),
-        realisers_(slot_count(topology_), 0) {
+        realisers_(slot_count(topology_), 0),
+        seen_(clock.plans(body).vertex_count(), 0) {
     if (topology_.width != 2)
       throw std::invalid_argument("a BoxTree is binary, the topology's width is " +
                                   std::to_string(topology_.width));
@@ -84,6 +86,10 @@ class KineticBoxTree {
   std::uint32_t realiser(std::uint32_t node) const { return realisers_[node + 5]; }
   /// Of the root: [lower x, upper x, lower y, ...].
   const std::uint32_t* root_realisers() const { return realisers_.data(); }
+  /// Unique, ascending; of a leaf.
+  std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const {
+    return leaves_[topology_.nodes[node]];
+  }
   SearchCost& search_cost() { return search_cost_; }
 
   /// Chooses the planes, finds every realiser at t and schedules every certificate. O(nodes log nodes +
@@ -121,7 +127,7 @@ class KineticBoxTree {
       node = above(node, side);
       if (realiser(node, side) != event.winner) break;
     }
-    certify(node, side, now);  // one of its candidates has changed
+    exchange_candidate(node, side, event.winner, event.loser, now);
   }
 
   /// The plans of `vertices` (ascending, unique) changed at t, each from its stored position: rechecks every
@@ -176,10 +182,12 @@ class KineticBoxTree {
 
   std::size_t bytes() const {
     return topology_.bytes() + original_.bytes() + leaves_.bytes() + own_sides_.size() + concerned_.size() +
-           (realisers_.size() + leaf_offsets_.size() + leaf_nodes_.size()) * sizeof(std::uint32_t);
+           (realisers_.size() + seen_.size() + leaf_offsets_.size() + leaf_nodes_.size()) *
+               sizeof(std::uint32_t);
   }
 
  private:
+  static constexpr double never = std::numeric_limits<double>::infinity();
   static constexpr std::uint32_t all_sides = 0x3f;
   static constexpr std::uint32_t marked_only = 0x40;  ///< above all sides: a node on a marked path
 
@@ -197,10 +205,19 @@ class KineticBoxTree {
     return node;
   }
 
-  /// Calls visit(vertex) for every candidate of a certificate (Z&W figs. 8, 9).
+  /// Calls visit(vertex) once for every candidate of a certificate (Z&W figs. 8, 9).
   template <class Visit>
   void for_candidates(std::uint32_t node, Side side, Visit&& visit) {
     std::uint64_t visited = 0;
+    if (++search_ == 0) {
+      std::fill(seen_.begin(), seen_.end(), 0);
+      search_ = 1;
+    }
+    const auto visit_once = [&](std::uint32_t vertex) {
+      if (seen_[vertex] == search_) return;
+      seen_[vertex] = search_;
+      visit(vertex);
+    };
     open_.clear();
     open_.push_back(node);
     while (!open_.empty()) {
@@ -209,13 +226,13 @@ class KineticBoxTree {
       ++visited;
       const TopologyNode n = topology_.nodes[at];
       if (n.is_leaf()) {
-        for (std::uint32_t v : leaves_[n]) visit(v);
+        for (std::uint32_t v : leaves_[n]) visit_once(v);
         continue;
       }
       for (std::uint32_t child = n.first() + 2; child-- > n.first();)
         if (own_sides_[child] == side) {
           ++visited;
-          visit(realiser(child));
+          visit_once(realiser(child));
         } else if (Rules::descends(own_sides_[child], side)) {
           open_.push_back(child);
         }
@@ -274,7 +291,7 @@ class KineticBoxTree {
       if (challenger == winner) return;
       event.loser = challenger;
       ++made;
-      if (!clock_->first_failure(event, now, own)) return;
+      if (!clock_->first_failure(event, now, own, found ? earliest.end : never)) return;
       if (found && !clock_->overtakes_first(event, own, earliest, earliest_own)) return;
       found = true;
       earliest = event;
@@ -282,10 +299,42 @@ class KineticBoxTree {
     });
     count_->add(Counter::certificates_made, made);
     clock_->remember(slot, earliest_own);
-    if (!found) return;
-    queue_->schedule(earliest);
+    if (found) schedule(earliest);
+  }
+  void schedule(const Event& event) {
+    queue_->schedule(event);
     count_->add(Counter::queue_operations);
     count_->peak(Counter::queue_peak, queue_->size());
+  }
+
+  /// Of a certificate's candidates, `before` has been replaced by `after`, which is not ahead of the
+  /// realiser. As long as it was not `before` who comes next, the others need not be looked at again.
+  void exchange_candidate(std::uint32_t node, Side side, std::uint32_t before, std::uint32_t after,
+                          const Instant<S>& now) {
+    const std::uint32_t slot = first_slot_ + std::uint32_t(place(node, side)), winner = realiser(node, side);
+    const bool scheduled = queue_->scheduled(slot);
+    if (scheduled && queue_->event(slot).loser == before) return certify(node, side, now);
+    if (after == winner) return;
+    Event event;
+    event.winner = winner;
+    event.loser = after;
+    event.slot = slot;
+    event.body = body_;
+    event.side = std::uint8_t(side);
+    event.depth = topology_.depths[node];
+    std::optional<Crossing<S>> own, next_own;
+    count_->add(Counter::certificates_made);
+    if (!clock_->first_failure(event, now, own, scheduled ? queue_->event(slot).end : never)) return;
+    if (scheduled) {
+      const Event& next = queue_->event(slot);
+      const FlightPlans<S>& plans = clock_->plans(body_);
+      if (plans.has_own_plan(next.winner) || plans.has_own_plan(next.loser))
+        next_own = clock_->crossing(next);
+      if (!clock_->overtakes_first(event, own, next, next_own)) return;
+      withdraw(slot);
+    }
+    clock_->remember(slot, own);
+    schedule(event);
   }
 
   // ---- Planes and rebuilding
@@ -388,6 +437,8 @@ class KineticBoxTree {
   std::vector<std::uint8_t> own_sides_;   ///< [node]
   std::vector<std::uint32_t> realisers_;  ///< six of the root, then one of each other node
   std::vector<std::uint32_t> open_;       ///< of a search
+  std::vector<std::uint32_t> seen_;  ///< [vertex]: the last search that met it, for leaves share vertices
+  std::uint32_t search_ = 0;
   SearchCost search_cost_;
   // For plan changes, made when the first one comes: leaves of each vertex, marks of affected nodes.
   std::vector<std::uint32_t> leaf_offsets_, leaf_nodes_, affected_;
