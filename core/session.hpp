@@ -67,6 +67,12 @@ class Session {
     timed(times.triangle_tests, [&] { strategy_->confirm(playback_.time(), pairs); });
     return status;
   }
+  /// Moves to t and appends the pairs of the interval that this takes, for strategies that declare spans.
+  void spans(double t, SpanBuffer& out) {
+    const double from = playback_.time();
+    playback_.seek(t);
+    strategy_->spans(from, t, out);
+  }
   /// Makes the changes at the current time.
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
     playback_.change_plans(playback_.time(), changes);

@@ -141,7 +141,9 @@ class Strategy {
     return status;
   }
 
-  /// Pairs over [t0, t1] with closed spans that enclose every contact of the exact plan and of every frame.
+  /// Appends the pairs over [t0, t1] with closed spans that enclose every contact of the exact plan and of
+  /// every frame; a pair may have several. Stands at t0 when it is called, and at t1 after, as by `advance`.
+  /// Spans are of candidates: at a frame, `confirm` keeps the pairs that intersect then.
   virtual void spans(double /*t0*/, double /*t1*/, SpanBuffer& /*out*/) { unsupported("spans"); }
 
   /// The plans of some vertices have changed at t; the motion view shows the new ones. Each starts from the

@@ -1,6 +1,7 @@
 #pragma once
 #include <boost/intrusive/avl_set.hpp>
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -10,22 +11,25 @@
 
 namespace kbvh {
 
-/// An event queue holds at most one event per certificate slot and can be shared by several structures:
+/// An event queue holds at most one event per slot and can be shared by several structures:
+///   grow(slots)       makes room for slots below this number; events stay
 ///   schedule(event)   inserts, or replaces the event of the same slot
 ///   cancel(slot)      removes the slot's event if there is one; says whether there was
 ///   scheduled(slot), event(slot)  whether the slot has an event, and which
 ///   top(), pop(), empty(), size(), clear(), bytes()
-/// `steps()` counts comparisons. Order comes from an EventClock: exact time, deeper node, slot.
+/// `steps()` counts comparisons. Events and their order come from a clock: Clock::Event has a `slot`, and
+/// clock.earlier(a, b) orders by exact time first (EventClock, OverlapClock).
 
 /// The paper's queue: an AVL tree (Z&W s.3), on Boost.Intrusive; all operations O(log events).
-template <class S>
-class AvlQueue {
+template <class Clock>
+class AvlEventQueue {
+  using Event = typename Clock::Event;
   struct Node : boost::intrusive::avl_set_base_hook<> {
     Event event;
     bool scheduled = false;
   };
   struct Less {
-    const EventClock<S>* clock;
+    const Clock* clock;
     std::uint64_t* steps;
     bool operator()(const Node& a, const Node& b) const {
       ++*steps;
@@ -36,10 +40,13 @@ class AvlQueue {
 
  public:
   static constexpr const char* name = "avl";
-  AvlQueue(const EventClock<S>& clock, std::uint32_t slots)
+  AvlEventQueue(const Clock& clock, std::uint32_t slots)
       : steps_(std::make_unique<std::uint64_t>(0)), nodes_(slots), tree_(Less{&clock, steps_.get()}) {}
-  ~AvlQueue() { tree_.clear(); }
+  ~AvlEventQueue() { tree_.clear(); }
 
+  void grow(std::uint32_t slots) {
+    if (slots > nodes_.size()) nodes_.resize(slots);
+  }
   void schedule(const Event& event) {
     Node& node = nodes_[event.slot];
     if (node.scheduled) tree_.erase(tree_.iterator_to(node));
@@ -69,20 +76,28 @@ class AvlQueue {
 
  private:
   std::unique_ptr<std::uint64_t> steps_;
-  std::vector<Node> nodes_;
+  std::deque<Node> nodes_;  ///< by slot; the tree points to them, so they stay where they are
   Tree tree_;
 };
 
 /// An indexed binary heap: the obvious array queue; all operations O(log events), no pointers.
-template <class S>
-class BinaryHeapQueue {
+template <class Clock>
+class BinaryHeapEventQueue {
+  using Event = typename Clock::Event;
+
  public:
   static constexpr const char* name = "binary_heap";
-  BinaryHeapQueue(const EventClock<S>& clock, std::uint32_t slots)
+  BinaryHeapEventQueue(const Clock& clock, std::uint32_t slots)
       : clock_(&clock), events_(slots), place_(slots, none) {
     heap_.reserve(slots);
   }
 
+  void grow(std::uint32_t slots) {
+    if (slots <= events_.size()) return;
+    events_.resize(slots);
+    place_.resize(slots, none);
+    heap_.reserve(events_.capacity());
+  }
   void schedule(const Event& event) {
     const std::uint32_t slot = event.slot;
     events_[slot] = event;
@@ -154,11 +169,17 @@ class BinaryHeapQueue {
     place_[slot] = at;
   }
 
-  const EventClock<S>* clock_;
+  const Clock* clock_;
   std::vector<Event> events_;         ///< by slot
   std::vector<std::uint32_t> place_;  ///< of each slot in the heap
   std::vector<std::uint32_t> heap_;
   std::uint64_t steps_ = 0;
 };
+
+/// The queues of kinetic trees.
+template <class S>
+using AvlQueue = AvlEventQueue<EventClock<S>>;
+template <class S>
+using BinaryHeapQueue = BinaryHeapEventQueue<EventClock<S>>;
 
 }  // namespace kbvh

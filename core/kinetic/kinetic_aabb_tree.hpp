@@ -16,6 +16,7 @@ struct NoObserver {
   void realiser_changed(std::uint32_t /*body*/, std::uint32_t /*node*/, Side /*side*/,
                         std::uint32_t /*old_vertex*/, std::uint32_t /*new_vertex*/,
                         const Instant<S>& /*now*/) {}
+  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
 };
 
 /// The kinetic AABB tree of one body (Z&W s.4): per node and side the vertex that realises the bound, and one
@@ -24,7 +25,8 @@ struct NoObserver {
 /// unique vertices, an inner node's the earliest among its other children's realisers.
 ///
 /// Slots of the queue are first_slot + 6 * node + side. Observer::realiser_changed(body, node, side, old,
-/// new, instant) is called at every change of a bound's realiser, deeper nodes first.
+/// new, instant) is called at every change of a bound's realiser, deeper nodes first, and
+/// Observer::realiser_plan_changed(body, node) for a node of which a realiser has another plan from now on.
 template <class S, class Queue, class Count, class Observer = NoObserver>
 class KineticAabbTree {
  public:
@@ -103,7 +105,7 @@ class KineticAabbTree {
     const auto changed = [&](std::uint32_t v) {
       return std::binary_search(vertices.begin(), vertices.end(), v);
     };
-    for (std::uint32_t node : affected_)
+    for (std::uint32_t node : affected_) {
       for (Side side = 0; side < 6; ++side) {
         const std::uint32_t old = realiser(node, side);
         bool concerned = topology_.nodes[node].is_leaf() || changed(old);
@@ -122,6 +124,9 @@ class KineticAabbTree {
         }
         certify(node, side, now);
       }
+      if (std::any_of(realisers(node), realisers(node) + 6, changed))
+        observer_.realiser_plan_changed(body_, node);
+    }
     for (std::uint32_t node : affected_) moved_[node] = 0;
   }
 

@@ -52,6 +52,7 @@ class KineticForest {
   Tree& tree(std::uint32_t body) { return trees_[body]; }
   const Tree& tree(std::uint32_t body) const { return trees_[body]; }
   EventClock<S>& clock() { return clock_; }
+  const EventClock<S>& clock() const { return clock_; }
   Queue& queue() { return queue_; }
   const Queue& queue() const { return queue_; }
   std::size_t bytes() const {

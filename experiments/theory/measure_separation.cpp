@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <set>
-#include <stdexcept>
 #include <tuple>
 
-// Built later than the trees it stands on; claims T13 and T14 are not decided without it.
-#if __has_include("core/kinetic/kinetic_collision.hpp")
 #include "core/kinetic/kinetic_collision.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/theory/kinetic_log.hpp"
@@ -113,10 +110,6 @@ std::uint64_t most_pairs_of_a_box(const Collision& collision, const SceneView<fl
 
 }  // namespace
 
-bool has_separation_list() {
-  return true;
-}
-
 SeparationRun measure_separation(const Scene<float>& scene, std::uint32_t instants) {
   const SceneView<float> view(scene);
   const std::vector<double> keyframes = overlaid_keyframes(scene);
@@ -198,19 +191,3 @@ ListSizeRun measure_list_size(const Scene<float>& scene) {
 }
 
 }  // namespace kbvh::theory
-
-#else
-namespace kbvh::theory {
-
-bool has_separation_list() {
-  return false;
-}
-SeparationRun measure_separation(const Scene<float>&, std::uint32_t) {
-  throw std::logic_error("this program has no separation list");
-}
-ListSizeRun measure_list_size(const Scene<float>&) {
-  throw std::logic_error("this program has no separation list");
-}
-
-}  // namespace kbvh::theory
-#endif

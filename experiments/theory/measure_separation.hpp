@@ -1,14 +1,8 @@
 #pragma once
-#include <span>
-#include <vector>
-
 #include "core/scene.hpp"
 #include "experiments/theory/measurements.hpp"
 
 namespace kbvh::theory {
-
-/// True if this program has the separation list; the functions below throw std::logic_error without it.
-bool has_separation_list();
 
 /// Plays the clip through kinetic incremental collision detection, event by event, and at `instants` times
 /// between events compares the list with a traversal from scratch in rational arithmetic.

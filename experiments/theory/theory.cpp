@@ -140,7 +140,7 @@ class Runner {
       exact_.push_back(get<ExactRun>("exact envelopes", family,
                                      parameters + "+" + std::to_string(options_->instants),
                                      [&] { return measure_exact(scene(), options_->instants); }));
-    if (has_separation_list()) separation(family, size, parameters);
+    separation(family, size, parameters);
     if (!chosen(size, 500)) return;
     const auto frames =
         get<std::vector<FrameRun>>("frames", family, parameters, [&] { return measure_frames(scene(), ls); });

@@ -352,7 +352,6 @@ TEST(Measured, BoxTreesAreProvedBesideTheAabbTrees) {
 }
 
 TEST(Measured, SeparationListsEqualTraversals) {
-  if (!has_separation_list()) GTEST_SKIP() << "no separation list in this program";
   const SeparationRun run = measure_separation(colliding_scene("expanding_sphere", 80, 6), 20);
   EXPECT_EQ(run.audits, 20u);
   EXPECT_EQ(run.differences, 0u);
