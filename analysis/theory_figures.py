@@ -206,7 +206,7 @@ def draw_mean_and_most(
 
 def steps_per_event(theory: Theory) -> Optional[Figure]:
     """Comparisons in the queue and nodes visited per event against polygons, with the bounds."""
-    rows = growing(theory.counts).sort_values(["scene", "triangles"])
+    rows = growing(theory.counts)
     if rows.empty:
         return None
     figure, (left, right) = _keyed(list(rows["scene"].unique()), theory, 2, 4.0)

@@ -22,20 +22,6 @@ constexpr const char* examples = R"(Example:
   kbvh report --out results
 writes results/report.html, self-contained, and its figures, from results/results.jsonl.)";
 
-/// Runs a program of PATH and waits for it; its exit code.
-int run_and_wait(std::vector<std::string> words) {
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  pid_t child = 0;
-  if (const int error = ::posix_spawnp(&child, arguments[0], nullptr, nullptr, arguments.data(), environ))
-    throw io::InputError("cannot start " + words[0] + ": " + std::strerror(error));
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0)
-    if (errno != EINTR) throw std::system_error(errno, std::generic_category(), "waitpid");
-  return WIFEXITED(status) ? WEXITSTATUS(status) : internal_error;
-}
-
 int report(const std::string& out, const std::string& title) {
   const std::filesystem::path results = std::filesystem::path(out) / "results.jsonl";
   std::error_code error;
@@ -50,6 +36,19 @@ int report(const std::string& out, const std::string& title) {
 }
 
 }  // namespace
+
+int run_and_wait(std::vector<std::string> words) {
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  pid_t child = 0;
+  if (const int error = ::posix_spawnp(&child, arguments[0], nullptr, nullptr, arguments.data(), environ))
+    throw io::InputError("cannot start " + words[0] + ": " + std::strerror(error));
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0)
+    if (errno != EINTR) throw std::system_error(errno, std::generic_category(), "waitpid");
+  return WIFEXITED(status) ? WEXITSTATUS(status) : internal_error;
+}
 
 void add_report(CLI::App& program, Action& action) {
   CLI::App* command = program.add_subcommand("report", "tables and figures of a result folder");

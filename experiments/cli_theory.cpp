@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "experiments/cli.hpp"
+#include "experiments/environment.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/machine.hpp"
 #include "experiments/program.hpp"
@@ -19,15 +20,15 @@ constexpr const char* examples = R"(Examples:
   kbvh theory --scenes waving_sheet --sizes 500,1000,2000,4000,8000,16000 --out results/theory
   kbvh theory --full --out results/theory
 Holds the claims of Zachmann & Weller 2006 against counts and exact arithmetic; no clock decides anything.
-DIR/theory.json has the table with all numbers, DIR/theory.jsonl each measurement as soon as it is made: a run that
-was stopped goes on where it was. `kbvh report` is not needed: analysis/theory_figures.py DIR draws the figures.)";
+DIR/theory.json has the table with all numbers, DIR/figures what grows with what, DIR/theory.jsonl each measurement as
+soon as it is made: a run that was stopped goes on where it was. Exit codes: 0 done, whatever the verdicts; 2 wrong use.)";
 
 struct TheoryArguments {
   std::string out;
   std::vector<std::string> scenes;
   std::vector<std::uint32_t> sizes;
   std::uint32_t keyframes = 0, exact_limit = 0, instants = 0;
-  bool quick = false, full = false;
+  bool quick = false, full = false, no_figures = false;
 };
 
 int run(const TheoryArguments& arguments) {
@@ -56,7 +57,12 @@ int run(const TheoryArguments& arguments) {
     io::write_file_atomically(file, theory::to_json(report, options).dump(1) + "\n");
     say("all numbers are in " + file.string());
   }
-  return success;
+  if (arguments.out.empty() || arguments.no_figures) return success;
+  const std::string script = (analysis_folder() / "theory_figures.py").string();
+  const int code = run_and_wait({python(), script, arguments.out});
+  if (code == 0) return success;
+  say("the figures were not drawn: " + script + " ended with " + std::to_string(code));
+  return internal_error;
 }
 
 }  // namespace
@@ -74,7 +80,8 @@ void add_theory(CLI::App& program, Action& action) {
       ->check(CLI::PositiveNumber);
   command->add_option("--instants", a->instants, "audited between keyframes (200)")
       ->check(CLI::PositiveNumber);
-  command->add_option("--out", a->out, "folder for theory.json (none: the table only)");
+  command->add_option("--out", a->out, "folder for theory.json and figures (none: the table only)");
+  command->add_flag("--no-figures", a->no_figures, "leave out the figures, which take Python and matplotlib");
   CLI::Option* quick = command->add_flag("--quick", a->quick, "what CI runs: the default");
   command->add_flag("--full", a->full, "up to 580k triangles, exact up to 16k, whole sequences: hours")
       ->excludes(quick);

@@ -20,8 +20,13 @@ Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseR
 Claim judge_never_more_updates(const std::vector<FrameRun>& frames,
                                const std::vector<FrameRun>& constructed);  // T9
 Claim judge_translation(const std::vector<TranslationRun>& translations);  // T10
-Claim judge_plan_changes(const std::vector<PlanRun>& plans);               // T15
-Claim judge_lower_bound(const std::vector<LooseRun>& loose);               // T16
+Claim judge_boxtree_size(const std::vector<BoxTreeRun>& boxtrees);         // T11
+Claim judge_boxtree_qualities(const std::vector<BoxTreeRun>& boxtrees,
+                              const std::vector<SearchRun>& searches);       // T12
+Claim judge_separation_list(const std::vector<SeparationRun>& separations);  // T13
+Claim judge_list_size(const std::vector<ListSizeRun>& sizes);                // T14
+Claim judge_plan_changes(const std::vector<PlanRun>& plans);                 // T15
+Claim judge_lower_bound(const std::vector<LooseRun>& loose);                 // T16
 
 /// A claim that nothing here can decide, and why.
 Claim undecided(Claim claim, const std::string& why);

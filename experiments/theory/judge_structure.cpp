@@ -63,10 +63,8 @@ Claim judge_valid_at_all_times(const std::vector<ExactRun>& exact) {
   claim.measured = number(logged) + " changes, " + number(faults) + " bounds exceeded";
   claim.why = fmt::format(
       "In {}, the log of {} changes of {} bounds {} the breakpoints of exact envelopes, instant by instant "
-      "in "
-      "rational arithmetic, which decides all times at once; audits at {} instants ({} bounds) and on the "
-      "paths "
-      "of {} events ({} bounds) found {} exceeded.",
+      "in rational arithmetic, which decides all times at once; audits at {} instants ({} bounds) and on the "
+      "paths of {} events ({} bounds) found {} exceeded.",
       counted(exact.size(), "clip"), number(logged), number(bounds),
       violation.empty() ? "is equal to" : "differs from", number(instants), number(audited), number(events),
       number(paths), faults == 0 ? "none" : number(faults));
@@ -109,8 +107,8 @@ Claim judge_compact(const std::vector<CountRun>& counts) {
                   of_node, number(std::round(fewest_bytes)), number(std::round(most_bytes)));
   claim.why = fmt::format(
       "Over {} in {} families the queue never held more than {:.3g} events per node and no node had more "
-      "than {}; "
-      "between the sizes of a family bytes per polygon vary by a factor of at most {:.3f}, {} linear space.",
+      "than {}; between the sizes of a family bytes per polygon vary by a factor of at most {:.3f}, {} "
+      "linear space.",
       counted(counts.size(), "clip"), scene_count(counts), most, of_node, spread,
       spread <= 1.1 ? "which is" : "which is not");
   return claim;
@@ -125,8 +123,8 @@ Claim judge_responsive(const std::vector<CountRun>& counts) {
   Claim claim{.id = "T3",
               .title = "responsive: one event costs O(log^2 m)",
               .statement =
-                  "An event is handled in O(log^2 m): a path of O(log m) nodes with one insertion and "
-                  "one deletion in the queue each, if the height of the tree is logarithmic.",
+                  "An event is handled in O(log^2 m): a path of O(log m) nodes with one insertion and one "
+                  "deletion in the queue each, if the height of the tree is logarithmic.",
               .citation = "Theorem 1",
               .counter = "per event: nodes visited, certificates computed, comparisons in the queue",
               .data = counts};
@@ -162,8 +160,7 @@ Claim judge_responsive(const std::vector<CountRun>& counts) {
   claim.why = fmt::format(
       "No event took more than {} nodes (depth {}) and {} comparisons at {}, {:.0f}% of the bound at most "
       "anywhere; the mean goes from {:.1f} comparisons at {} to {:.1f}. Finding a failure walks the rest of "
-      "a flight "
-      "plan, segment by segment, which the paper and this count as one step.",
+      "a flight plan, segment by segment, which the paper and this count as one step.",
       largest->max_visited, largest->depth, number(largest->max_steps), place(*largest), 100 * share,
       mean(smallest), place(*smallest), mean(largest));
   return claim;
@@ -173,12 +170,12 @@ Claim judge_local(const std::vector<CountRun>& counts, const std::vector<CountRu
   Claim claim{.id = "T4",
               .title = "local: a vertex takes part in O(log m) certificates",
               .statement =
-                  "If the degree of every vertex is bounded, a vertex takes part in O(log m) events, and "
-                  "a change of its flight plan costs O(log^2 m).",
+                  "If the degree of every vertex is bounded, a vertex takes part in O(log m) events, and a "
+                  "change of its flight plan costs O(log^2 m).",
               .citation = "Theorem 1",
               .counter =
-                  "certificates (of a node and side) with the vertex as winner or possible loser; "
-                  "candidates looked at by a change of one plan",
+                  "certificates (of a node and side) with the vertex as winner or possible loser; candidates "
+                  "looked at by a change of one plan",
               .condition = "the number of polygons at a vertex is bounded, as the paper assumes",
               .data = {{"counts", counts}, {"fans", fans}}};
   if (counts.empty()) return undecided(claim, "Nothing was counted.");
@@ -209,8 +206,7 @@ Claim judge_local(const std::vector<CountRun>& counts, const std::vector<CountRu
       number(largest->max_update_certificates));
   claim.why = fmt::format(
       "In {} no vertex took part in more than {:.0f}% of what its leaves and the depth allow, and {} changes "
-      "of "
-      "single plans looked at no more than {:.0f}% of the candidates above the vertex",
+      "of single plans looked at no more than {:.0f}% of the candidates above the vertex",
       counted(counts.size(), "clip"), 100 * share, number(updates), 100 * update_share);
   for (const CountRun& fan : fans)
     claim.why += fmt::format("{} the hub of a fan of {} triangles takes part in {} certificates",
@@ -251,9 +247,8 @@ Claim judge_efficient(const std::vector<CountRun>& counts, const std::vector<Exa
   if (momentary > 0)
     claim.why += fmt::format(
         " Where several vertices meet at one point, a bound may pass through some of them at a single "
-        "instant: {} of "
-        "{} events ({:.2g}%), in {} of {} exact clips, change a realiser but no bound for any length of "
-        "time.",
+        "instant: {} of {} events ({:.2g}%), in {} of {} exact clips, change a realiser but no bound for any "
+        "length of time.",
         number(momentary), number(exact_events), 100 * double(momentary) / double(exact_events), tied,
         exact.size());
   else if (!exact.empty())

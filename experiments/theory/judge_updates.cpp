@@ -63,16 +63,16 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
   Claim claim{.id = "T6",
               .title = "a clip has O(lambda_s(n) log n) events, nearly O(n log n)",
               .statement =
-                  "If two flight plans cross at most s times, all events of a clip are "
-                  "O(lambda_s(n) log n), which is nearly O(n log n).",
+                  "If two flight plans cross at most s times, all events of a clip are O(lambda_s(n) log n), "
+                  "which is nearly O(n log n).",
               .citation = "Theorems 2 to 4",
               .counter = "events and changes of a clip; breakpoints of exact envelopes",
               .bound =
                   "segments x sum over nodes and sides of (vertices below - 1); lambda_1(n) - 1 = n - 1 "
                   "breakpoints per bound and segment; exponent of n log n not above 1 + 5%",
               .condition =
-                  "what grows is the bound with its factor, the number of segments; over the sizes "
-                  "measured some families grow faster than n log n",
+                  "what grows is the bound with its factor, the number of segments; over the sizes measured "
+                  "some families grow faster than n log n",
               .data = {{"counts", counts}, {"exact", exact}, {"fits", fits}}};
   if (counts.empty()) return undecided(claim, "Nothing was counted.");
   double share = 0, fullest = 0;
@@ -109,8 +109,7 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
   if (!exact.empty())
     claim.why += fmt::format(
         ", and no exact envelope of {} (bounds x segments) {} n - 1 breakpoints (the fullest has {} of them, "
-        "the "
-        "longest {})",
+        "the longest {})",
         number(pieces), over == 0 ? "has more than" : "should have more than", percent(fullest), most);
   if (fits.empty())
     claim.why += "; no family has enough sizes with events for a fit.";
@@ -162,8 +161,7 @@ Claim judge_independent_of_frames(const std::vector<FrameRun>& frames) {
   claim.measured = fmt::format("spread {}; bottom-up's values times {:.4g}", number(spread), grows);
   claim.why = fmt::format(
       "{} with {} events in all, played at up to {} frames per keyframe interval: {}, while bottom-up writes "
-      "{:.4g} "
-      "times as many values as at the lowest rate.",
+      "{:.4g} times as many values as at the lowest rate.",
       counted(scenes.size(), "clip"), number(events), number(most_l),
       spread == 0 && differ == 0 ? "events, changes and their order are the same at every rate"
                                  : "events or changes differ by up to " + number(spread) + ", and " +
@@ -215,15 +213,14 @@ Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseR
                   number(net), number(envelope), number(ties));
   claim.why = fmt::format(
       "Among tight hierarchies {}: {} net changes against {} breakpoints in {} ({} of them in general "
-      "position, where "
-      "every logged change is one); {} changes more are hand-overs through ties at one instant.",
+      "position, where every logged change is one); {} changes more are hand-overs through ties at one "
+      "instant.",
       net == envelope ? "none makes fewer" : "some make fewer", number(net), number(envelope),
       counted(exact.size(), "clip"), general, number(logged - net));
   if (!loose.empty())
     claim.why += fmt::format(
         " Definition 1 asks for containment only, and one constant box per node, swept over the clip, {} at "
-        "every "
-        "frame with no update at all beside {} changes; the price is a looseness of {:.3g} to {:.3g}.",
+        "every frame with no update at all beside {} changes; the price is a looseness of {:.3g} to {:.3g}.",
         outside == 0 ? "contains everything" : "does not contain everything", number(kinetic), least_loose,
         most_loose);
   return claim;
@@ -260,14 +257,12 @@ Claim judge_never_more_updates(const std::vector<FrameRun>& frames,
   for (const FrameRun& run : constructed)
     claim.why += fmt::format(
         "{}: in one frame one bound changes hands {} times and the kinetic tree writes {} values where "
-        "bottom-up "
-        "writes {}. ",
+        "bottom-up writes {}. ",
         place(run), run.most_of_bound, number(run.values), number(run.bottom_up_values));
   if (!frames.empty())
     claim.why += fmt::format(
         "In the other clips some bound changes more than once in {} of {} frames, but {} frames cost more "
-        "than "
-        "bottom-up (the worst writes {} of its values).",
+        "than bottom-up (the worst writes {} of its values).",
         number(repeated), number(all), worse == 0 ? "no" : number(worse), percent(worst));
   return claim;
 }
@@ -299,8 +294,7 @@ Claim judge_translation(const std::vector<TranslationRun>& translations) {
     else
       claim.why += fmt::format(
           "{} ({} vertices, {}, {} coordinates rounded): {} events, {} of them between vertices whose "
-          "coordinates "
-          "were equal before: rounding made ties, and these separate. ",
+          "coordinates were equal before: rounding made ties, and these separate. ",
           run.scene, number(run.vertices), keyframes, number(run.rounded), number(run.events),
           number(run.separated_ties));
   }
@@ -313,14 +307,13 @@ Claim judge_plan_changes(const std::vector<PlanRun>& plans) {
       .id = "T15",
       .title = "flight-plan updates do not change the combinatorial structure",
       .statement =
-          "A flight-plan update does not change the combinatorial structure of the hierarchy, "
-          "which stays valid.",
+          "A flight-plan update does not change the combinatorial structure of the hierarchy, which stays "
+          "valid.",
       .citation = "section 4, proof of Theorem 1",
       .counter = "nodes that differ; realisers exceeded before and after; realisers changed by the update",
       .bound = "0",
       .condition =
-          "the new plan starts where the old one is; a position rounded to the scalar may pass "
-          "another",
+          "the new plan starts where the old one is; a position rounded to the scalar may pass another",
       .data = plans};
   if (plans.empty()) return undecided(claim, "No plan was changed.");
   std::uint64_t updates = 0, at_keyframes = 0, changed = 0, moved = 0, moved_at_keyframes = 0, invalid = 0,
@@ -346,10 +339,8 @@ Claim judge_plan_changes(const std::vector<PlanRun>& plans) {
                                number(moved_at_keyframes), number(moved), number(invalid));
   claim.why = fmt::format(
       "{} updates of {} plans: the topology differed {} times, {} bounds were exceeded before or after in "
-      "exact "
-      "arithmetic, and {} clips differ from their envelopes; {} updates at keyframes changed {} realisers, "
-      "{} between "
-      "keyframes, where a vertex starts from its rounded position, changed {}.",
+      "exact arithmetic, and {} clips differ from their envelopes; {} updates at keyframes changed {} "
+      "realisers, {} between keyframes, where a vertex starts from its rounded position, changed {}.",
       number(updates), number(changed), number(topology), number(invalid), number(wrong),
       number(at_keyframes), number(moved_at_keyframes), number(updates - at_keyframes), number(moved));
   return claim;
@@ -391,12 +382,10 @@ Claim judge_lower_bound(const std::vector<LooseRun>& loose) {
                   number(computed), number(values));
   claim.why = fmt::format(
       "In {} boxes computed at keyframes ({} values) and linear in between contain every vertex at all {} "
-      "frames with "
-      "no update in between, at most {:.2g} looser than tight, where the kinetic tree has {} events ({} "
-      "changes, "
-      "bottom-up {} values); constant boxes need {} values for a whole clip. What does hold is T8: for tight "
-      "hierarchies the changes are forced; and the paper's argument bounds events from above, not from "
-      "below.",
+      "frames with no update in between, at most {:.2g} looser than tight, where the kinetic tree has {} "
+      "events ({} changes, bottom-up {} values); constant boxes need {} values for a whole clip. What does "
+      "hold is T8: for tight hierarchies the changes are forced; and the paper's argument bounds events from "
+      "above, not from below.",
       counted(clips, "clip"), number(computed), number(frames), most_loose, number(events), number(values),
       number(bottom_up), number(bounds));
   return claim;

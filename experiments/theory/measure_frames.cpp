@@ -46,6 +46,7 @@ struct FrameObserver {
     count->most = std::max(count->most, ++count->of_bound[body][bound]);
     ++count->values;
   }
+  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
 };
 
 /// Frame by frame against bottom-up, which writes every bound of every body that moves in every frame.

@@ -126,6 +126,61 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LooseRun, scene, triangles, bounds, l, frames
                                    swept_updates, linear_values, linear_updates, kinetic_events,
                                    kinetic_values, bottom_up_values)
 
+/// The kinetic BoxTree of the same topology beside the AABB tree.
+struct BoxTreeRun {
+  std::string scene;
+  std::uint64_t triangles = 0, trees = 0, nodes = 0, inner_nodes = 0, depth = 0;
+  std::uint64_t certificates = 0;  ///< places for events: two per inner node, and the roots' own
+  std::uint64_t most_of_planes = 0, queue_peak = 0;  ///< events alive: of one inner node's planes; in all
+  std::uint64_t events = 0, values = 0, silent_events = 0, bytes = 0;
+  std::uint64_t aabb_events = 0, aabb_values = 0, aabb_bytes = 0;
+  std::uint64_t searches = 0, searched = 0, most_searched = 0;  ///< nodes looked at by certificate searches
+  std::uint64_t max_vertex_certificates = 0, max_leaves_of_vertex = 0;
+  std::uint64_t proved = 0;  ///< bounds held against exact envelopes
+  std::string violation;     ///< the first, empty if there is none
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(BoxTreeRun, scene, triangles, trees, nodes, inner_nodes, depth,
+                                   certificates, most_of_planes, queue_peak, events, values, silent_events,
+                                   bytes, aabb_events, aabb_values, aabb_bytes, searches, searched,
+                                   most_searched, max_vertex_certificates, max_leaves_of_vertex, proved,
+                                   violation)
+
+/// What certificate searches cost in BoxTrees with forced axes.
+struct SearchRun {
+  std::string tree;
+  std::uint64_t leaves = 0, events = 0;
+  std::uint64_t searches = 0, searched = 0, most_searched = 0;
+  std::uint64_t events_of_root = 0, searched_by_root = 0;  ///< at the two planes of the root
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SearchRun, tree, leaves, events, searches, searched, most_searched,
+                                   events_of_root, searched_by_root)
+
+/// Kinetic incremental collision detection on a clip, event by event.
+struct SeparationRun {
+  /// Events of one kind: how many pairs they touch, what the queues cost.
+  struct Kind {
+    std::uint64_t events = 0, pairs = 0, most_pairs = 0, steps = 0, operations = 0;
+    double most_steps_per_operation = 0;  ///< comparisons per operation on the queue, mean of one event
+  };
+  std::string scene;
+  std::uint64_t polygons = 0;  ///< of all bodies
+  Kind overlap, fathers, leaves, changes;
+  std::uint64_t list_peak = 0, queue_peak = 0, bytes = 0;
+  std::uint64_t most_of_box = 0;  ///< most pairs that a box takes part in, at keyframes
+  std::uint64_t audits = 0, entries = 0, differences = 0;  ///< list against traversals between events
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SeparationRun::Kind, events, pairs, most_pairs, steps, operations,
+                                   most_steps_per_operation)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SeparationRun, scene, polygons, overlap, fathers, leaves, changes,
+                                   list_peak, queue_peak, bytes, most_of_box, audits, entries, differences)
+
+/// Sizes of the separation list at keyframes, at most.
+struct ListSizeRun {
+  std::string scene;
+  std::uint64_t polygons = 0, list = 0, overlapping = 0;  ///< all pairs of the list; overlapping leaves
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ListSizeRun, scene, polygons, list, overlapping)
+
 /// How the number of events of a family of scenes grows with its vertices.
 struct GrowthFit {
   std::string scene;

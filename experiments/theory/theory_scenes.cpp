@@ -47,6 +47,14 @@ Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, st
   return only_moving(experiments::assemble<float>(experiments::load(spec, progress)));
 }
 
+Scene<float> colliding_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes) {
+  experiments::SceneSpec spec;
+  spec.builtin = family;
+  spec.options.triangles = spec.options.obstacle_triangles = triangles;
+  spec.options.keyframes = keyframes;
+  return experiments::assemble<float>(experiments::load(spec));
+}
+
 std::optional<Scene<float>> data_scene(const std::string& name, std::size_t keyframes) {
   const auto folder = experiments::data_folder() / "sequences" / name;
   std::error_code error;
@@ -104,6 +112,25 @@ Scene<float> fan_scene(std::uint32_t triangles) {
   body.plans = FlightPlans<float>(triangles + 2, {0.0, 1.0}, std::move(twice));
   scene.bodies.push_back(std::move(body));
   validate(scene);
+  return scene;
+}
+
+Scene<float> wandering_points(std::uint32_t count, std::size_t axes) {
+  const scenes::SeededNoise noise(count);
+  std::uint64_t index = 0;
+  Body<float> body;
+  body.name = "points";
+  body.primitives.kind = PrimitiveKind::points;
+  for (std::uint32_t p = 0; p < count; ++p) body.primitives.add(std::vector<std::uint32_t>{p});
+  std::vector<float> positions;
+  for (int keyframe = 0; keyframe < 4; ++keyframe)
+    for (std::uint32_t p = 0; p < count; ++p)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        positions.push_back(axis < axes ? float(noise.signed_unit(index++)) : 0.0f);
+  body.plans = FlightPlans<float>(count, {0, 1, 2, 3}, std::move(positions));
+  Scene<float> scene;
+  scene.name = "wandering points";
+  scene.bodies.push_back(std::move(body));
   return scene;
 }
 

@@ -13,6 +13,9 @@ namespace kbvh::theory {
 Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes,
                           const experiments::MakeProgress& progress = {});
 
+/// The whole of a built-in scene, with as many triangles in the body beside the one that moves.
+Scene<float> colliding_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes);
+
 /// A sequence of the data folder, with at most so many keyframes (0: all); nothing if it is not there.
 std::optional<Scene<float>> data_scene(const std::string& name, std::size_t keyframes);
 
@@ -22,6 +25,9 @@ Scene<float> tangents_scene(std::uint32_t vertices);
 
 /// A fan: `triangles` around one vertex, at rest. Its hub takes part in every leaf's certificates (T4).
 Scene<float> fan_scene(std::uint32_t triangles);
+
+/// Points that jump about at random on the first `axes` axes, four keyframes; other coordinates are 0.
+Scene<float> wandering_points(std::uint32_t count, std::size_t axes);
 
 /// A sphere's vertices on a lattice, moved by lattice steps: a translation that float holds exactly, near the
 /// origin. `far` moves it to coordinates of 1e6, by steps that are not multiples of float's spacing there.

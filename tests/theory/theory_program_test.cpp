@@ -57,6 +57,8 @@ TEST_F(TheoryProgram, QuickDecidesWhatItMeasures) {
                                                     {"T8", "holds with a condition"},
                                                     {"T9", "holds with a condition"},
                                                     {"T10", "holds with a condition"},
+                                                    {"T11", "holds with a condition"},
+                                                    {"T12", "holds"},
                                                     {"T15", "holds with a condition"},
                                                     {"T16", "does not hold"}};
   ASSERT_EQ(report.at("claims").size(), 16u);
@@ -78,13 +80,18 @@ TEST_F(TheoryProgram, QuickDecidesWhatItMeasures) {
     EXPECT_NE(claim.at("verdict"), id == "T16" ? "" : "does not hold") << claim.at("why");
     EXPECT_NE(out.find(id + " "), std::string::npos) << id;
   }
+  for (const char* name : {"events-n", "events-l", "certificates", "steps"})
+    for (const char* kind : {".png", ".pdf"})
+      EXPECT_TRUE(fs::exists(folder_ / "results" / "figures" / (std::string("theory-") + name + kind)))
+          << name;
   std::size_t begin = 0;
   for (std::size_t end; (end = out.find('\n', begin)) != std::string::npos; begin = end + 1)
     EXPECT_LE(end - begin, 120u) << out.substr(begin, end - begin);
 }
 
 TEST_F(TheoryProgram, GoesOnWhereItWasStopped) {
-  const std::string tiny = "--scenes waving_sheet --sizes 60,100 --keyframes 5 --instants 5 --out results";
+  const std::string tiny =
+      "--scenes waving_sheet --sizes 60,100 --keyframes 5 --instants 5 --no-figures --out results";
   ASSERT_EQ(kbvh(tiny), 0) << err;
   const std::string table = out, records = text_of(folder_ / "results" / "theory.jsonl");
   const json report = json::parse(text_of(folder_ / "results" / "theory.json"));

@@ -8,8 +8,10 @@
 
 #include "experiments/theory/fit.hpp"
 #include "experiments/theory/judge.hpp"
+#include "experiments/theory/measure_boxtree.hpp"
 #include "experiments/theory/measure_counts.hpp"
 #include "experiments/theory/measure_exact.hpp"
+#include "experiments/theory/measure_separation.hpp"
 #include "experiments/theory/theory.hpp"
 #include "experiments/theory/theory_scenes.hpp"
 
@@ -221,6 +223,58 @@ TEST(Verdict, TranslationsAndPlans) {
   expect_flip(plans, holds, fails, judge_plan_changes, [](PlanRun& r) { r.violation = "node 3"; });
 }
 
+TEST(Verdict, BoxTrees) {
+  BoxTreeRun box;
+  box.scene = "cloth", box.triangles = 1000, box.trees = 1, box.depth = 10;
+  box.inner_nodes = 999, box.nodes = 1999, box.certificates = 2 * 999 + 6;
+  box.most_of_planes = 2, box.queue_peak = 1000, box.bytes = 900, box.aabb_bytes = 1000;
+  box.events = 90, box.aabb_events = 100, box.max_leaves_of_vertex = 6, box.max_vertex_certificates = 50;
+  const std::vector<BoxTreeRun> good{box};
+  expect_flip(good, condition, fails, judge_boxtree_size, [](BoxTreeRun& r) { r.bytes = 1001; });
+  expect_flip(good, condition, fails, judge_boxtree_size, [](BoxTreeRun& r) { r.events = 101; });
+  expect_flip(good, condition, fails, judge_boxtree_size, [](BoxTreeRun& r) { r.most_of_planes = 3; });
+  expect_flip(good, condition, holds, judge_boxtree_size, [](BoxTreeRun& r) { r.certificates -= 6; });
+  SearchRun line, worst;
+  line.tree = "one axis", line.leaves = 1024, line.most_searched = 21, line.searches = 10;
+  worst.tree = "root x, else y", worst.leaves = 1024, worst.most_searched = 1023, worst.events_of_root = 5;
+  const std::vector<SearchRun> searches{line, worst};
+  const auto by_box = [&](const std::vector<BoxTreeRun>& runs) {
+    return judge_boxtree_qualities(runs, searches);
+  };
+  expect_flip(good, holds, fails, by_box, [](BoxTreeRun& r) { r.silent_events = 1; });
+  expect_flip(good, holds, fails, by_box, [](BoxTreeRun& r) { r.violation = "node 3"; });
+  expect_flip(good, holds, fails, by_box, [](BoxTreeRun& r) { r.max_vertex_certificates = 1000; });
+  const auto by_search = [&](const std::vector<SearchRun>& runs) {
+    return judge_boxtree_qualities(good, runs);
+  };
+  expect_flip(searches, holds, fails, by_search, [](SearchRun& r) { r.most_searched = 100; });
+  expect_flip(searches, holds, fails, by_search, [](SearchRun& r) { r.tree = "one axis"; });
+}
+
+TEST(Verdict, SeparationLists) {
+  SeparationRun run;
+  run.scene = "cloth", run.polygons = 1000, run.queue_peak = 3000;
+  run.audits = 20, run.entries = 50000, run.most_of_box = 100, run.list_peak = 2500;
+  run.overlap = {100, 400, 4, 5000, 500, 12.0};
+  run.fathers = {100, 400, 4, 5000, 500, 12.0};
+  const std::vector<SeparationRun> good{run};
+  expect_flip(good, holds, fails, judge_separation_list, [](SeparationRun& r) { r.differences = 1; });
+  expect_flip(good, holds, fails, judge_separation_list, [](SeparationRun& r) { r.audits = 0; });
+  expect_flip(good, holds, condition, judge_separation_list,
+              [](SeparationRun& r) { r.overlap.most_pairs = 8; });
+  expect_flip(good, holds, fails, judge_separation_list,
+              [](SeparationRun& r) { r.leaves.most_steps_per_operation = 100; });
+  std::vector<ListSizeRun> sizes;
+  for (const char* scene : {"sheet", "cloth"})
+    for (const std::uint64_t m : {100, 200, 400, 800}) sizes.push_back({scene, m, 3 * m, m / 2});
+  EXPECT_EQ(judge_list_size(sizes).verdict(), holds);
+  for (std::size_t i = 4; i < 8; ++i) sizes[i].list *= sizes[i].polygons;
+  EXPECT_EQ(judge_list_size(sizes).verdict(), condition);
+  for (std::size_t i = 0; i < 4; ++i) sizes[i].list *= sizes[i].polygons;
+  EXPECT_EQ(judge_list_size(sizes).verdict(), fails);
+  EXPECT_EQ(judge_list_size({sizes[0]}).verdict(), Verdict::not_decided);
+}
+
 // ---- Constructed scenes ----------------------------------------------------------------------------------
 
 TEST(Constructed, OneBoundChangesHandsFifteenTimesInOneFrame) {
@@ -245,6 +299,18 @@ TEST(Constructed, TheHubOfAFanTakesPartInEveryLeaf) {
   EXPECT_EQ(fan.max_leaves_of_vertex, 500u);
   EXPECT_GE(fan.max_vertex_certificates, 6 * 500u);
   EXPECT_LE(fan.update_share, 1.0);
+}
+
+TEST(Constructed, OneSearchTakesHalfOfTheTreeThatIsSplitOnceOnItsAxis) {
+  for (const std::uint32_t leaves : {64u, 512u}) {
+    const SearchRun worst = measure_searches("root x, else y", leaves);
+    EXPECT_GE(worst.most_searched, leaves - 1);
+    EXPECT_GT(worst.events_of_root, 0u);
+    EXPECT_GE(worst.searched_by_root, worst.events_of_root * (leaves - 1));
+    const SearchRun line = measure_searches("one axis", leaves);
+    EXPECT_LE(line.most_searched, 2 * std::uint64_t(std::log2(leaves)) + 1);
+  }
+  EXPECT_THROW(measure_searches("sideways", 64), std::invalid_argument);
 }
 
 TEST(Constructed, TranslationsAreExactNearAndRoundedFar) {
@@ -272,6 +338,25 @@ TEST(Measured, CountsAgreeWithTheLog) {
   EXPECT_EQ(loose.swept_outside + loose.linear_outside, 0u);
   EXPECT_GT(loose.swept_looseness, loose.linear_looseness);
   EXPECT_EQ(loose.kinetic_values, counts.values);
+}
+
+TEST(Measured, BoxTreesAreProvedBesideTheAabbTrees) {
+  const Scene<float> scene = moving_scene("waving_sheet", 200, 6);
+  const CountRun counts = measure_counts(scene);
+  const BoxTreeRun box = measure_boxtree(scene, counts, Proof::exact_envelopes);
+  EXPECT_EQ(box.violation, "");
+  EXPECT_EQ(box.certificates, 2 * box.inner_nodes + 6);
+  EXPECT_EQ(box.proved, box.certificates);
+  EXPECT_LT(box.bytes, counts.bytes);
+  EXPECT_GT(box.searches, box.events);
+}
+
+TEST(Measured, SeparationListsEqualTraversals) {
+  const SeparationRun run = measure_separation(colliding_scene("expanding_sphere", 80, 6), 20);
+  EXPECT_EQ(run.audits, 20u);
+  EXPECT_EQ(run.differences, 0u);
+  EXPECT_GT(run.entries, 0u);
+  EXPECT_GT(run.overlap.events, 0u);
 }
 
 TEST(Measured, PlanChangesKeepTheTree) {

@@ -1,0 +1,148 @@
+// T11, T12: the kinetic BoxTree.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "experiments/text.hpp"
+#include "experiments/theory/judge.hpp"
+
+namespace kbvh::theory {
+
+using experiments::counted;
+
+namespace {
+constexpr Role always = Role::always, as_stated = Role::as_stated;
+
+std::string place(const BoxTreeRun& run) {
+  return run.scene + ", " + number(run.triangles) + " polygons";
+}
+}  // namespace
+
+Claim judge_boxtree_size(const std::vector<BoxTreeRun>& boxtrees) {
+  Claim claim{
+      .id = "T11",
+      .title = "BoxTree: at most two events per node, less memory, fewer events",
+      .statement =
+          "The kinetic BoxTree has at most two events per node, needs less memory than the kinetic AABB tree "
+          "and has fewer events.",
+      .citation = "section 6, Theorem 5",
+      .counter = "events alive per inner node; bytes and events beside the AABB tree's on one topology",
+      .bound = "two events per inner node; bytes and events of the AABB tree",
+      .condition = "the root has its own six sides besides, which the paper omits",
+      .data = boxtrees};
+  if (boxtrees.empty()) return undecided(claim, "No BoxTree was played.");
+  double most_memory = 0, most_events = 0;
+  std::uint64_t of_planes = 0, of_roots = 0, compared = 0, fewer = 0;
+  for (const BoxTreeRun& run : boxtrees) {
+    claim.criteria.push_back({"most events of an inner node's planes, " + place(run),
+                              double(run.most_of_planes), Relation::at_most, 2, 0, always});
+    claim.criteria.push_back({"most events alive, " + place(run), double(run.queue_peak), Relation::at_most,
+                              2 * double(run.inner_nodes) + 6 * double(run.trees), 0, always});
+    const std::uint64_t roots = run.certificates - 2 * run.inner_nodes;
+    claim.criteria.push_back({"events beside those of inner nodes, " + place(run), double(roots),
+                              Relation::at_most, 0, 0, as_stated});
+    claim.criteria.push_back(
+        {"bytes, " + place(run), double(run.bytes), Relation::at_most, double(run.aabb_bytes), 0, always});
+    of_planes = std::max(of_planes, run.most_of_planes);
+    of_roots = std::max(of_roots, roots / std::max<std::uint64_t>(run.trees, 1));
+    most_memory = std::max(most_memory, double(run.bytes) / double(run.aabb_bytes));
+    if (run.aabb_events == 0) continue;
+    claim.criteria.push_back(
+        {"events, " + place(run), double(run.events), Relation::at_most, double(run.aabb_events), 0, always});
+    const double share = double(run.events) / double(run.aabb_events);
+    most_events = std::max(most_events, share);
+    fewer += share <= 1;
+    ++compared;
+  }
+  claim.measured =
+      fmt::format("at most {} events per inner node, {} at a root; {:.3g} of the bytes; {:.3g} of the events",
+                  of_planes, of_roots, most_memory, most_events);
+  claim.why = fmt::format(
+      "In {} no inner node's planes had more than {} events at once, and each root up to {} of its own; "
+      "trees and queue took at most {:.3g} of the AABB tree's bytes; in {} of {} clips with events there "
+      "were fewer, at most {:.3g} of the AABB tree's.",
+      counted(boxtrees.size(), "clip"), of_planes, of_roots, most_memory, fewer, compared, most_events);
+  return claim;
+}
+
+Claim judge_boxtree_qualities(const std::vector<BoxTreeRun>& boxtrees,
+                              const std::vector<SearchRun>& searches) {
+  Claim claim{.id = "T12",
+              .title = "BoxTree: valid, compact, local, efficient; responsive in 1D only",
+              .statement =
+                  "The kinetic BoxTree is compact, local and efficient and valid at every time; it is "
+                  "responsive only in the one-dimensional case.",
+              .citation = "Theorem 5",
+              .counter =
+                  "nodes looked at by a certificate search; certificates of a vertex; events that change "
+                  "nothing; stored bounds against exact envelopes",
+              .bound = "one axis: 2 log2 m + 1 nodes; root x, all else y: half of all nodes",
+              .data = {{"boxtrees", boxtrees}, {"searches", searches}}};
+  if (boxtrees.empty() || searches.empty()) return undecided(claim, "No BoxTree was played.");
+  std::uint64_t silent = 0, events = 0, proved = 0, wrong = 0;
+  double local = 0;
+  for (const BoxTreeRun& run : boxtrees) {
+    claim.criteria.push_back({"bounds that differ from their envelopes, " + place(run),
+                              run.violation.empty() ? 0.0 : 1.0, Relation::equal, 0, 0, always});
+    claim.criteria.push_back({"events that change no realiser, " + place(run), double(run.silent_events),
+                              Relation::equal, 0, 0, always});
+    const double bound = double(run.max_leaves_of_vertex) * (6 + 2 * (double(run.depth) + 6));
+    claim.criteria.push_back({"most certificates of a vertex, " + place(run),
+                              double(run.max_vertex_certificates), Relation::at_most, bound, 0, always});
+    local = std::max(local, double(run.max_vertex_certificates) / bound);
+    silent += run.silent_events, events += run.events, proved += run.proved, wrong += !run.violation.empty();
+  }
+  const SearchRun *one = nullptr, *adversarial = nullptr, *mixed = nullptr;
+  for (const SearchRun& run : searches) {
+    const std::string where = run.tree + ", " + number(run.leaves) + " leaves";
+    if (run.tree == "one axis") {
+      claim.criteria.push_back({"most nodes of a search, " + where, double(run.most_searched),
+                                Relation::at_most, 2 * std::ceil(std::log2(double(run.leaves))) + 1, 0,
+                                always});
+      one = &run;
+    } else if (run.tree == "mixed") {
+      mixed = &run;
+    } else {
+      // The claim says that this case is not responsive: a search through half of the tree proves it.
+      claim.criteria.push_back({"most nodes of a search, " + where, double(run.most_searched),
+                                Relation::at_least, double(run.leaves) - 1, 0, always});
+      claim.criteria.push_back({"events at the root's planes, " + where, double(run.events_of_root),
+                                Relation::at_least, 1, 0, always});
+      adversarial = &run;
+    }
+  }
+  claim.why = fmt::format(
+      "{} stored bounds were proved against exact envelopes ({} clips differ), {} of {} events change "
+      "nothing, and no vertex takes part in more than {:.0f}% of the certificates that its leaves and the "
+      "depth allow.",
+      number(proved), wrong, silent == 0 ? "none" : number(silent), number(events), 100 * local);
+  const auto mean = [](const SearchRun& run) {
+    return double(run.searched) / double(std::max<std::uint64_t>(run.searches, 1));
+  };
+  if (one != nullptr) {
+    claim.measured =
+        fmt::format("one axis: at most {} nodes of {} leaves", one->most_searched, number(one->leaves));
+    claim.why += fmt::format(" On one axis a search looks at {} of {} nodes at most;", one->most_searched,
+                             number(2 * one->leaves - 1));
+  }
+  if (adversarial != nullptr) {
+    claim.measured += fmt::format("; root x, else y: {}", number(adversarial->most_searched));
+    claim.why += fmt::format(
+        " with the root split on x and all else on y one looks at up to {} of {} nodes, and an event at the "
+        "root's planes costs {} on average;",
+        number(adversarial->most_searched), number(2 * adversarial->leaves - 1),
+        number(std::round(double(adversarial->searched_by_root) /
+                          double(std::max<std::uint64_t>(adversarial->events_of_root, 1)))));
+  }
+  if (mixed != nullptr) {
+    claim.measured +=
+        fmt::format("; mixed: {} ({:.3g} on average)", number(mixed->most_searched), mean(*mixed));
+    claim.why += fmt::format(" with axes chosen by area {} on average, {} at most.", number(mean(*mixed)),
+                             number(mixed->most_searched));
+  }
+  if (claim.why.back() == ';') claim.why.back() = '.';
+  return claim;
+}
+
+}  // namespace kbvh::theory
