@@ -16,11 +16,7 @@ struct CountNotices {
   void realiser_changed(std::uint32_t, std::uint32_t, Side, std::uint32_t, std::uint32_t, const Instant<S>&) {
     ++*notices;
   }
-<<<<<<< HEAD
-  void realiser_plan_changed(std::uint32_t, std::uint32_t) {}
-=======
   void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
->>>>>>> theory
 };
 
 using Forest = KineticForest<float, AvlQueue<float>, Counting, CountNotices>;

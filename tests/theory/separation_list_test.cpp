@@ -13,12 +13,8 @@
 namespace kbvh::test {
 namespace {
 
-<<<<<<< HEAD
 using theory::exact;
 using theory::Rational;
-=======
-using namespace kbvh::theory;
->>>>>>> theory
 
 template <class S>
 Rational value_at(const Piece<S>& piece, const Rational& t) {
