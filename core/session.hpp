@@ -44,12 +44,13 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Starts at time t, with the scene's own plans and geometry again: where geometry has changed, with a new
-  /// instance of the strategy.
+  /// Starts at time t, with the scene's own plans and geometry again. Where geometry was changed the
+  /// instance is made anew, and references to it are not valid any more.
   void reset(double t) {
     playback_.restore_plans();
     if (geometry_changed_) {
       changing_.emplace(*original_);
+      playback_.seek(overlaid_keyframes(*original_).front());
       make_strategy();
       geometry_changed_ = false;
     }
