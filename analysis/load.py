@@ -20,11 +20,12 @@ FILE_NAME = "results.jsonl"
 PHASES = ("motion", "update", "traversal", "triangle_tests", "plan_changes")
 COUNTERS = (
     "nodes_visited", "values_written", "vertex_reads", "positions_fetched", "certificates_made",
-    "certificates_failed", "certificates_discarded", "internal_events", "queue_operations", "queue_steps",
+    "certificates_failed", "certificates_discarded", "internal_events", "overlap_events",
+    "fathers_apart_events", "leaves_apart_events", "bound_change_events", "list_peak", "queue_operations", "queue_steps",
     "queue_peak", "box_tests", "triangle_tests", "triangle_tests_exact",
 )  # fmt: skip
 #: Counters that are a level, not a sum over the clip.
-LEVELS = ("queue_peak",)
+LEVELS = ("queue_peak", "list_peak")
 GUARANTEES = ("exact", "candidate_superset", "approximate")
 
 

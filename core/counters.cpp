@@ -20,6 +20,16 @@ const char* name(Counter counter) {
       return "certificates_discarded";
     case Counter::internal_events:
       return "internal_events";
+    case Counter::overlap_events:
+      return "overlap_events";
+    case Counter::fathers_apart_events:
+      return "fathers_apart_events";
+    case Counter::leaves_apart_events:
+      return "leaves_apart_events";
+    case Counter::bound_change_events:
+      return "bound_change_events";
+    case Counter::list_peak:
+      return "list_peak";
     case Counter::queue_operations:
       return "queue_operations";
     case Counter::queue_steps:

@@ -15,6 +15,11 @@ enum class Counter : std::uint8_t {
   certificates_failed,     ///< events processed
   certificates_discarded,  ///< scheduled failures removed before they happened
   internal_events,         ///< events that changed no bound
+  overlap_events,          ///< boxes of a separation list that began to overlap
+  fathers_apart_events,    ///< inner pairs above a separation list that ceased to overlap
+  leaves_apart_events,     ///< overlapping leaves that ceased to overlap
+  bound_change_events,     ///< changes of a box that takes part in a separation list
+  list_peak,               ///< largest number of pairs in the separation list (a maximum, not a sum)
   queue_operations,        ///< insert, erase, pop and re-key on the event queue
   queue_steps,             ///< comparisons made by the queue
   queue_peak,              ///< largest number of events scheduled at once (a maximum, not a sum)

@@ -1,32 +1,14 @@
 #pragma once
-#include <algorithm>
 #include <chrono>
 #include <map>
 #include <optional>
 #include <vector>
 
 #include "core/hierarchy/oracle.hpp"
+#include "core/plan_script.hpp"
 #include "core/registry.hpp"
 
 namespace kbvh {
-
-/// Changes of plans and geometry to be made at run time, at frames: the same script is replayed to every
-/// contestant.
-template <class S>
-struct PlanScript {
-  struct Step {
-    double time;  ///< of a frame; the changes are made after its query
-    std::vector<PlanChange<S>> changes{};
-    GeometryChange<S> geometry{};  ///< after the plans
-  };
-  std::vector<Step> steps;  ///< ascending times
-  bool changes_plans() const {
-    return std::any_of(steps.begin(), steps.end(), [](const Step& step) { return !step.changes.empty(); });
-  }
-  bool changes_geometry() const {
-    return std::any_of(steps.begin(), steps.end(), [](const Step& step) { return !step.geometry.empty(); });
-  }
-};
 
 /// How one contestant is to be run.
 struct Contestant {
@@ -48,21 +30,28 @@ class Session {
  public:
   /// Builds topologies at the first frame and makes the instance. Throws ConfigError.
   Session(const Scene<S>& scene, const Contestant& contestant, CountingPolicy policy)
-      : info_(&contestant.entry->info),
-        changing_(info_->can.geometry_changes ? std::optional<ChangingScene<S>>(scene) : std::nullopt),
+      : original_(&scene),
+        contestant_(contestant),
+        policy_(policy),
+        changing_(info().can.geometry_changes ? std::optional<ChangingScene<S>>(scene) : std::nullopt),
         scene_(changing_ ? &changing_->scene() : &scene),
         view_(*scene_),
         playback_(scene) {
-    const Params params(info_->id, info_->parameters, contestant.params);
-    Topologies topologies;
-    if (!info_->topology.own) topologies = build_topologies(view_, playback_, contestant.builder);
-    strategy_ = create(*contestant.entry, view_, playback_, std::move(topologies), params, policy);
+    make_instance();
   }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Starts at time t; phase times so far are forgotten. Plans and geometry stay as the changes left them.
+  /// Starts at time t, with the scene's own plans and geometry again. If geometry was changed, the instance
+  /// is made anew, and references to it are not valid any more.
   void reset(double t) {
+    playback_.restore_plans();
+    if (geometry_changed_) {
+      geometry_changed_ = false;
+      *changing_ = ChangingScene<S>(*original_);
+      playback_.seek(overlaid_keyframes(*original_).front());
+      make_instance();
+    }
     playback_.seek(t);
     playback_.evaluate_all();
     strategy_->reset(t);
@@ -70,7 +59,7 @@ class Session {
   /// Moves to t, with positions if the strategy wants all of them, and advances.
   void advance(double t, PhaseTimes& times) {
     playback_.seek(t);
-    if (info_->positions == PositionUse::all) timed(times.motion, [&] { playback_.evaluate_all(); });
+    if (info().positions == PositionUse::all) timed(times.motion, [&] { playback_.evaluate_all(); });
     timed(times.update, [&] { strategy_->advance(t); });
   }
   /// Fills `pairs` with the confirmed pairs at the current time.
@@ -81,7 +70,14 @@ class Session {
     timed(times.triangle_tests, [&] { strategy_->confirm(playback_.time(), pairs); });
     return status;
   }
-  /// Makes the changes at the current time.
+  /// Moves to t and appends the pairs of the interval that this takes, for strategies that declare spans.
+  void spans(double t, SpanBuffer& out) {
+    const double from = playback_.time();
+    playback_.seek(t);
+    strategy_->spans(from, t, out);
+  }
+  /// Makes the changes at the current time, all of them or, if one is not valid, none
+  /// (Playback::change_plans).
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
     if (changing_) changing_->check_plans(changes);
     playback_.change_plans(playback_.time(), changes);
@@ -91,14 +87,15 @@ class Session {
   /// std::logic_error if the strategy does not declare geometry changes, std::invalid_argument (see
   /// ChangingScene) with nothing changed.
   void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
-    if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
+    if (!changing_) throw std::logic_error("'" + info().id + "' does not declare geometry changes");
     changing_->apply(change, playback_);
+    geometry_changed_ = true;
     timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
   }
 
   Strategy<S>& strategy() { return *strategy_; }
   Playback<S>& playback() { return playback_; }
-  const Info& info() const { return *info_; }
+  const Info& info() const { return contestant_.entry->info; }
   /// The scene as it is now.
   const Scene<S>& scene() const { return *scene_; }
 
@@ -109,12 +106,22 @@ class Session {
     work();
     seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
-  const Info* info_;
+  void make_instance() {
+    const Params params(info().id, info().parameters, contestant_.params);
+    Topologies topologies;
+    if (!info().topology.own) topologies = build_topologies(view_, playback_, contestant_.builder);
+    strategy_ = create(*contestant_.entry, view_, playback_, std::move(topologies), params, policy_);
+  }
+
+  const Scene<S>* original_;
+  Contestant contestant_;
+  CountingPolicy policy_;
   std::optional<ChangingScene<S>> changing_;  ///< for strategies that can follow
   const Scene<S>* scene_;
   SceneView<S> view_;
   Playback<S> playback_;
   std::unique_ptr<Strategy<S>> strategy_;
+  bool geometry_changed_ = false;
 };
 
 }  // namespace kbvh

@@ -121,7 +121,9 @@ class Strategy {
     return status;
   }
 
-  /// Pairs over [t0, t1] with closed spans that enclose every contact of the exact plan and of every frame.
+  /// Appends the pairs over [t0, t1] with closed spans that enclose every contact of the exact plan and of
+  /// every frame; a pair may have several. Stands at t0 when it is called, and at t1 after, as by `advance`.
+  /// Spans are of candidates: at a frame, `confirm` keeps the pairs that intersect then.
   virtual void spans(double /*t0*/, double /*t1*/, SpanBuffer& /*out*/) { unsupported("spans"); }
 
   /// The plans of some vertices have changed at t; the motion view shows the new ones. Each starts from the
@@ -131,8 +133,9 @@ class Strategy {
   }
 
   /// Vertices and primitives were inserted or deleted at t; ids are stable, and the scene and motion views
-  /// show the new geometry (`body_changes` says what that means for each body). The strategy has been advanced
-  /// to t before; afterwards everything is valid at t. A later `reset` keeps the present geometry.
+  /// show the new geometry (`body_changes` says what that means for each body). The strategy has been
+  /// advanced to t before; afterwards everything is valid at t. A `reset` keeps the geometry of the views
+  /// (the driver makes a new instance to go back).
   virtual void geometry_changed(double /*t*/, const GeometryChange<S>& /*change*/) {
     unsupported("geometry changes");
   }

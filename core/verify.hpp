@@ -27,8 +27,9 @@ struct VerifyOptions {
 
 /// Runs a contestant over the frames and compares each with the oracle: candidates contain the truth,
 /// confirmed pairs equal it, each pair once and canonical, boxes that were read are valid, and tight where
-/// that is declared. `session` must be fresh. With a script, truth is computed afresh, since plans and
-/// geometry then differ from the scene's; where geometry changes, the frame is compared before and after.
+/// that is declared. `session` must be fresh. The script's times must be frames (std::invalid_argument).
+/// Truth is computed afresh if the oracle was made for another script, or for none, and wherever geometry
+/// changes: then a frame is compared before and after its change.
 template <class S>
 Verification verify(Session<S>& session, std::span<const double> frames, Oracle<S>& oracle,
                     const PlanScript<S>* script = nullptr, const VerifyOptions& options = {});

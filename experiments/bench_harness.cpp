@@ -41,6 +41,7 @@ json run_benchmarks(const std::vector<BenchItem>& items, std::uint32_t repetitio
                                      state.counters["update_ms"] = 1e3 * mean.update;
                                      state.counters["traversal_ms"] = 1e3 * mean.traversal;
                                      state.counters["triangle_tests_ms"] = 1e3 * mean.triangle_tests;
+                                     state.counters["plan_changes_ms"] = 1e3 * mean.plan_changes;
                                    }
                                  })
         ->Iterations(1)

@@ -1,5 +1,6 @@
 #include "experiments/builtin_scenes.hpp"
 
+#include <algorithm>
 #include <system_error>
 
 #include "experiments/environment.hpp"
@@ -61,6 +62,31 @@ Meshes expanding_sphere(const BuiltinOptions& options, const MakeProgress&) {
           scenes::icosphere(obstacle_triangles(options), {0.5, 0.1, -0.05}, 0.4)};
 }
 
+// Two spheres grow towards each other, all vertices at 0.1 m/s until they are told otherwise. Their centres
+// are not mirror images in anything that their triangles are aligned with, so contacts are in general
+// position.
+constexpr std::array<double, 3> left_centre{-0.52, 0.0, 0.0}, right_centre{0.52, 0.013, -0.007};
+constexpr double first_radius = 0.5, outward_speed = 0.1;
+
+ReversalRule reversing_rule(const BuiltinOptions& options) {
+  return {.centres = {left_centre, right_centre}, .lowest_radius = first_radius, .frames = options.keyframes};
+}
+
+Meshes reversing_spheres(const BuiltinOptions& options, const MakeProgress&) {
+  // The velocity field holds until it is changed: one segment, whose end no clip of up to 1000 frames
+  // reaches.
+  const ReversalRule rule = reversing_rule(options);
+  const double seconds = double(std::max(1000u, rule.frames)) / rule.frames_per_second;
+  const double last_radius = first_radius + outward_speed * seconds;
+  const auto sphere = [&](std::uint32_t triangles, const std::array<double, 3>& centre) {
+    return scenes::expanding_sphere(triangles, {centre[0], centre[1], centre[2]}, first_radius, last_radius,
+                                    2, 1 / seconds);
+  };
+  return {
+      sphere(options.triangles, left_centre),
+      sphere(options.obstacle_triangles > 0 ? options.obstacle_triangles : options.triangles, right_centre)};
+}
+
 Meshes passing_spheres(const BuiltinOptions& options, const MakeProgress&) {
   const double last = options.keyframes > 1 ? double(options.keyframes - 1) : 1.0;
   const double path = 1.5;
@@ -88,6 +114,10 @@ const std::vector<BuiltinScene>& builtin_scenes() {
       {"tablecloth", "a cloth, simulated, falls onto a round table and hangs over its rim", &tablecloth},
       {"waving_sheet", "a sheet in crossing waves cuts a sphere at rest", &waving_sheet},
       {"expanding_sphere", "a growing sphere reaches a sphere at rest", &expanding_sphere},
+      {"reversing_spheres",
+       "two spheres expand and vertices turn round where triangles meet, at 60 frames per second; keyframes: "
+       "frames",
+       &reversing_spheres, &reversing_rule},
       {"passing_spheres", "two spheres fly through each other, without deforming", &passing_spheres},
       {"turning_box", "a box turns inside a sphere at rest", &turning_box},
       {"random_soups", "two clouds of separate drifting triangles in the same cube", &random_soups},

@@ -1,6 +1,8 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,11 +21,24 @@ struct BuiltinOptions {
 /// Told what long work is doing and the finished fraction; may be empty.
 using MakeProgress = std::function<void(const std::string& what, double fraction)>;
 
+/// How vertices that fly outwards answer contact (Z&W s.9): after every frame's query, each vertex of a
+/// colliding primitive that moves outwards turns round, and each that moves inwards and has come to the
+/// lowest radius turns outwards again, both at the speed they had. So motion goes on for as long as one
+/// likes.
+struct ReversalRule {
+  std::vector<std::array<double, 3>> centres;  ///< of every body
+  double lowest_radius = 0;
+  double frames_per_second = 60;
+  std::uint32_t frames = 0;
+};
+
 /// A scene that needs no files.
 struct BuiltinScene {
   std::string name;
   std::string meaning;
   std::vector<io::AnimatedMesh> (*make)(const BuiltinOptions& options, const MakeProgress& progress);
+  /// For scenes whose plans change at run time: they are played at the rule's frames. Else nullptr.
+  ReversalRule (*reversal)(const BuiltinOptions& options) = nullptr;
 };
 
 const std::vector<BuiltinScene>& builtin_scenes();

@@ -17,11 +17,12 @@ void add_list(CLI::App& program, Action& action);
 void add_run(CLI::App& program, Action& action);
 void add_bench(CLI::App& program, Action& action);
 void add_report(CLI::App& program, Action& action);
+void add_theory(CLI::App& program, Action& action);
 
 /// `run` and `bench` as said on the command line. Strings are kept as given, until `plan_of` turns them into
 /// the plan that a file would hold.
 struct StudyOptions {
-  std::string plan_file, out, scene, builder, name, order, clip;
+  std::string plan_file, out, scene, builder, name, order, clip, script;
   std::vector<std::string> bodies, strategies, scalars, params;
   std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
   std::vector<std::string> builders;

@@ -20,7 +20,8 @@ constexpr const char* run_examples = R"(Examples:
   kbvh run --body cloth.obj,motion=cloth.pc2 --body sphere:triangles=2000,centre=0:0:1,radius=0.4 --out results
   kbvh run --scene waving_sheet --strategies bottom_up,rebuild --leaf-size 1,4 --scalar float,double
 A body is a file (.obj .ply .gltf .glb, or a folder of numbered frames) or a shape, then key=value separated by
-commas: motion clip fps (files), name scale rotate=axis:degrees translate=x:y:z (all); `kbvh list` shows shapes.
+commas: motion clip fps (files), name scale rotate=axis:degrees translate=x:y:z as=triangles|points (all); `kbvh
+list` shows shapes.
 Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input.)";
 
 constexpr const char* bench_examples = R"(Examples:
@@ -69,6 +70,7 @@ json scene_of(const StudyOptions& options) {
   if (options.keyframes > 0) scene["keyframes"] = options.keyframes;
   if (options.obstacle > 0) scene["obstacle"] = options.obstacle;
   if (!options.name.empty()) scene["name"] = options.name;
+  if (!options.script.empty()) scene["script"] = options.script;
   if (!options.order.empty()) scene["order"] = split(options.order, ',');
   return scene;
 }
@@ -128,6 +130,8 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
           ->check(CLI::PositiveNumber),
       command.add_option("--keyframes", o->keyframes, "of a built-in scene (60)")->check(CLI::PositiveNumber),
       command.add_option("--seed", o->seeds, "of what chance decides (1); a list sweeps")->delimiter(','),
+      command.add_option("--script", o->script,
+                         "changes of plans while the scene runs: a file, see RESULTS.md"),
       command.add_option("--order", o->order, "vertex order: given, shuffled, renumbered; a list sweeps"),
       command
           .add_option("--strategies", o->strategies,

@@ -161,9 +161,10 @@ std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests,
 }
 
 template <class S>
-std::string unsuitable(const Info& info, const Scene<S>& scene) {
+std::string unsuitable(const Info& info, const Scene<S>& scene, const PlanScript<S>& script) {
   if (!(sizeof(S) == 4 ? info.has_float : info.has_double))
     return std::string("has no ") + (sizeof(S) == 4 ? "float" : "double") + " version";
+  if (!script.empty() && !info.can.plan_changes) return "cannot take changes of plans";
   if (info.max_primitive_pairs == 0) return {};
   for (const BodyPair& pair : scene.pairs) {
     const std::uint64_t pairs = std::uint64_t(scene.bodies[pair.first].primitives.count()) *
@@ -175,7 +176,7 @@ std::string unsuitable(const Info& info, const Scene<S>& scene) {
   return {};
 }
 
-template std::string unsuitable(const Info&, const Scene<float>&);
-template std::string unsuitable(const Info&, const Scene<double>&);
+template std::string unsuitable(const Info&, const Scene<float>&, const PlanScript<float>&);
+template std::string unsuitable(const Info&, const Scene<double>&, const PlanScript<double>&);
 
 }  // namespace kbvh::experiments

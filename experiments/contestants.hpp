@@ -49,8 +49,9 @@ const StrategyEntry* known_strategy(const std::string& id);
 std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests, const Sweep& common,
                                    const BuilderRequest& builder, std::vector<std::string>& notes);
 
-/// Why the strategy cannot take part in the scene, in one clause; or "".
+/// Why the strategy cannot take part in the scene, in one clause; or "". `script`: the changes that are to be
+/// replayed, empty for most scenes.
 template <class S>
-std::string unsuitable(const Info& info, const Scene<S>& scene);
+std::string unsuitable(const Info& info, const Scene<S>& scene, const PlanScript<S>& script = {});
 
 }  // namespace kbvh::experiments

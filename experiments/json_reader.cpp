@@ -126,6 +126,8 @@ json parse_json(const std::string& text, const std::string& name) {
     const std::size_t column = begin == std::string::npos ? end + 1 : end - begin;
     throw io::InputError(name + ": line " + std::to_string(line) + ", column " + std::to_string(column) +
                          ": this is not JSON");
+  } catch (const json::out_of_range&) {
+    throw io::InputError(name + ": holds a number that is too large for a double");
   }
 }
 

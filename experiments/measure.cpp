@@ -19,7 +19,9 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
 }
 
 template <class S>
-ClipTimes play_clip(Session<S>& session, std::span<const double> frames, PairBuffer& pairs) {
+ClipTimes play_clip(Session<S>& session, std::span<const double> frames, const PlanScript<S>* script,
+                    PairBuffer& pairs) {
+  ScriptCursor<S> cursor(script);
   ClipTimes times;
   times.frames.reserve(frames.size());
   const auto begin = std::chrono::steady_clock::now();
@@ -30,34 +32,39 @@ ClipTimes play_clip(Session<S>& session, std::span<const double> frames, PairBuf
     // same, since lazy strategies work there.
     PhaseTimes ignored;
     session.query(pairs, ignored);
+    if (const auto due = cursor.at(frames[0]); !due.empty()) session.change_plans(due, ignored);
   }
   for (std::size_t f = frames.size() > 1 ? 1 : 0; f < frames.size(); ++f) {
     PhaseTimes frame;
     session.advance(frames[f], frame);
     session.query(pairs, frame);
+    if (const auto due = cursor.at(frames[f]); !due.empty()) session.change_plans(due, frame);
     times.frames.push_back(frame);
   }
   return times;
 }
 
 template <class S>
-void warm_up(Session<S>& session, std::span<const double> frames, PairBuffer& pairs) {
+void warm_up(Session<S>& session, std::span<const double> frames, const PlanScript<S>* script,
+             PairBuffer& pairs) {
+  ScriptCursor<S> cursor(script);
   const auto begin = std::chrono::steady_clock::now();
   PhaseTimes ignored;
   session.reset(frames[0]);
-  session.query(pairs, ignored);
-  for (std::size_t f = 1; f < frames.size() && seconds_since(begin) < warm_up_seconds; ++f) {
-    session.advance(frames[f], ignored);
+  for (std::size_t f = 0; f < frames.size() && (f == 0 || seconds_since(begin) < warm_up_seconds); ++f) {
+    if (f > 0) session.advance(frames[f], ignored);
     session.query(pairs, ignored);
+    if (const auto due = cursor.at(frames[f]); !due.empty()) session.change_plans(due, ignored);
   }
 }
 
 /// Counters over every frame: the verifying instance confirms only the frames that it compares.
 template <class S>
-Counters count_clip(const Scene<S>& scene, const Contestant& contestant, std::span<const double> frames) {
+Counters count_clip(const Scene<S>& scene, const Contestant& contestant, std::span<const double> frames,
+                    const PlanScript<S>* script) {
   Session<S> session(scene, contestant, CountingPolicy::counting);
   PairBuffer pairs;
-  play_clip(session, frames, pairs);
+  play_clip(session, frames, script, pairs);
   return session.strategy().counters();
 }
 
@@ -91,17 +98,17 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
   try {
     {
       Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
-      measured.verification = verify<S>(session, frames_, *oracle_, nullptr, {oracle_every});
+      measured.verification = verify<S>(session, frames_, *oracle_, script_, {oracle_every});
       measured.counters = session.strategy().counters();
     }
     if (!measured.verification.holds()) {
       measured.refused = measured.verification.first_violation;
     } else {
-      if (oracle_every > 1) measured.counters = count_clip(*scene_, spec.contestant(), frames_);
+      if (oracle_every > 1) measured.counters = count_clip<S>(*scene_, spec.contestant(), frames_, script_);
       const auto begin = std::chrono::steady_clock::now();
       entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
       measured.build_seconds = seconds_since(begin);
-      warm_up(*entrant.session, frames_, pairs_);
+      warm_up<S>(*entrant.session, frames_, script_, pairs_);
     }
   } catch (const ConfigError&) {
     throw;
@@ -116,7 +123,7 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
 template <class S>
 const ClipTimes& Measurement<S>::play(std::size_t i) {
   Entrant& entrant = entrants_[i];
-  entrant.measured.repetitions.push_back(play_clip(*entrant.session, frames_, pairs_));
+  entrant.measured.repetitions.push_back(play_clip<S>(*entrant.session, frames_, script_, pairs_));
   return entrant.measured.repetitions.back();
 }
 

@@ -11,7 +11,8 @@
 
 namespace kbvh::experiments {
 
-/// One clip played once by one contestant.
+/// One clip played once by one contestant. What a script changes after the first frame's query belongs to the
+/// first frame, and is not timed.
 struct ClipTimes {
   double reset_seconds = 0;        ///< `reset` at the first frame: what is prepared before anything moves
   std::vector<PhaseTimes> frames;  ///< of every frame after the first; of the only one if there is just one
@@ -37,8 +38,11 @@ using MeasureProgress = std::function<void(const std::string&)>;
 template <class S>
 class Measurement {
  public:
-  Measurement(const Scene<S>& scene, std::vector<double> frames, Oracle<S>& oracle)
-      : scene_(&scene), frames_(std::move(frames)), oracle_(&oracle) {}
+  /// The script, if there is one, is replayed to every contestant; its times are frames, and the oracle is
+  /// made for it.
+  Measurement(const Scene<S>& scene, std::vector<double> frames, Oracle<S>& oracle,
+              const PlanScript<S>* script = nullptr)
+      : scene_(&scene), frames_(std::move(frames)), oracle_(&oracle), script_(script) {}
 
   /// Verifies a contestant over all frames, comparing every n-th with the oracle, and counts what it does
   /// there; if its guarantee holds, makes the silent instance that will be timed. Exceptions of the strategy
@@ -61,6 +65,7 @@ class Measurement {
   const Scene<S>* scene_;
   std::vector<double> frames_;
   Oracle<S>* oracle_;
+  const PlanScript<S>* script_;
   std::vector<Entrant> entrants_;
   PairBuffer pairs_;
 };

@@ -44,6 +44,18 @@ const char* word(Foresight foresight) {
   return "none";
 }
 
+const char* word(PrimitiveKind kind) {
+  switch (kind) {
+    case PrimitiveKind::points:
+      return "points";
+    case PrimitiveKind::control_nets:
+      return "control_nets";
+    case PrimitiveKind::polygons:
+      break;
+  }
+  return "polygons";
+}
+
 const char* word(Harness harness) {
   return harness == Harness::rounds ? "run" : "bench";
 }
@@ -59,6 +71,7 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
                       {"vertices", body.plans.vertex_count()},
                       {"keyframes", body.plans.keyframe_count()},
                       {"moving", body.plans.moving()},
+                      {"kind", word(body.primitives.kind)},
                       {"degenerate", loaded.meshes[i].degenerate_primitives}});
   }
   return {{"name", scene.name},
@@ -74,6 +87,16 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
 
 template json scene_record(const Scene<float>&, const LoadedScene&, std::uint32_t, std::size_t);
 template json scene_record(const Scene<double>&, const LoadedScene&, std::uint32_t, std::size_t);
+
+template <class S>
+json script_record(const PlanScript<S>& script, double end) {
+  std::size_t steps = 0;
+  for (const auto& step : script.steps) steps += step.time <= end ? 1 : 0;
+  return {{"hash", hexadecimal(hash(script))}, {"steps", steps}, {"changes", script.changes_until(end)}};
+}
+
+template json script_record(const PlanScript<float>&, double);
+template json script_record(const PlanScript<double>&, double);
 
 json strategy_record(const ContestantSpec& spec) {
   const Info& info = spec.entry->info;
@@ -100,21 +123,22 @@ json strategy_record(const ContestantSpec& spec) {
 std::string configuration_key(Harness harness, const std::string& program, const json& scene,
                               const json& strategy, const Study& study, const json& machine) {
   // nlohmann's objects are sorted by key, so the text does not depend on the order of insertion.
-  const json all{{"schema", results_schema},
-                 {"kind", word(harness)},
-                 {"program", program},
-                 {"scene", scene.at("hash")},
-                 {"scalar", scene.at("scalar")},
-                 {"per_keyframe", scene.at("per_keyframe")},
-                 {"frames", scene.at("frames")},
-                 {"strategy", strategy.at("id")},
-                 {"params", strategy.at("params")},
-                 {"builder", strategy.at("builder")},
-                 {"repetitions", study.repetitions},
-                 {"oracle_every", study.oracle_every},
-                 {"machine",
-                  {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
-                   machine.at("kernels")}}};
+  json all{{"schema", results_schema},
+           {"kind", word(harness)},
+           {"program", program},
+           {"scene", scene.at("hash")},
+           {"scalar", scene.at("scalar")},
+           {"per_keyframe", scene.at("per_keyframe")},
+           {"frames", scene.at("frames")},
+           {"strategy", strategy.at("id")},
+           {"params", strategy.at("params")},
+           {"builder", strategy.at("builder")},
+           {"repetitions", study.repetitions},
+           {"oracle_every", study.oracle_every},
+           {"machine",
+            {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
+             machine.at("kernels")}}};
+  if (scene.contains("script")) all["script"] = scene.at("script").at("hash");
   return hexadecimal(hash_of(all.dump()));
 }
 

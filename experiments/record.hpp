@@ -16,12 +16,17 @@ inline constexpr int results_schema = 1;
 const char* word(Tightness tightness);
 const char* word(Guarantee guarantee);
 const char* word(Foresight foresight);
+const char* word(PrimitiveKind kind);
 const char* word(Harness harness);
 
 /// The "scene" of a record.
 template <class S>
 nlohmann::json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_t per_keyframe,
                             std::size_t frames);
+
+/// The "script" of a scene whose plans change at run time, as far as it is replayed until `end`.
+template <class S>
+nlohmann::json script_record(const PlanScript<S>& script, double end);
 
 /// The "strategy" of a record.
 nlohmann::json strategy_record(const ContestantSpec& spec);

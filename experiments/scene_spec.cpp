@@ -51,6 +51,14 @@ fs::path resolved(const std::string& text, const fs::path& folder) {
   return path.is_absolute() || folder.empty() ? path : folder / path;
 }
 
+io::TakeAs take_as_of(JsonReader& keys) {
+  const std::string word = keys.word("as").value_or("given");
+  if (word == "given") return io::TakeAs::given;
+  if (word == "triangles") return io::TakeAs::triangles;
+  if (word == "points") return io::TakeAs::points;
+  keys.fail("as", "expected given, triangles or points, got '" + word + "'");
+}
+
 BodySpec read_body(const json& value, const std::string& place, const fs::path& folder) {
   const json object = value.is_string() ? body_from_text(value.get<std::string>()) : value;
   JsonReader keys(object, place);
@@ -63,19 +71,20 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
     body.placement.rotations.push_back(rotation_of(rotation, place + ": rotate"));
   if (const auto move = keys.numbers("translate", 3))
     std::copy(move->begin(), move->end(), body.placement.translate);
+  body.as = take_as_of(keys);
   if (keys.has("file") == keys.has("shape"))
     throw io::InputError(place + ": a body has either a file or a shape");
   if (keys.has("shape")) {
     if (const json* triangles = keys.find("triangles"); triangles != nullptr && triangles->is_array())
       keys.fail("triangles", "a sweep belongs to the scene, a body has one number");
     body.shape = object;
-    for (const char* common : {"name", "scale", "rotate", "translate"}) body.shape.erase(common);
+    for (const char* common : {"name", "scale", "rotate", "translate", "as"}) body.shape.erase(common);
     // Made once for its complaints where the sizes are small, so that a wrong key shows before hours of work.
     json probe = body.shape;
-    if (probe.contains("triangles") && probe["triangles"].is_number_unsigned() &&
-        probe["triangles"].get<std::uint64_t>() > 100)
-      probe["triangles"] = 100;
-    if (!probe.contains("triangles")) probe["triangles"] = 100;
+    const auto& name = probe["shape"];
+    const std::string size = name.is_string() ? shape_kind(name, place).size_key : "triangles";
+    if (!probe.contains(size) || (probe[size].is_number_unsigned() && probe[size].get<std::uint64_t>() > 100))
+      probe[size] = 100;
     JsonReader shape_keys(probe, place);
     make_shape(shape_keys);
     shape_keys.finish();
@@ -123,8 +132,9 @@ std::string given_name(const SceneSpec& spec) {
 
 json body_from_text(const std::string& text) {
   const std::string where = "body '" + text + "'";
-  static const std::set<std::string> words{"name", "motion", "clip"},
-      wholes{"triangles", "keyframes", "seed"}, vectors{"translate", "centre", "step", "lower", "upper"};
+  static const std::set<std::string> words{"name", "motion", "clip", "as", "knots"},
+      wholes{"triangles", "keyframes", "seed", "spans", "degree"},
+      vectors{"translate", "centre", "step", "lower", "upper"};
   json body = json::object();
   auto parts = split(text, ',');
   const std::size_t colon = parts[0].find(':');
@@ -192,6 +202,11 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
       throw io::InputError(place + ": " + problem.what());
     }
   }
+  if (const json* script = keys.find("script")) {
+    if (!base.builtin.empty() && find_builtin_scene(base.builtin).reversal != nullptr)
+      keys.fail("script", "the scene '" + base.builtin + "' records its own");
+    base.script = read_script_spec(*script, place + ": script", folder);
+  }
   auto triangles = keys.wholes("triangles", 1, 1u << 27);
   auto seeds = keys.wholes("seed", 0, ~std::uint64_t(0));
   auto orders = keys.words("order");
@@ -210,6 +225,8 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
         spec.options.triangles = std::uint32_t(count);
         spec.options.seed = seed;
         spec.order = order_of(order, keys);
+        if (spec.script && spec.order != VertexOrder::given)
+          keys.fail("order", "a script names vertices in the given order");
         spec.said = json{object, folder.string(), count, seed, order}.dump();
         scenes.push_back(std::move(spec));
       }
@@ -295,7 +312,9 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
   LoadedScene loaded;
   loaded.seed = spec.options.seed;
   if (!spec.builtin.empty()) {
-    loaded.meshes = find_builtin_scene(spec.builtin).make(spec.options, progress);
+    const BuiltinScene& builtin = find_builtin_scene(spec.builtin);
+    loaded.meshes = builtin.make(spec.options, progress);
+    if (builtin.reversal != nullptr) loaded.reversal = builtin.reversal(spec.options);
     loaded.name = spec.builtin;
     // Shapes end their names with the number of triangles that their pattern allowed.
     if (!loaded.meshes.empty()) loaded.name += "-" + std::to_string(loaded.meshes[0].primitive_count());
@@ -316,6 +335,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
       mesh = io::load_animated_mesh({body.file, body.motion, body.clip, body.frames_per_second});
     }
     if (!body.name.empty()) mesh.name = body.name;
+    io::take_as(mesh, body.as);
     const std::string source = body.shape.is_null() ? body.file.string() : mesh.name;
     if (mesh.degenerate_primitives > 0)
       loaded.notes.push_back(source + ": " + std::to_string(mesh.degenerate_primitives) +
@@ -323,6 +343,11 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     if (mesh.merged_keyframes > 0)
       loaded.notes.push_back(source + ": " + std::to_string(mesh.merged_keyframes) +
                              " keyframes repeat time and positions of the one before, merged");
+    if (mesh.kind != io::MeshKind::polygons)
+      loaded.notes.push_back(
+          source + ": " +
+          counted(mesh.primitive_count(), mesh.kind == io::MeshKind::points ? "point" : "control net") +
+          "; pairs with them are overlaps of boxes, not intersections");
     place(mesh, body.placement);
     loaded.sources.push_back(source);
     names.push_back(mesh.name);
@@ -331,6 +356,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
   if (loaded.name.empty()) loaded.name = joined(names, "+");
   if (!spec.name.empty()) loaded.name = spec.name;
   loaded.order = spec.order;
+  loaded.script = spec.script;
   loaded.name += suffix(spec.order);
   if (spec.order == VertexOrder::shuffled)
     for (std::size_t i = 0; i < loaded.meshes.size(); ++i)
@@ -338,6 +364,20 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
   if (loaded.meshes.empty()) throw io::InputError("the scene has no body");
   return loaded;
 }
+
+namespace {
+PrimitiveKind kind_of(io::MeshKind kind) {
+  switch (kind) {
+    case io::MeshKind::points:
+      return PrimitiveKind::points;
+    case io::MeshKind::control_nets:
+      return PrimitiveKind::control_nets;
+    case io::MeshKind::polygons:
+      break;
+  }
+  return PrimitiveKind::polygons;
+}
+}  // namespace
 
 template <class S>
 Scene<S> assemble(const LoadedScene& loaded) {
@@ -347,6 +387,7 @@ Scene<S> assemble(const LoadedScene& loaded) {
     const io::AnimatedMesh& mesh = loaded.meshes[i];
     Body<S> body;
     body.name = mesh.name;
+    body.primitives.kind = kind_of(mesh.kind);
     body.primitives.offsets = mesh.primitive_offsets;
     body.primitives.vertices = mesh.primitive_vertices;
     try {

@@ -7,6 +7,8 @@
 #include "core/scene.hpp"
 #include "experiments/builtin_scenes.hpp"
 #include "experiments/io/animated_mesh.hpp"
+#include "experiments/io/primitives.hpp"
+#include "experiments/scripted.hpp"
 
 namespace kbvh::experiments {
 
@@ -29,6 +31,7 @@ struct BodySpec {
   std::string clip;
   double frames_per_second = 0;
   nlohmann::json shape;  ///< for make_shape; null for files
+  io::TakeAs as = io::TakeAs::given;
   Placement placement;
   std::string place;  ///< for messages
 };
@@ -46,6 +49,7 @@ struct SceneSpec {
   std::string builtin;  ///< or empty: the bodies
   BuiltinOptions options;
   std::vector<BodySpec> bodies;
+  std::optional<ScriptSpec> script;  ///< plan changes of the user's own
   VertexOrder order = VertexOrder::given;
   bool optional = false;  ///< skipped with a note if a file does not exist
   std::string said;       ///< all that decides what it is, as text: equal texts are equal scenes
@@ -75,6 +79,8 @@ struct LoadedScene {
   std::vector<io::AnimatedMesh> meshes;    ///< placed, in double
   std::vector<std::string> sources;        ///< of each: its file, or how it was made
   VertexOrder order = VertexOrder::given;  ///< `renumbered` is left to `assemble`
+  std::optional<ReversalRule> reversal;    ///< of scenes that record their plan changes
+  std::optional<ScriptSpec> script;        ///< plan changes of the user's own
   std::vector<std::string> notes;          ///< what readers noticed, one sentence each
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "experiments/scenes/nurbs.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/text.hpp"
 
@@ -94,6 +95,21 @@ io::AnimatedMesh expanding_sphere(JsonReader& keys) {
                                   positive(keys, "last_radius", 0.75), keyframes(keys, 60), rate(keys));
 }
 
+io::AnimatedMesh nurbs(JsonReader& keys) {
+  scenes::NurbsConfig config;
+  config.spans = std::uint32_t(keys.whole("spans", 1, 1u << 24).value_or(config.spans));
+  config.degree = std::uint32_t(keys.whole("degree", 1, 16).value_or(config.degree));
+  const std::string knots = keys.word("knots").value_or("clamped");
+  if (knots != "clamped" && knots != "uniform")
+    keys.fail("knots", "expected clamped or uniform, got '" + knots + "'");
+  config.knots = knots == "clamped" ? scenes::KnotSpacing::clamped : scenes::KnotSpacing::uniform;
+  config.centre = point(keys, "centre", {0, 0, 0});
+  config.side = positive(keys, "side", config.side);
+  config.keyframes = keyframes(keys, config.keyframes);
+  config.keyframes_per_second = rate(keys);
+  return scenes::nurbs_surface(config).mesh;
+}
+
 }  // namespace
 
 const std::vector<ShapeKind>& shape_kinds() {
@@ -108,6 +124,10 @@ const std::vector<ShapeKind>& shape_kinds() {
        &random_soup},
       {"expanding_sphere", "triangles, centre, first_radius, last_radius, keyframes, rate",
        &expanding_sphere},
+      {"nurbs",
+       "spline surface in waves, a control net for each knot span: spans, degree, knots (clamped, uniform), "
+       "centre, side, keyframes, rate",
+       &nurbs, "spans"},
   };
   return kinds;
 }
@@ -117,14 +137,17 @@ bool is_shape(const std::string& name) {
   return std::any_of(kinds.begin(), kinds.end(), [&](const ShapeKind& kind) { return kind.name == name; });
 }
 
-io::AnimatedMesh make_shape(JsonReader& keys) {
-  const std::string name = keys.word("shape").value_or("");
+const ShapeKind& shape_kind(const std::string& name, const std::string& place) {
   std::vector<std::string> known;
   for (const ShapeKind& kind : shape_kinds()) {
-    if (kind.name == name) return kind.make(keys);
+    if (kind.name == name) return kind;
     known.push_back(kind.name);
   }
-  keys.fail("shape", "there is no shape '" + name + "'; known are " + joined(known));
+  throw io::InputError(place + ": shape: there is no shape '" + name + "'; known are " + joined(known));
+}
+
+io::AnimatedMesh make_shape(JsonReader& keys) {
+  return shape_kind(keys.word("shape").value_or(""), keys.place()).make(keys);
 }
 
 }  // namespace kbvh::experiments

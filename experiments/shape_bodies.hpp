@@ -13,10 +13,14 @@ struct ShapeKind {
   std::string meaning;  ///< with its keys
   /// Reads its keys and makes the mesh. `triangles` is the plan's value or a default.
   io::AnimatedMesh (*make)(JsonReader& keys);
+  std::string size_key = "triangles";  ///< the key that says how large it is
 };
 
 /// All of them; what else there is to say about them (`step`, `turns`, `keyframes`) is in `make_shape`.
 const std::vector<ShapeKind>& shape_kinds();
+
+/// The kind of that name. Throws io::InputError, naming those that there are.
+const ShapeKind& shape_kind(const std::string& name, const std::string& place);
 
 bool is_shape(const std::string& name);
 

@@ -43,9 +43,7 @@ class Runner {
           continue;
         }
       }
-      const LoadedScene loaded = load(spec, [&](const std::string& what, double fraction) {
-        progress_.show(what + (fraction > 0 ? ": " + std::to_string(int(100 * fraction)) + " %" : ""));
-      });
+      const LoadedScene loaded = load(spec, making_);
       for (const std::string& text : loaded.notes) note("note: " + text);
       for (const std::string& scalar : study.scalars) {
         if (scalar == "float")
@@ -76,31 +74,40 @@ class Runner {
   template <class S>
   void scene(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded) {
     const Scene<S> scene = assemble<S>(loaded);
-    Oracle<S> oracle(scene, cache_folder());
-    for (const std::uint32_t l : study.per_keyframe) {
-      std::vector<double> frames = frame_times(scene, l);
+    const PlanScript<S> script = script_of(scene, loaded, making_);
+    Oracle<S> oracle(scene, cache_folder(), hash(script));
+    std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
+    if (has_own_frames(loaded)) {
+      if (per_keyframe != std::vector<std::uint32_t>{1})
+        note("note: " + scene.name + " says itself when its frames are: l does not apply and counts as 1");
+      per_keyframe = {1};
+    }
+    for (const std::uint32_t l : per_keyframe) {
+      std::vector<double> frames = frames_of(scene, loaded, script, l);
       if (study.frames_limit > 0 && frames.size() > study.frames_limit) frames.resize(study.frames_limit);
-      group(study, contestants, loaded, scene, oracle, l, frames);
+      group(study, contestants, loaded, scene, script, oracle, l, frames);
     }
   }
 
   /// All contestants on one scene, in one scalar, at one l: what one table shows.
   template <class S>
   void group(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded,
-             const Scene<S>& scene, Oracle<S>& oracle, std::uint32_t l, const std::vector<double>& frames) {
-    const json about_scene = scene_record(scene, loaded, l, frames.size());
+             const Scene<S>& scene, const PlanScript<S>& script, Oracle<S>& oracle, std::uint32_t l,
+             const std::vector<double>& frames) {
+    json about_scene = scene_record(scene, loaded, l, frames.size());
+    if (!script.empty()) about_scene["script"] = script_record(script, frames.back());
     const std::string title = scene.name + ", l = " + std::to_string(l);
     if (l > 1 && study.oracle_every % l == 0)
       note("warning: with oracle_every " + std::to_string(study.oracle_every) +
            " and l = " + std::to_string(l) +
            " only keyframes are compared with the truth; take a number without common factors");
-    Measurement<S> measurement(scene, frames, oracle);
+    Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script);
     std::vector<json> records;           // in the order of the contestants
     std::vector<std::size_t> record_of;  // of each one that is measured
     std::size_t skipped = 0;
     for (std::size_t c = 0; c < contestants.size(); ++c) {
       const ContestantSpec& spec = contestants[c];
-      if (const std::string why = unsuitable(spec.entry->info, scene); !why.empty()) {
+      if (const std::string why = unsuitable(spec.entry->info, scene, script); !why.empty()) {
         note("note: " + spec.entry->info.id + " is left out of " + scene.name + ": it " + why);
         continue;
       }
@@ -191,6 +198,9 @@ class Runner {
   std::string run_;
   std::unique_ptr<ResultStore> store_;
   Progress progress_;
+  const MakeProgress making_ = [this](const std::string& what, double fraction) {
+    progress_.show(what + (fraction > 0 ? ": " + std::to_string(int(100 * fraction)) + " %" : ""));
+  };
   std::set<std::string> said_;
   StudyOutcome outcome_;
   std::vector<TargetGroup> groups_;  // everything that the plan has asked for, for its targets

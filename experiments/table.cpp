@@ -95,22 +95,39 @@ std::string results_table(const std::vector<json>& records) {
                   counted(scene.at("frames").get<std::uint64_t>(), "frame"),
                   counted(scene.at("primitives").get<std::uint64_t>(), "primitive"));
   const json* refit = best_refit(records);
-  std::vector<std::vector<std::string>> rows{{"strategy", "motion", "update", "query", "x refit",
-                                              "with motion", "missed", "extra", "protrusion", "looseness"}};
+  std::vector<const char*> phases{"motion", "update", "query"};
+  std::vector<std::string> head{"strategy", "motion", "update", "query"};
+  if (scene.contains("script")) {
+    const json& script = scene.at("script");
+    text += fmt::format("  plans change while it runs: {} at {}, column plans\n",
+                        counted(script.at("changes").get<std::uint64_t>(), "change"),
+                        counted(script.at("steps").get<std::uint64_t>(), "frame"));
+    phases.push_back("plan_changes");
+    head.push_back("plans");
+  }
+  for (const char* kind : {"points", "control_nets"})
+    if (std::any_of(scene.at("bodies").begin(), scene.at("bodies").end(),
+                    [&](const json& body) { return body.value("kind", std::string()) == kind; }))
+      text +=
+          fmt::format("  pairs with {} are candidates: boxes that overlap, which says nothing of contact\n",
+                      kind == std::string("points") ? "points" : "control nets");
+  for (const char* column : {"x refit", "with motion", "missed", "extra", "protrusion", "looseness"})
+    head.push_back(column);
+  std::vector<std::vector<std::string>> rows{head};
   std::string refusals;
   for (const json& record : records) {
     const json& verified = record.at("verified");
     const std::string label = record.at("strategy").at("label").get<std::string>();
     std::vector<std::string> row{label};
     if (has_times(record)) {
-      for (const char* phase : {"motion", "update", "query"})
-        row.push_back(milliseconds(median_phase(record, phase)));
+      for (const char* phase : phases) row.push_back(milliseconds(median_phase(record, phase)));
       for (const char* phase : {"total", "total_with_motion"})
         row.push_back(refit == nullptr
                           ? "-"
                           : fmt::format("{:.3g}", median_phase(*refit, phase) / median_phase(record, phase)));
     } else {
-      row.insert(row.end(), {"refused", "", "", "", ""});
+      row.push_back("refused");
+      row.resize(1 + phases.size() + 2);
       refusals += "  " + label + " is refused a time: " + record.value("refused", std::string()) + "\n";
     }
     row.push_back(std::to_string(verified.at("missed").get<std::uint64_t>()));

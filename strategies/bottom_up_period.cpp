@@ -35,6 +35,7 @@ class BottomUpPeriod final : public Strategy<S> {
 
   void reset(double t) override {
     this->start_at(t);
+    plans_changed_ = false;
     for (std::uint32_t body = 0; body < roots_.size(); ++body) update(body);
     count_.table = {};
   }

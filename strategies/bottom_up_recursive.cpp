@@ -41,6 +41,7 @@ class BottomUpRecursive final : public Strategy<S> {
 
   void reset(double t) override {
     this->start_at(t);
+    plans_changed_ = false;
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
     count_.table = {};
   }

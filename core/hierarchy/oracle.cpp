@@ -104,11 +104,16 @@ constexpr std::uint64_t cache_magic =
 }
 
 template <class S>
-Oracle<S>::Oracle(const Scene<S>& scene, std::filesystem::path cache_folder) : scene_(&scene) {
+Oracle<S>::Oracle(const Scene<S>& scene, std::filesystem::path cache_folder, std::uint64_t script)
+    : scene_(&scene), script_(script) {
   if (cache_folder.empty()) return;
   char file_name[64];
-  std::snprintf(file_name, sizeof file_name, "oracle-%016llx.bin",
-                static_cast<unsigned long long>(hash(scene)));
+  if (script == 0)
+    std::snprintf(file_name, sizeof file_name, "oracle-%016llx.bin",
+                  static_cast<unsigned long long>(hash(scene)));
+  else
+    std::snprintf(file_name, sizeof file_name, "oracle-%016llx-%016llx.bin",
+                  static_cast<unsigned long long>(hash(scene)), static_cast<unsigned long long>(script));
   file_ = cache_folder / file_name;
   load();
 }

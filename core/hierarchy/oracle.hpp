@@ -18,21 +18,25 @@ std::vector<PrimitivePair> brute_force_pairs(const Scene<S>& scene, Playback<S>&
 template <class S>
 std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playback);
 
-/// The true pairs at any time of a scene, computed once per (scene, scalar, t) and kept; optionally on disk,
-/// so that a later run of the same scene need not compute them again.
+/// The true pairs at any time of a scene, computed once per (scene, script, scalar, t) and kept; optionally
+/// on disk, so that a later run of the same scene need not compute them again.
 template <class S>
 class Oracle {
  public:
-  /// `cache_folder` empty: memory only. A damaged or foreign cache file is ignored and written anew.
-  explicit Oracle(const Scene<S>& scene, std::filesystem::path cache_folder = {});
+  /// `cache_folder` empty: memory only. A damaged or foreign cache file is ignored and written anew. `script`
+  /// is the hash of the plan script that is replayed, 0: plans are the scene's own.
+  explicit Oracle(const Scene<S>& scene, std::filesystem::path cache_folder = {}, std::uint64_t script = 0);
   ~Oracle();
-  /// Sorted pairs at the playback's current time; the playback must follow the scene's own plans.
+  std::uint64_t script() const { return script_; }
+  /// Sorted pairs at the playback's current time; the playback must follow the scene's own plans, and the
+  /// script up to that time.
   const std::vector<PrimitivePair>& pairs(Playback<S>& playback);
 
  private:
   void load();
   void save() const;
   const Scene<S>* scene_;
+  std::uint64_t script_;
   std::filesystem::path file_;
   std::map<double, std::vector<PrimitivePair>> known_;
   bool grown_ = false;

@@ -29,6 +29,7 @@ class StoredHierarchyStrategy : public Strategy<S> {
 
   void reset(double t) override {
     this->start_at(t);
+    plans_changed_ = false;
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
       hierarchies_[body].positions_changed();
       refit(body);

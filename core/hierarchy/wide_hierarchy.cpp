@@ -127,9 +127,13 @@ void WideHierarchy<S>::list_vertices() {
   for (std::uint32_t i = 0; i < topology_.size(); ++i)
     if (topology_.nodes[i].is_leaf()) leaf_of[std::size_t(places_[i].node) * width + places_[i].lane] = i;
   std::vector<std::size_t> lengths(nodes_.size(), 0);
+  listed_.assign(nodes_.size(), 0);
   for (std::uint32_t n = 0; n < nodes_.size(); ++n)
-    for (std::uint32_t lane = 0; lane < nodes_[n].leaf_count; ++lane)
-      lengths[n] = std::max(lengths[n], leaf_vertices_[leaf_of[std::size_t(n) * width + lane]].size());
+    for (std::uint32_t lane = 0; lane < nodes_[n].leaf_count; ++lane) {
+      const std::size_t size = leaf_vertices_[leaf_of[std::size_t(n) * width + lane]].size();
+      lengths[n] = std::max(lengths[n], size);
+      listed_[n] += std::uint32_t(size);
+    }
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
     WideNode& node = nodes_[n];
     if (node.leaf_count == 0) continue;
@@ -171,6 +175,7 @@ void WideHierarchy<S>::list_leaves(const Primitives& primitives) {
     first_entry_.push_back(std::uint32_t(primitives_.size()));
   }
   stamps_.assign(leaves, 0);
+  fetched_.assign(leaves, 0);
   stamp_ = 1;
   // Leaves of one primitive need no boxes besides their own.
   rows_.assign(padded_leaf_size() == 1 ? 0 : leaves * lane_scalars(padded_leaf_size()), S(0));
@@ -219,8 +224,8 @@ std::size_t WideHierarchy<S>::bytes() const {
   return topology_.bytes() + nodes_.size() * sizeof(WideNode) +
          (lanes_.size() + own_.size() + rows_.size()) * sizeof(S) +
          (vertices_.size() + leaf_vertices_.offsets.size() + leaf_vertices_.vertices.size() +
-          first_entry_.size() + first_corner_.size() + corners_.size() + primitives_.size() +
-          stamps_.size()) *
+          first_entry_.size() + first_corner_.size() + corners_.size() + primitives_.size() + stamps_.size() +
+          fetched_.size() + parent_.size() + listed_.size()) *
              sizeof(std::uint32_t) +
          places_.size() * sizeof(Place) + subtrees_.size() * sizeof(Subtree);
 }
@@ -231,24 +236,71 @@ QueryStatus WideQuery<S>::run(WideHierarchy<S>& a, std::uint32_t body_a, WideHie
                               const Budget& budget, PairBuffer& out, std::uint64_t& tests) {
   if (a.empty() || b.empty()) return {};
   if (!a.suits(b)) throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
-  stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
-  leaf_pairs_.resize(2 * leaf_pair_room);
-  WideTraversal state{stack_.data(),  0, stack_.size(),   leaf_pairs_.data(), 0,
-                      leaf_pair_room, 1, budget.box_tests};
+  WideTraversal state = fresh_traversal(budget);
   if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
   const auto traverse = overlap_kernels<S>(a.kernels()).traverse(a.topology().width);
   while (state.depth > 0 && state.tests < state.test_limit) {
     traverse(a.arrays(), b.arrays(), state);
     leaves_to_pairs(a, body_a, b, body_b, scene, motion, state.found, out, tests);
     state.found = 0;
-    if (state.depth + wide_step >= state.stack_room) {
-      stack_.resize(2 * stack_.size());
-      state.stack = stack_.data();
-      state.stack_room = stack_.size();
-    }
+    grow(state);
   }
   tests += state.tests;
   return {state.depth};
+}
+
+template <class S>
+WideTraversal WideQuery<S>::fresh_traversal(const Budget& budget) {
+  stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
+  leaf_pairs_.resize(2 * leaf_pair_room);
+  return {stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pair_room, 1, budget.box_tests};
+}
+
+template <class S>
+void WideQuery<S>::grow(WideTraversal& state) {
+  if (state.depth + wide_step < state.stack_room) return;
+  stack_.resize(2 * stack_.size());
+  state.stack = stack_.data();
+  state.stack_room = stack_.size();
+}
+
+template <class S>
+void WideQuery<S>::start_lazy(const LazySide& a, const LazySide& b, const Budget& budget) {
+  lazy_ = fresh_traversal(budget);
+  lazy_.stale_a = a.stale;
+  lazy_.stale_b = b.stale;
+  if (a.hierarchy->empty() || b.hierarchy->empty()) {
+    lazy_.tests = 0;
+    return;
+  }
+  if (!a.hierarchy->suits(*b.hierarchy))
+    throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
+  if (overlap(a.hierarchy->box(0), b.hierarchy->box(0))) lazy_.stack[lazy_.depth++] = {0, 0};
+}
+
+template <class S>
+typename WideQuery<S>::Wanted WideQuery<S>::proceed(const LazySide& a, const LazySide& b,
+                                                    const SceneView<S>& scene, const SampledMotion<S>& motion,
+                                                    PairBuffer& out, std::uint64_t& tests) {
+  const auto traverse = overlap_kernels<S>(a.hierarchy->kernels()).lazy(a.hierarchy->topology().width);
+  while (lazy_.depth > 0 && lazy_.tests < lazy_.test_limit) {
+    traverse(a.hierarchy->arrays(), b.hierarchy->arrays(), lazy_);
+    if (lazy_.depth > 0 && lazy_.tests < lazy_.test_limit) {
+      Wanted wanted;
+      if (lazy_.first_is_stale()) wanted.first = lazy_.stack[lazy_.depth - 1].first;
+      if (lazy_.second_is_stale()) wanted.second = lazy_.stack[lazy_.depth - 1].second;
+      if (wanted) return wanted;
+    }
+    leaves_to_pairs(*a.hierarchy, a.body, *b.hierarchy, b.body, scene, motion, lazy_.found, out, tests);
+    lazy_.found = 0;
+    grow(lazy_);
+  }
+  // What was found last before a wait, when nothing was left to do after it.
+  if (lazy_.found != 0)
+    leaves_to_pairs(*a.hierarchy, a.body, *b.hierarchy, b.body, scene, motion, lazy_.found, out, tests);
+  lazy_.found = 0;
+  tests += lazy_.tests;
+  return {};
 }
 
 template <class S>
@@ -262,14 +314,24 @@ void WideQuery<S>::leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, Wi
                      b.leaf_primitives(b.leaf_number(leaf_pairs_[2 * i + 1]))[0]});
     return;
   }
-  const auto fetch = [&](const WideHierarchy<S>& h, std::uint32_t body, std::size_t side) {
+  // Positions that are not there yet, all at once: calls with a few vertices each cost more than the
+  // vertices.
+  const auto fetch = [&](WideHierarchy<S>& h, std::uint32_t body, std::size_t side) {
     if (motion.all_current(body)) return;
+    to_fetch_.clear();
     for (std::size_t i = 0; i < count; ++i) {
       const std::uint32_t leaf = h.leaf_number(leaf_pairs_[2 * i + side]);
-      if (h.leaf_is_current(leaf)) continue;
-      for (const std::uint32_t primitive : h.leaf_primitives(leaf))
-        motion.fetch(body, scene.primitives(body)[primitive]);
+      if (!h.to_be_fetched(leaf)) continue;
+      for (const std::uint32_t primitive : h.leaf_primitives(leaf)) {
+        const auto vertices = scene.primitives(body)[primitive];
+        to_fetch_.insert(to_fetch_.end(), vertices.begin(), vertices.end());
+      }
     }
+    // As in Playback: beyond so many, all of them cost less.
+    if (std::uint64_t(4) * to_fetch_.size() > scene.vertex_count(body))
+      motion.fetch_all(body);
+    else
+      motion.fetch(body, to_fetch_);
   };
   fetch(a, body_a, 0);
   fetch(b, body_b, 1);

@@ -47,6 +47,14 @@ class WideHierarchy {
   const std::vector<Subtree>& subtrees() const { return subtrees_; }
   const std::vector<std::uint32_t>& above_subtrees() const { return above_subtrees_; }
 
+  static constexpr std::uint32_t no_node = ~std::uint32_t(0);
+  /// The wide node of an inner node of the topology; `no_node` for a leaf.
+  std::uint32_t wide_node(std::uint32_t node) const { return places_[node].wide; }
+  /// The wide node that holds the box of a node of the topology; `no_node` for a root that is no leaf.
+  std::uint32_t wide_parent(std::uint32_t node) const { return places_[node].node; }
+  /// Unique vertices of the leaves of one wide node, summed over its leaves.
+  std::uint32_t leaf_vertices_of(std::uint32_t wide) const { return listed_[wide]; }
+
   /// The box of a node of the topology.
   Box<S> box(std::uint32_t node) const;
   void set_box(std::uint32_t node, const Box<S>& box);
@@ -58,6 +66,7 @@ class WideHierarchy {
   void positions_changed() {
     if (++stamp_ == 0) {
       std::fill(stamps_.begin(), stamps_.end(), 0);
+      std::fill(fetched_.begin(), fetched_.end(), 0);
       stamp_ = 1;
     }
   }
@@ -67,8 +76,12 @@ class WideHierarchy {
     return {first_entry_.data(), first_corner_.data(), corners_.data(), primitives_.data(),
             rows_.data(),        stamps_.data(),       stamp_,          positions};
   }
-  /// The leaf numbered by `WideNode::first_leaf`: is its cache of primitive boxes of these positions?
-  bool leaf_is_current(std::uint32_t leaf) const { return stamps_[leaf] == stamp_; }
+  /// The leaf numbered by `WideNode::first_leaf`: true when first asked since `positions_changed`.
+  bool to_be_fetched(std::uint32_t leaf) {
+    const bool first = fetched_[leaf] != stamp_;
+    fetched_[leaf] = stamp_;
+    return first;
+  }
   std::uint32_t leaf_number(LeafSlot slot) const { return nodes_[slot.node()].first_leaf + slot.lane(); }
   std::span<const std::uint32_t> leaf_primitives(std::uint32_t leaf) const {
     return {primitives_.data() + first_entry_[leaf], primitives_.data() + first_entry_[leaf + 1]};
@@ -106,12 +119,13 @@ class WideHierarchy {
   typename WideRefitKernels<S>::Refit refit_ = nullptr;
   std::vector<Place> places_;          // of the topology's nodes
   std::vector<std::uint32_t> parent_;  // of wide nodes
+  std::vector<std::uint32_t> listed_;  // of wide nodes: vertices of their leaves
   std::vector<Subtree> subtrees_;
   std::vector<std::uint32_t> above_subtrees_;
   AlignedArray<WideNode> nodes_;
   AlignedArray<S> lanes_, own_;
   AlignedArray<std::uint32_t> vertices_;
-  std::vector<std::uint32_t> first_entry_, first_corner_, corners_, primitives_, stamps_;
+  std::vector<std::uint32_t> first_entry_, first_corner_, corners_, primitives_, stamps_, fetched_;
   AlignedArray<S> rows_;
   std::uint32_t stamp_ = 1;
 };
@@ -127,13 +141,43 @@ class WideQuery {
                   const SceneView<S>& scene, const SampledMotion<S>& motion, const Budget& budget,
                   PairBuffer& out, std::uint64_t& tests);
 
+  /// One side of a lazy query: `stale[wide node]` is not 0 while the boxes of the node's children are not
+  /// those of the present. The boxes of the roots must be.
+  struct LazySide {
+    WideHierarchy<S>* hierarchy;
+    std::uint32_t body;
+    const std::uint8_t* stale;
+  };
+  /// Wide nodes whose boxes a lazy query waits for; `none`: on that side it waits for nothing.
+  struct Wanted {
+    static constexpr std::uint32_t none = ~std::uint32_t(0);
+    std::uint32_t first = none, second = none;
+    explicit operator bool() const { return first != none || second != none; }
+  };
+  /// The same query for hierarchies whose boxes are made when they are first needed:
+  ///   query.start_lazy(a, b, budget);
+  ///   while (const auto wanted = query.proceed(a, b, scene, motion, out, tests)) make the boxes of their
+  ///   children,
+  ///     and take back the marks
+  /// Nothing is read that is marked. `run` pays nothing for it: the traversal is another one.
+  void start_lazy(const LazySide& a, const LazySide& b, const Budget& budget);
+  Wanted proceed(const LazySide& a, const LazySide& b, const SceneView<S>& scene,
+                 const SampledMotion<S>& motion, PairBuffer& out, std::uint64_t& tests);
+  /// What the budget left undone, once `proceed` waits for nothing.
+  QueryStatus lazy_status() const { return {lazy_.depth}; }
+
  private:
+  /// An empty traversal in this query's buffers.
+  WideTraversal fresh_traversal(const Budget& budget);
+  void grow(WideTraversal& state);
   void leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
                        const SceneView<S>& scene, const SampledMotion<S>& motion, std::size_t count,
                        PairBuffer& out, std::uint64_t& tests);
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
   std::vector<FoundPair> chunk_;
+  std::vector<std::uint32_t> to_fetch_;
+  WideTraversal lazy_{};
 };
 
 extern template class WideHierarchy<float>;

@@ -6,7 +6,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/kernels/bounds.hpp"
 #include "core/kernels/limits.hpp"
+#include "core/kernels/wide_inflate.hpp"
 
 namespace kbvh {
 
@@ -92,6 +94,23 @@ KernelSet active_kernel_set() {
 
 const LimitKernels& limit_kernels(KernelSet set) {
   return KBVH_SELECT_KERNELS(set, limits);
+}
+
+template <>
+const BoundsKernels<float>& bounds_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, bounds_float);
+}
+template <>
+const BoundsKernels<double>& bounds_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, bounds_double);
+}
+template <>
+const WideInflateKernels<float>& wide_inflate_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, wide_inflate_float);
+}
+template <>
+const WideInflateKernels<double>& wide_inflate_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, wide_inflate_double);
 }
 
 void use_kernel_set(KernelSet set) {

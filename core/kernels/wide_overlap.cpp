@@ -67,12 +67,16 @@ template <class S, std::size_t width>
   state.found += leaves ? 1 : 0;
 }
 
-template <class S, std::uint32_t width>
+enum class Boxes { current, lazy };
+
+template <class S, std::uint32_t width, Boxes boxes>
 void traverse(WideArrays<S> a, WideArrays<S> b, WideTraversal& shared) {
   constexpr std::size_t node_rows = 6 * width;
   WideTraversal state = shared;
   while (state.depth > 0 && state.tests < state.test_limit && state.depth + wide_step < state.stack_room &&
          state.found + wide_step < state.out_room) {
+    if constexpr (boxes == Boxes::lazy)
+      if (state.first_is_stale() || state.second_is_stale()) break;
     const WidePair pair = state.stack[--state.depth];
     if (((pair.first | pair.second) & WidePair::leaf_bit) == 0) {
       const WideNode node_a = a.nodes[pair.first], node_b = b.nodes[pair.second];
@@ -168,12 +172,15 @@ void leaf_pairs(WideLeafPairs<S>& shared) {
 }
 
 template <class S>
-constexpr WideOverlapKernels<S> table{&traverse<S, 2>,
-                                      &traverse<S, 4>,
-                                      &traverse<S, 8>,
+constexpr WideOverlapKernels<S> table{&traverse<S, 2, Boxes::current>,
+                                      &traverse<S, 4, Boxes::current>,
+                                      &traverse<S, 8, Boxes::current>,
                                       {{&leaf_pairs<S, 2, 4>, &leaf_pairs<S, 2, 8>, &leaf_pairs<S, 2, 16>},
                                        {&leaf_pairs<S, 4, 4>, &leaf_pairs<S, 4, 8>, &leaf_pairs<S, 4, 16>},
-                                       {&leaf_pairs<S, 8, 4>, &leaf_pairs<S, 8, 8>, &leaf_pairs<S, 8, 16>}}};
+                                       {&leaf_pairs<S, 8, 4>, &leaf_pairs<S, 8, 8>, &leaf_pairs<S, 8, 16>}},
+                                      &traverse<S, 2, Boxes::lazy>,
+                                      &traverse<S, 4, Boxes::lazy>,
+                                      &traverse<S, 8, Boxes::lazy>};
 
 }  // namespace
 

@@ -11,6 +11,17 @@ struct WideTraversal {
   LeafSlot* out;                ///< pairs of overlapping leaves: first, second, first, second, ...
   std::size_t found, out_room;  ///< in pairs
   std::uint64_t tests, test_limit;
+  /// Per node of either hierarchy, for the lazy traversal: not 0 if its children's boxes have to be made
+  /// first.
+  const std::uint8_t *stale_a = nullptr, *stale_b = nullptr;
+
+  /// The pair on top waits for boxes of the first, or of the second hierarchy.
+  [[gnu::always_inline]] bool first_is_stale() const {
+    return (stack[depth - 1].first & WidePair::leaf_bit) == 0 && stale_a[stack[depth - 1].first] != 0;
+  }
+  [[gnu::always_inline]] bool second_is_stale() const {
+    return (stack[depth - 1].second & WidePair::leaf_bit) == 0 && stale_b[stack[depth - 1].second] != 0;
+  }
 };
 /// One step may push, and find, so many pairs.
 inline constexpr std::size_t wide_step = 64;
@@ -59,6 +70,9 @@ struct WideOverlapKernels {
   Traverse width2, width4, width8;
   /// [log2(width) - 1][padded leaf size 4, 8, 16]
   LeafPairs leaf_pairs[3][3];
+  /// As `traverse`, but leaves off, too, when the pair on top of the stack waits for boxes.
+  Traverse lazy2, lazy4, lazy8;
+  Traverse lazy(std::uint32_t width) const { return width == 2 ? lazy2 : width == 4 ? lazy4 : lazy8; }
   Traverse traverse(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
   LeafPairs pairs(std::uint32_t width, std::uint32_t padded_leaf) const {
     return leaf_pairs[width == 2 ? 0 : width == 4 ? 1 : 2][padded_leaf == 4 ? 0 : padded_leaf == 8 ? 1 : 2];

@@ -49,6 +49,7 @@ struct Instant {
 template <class S>
 class EventClock {
  public:
+  using Event = kbvh::Event;
   explicit EventClock(std::vector<const FlightPlans<S>*> plans) : plans_(std::move(plans)) {}
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return *plans_[body]; }

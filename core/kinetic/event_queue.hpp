@@ -10,23 +10,25 @@
 
 namespace kbvh {
 
-/// An event queue holds at most one event per certificate slot and can be shared by several structures:
+/// An event queue holds at most one event per slot and can be shared by several structures:
+///   grow(slots)       makes room for slots below this number, amortised O(1) each; events stay scheduled
+///   slots()           how many there is room for
 ///   schedule(event)   inserts, or replaces the event of the same slot
 ///   cancel(slot)      removes the slot's event if there is one; says whether there was
 ///   top(), pop(), empty(), size(), clear(), bytes()
-///   grow(slots)       makes room for slots below this number, amortised O(1) each; events stay scheduled
-///   slots()           how many there is room for
-/// `steps()` counts comparisons. Order comes from an EventClock: exact time, deeper node, slot.
+/// `steps()` counts comparisons. Events and their order come from a clock: Clock::Event has a `slot`, and
+/// clock.earlier(a, b) orders by exact time first (EventClock, OverlapClock).
 
 /// The paper's queue: an AVL tree (Z&W s.3), on Boost.Intrusive; all operations O(log events).
-template <class S>
-class AvlQueue {
+template <class Clock>
+class AvlEventQueue {
+  using Event = typename Clock::Event;
   struct Node : boost::intrusive::avl_set_base_hook<> {
     Event event;
     bool scheduled = false;
   };
   struct Less {
-    const EventClock<S>* clock;
+    const Clock* clock;
     std::uint64_t* steps;
     bool operator()(const Node& a, const Node& b) const {
       ++*steps;
@@ -37,9 +39,9 @@ class AvlQueue {
 
  public:
   static constexpr const char* name = "avl";
-  AvlQueue(const EventClock<S>& clock, std::uint32_t slots)
+  AvlEventQueue(const Clock& clock, std::uint32_t slots)
       : steps_(std::make_unique<std::uint64_t>(0)), nodes_(slots), tree_(Less{&clock, steps_.get()}) {}
-  ~AvlQueue() { tree_.clear(); }
+  ~AvlEventQueue() { tree_.clear(); }
 
   void schedule(const Event& event) {
     Node& node = nodes_[event.slot];
@@ -87,20 +89,28 @@ class AvlQueue {
 
  private:
   std::unique_ptr<std::uint64_t> steps_;
-  std::vector<Node> nodes_;
+  std::vector<Node> nodes_;  ///< by slot
   Tree tree_;
 };
 
 /// An indexed binary heap: the obvious array queue; all operations O(log events), no pointers.
-template <class S>
-class BinaryHeapQueue {
+template <class Clock>
+class BinaryHeapEventQueue {
+  using Event = typename Clock::Event;
+
  public:
   static constexpr const char* name = "binary_heap";
-  BinaryHeapQueue(const EventClock<S>& clock, std::uint32_t slots)
+  BinaryHeapEventQueue(const Clock& clock, std::uint32_t slots)
       : clock_(&clock), events_(slots), place_(slots, none) {
     heap_.reserve(slots);
   }
 
+  void grow(std::uint32_t slots) {
+    if (slots <= events_.size()) return;
+    events_.resize(slots);
+    place_.resize(slots, none);
+    heap_.reserve(events_.capacity());
+  }
   void schedule(const Event& event) {
     const std::uint32_t slot = event.slot;
     events_[slot] = event;
@@ -135,11 +145,6 @@ class BinaryHeapQueue {
     std::fill(place_.begin(), place_.end(), none);
   }
   std::uint32_t slots() const { return std::uint32_t(events_.size()); }
-  void grow(std::uint32_t slots) {
-    if (slots <= events_.size()) return;
-    events_.resize(slots);
-    place_.resize(slots, none);
-  }
   std::uint64_t steps() const { return steps_; }
   std::size_t bytes() const { return events_.size() * (sizeof(Event) + 2 * sizeof(std::uint32_t)); }
 
@@ -177,11 +182,17 @@ class BinaryHeapQueue {
     place_[slot] = at;
   }
 
-  const EventClock<S>* clock_;
+  const Clock* clock_;
   std::vector<Event> events_;         ///< by slot
   std::vector<std::uint32_t> place_;  ///< of each slot in the heap
   std::vector<std::uint32_t> heap_;
   std::uint64_t steps_ = 0;
 };
+
+/// The queues of kinetic trees.
+template <class S>
+using AvlQueue = AvlEventQueue<EventClock<S>>;
+template <class S>
+using BinaryHeapQueue = BinaryHeapEventQueue<EventClock<S>>;
 
 }  // namespace kbvh

@@ -36,6 +36,7 @@ struct NoObserver {
   void realiser_changed(std::uint32_t /*body*/, std::uint32_t /*node*/, Side /*side*/,
                         std::uint32_t /*old_vertex*/, std::uint32_t /*new_vertex*/,
                         const Instant<S>& /*now*/) {}
+  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
 };
 
 /// The kinetic AABB tree of one body (Z&W s.4): per node and side the vertex that realises the bound, and one
@@ -45,7 +46,8 @@ struct NoObserver {
 ///
 /// Slots of the queue are first_slot + 6 * node + side for the nodes that there were at the start; later ones
 /// get theirs in chunks. Observer::realiser_changed(body, node, side, old, new, instant) is called at every
-/// change of a bound's realiser, deeper nodes first.
+/// change of a bound's realiser, deeper nodes first, and Observer::realiser_plan_changed(body, node) for a
+/// node of which a realiser has another plan from now on.
 ///
 /// Primitives can be inserted and removed at any time (the paper's claim): a local edit of the topology, then
 /// certificates of the few nodes whose candidates are others, and of their ancestors as far up and on as many
@@ -67,7 +69,7 @@ class KineticAabbTree {
         observer_(observer),
         realisers_(std::size_t(6) * topology_.size(), 0) {}
 
-  static std::uint32_t slot_count(const Topology& topology) { return 6 * topology.size(); }
+  static std::uint64_t slot_count(const Topology& topology) { return std::uint64_t(6) * topology.size(); }
   /// After insertions or deletions it is laid out as TopologyEditor says, with ids that mean nothing.
   const Topology& topology() const { return topology_; }
   /// The topology as a builder lays it out, for audits: node i of it is node order[i] of the tree.
@@ -397,6 +399,8 @@ class KineticAabbTree {
         }
         certify(node, side, now);
       }
+      if (!vertices.empty() && std::any_of(realisers(node), realisers(node) + 6, changed))
+        observer_.realiser_plan_changed(body_, node);
     }
     for (std::uint32_t node : affected_) moved_[node] = 0;
   }

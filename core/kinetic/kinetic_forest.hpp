@@ -7,11 +7,13 @@
 
 namespace kbvh {
 
-/// The kinetic AABB trees of all bodies of a scene on one event queue.
-template <class S, class Queue, class Count, class Observer = NoObserver>
+/// The kinetic trees of all bodies of a scene on one event queue: AABB trees, or others that are made and
+/// used alike.
+template <class S, class Queue, class Count, class Observer = NoObserver,
+          template <class, class, class, class> class KineticTree = KineticAabbTree>
 class KineticForest {
  public:
-  using Tree = KineticAabbTree<S, Queue, Count, Observer>;
+  using Tree = KineticTree<S, Queue, Count, Observer>;
 
   KineticForest(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, Count& count,
                 Observer observer = {})
@@ -19,7 +21,7 @@ class KineticForest {
     std::uint32_t first_slot = 0;
     trees_.reserve(topologies.size());
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
-      const std::uint32_t slots = Tree::slot_count(topologies[body]);
+      const auto slots = std::uint32_t(Tree::slot_count(topologies[body]));
       trees_.emplace_back(std::move(topologies[body]), scene.primitives(body), std::uint16_t(body),
                           first_slot, clock_, queue_, count, observer);
       first_slot += slots;
@@ -63,6 +65,7 @@ class KineticForest {
   Tree& tree(std::uint32_t body) { return trees_[body]; }
   const Tree& tree(std::uint32_t body) const { return trees_[body]; }
   EventClock<S>& clock() { return clock_; }
+  const EventClock<S>& clock() const { return clock_; }
   Queue& queue() { return queue_; }
   const Queue& queue() const { return queue_; }
   std::size_t bytes() const {
@@ -79,7 +82,7 @@ class KineticForest {
   }
   static std::uint32_t slots_of(const Topologies& topologies) {
     std::uint64_t slots = 0;
-    for (const Topology& topology : topologies) slots += std::uint64_t(6) * topology.size();
+    for (const Topology& topology : topologies) slots += Tree::slot_count(topology);
     if (slots > std::numeric_limits<std::uint32_t>::max())
       throw std::length_error(std::to_string(slots) + " certificates are more than a queue can number");
     return std::uint32_t(slots);

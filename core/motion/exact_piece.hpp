@@ -23,6 +23,8 @@ int compare_slopes(const Piece<S>& a, const Piece<S>& b);
 template <class S>
 struct Crossing {
   Piece<S> winner, loser;
+
+  bool operator==(const Crossing&) const = default;
 };
 
 /// A time and how far off it may be: |exact - time| <= error.

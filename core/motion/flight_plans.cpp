@@ -38,6 +38,7 @@ FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> time
     check_value(positions[i], "coordinate", point / vertex_count, point % vertex_count, int(i % 3));
     if (positions[i] == S(0)) positions[i] = S(0);  // truth B holds no negative zero
   }
+  longest_steps_.assign(times.size(), -1.0);
   keyframes_ = std::make_shared<const Keyframes>(Keyframes{std::move(times), std::move(positions)});
 }
 
@@ -58,8 +59,60 @@ void FlightPlans<S>::evaluate(double t, S* out, RoundingStats* stats) const {
     round_chord(keyframe(k), keyframe(k + 1), scalars, times[k], times[k + 1], t, out, stats);
   }
   for (const OwnPlan& plan : own_)
-    for (int axis = 0; axis < 3; ++axis)
-      out[3 * std::size_t(plan.vertex) + std::size_t(axis)] = round_piece(own_piece(plan, axis, t), t);
+    for (int axis = 0; plan.group == none && axis < 3; ++axis)
+      out[3 * std::size_t(plan.vertex) + std::size_t(axis)] = round_piece(own_piece(plan, axis, t), t, stats);
+  evaluate_rays(t, out, stats);
+}
+
+template <class S>
+void FlightPlans<S>::evaluate_rays(double t, S* out, RoundingStats* stats) const {
+  constexpr std::size_t block = 128;  // vertices
+  S positions[3 * block];
+  for (const Rays& rays : rays_)
+    for (std::size_t first = 0; first < rays.vertices.size(); first += block) {
+      const std::size_t count = std::min(block, rays.vertices.size() - first);
+      round_ray(rays.origins.data() + 3 * first, rays.velocities.data() + 3 * first, 3 * count, rays.t0, t,
+                positions, stats);
+      for (std::size_t i = 0; i < count; ++i)
+        std::copy_n(positions + 3 * i, 3, out + std::size_t(3) * rays.vertices[first + i]);
+    }
+}
+
+template <class S>
+void FlightPlans<S>::join_rays(OwnPlan& plan) {
+  if (plan.times.size() > 1) return;
+  // Changes of one time come together: nearly always the newest group is the right one.
+  auto rays = std::find_if(rays_.rbegin(), rays_.rend(),
+                           [&](const Rays& group) { return group.t0 == plan.times[0]; });
+  if (rays == rays_.rend()) {
+    rays_.push_back({plan.times[0], {}, {}, {}});
+    rays = rays_.rbegin();
+  }
+  plan.group = std::uint32_t(rays_.rend() - rays - 1);
+  plan.place = std::uint32_t(rays->vertices.size());
+  rays->vertices.push_back(plan.vertex);
+  rays->origins.insert(rays->origins.end(), plan.positions.begin(), plan.positions.end());
+  rays->velocities.insert(rays->velocities.end(), plan.velocity, plan.velocity + 3);
+}
+
+template <class S>
+void FlightPlans<S>::leave_rays(const OwnPlan& plan) {
+  if (plan.group == none) return;
+  Rays& rays = rays_[plan.group];
+  const std::size_t last = rays.vertices.size() - 1;
+  own_[own_of_vertex_[rays.vertices[last]]].place = plan.place;
+  rays.vertices[plan.place] = rays.vertices[last];
+  for (std::vector<S>* values : {&rays.origins, &rays.velocities}) {
+    std::copy_n(values->begin() + std::ptrdiff_t(3 * last), 3,
+                values->begin() + std::ptrdiff_t(3) * plan.place);
+    values->resize(3 * last);
+  }
+  rays.vertices.pop_back();
+  if (!rays.vertices.empty()) return;
+  const std::uint32_t group = plan.group;
+  for (const std::uint32_t vertex : rays_.back().vertices) own_[own_of_vertex_[vertex]].group = group;
+  if (group + 1 < rays_.size()) rays_[group] = std::move(rays_.back());
+  rays_.pop_back();
 }
 
 template <class S>
@@ -128,51 +181,61 @@ Piece<S> FlightPlans<S>::own_piece(const OwnPlan& plan, int axis, double t) cons
 }
 
 template <class S>
-auto FlightPlans<S>::checked_plan(double t, const PlanChange<S>& change, std::uint32_t vertex,
-                                  const S* position) -> OwnPlan {
+void FlightPlans<S>::check_vertex(std::uint32_t vertex) const {
+  if (vertex >= vertex_count_)
+    throw std::invalid_argument("plan change for vertex " + std::to_string(vertex) + " of a body with " +
+                                std::to_string(vertex_count_) + " vertices");
+}
+
+template <class S>
+void FlightPlans<S>::check_change(double t, const PlanChange<S>& change, const S* position) const {
+  check_vertex(change.vertex);
+  check_new_vertex(t, change, position, change.vertex);
+}
+
+template <class S>
+void FlightPlans<S>::check_new_vertex(double t, const PlanChange<S>& change, const S* position,
+                                      std::uint32_t vertex) {
+  if (!std::isfinite(t)) throw std::invalid_argument("plan change at t = " + std::to_string(t));
   if (change.positions.size() != 3 * change.times.size())
     throw std::invalid_argument("plan change with " + std::to_string(change.times.size()) + " knots and " +
                                 std::to_string(change.positions.size()) + " coordinates");
-  OwnPlan plan{vertex, {t}, {position[0], position[1], position[2]}, {}};
+  for (int axis = 0; axis < 3; ++axis) {
+    check_value(position[axis], "coordinate", 0, vertex, axis);
+    check_value(change.velocity[axis], "velocity", change.times.size(), vertex, axis);
+  }
+  double before = t;
   for (std::size_t k = 0; k < change.times.size(); ++k) {
-    if (!std::isfinite(change.times[k]) || !(plan.times.back() < change.times[k]))
+    if (!std::isfinite(change.times[k]) || !(before < change.times[k]))
       throw std::invalid_argument("knot " + std::to_string(k) + " of a plan change at " + std::to_string(t) +
                                   " has time " + std::to_string(change.times[k]) + ", which does not follow");
-    plan.times.push_back(change.times[k]);
-    for (int axis = 0; axis < 3; ++axis) {
-      const S value = change.positions[3 * k + std::size_t(axis)];
-      check_value(value, "coordinate", k + 1, vertex, axis);
-      plan.positions.push_back(value == S(0) ? S(0) : value);
-    }
+    before = change.times[k];
+    for (int axis = 0; axis < 3; ++axis)
+      check_value(change.positions[3 * k + std::size_t(axis)], "coordinate", k + 1, vertex, axis);
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    check_value(change.velocity[axis], "velocity", change.times.size(), vertex, axis);
-    plan.velocity[axis] = change.velocity[axis];
-  }
-  return plan;
 }
 
 template <class S>
 void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* position) {
-  if (change.vertex >= vertex_count_)
-    throw std::invalid_argument("plan change for vertex " + std::to_string(change.vertex) +
-                                " of a body with " + std::to_string(vertex_count_) + " vertices");
-  OwnPlan plan = checked_plan(t, change, change.vertex, position);
+  check_change(t, change, position);
+  OwnPlan plan;
+  plan.vertex = change.vertex;
+  plan.times = {t};
+  plan.positions.assign(position, position + 3);
+  plan.times.insert(plan.times.end(), change.times.begin(), change.times.end());
+  for (const S value : change.positions) plan.positions.push_back(value == S(0) ? S(0) : value);
+  std::copy_n(change.velocity, 3, plan.velocity);
+  own_speed_until_ = own_speed_from_;  // to be computed anew
   if (own_of_vertex_.empty()) own_of_vertex_.assign(vertex_count_, none);
   std::uint32_t& slot = own_of_vertex_[change.vertex];
   if (slot == none) {
     slot = std::uint32_t(own_.size());
     own_.push_back(std::move(plan));
   } else {
+    leave_rays(own_[slot]);
     own_[slot] = std::move(plan);
   }
-}
-
-template <class S>
-void FlightPlans<S>::check_new_vertex(double t, const PlanChange<S>& plan, const S* position,
-                                      std::uint32_t vertex) {
-  for (int axis = 0; axis < 3; ++axis) check_value(position[axis], "coordinate", 0, vertex, axis);
-  checked_plan(t, plan, vertex, position);
+  join_rays(own_[slot]);
 }
 
 template <class S>
@@ -180,48 +243,113 @@ void FlightPlans<S>::add_vertex(double t, const PlanChange<S>& plan, const S* po
   check_new_vertex(t, plan, position, vertex_count_);
   S start[3];
   for (int axis = 0; axis < 3; ++axis) start[axis] = position[axis] == S(0) ? S(0) : position[axis];
+  PlanChange<S> own = plan;
+  own.vertex = vertex_count_++;
   own_of_vertex_.resize(vertex_count_, none);
-  own_of_vertex_.push_back(std::uint32_t(own_.size()));
-  own_.push_back(checked_plan(t, plan, vertex_count_, start));
-  ++vertex_count_;
+  change(t, own, start);
+}
+
+namespace {
+/// Above every rounding of the few operations on positive numbers that went before, underflow included.
+double rounded_up(double value) {
+  return value * (1 + 1e-12) + std::numeric_limits<double>::min();
+}
+}  // namespace
+
+/// The furthest that any vertex moves in a segment, rounded up; 0 only if none moves.
+template <class S>
+double FlightPlans<S>::longest_step(std::size_t segment) const {
+  double& known = longest_steps_[segment];
+  if (known >= 0) return known;
+  const S *from = keyframe(segment), *to = keyframe(segment + 1);
+  double square = 0, largest = 0;
+  for (std::size_t i = 0; i < std::size_t(3) * keyframed_count_; i += 3) {
+    double sum = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double step = double(to[i + axis]) - double(from[i + axis]);
+      sum += step * step;
+      largest = std::max(largest, std::abs(step));
+    }
+    square = std::max(square, sum);
+  }
+  // Squares of small numbers vanish: what that can hide is added.
+  known = largest == 0 ? 0 : rounded_up(std::sqrt(square + 1e-300));
+  return known;
+}
+
+/// Of the piece that holds at t.
+template <class S>
+double FlightPlans<S>::own_speed(const OwnPlan& plan, double t) const {
+  double step[3], seconds = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Piece<S> piece = own_piece(plan, axis, t);
+    step[axis] = piece.kind == PieceKind::chord ? double(piece.x1) - double(piece.x0) : double(piece.x1);
+    if (piece.kind == PieceKind::chord) seconds = piece.t1 - piece.t0;
+  }
+  if (step[0] == 0 && step[1] == 0 && step[2] == 0) return 0;
+  return rounded_up(std::hypot(step[0], step[1], step[2]) / seconds);
+}
+
+template <class S>
+double FlightPlans<S>::own_speed_bound(double t) const {
+  if (t < own_speed_from_ || t >= own_speed_until_) {
+    own_speed_ = 0;
+    own_speed_from_ = t;
+    own_speed_until_ = std::numeric_limits<double>::infinity();
+    for (const OwnPlan& plan : own_) {
+      own_speed_ = std::max(own_speed_, own_speed(plan, t));
+      own_speed_until_ = std::min(own_speed_until_, piece_end(plan.vertex, t));
+    }
+  }
+  return own_speed_;
 }
 
 template <class S>
 double FlightPlans<S>::speed_bound(double t) const {
-  const auto speed = [](const double* step, double seconds) {
-    return std::sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2]) / seconds;
-  };
   const auto& times = keyframes_->times;
   const std::size_t k = segment_at(t);
-  if (k != bounded_segment_) {
-    segment_speed_ = 0;
-    if (k + 1 < times.size() && t >= times[0])
-      for (std::size_t i = 0; i < std::size_t(3) * keyframed_count_; i += 3) {
-        double step[3];
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          step[axis] = double(keyframe(k + 1)[i + axis]) - double(keyframe(k)[i + axis]);
-        segment_speed_ = std::max(segment_speed_, speed(step, times[k + 1] - times[k]));
-      }
-    bounded_segment_ = k;
+  double bound = own_.empty() ? 0 : own_speed_bound(t);
+  if (k + 1 < times.size() && t >= times[0] && longest_step(k) > 0)
+    bound = std::max(bound, rounded_up(longest_step(k) / (times[k + 1] - times[k])));
+  return bound;
+}
+
+template <class S>
+double FlightPlans<S>::displacement_bound(double t0, double t1) const {
+  if (!(t0 < t1)) return 0;
+  const auto& times = keyframes_->times;
+  double common = 0;
+  for (std::size_t k = segment_at(t0); k + 1 < times.size() && times[k] < t1; ++k) {
+    const double begin = std::max(t0, times[k]), end = std::min(t1, times[k + 1]);
+    if (!(begin < end) || longest_step(k) == 0) continue;
+    const double share = (end - begin) / (times[k + 1] - times[k]);
+    common = rounded_up(common + longest_step(k) * std::min(1.0, rounded_up(share)));
   }
-  double bound = segment_speed_;
+  if (own_.empty()) return common;
+  double own = own_speed_bound(t0);
+  if (t1 <= own_speed_until_) return std::max(common, own == 0 ? 0 : rounded_up(own * (t1 - t0)));
+  // Some plan has a knot between: each along its own pieces.
+  own = 0;
   for (const OwnPlan& plan : own_) {
-    double step[3], seconds = 1;
-    for (int axis = 0; axis < 3; ++axis) {
-      const Piece<S> piece = own_piece(plan, axis, t);
-      step[axis] = piece.kind == PieceKind::chord ? double(piece.x1) - double(piece.x0) : double(piece.x1);
-      if (piece.kind == PieceKind::chord) seconds = piece.t1 - piece.t0;
+    double way = 0;
+    for (double begin = t0; begin < t1;) {
+      const double end = std::min(t1, piece_end(plan.vertex, begin)), speed = own_speed(plan, begin);
+      if (speed > 0) way = rounded_up(way + speed * (end - begin));
+      begin = end;
     }
-    bound = std::max(bound, speed(step, seconds));
+    own = std::max(own, way);
   }
-  return bound * (1 + 1e-12);  // above every rounding of the few operations here
+  return std::max(common, own);
 }
 
 template <class S>
 std::size_t FlightPlans<S>::bytes() const {
   std::size_t total = keyframes_->times.size() * sizeof(double) + keyframes_->positions.size() * sizeof(S) +
-                      own_of_vertex_.size() * sizeof(std::uint32_t) + own_.size() * sizeof(OwnPlan);
+                      longest_steps_.size() * sizeof(double) + own_of_vertex_.size() * sizeof(std::uint32_t) +
+                      own_.size() * sizeof(OwnPlan);
   for (const OwnPlan& plan : own_) total += plan.times.size() * (sizeof(double) + 3 * sizeof(S));
+  for (const Rays& rays : rays_)
+    total += sizeof(Rays) + rays.vertices.size() * (sizeof(std::uint32_t) + 6 * sizeof(S));
   return total;
 }
 

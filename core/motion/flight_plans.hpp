@@ -60,19 +60,27 @@ class FlightPlans {
   double piece_end(std::uint32_t vertex, double t) const;
 
   /// No vertex is faster than this on the segment that holds at t (units per second, rounded up); own plans
-  /// included. O(vertices) the first time a segment is asked for, O(own plans) after.
+  /// included. O(vertices) the first time a segment is asked for; O(own plans) after a change, or a knot of
+  /// one.
   double speed_bound(double t) const;
+  /// No vertex moves further than this on its way from t0 to t1 (Euclidean, rounded up), whatever segments
+  /// lie between; 0 only if none moves at all. Not for times before the last change. Costs as `speed_bound`.
+  double displacement_bound(double t0, double t1) const;
 
-  /// Starts the vertex's new plan at t from its stored position at t (`position`, 3 scalars).
-  /// Throws std::invalid_argument on non-finite values, knots not after t, or an unknown vertex.
+  /// Throws std::invalid_argument if there is no such vertex.
+  void check_vertex(std::uint32_t vertex) const;
+  /// Throws std::invalid_argument, saying what is wrong, if `change` would.
+  void check_change(double t, const PlanChange<S>& change, const S* position) const;
+  /// Starts the vertex's new plan at t from its stored position at t (`position`, 3 scalars). Throws
+  /// std::invalid_argument, with nothing changed: on values that are not finite or beyond the admissible
+  /// range (the position, too: a vertex can have flown out of it), knots not after t, or an unknown vertex.
   void change(double t, const PlanChange<S>& change, const S* position);
-  /// Adds a vertex, with the next free id, that is at `position` (3 scalars) at t and follows the plan from
-  /// there (before t its first line means nothing, but is defined). `plan.body` and `plan.vertex` are
-  /// ignored. Throws std::invalid_argument like `change`, and on a position that is not admissible. Amortised
-  /// O(knots).
-  void add_vertex(double t, const PlanChange<S>& plan, const S* position);
   /// Throws what `add_vertex` would throw for a vertex with that id, and does nothing else.
   static void check_new_vertex(double t, const PlanChange<S>& plan, const S* position, std::uint32_t vertex);
+  /// Adds a vertex, with the next free id, that is at `position` (3 scalars) at t and follows the plan from
+  /// there (before t its first line means nothing, but is defined). `plan.body` and `plan.vertex` are
+  /// ignored. Throws like `change`. Amortised O(knots).
+  void add_vertex(double t, const PlanChange<S>& plan, const S* position);
 
   std::size_t bytes() const;
 
@@ -87,18 +95,32 @@ class FlightPlans {
     std::vector<double> times;  // first knot: the change itself
     std::vector<S> positions;
     S velocity[3];
+    std::uint32_t group = none, place = 0;  ///< in rays_, of plans without a further knot
   };
+  /// Vertices that fly on for ever from one time on, laid out to be evaluated together: a field of velocities
+  /// that change at run time has thousands of them.
+  struct Rays {
+    double t0;
+    std::vector<std::uint32_t> vertices;
+    std::vector<S> origins, velocities;  ///< [vertex][3]
+  };
+  void join_rays(OwnPlan& plan);
+  void leave_rays(const OwnPlan& plan);
+  void evaluate_rays(double t, S* out, RoundingStats* stats) const;
   Piece<S> own_piece(const OwnPlan& plan, int axis, double t) const;
-  static OwnPlan checked_plan(double t, const PlanChange<S>& change, std::uint32_t vertex, const S* position);
   void evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out,
                           RoundingStats* stats) const;
+  double longest_step(std::size_t segment) const;
+  double own_speed(const OwnPlan& plan, double t) const;
+  double own_speed_bound(double t) const;
 
   std::uint32_t vertex_count_ = 0, keyframed_count_ = 0;
   std::shared_ptr<const Keyframes> keyframes_;
   std::vector<std::uint32_t> own_of_vertex_;
   std::vector<OwnPlan> own_;
-  mutable std::size_t bounded_segment_ = std::numeric_limits<std::size_t>::max();
-  mutable double segment_speed_ = 0;
+  std::vector<Rays> rays_;                     ///< none is empty
+  mutable std::vector<double> longest_steps_;  // by segment; negative until it is asked for
+  mutable double own_speed_ = 0, own_speed_from_ = 0, own_speed_until_ = 0;  // holds in [from, until)
 };
 
 extern template class FlightPlans<float>;

@@ -28,6 +28,7 @@ class SampledMotion {
   void fetch(std::uint32_t body, std::span<const std::uint32_t> vertices) const {
     playback_->fetch(body, vertices);
   }
+  void fetch_all(std::uint32_t body) const { playback_->fetch_all(body); }
   bool all_current(std::uint32_t body) const { return playback_->all_current(body); }
   /// How many positions were evaluated on demand since the playback was made.
   std::uint64_t fetched() const { return playback_->fetched(); }
@@ -45,6 +46,12 @@ class SteppedMotion : public SampledMotion<S> {
   /// frames.
   double speed_bound(std::uint32_t body) const {
     return this->playback_->plans(body).speed_bound(this->time());
+  }
+  /// No vertex of the body moves further than this on its way from t0 to t1 (Euclidean, rounded up), however
+  /// many segments lie between; 0 only if none moves. For steps from frame to frame: t0 not before the last
+  /// change.
+  double displacement_bound(std::uint32_t body, double t0, double t1) const {
+    return this->playback_->plans(body).displacement_bound(t0, t1);
   }
 };
 

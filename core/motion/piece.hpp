@@ -15,6 +15,8 @@ struct Piece {
   double t0 = 0, t1 = std::numeric_limits<double>::infinity();
   S x0 = 0, x1 = 0;
   PieceKind kind = PieceKind::ray;
+
+  bool operator==(const Piece&) const = default;
 };
 
 }  // namespace kbvh

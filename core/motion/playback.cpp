@@ -11,7 +11,7 @@ Playback<S>::Playback(const Scene<S>& scene) {
   double start = 0;
   for (const auto& body : scene.bodies) {
     BodyState state;
-    state.plans = body.plans;
+    state.plans = state.scene_plans = body.plans;
     state.positions.assign(std::size_t(3) * body.plans.vertex_count() + 1, S(0));
     state.stamp.assign(body.plans.vertex_count(), 0);
     largest = std::max<std::size_t>(largest, body.plans.vertex_count());
@@ -48,9 +48,7 @@ template <class S>
 void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices) {
   // A static body is evaluated once, for good.
   if (!state.plans.moving() || std::uint64_t(16) * state.fetched > state.plans.vertex_count()) {
-    if (state.plans.moving()) fetched_ += state.plans.vertex_count() - state.fetched;
-    state.plans.evaluate(time_, state.positions.data(), &rounding_);
-    state.all_current = true;
+    fetch_all(state);
     return;
   }
   stale_.clear();
@@ -66,28 +64,39 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
 }
 
 template <class S>
+void Playback<S>::fetch_all(BodyState& state) {
+  if (state.plans.moving()) fetched_ += state.plans.vertex_count() - state.fetched;
+  state.plans.evaluate(time_, state.positions.data(), &rounding_);
+  state.all_current = true;
+}
+
+template <class S>
 void Playback<S>::change_plans(double t, std::span<const PlanChange<S>> changes) {
   if (t != time_)
     throw std::invalid_argument("plan changes at " + std::to_string(t) + " while the motion stands at " +
                                 std::to_string(time_));
-  // All or nothing: try every change on copies of the plans it touches (the keyframes are shared), then
-  // commit.
-  std::vector<std::pair<std::uint32_t, FlightPlans<S>>> changed;
   for (const PlanChange<S>& change : changes) {
     if (change.body >= bodies_.size())
       throw std::invalid_argument("plan change for body " + std::to_string(change.body) + " of " +
                                   std::to_string(bodies_.size()));
-    if (change.vertex >= bodies_[change.body].plans.vertex_count())
-      throw std::invalid_argument("plan change for vertex " + std::to_string(change.vertex) +
-                                  " of a body with " +
-                                  std::to_string(bodies_[change.body].plans.vertex_count()) + " vertices");
-    auto entry = std::find_if(changed.begin(), changed.end(),
-                              [&](const auto& item) { return item.first == change.body; });
-    if (entry == changed.end())
-      entry = changed.emplace(changed.end(), change.body, bodies_[change.body].plans);
-    entry->second.change(t, change, position(change.body, change.vertex));
+    const FlightPlans<S>& plans = bodies_[change.body].plans;
+    plans.check_vertex(change.vertex);
+    plans.check_change(t, change, position(change.body, change.vertex));
   }
-  for (auto& [body, plans] : changed) bodies_[body].plans = std::move(plans);
+  // A vertex's position at t is the same before and after a change, so the order does not matter.
+  for (const PlanChange<S>& change : changes)
+    bodies_[change.body].plans.change(t, change, position(change.body, change.vertex));
+}
+
+template <class S>
+void Playback<S>::restore_plans() {
+  for (auto& state : bodies_) {
+    if (!state.plans.has_own_plans()) continue;
+    state.plans = state.scene_plans;
+    state.all_current = false;
+    state.positions.resize(std::size_t(3) * state.plans.vertex_count() + 1);
+    state.stamp.resize(state.plans.vertex_count());
+  }
 }
 
 template <class S>

@@ -28,6 +28,10 @@ class Playback {
     if (state.all_current) return;
     fetch_stale(state, vertices);
   }
+  /// Evaluates all vertices of one body, unless they are current.
+  void fetch_all(std::uint32_t body) {
+    if (!bodies_[body].all_current) fetch_all(bodies_[body]);
+  }
   /// Position of one vertex at the current time: 3 scalars.
   const S* position(std::uint32_t body, std::uint32_t vertex) {
     BodyState& state = bodies_[body];
@@ -40,9 +44,12 @@ class Playback {
   bool all_current(std::uint32_t body) const { return bodies_[body].all_current; }
 
   /// Each changed vertex starts its new plan at the current time from its stored position.
-  /// Throws std::invalid_argument, with nothing changed, if t is not the current time or a change is not
-  /// valid.
+  /// Of several changes of one vertex the last counts. Throws std::invalid_argument, with nothing changed, if
+  /// t is not the current time or a change is not valid.
   void change_plans(double t, std::span<const PlanChange<S>> changes);
+  /// Forgets every change: the plans are the scene's again, and positions are to be evaluated anew after the
+  /// next `seek`.
+  void restore_plans();
 
   /// Adds a vertex to a body at the current time; see FlightPlans::add_vertex. Its position is current.
   /// Amortised O(1); `positions` may move.
@@ -56,13 +63,14 @@ class Playback {
 
  private:
   struct BodyState {
-    FlightPlans<S> plans;
+    FlightPlans<S> plans, scene_plans;  ///< as changed, and as the scene has them
     std::vector<S> positions;
     std::vector<std::uint32_t> stamp;
     std::uint32_t fetched = 0;  ///< at the current time
     bool all_current = false;
   };
   void fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices);
+  void fetch_all(BodyState& state);
 
   double time_ = 0;
   std::uint32_t epoch_ = 0;

@@ -6,10 +6,18 @@
 
 namespace kbvh::io {
 
+/// What the primitives of a mesh are.
+enum class MeshKind : std::uint8_t {
+  polygons,      ///< of three or more vertices each
+  points,        ///< of one vertex
+  control_nets,  ///< control points of one patch of a spline surface each
+};
+
 /// A mesh and its keyframes as read from files or made by a generator, before it becomes a body of a scene.
 /// Positions are kept in double so that no file format loses digits here; a scene rounds them once.
 struct AnimatedMesh {
   std::string name;
+  MeshKind kind = MeshKind::polygons;
   std::uint32_t vertex_count = 0;
   std::vector<std::uint32_t> primitive_offsets{0};  ///< CSR, size primitives + 1
   std::vector<std::uint32_t> primitive_vertices;    ///< vertex ids, concatenated

@@ -119,7 +119,10 @@ AnimatedMesh read_mesh(PayloadReader& in, const std::filesystem::path& file) {
 void save_cache(const std::vector<AnimatedMesh>& meshes, const std::filesystem::path& file) {
   std::string payload;
   append_little_endian(payload, std::uint64_t{meshes.size()});
-  for (const AnimatedMesh& mesh : meshes) append_mesh(payload, mesh);
+  for (const AnimatedMesh& mesh : meshes) {
+    if (mesh.kind != MeshKind::polygons) fail(file, mesh.name, "only polygons are kept in this format");
+    append_mesh(payload, mesh);
+  }
   std::string out(magic);
   append_little_endian(out, cache_version);
   append_little_endian(out, std::uint32_t{0});

@@ -13,7 +13,7 @@ inline constexpr std::uint32_t cache_version = 1;
 /// Writes meshes to one binary file: "KBVHMESH", u32 version, u32 0, u64 payload bytes, u64 checksum,
 /// payload; all little-endian. Positions take float32 each if all of a mesh are exactly floats, else float64:
 /// nothing is rounded. Written under another name and renamed, so that an interrupted run leaves no half
-/// file. Throws InputError if it cannot be written.
+/// file. Throws InputError if it cannot be written, or has points or control nets.
 void save_cache(const std::vector<AnimatedMesh>& meshes, const std::filesystem::path& file);
 
 /// Reads what save_cache wrote, equal in every field (but a negative zero comes back as zero), after all

@@ -8,13 +8,16 @@
 
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/number_text.hpp"
+#include "experiments/io/obj_surfaces.hpp"
+#include "experiments/io/primitives.hpp"
 
 namespace kbvh::io {
 namespace {
 
 class ObjReader {
  public:
-  explicit ObjReader(const std::filesystem::path& file) : file_(file), bytes_(read_file(file)) {}
+  explicit ObjReader(const std::filesystem::path& file)
+      : file_(file), bytes_(read_file(file)), surfaces_(file) {}
 
   AnimatedMesh read() {
     std::string_view rest = bytes_;
@@ -38,7 +41,7 @@ class ObjReader {
     }
     check_forward_indices();
     if (mesh_.vertex_count == 0) fail(file_, "", "holds no vertices (no 'v' line)");
-    if (mesh_.primitive_count() == 0) fail(file_, "", "holds no faces (no 'f' line)");
+    finish_primitives();
     mesh_.name = file_.stem().string();
     mesh_.keyframe_times = {0.0};
     return std::move(mesh_);
@@ -65,7 +68,9 @@ class ObjReader {
       read_vertex(line);
     } else if (word == "f" || word == "fo") {
       read_face(line);
-    } else {
+    } else if (word == "l") {
+      has_lines_ = true;
+    } else if (!surfaces_.take(word, line, line_, mesh_.vertex_count)) {
       // Any other word is skipped, so that vendors' statements do no harm; what is not text at all is not an
       // OBJ file.
       for (char c : word) {
@@ -89,7 +94,25 @@ class ObjReader {
       if (!std::isfinite(*value)) fail(file_, place(), what + " is " + text_of(*value));
       mesh_.positions.push_back(*value);
     }
+    // A fourth number alone is a weight; three or four more are a colour.
+    const std::string_view weight = next_token(line);
+    if (!weight.empty() && next_token(line).empty()) {
+      const std::optional<double> value = parse_double(weight);
+      if (!value || !(*value > 0) || !std::isfinite(*value)) surfaces_.bad_weight(mesh_.vertex_count);
+    }
     ++mesh_.vertex_count;
+  }
+
+  /// Faces, or surfaces, or nothing but vertices: a cloud of points.
+  void finish_primitives() {
+    if (!surfaces_.empty()) {
+      if (mesh_.primitive_count() > 0)
+        fail(file_, "", "holds faces and surfaces; the primitives of a body are of one kind");
+      surfaces_.add_to(mesh_);
+    } else if (mesh_.primitive_count() == 0) {
+      if (has_lines_) fail(file_, "", "holds lines, but no faces (no 'f' line)");
+      make_points(mesh_);
+    }
   }
 
   void read_face(std::string_view line) {
@@ -140,6 +163,8 @@ class ObjReader {
   std::string bytes_;
   std::size_t line_ = 0;
   std::vector<Forward> forward_;  // indices of vertices not seen yet: legal, checked at the end
+  ObjSurfaces surfaces_;
+  bool has_lines_ = false;
   AnimatedMesh mesh_;
 };
 
@@ -150,6 +175,7 @@ AnimatedMesh read_obj(const std::filesystem::path& file) {
 }
 
 void save_obj(const AnimatedMesh& mesh, const std::filesystem::path& file) {
+  if (mesh.kind == MeshKind::control_nets) fail(file, "", "control nets are not written");
   std::string out;
   for (std::size_t v = 0; v < mesh.vertex_count; ++v) {
     out += 'v';
@@ -157,7 +183,7 @@ void save_obj(const AnimatedMesh& mesh, const std::filesystem::path& file) {
     out += '\n';
   }
   for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
-    out += 'f';
+    out += mesh.kind == MeshKind::points ? 'p' : 'f';
     for (std::size_t c = mesh.primitive_offsets[p]; c < mesh.primitive_offsets[p + 1]; ++c) {
       out += ' ' + std::to_string(std::uint64_t{mesh.primitive_vertices[c]} + 1);
     }

@@ -6,9 +6,10 @@
 namespace kbvh::io {
 
 /// Reads a Wavefront OBJ file: its vertices in file order, every `f` as one primitive with all its vertices
-/// (polygons are not cut into triangles), one keyframe at time 0. Texture coordinates, normals, groups,
-/// materials, lines, points, vertex colours and weights are skipped. Indices may be negative (relative) or
-/// point forward.
+/// (polygons are not cut into triangles), one keyframe at time 0. A file with B-spline or NURBS surfaces
+/// (obj_surfaces.hpp) and no face gives their control nets; one with nothing but vertices a cloud of points.
+/// Texture coordinates, normals, groups, materials, lines, curves and vertex colours are skipped. Indices may
+/// be negative (relative) or point forward.
 ///
 /// This is a reader of our own, not tinyobjloader, because that one (2.0rc10) reads "nan", a missing or a
 /// misspelt coordinate as 0 without a word, drops faces of two vertices, wraps large indices, and rounds two

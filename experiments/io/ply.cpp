@@ -8,6 +8,7 @@
 
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/number_text.hpp"
+#include "experiments/io/primitives.hpp"
 
 namespace kbvh::io {
 namespace {
@@ -53,7 +54,7 @@ class PlyReader {
     read_header();
     for (const Element& element : elements_) read_element(element);
     if (mesh_.vertex_count == 0) fail(file_, "", "holds no vertices");
-    if (mesh_.primitive_count() == 0) fail(file_, "", "holds no faces");
+    if (mesh_.primitive_count() == 0) make_points(mesh_);
     check_indices();
     mesh_.name = file_.stem().string();
     mesh_.keyframe_times = {0.0};

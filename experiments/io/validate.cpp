@@ -83,10 +83,13 @@ void check_structure(const AnimatedMesh& mesh, const std::filesystem::path& file
              std::to_string(mesh.keyframe_times.size()) + " keyframes of " +
              std::to_string(mesh.vertex_count) + " vertices");
   }
+  const bool polygons = mesh.kind == MeshKind::polygons;
+  const char* const noun = polygons ? "face " : mesh.kind == MeshKind::points ? "point " : "control net ";
+  const std::uint32_t least = polygons ? 3 : 1;
   for (std::size_t p = 0; p + 1 < offsets.size(); ++p) {
-    const std::string place = "face " + std::to_string(p);
-    if (offsets[p + 1] < offsets[p] || offsets[p + 1] - offsets[p] < 3) {
-      fail(file, place, "has fewer than 3 vertices");
+    const std::string place = noun + std::to_string(p);
+    if (offsets[p + 1] < offsets[p] || offsets[p + 1] - offsets[p] < least) {
+      fail(file, place, polygons ? "has fewer than 3 vertices" : "has no vertex");
     }
     for (std::size_t c = offsets[p]; c < offsets[p + 1]; ++c) {
       if (mesh.primitive_vertices[c] >= mesh.vertex_count) {
@@ -184,6 +187,7 @@ void finish(AnimatedMesh& mesh, const std::filesystem::path& file) {
   check_coordinates(mesh, file);
   merge_equal_times(mesh, file);
   mesh.degenerate_primitives = 0;
+  if (mesh.kind != MeshKind::polygons) return;  // they have no area of their own
   for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
     const std::uint32_t begin = mesh.primitive_offsets[p], end = mesh.primitive_offsets[p + 1];
     if (is_degenerate(&mesh.primitive_vertices[begin], end - begin, mesh.positions.data())) {

@@ -9,14 +9,13 @@ namespace kbvh::io {
 inline constexpr double largest_coordinate = 1e30;
 
 /// The last step of every reader: checks what they all promise, and mends what may be mended. In place:
-///  - structure: sizes fit together, at least one vertex, primitive and keyframe, every primitive has at
-///  least
-///    three vertices, every index is below vertex_count;
+///  - structure: sizes fit together, at least one vertex, primitive and keyframe, every polygon has at
+///    least three vertices and every other primitive at least one, every index is below vertex_count;
 ///  - every coordinate is finite and at most `largest_coordinate` in magnitude; a negative zero becomes zero;
 ///  - keyframe times are finite and increase; neighbours of equal time are merged if all their positions are
 ///  equal,
 ///    and are an error if not (`merged_keyframes` counts);
-///  - primitives of zero area or with a repeated vertex at the first keyframe are counted
+///  - polygons of zero area or with a repeated vertex at the first keyframe are counted
 ///    (`degenerate_primitives`) and kept.
 /// Throws InputError that names `file`, the place and the value. O(size of the mesh), a second only where a
 /// zero area has to be decided exactly.

@@ -23,7 +23,8 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
   if (entry.info.topology.own && !entry.info.own_scalar.empty())
     for (const auto& body : test.scene.bodies)
       if (body.primitives.kind != PrimitiveKind::polygons) return "skipped: a peer that knows polygons only";
-  const std::vector<double> frames = frame_times(test.scene, frames_per_keyframe);
+  const std::vector<double> frames =
+      test.frames.empty() ? frame_times(test.scene, frames_per_keyframe) : test.frames;
   Session<S> session(test.scene, {&entry, params, builder}, CountingPolicy::counting);
   Oracle<S> oracle(test.scene);
   const Verification result = verify(session, std::span<const double>(frames), oracle,

@@ -190,6 +190,124 @@ using RepairsAll = LocalRepair<S, C, false>;
 template <class S, class C>
 using ForgetsAncestors = LocalRepair<S, C, true>;
 
+enum class LazyFault : std::uint8_t {
+  none,
+  small_margin,  // boxes are inflated by three quarters of the margin that the motion is allowed
+  half_bound,    // the bound on the motion is taken for half of what it is
+};
+
+/// Inflated boxes that wait for the bound on the motion, in their simplest form.
+template <class S, class Count, LazyFault fault>
+class FaultyMargin : public StoredHierarchyStrategy<S, Count> {
+  using Base = StoredHierarchyStrategy<S, Count>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::step_bound;
+  FaultyMargin(const SceneView<S>& scene, const SteppedMotion<S>& motion, Topologies topologies,
+               const Params& params)
+      : Base(scene, motion, std::move(topologies), params), motion_(motion), moved_(scene.body_count(), 0) {}
+  void reset(double t) override {
+    Base::reset(t);
+    last_ = t;
+    for (std::uint32_t body = 0; body < moved_.size(); ++body) inflate(body);
+  }
+  void advance(double t) override {
+    Base::advance(t);
+    last_ = t;
+  }
+
+ private:
+  static constexpr double margin = 0.2;
+  void inflate(std::uint32_t body) {
+    this->refit(body);
+    moved_[body] = 0;
+    auto& hierarchy = this->hierarchies_[body];
+    const S by = S(fault == LazyFault::small_margin ? 0.75 * margin : margin);
+    for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
+      Box<S> box = hierarchy.box(node);
+      for (int axis = 0; axis < 3; ++axis) {
+        box.lower[axis] -= by;
+        box.upper[axis] += by;
+      }
+      hierarchy.set_box(node, box);
+    }
+  }
+  void update(std::uint32_t body) override {
+    double way = motion_.displacement_bound(body, last_, this->time());
+    if (fault == LazyFault::half_bound) way /= 2;
+    moved_[body] += way;
+    if (moved_[body] > margin - 1e-3) inflate(body);
+  }
+  SteppedMotion<S> motion_;
+  std::vector<double> moved_;
+  double last_ = 0;
+};
+template <class S, class C>
+using SoundMargin = FaultyMargin<S, C, LazyFault::none>;
+template <class S, class C>
+using SmallMargin = FaultyMargin<S, C, LazyFault::small_margin>;
+template <class S, class C>
+using HalfBound = FaultyMargin<S, C, LazyFault::half_bound>;
+
+/// Boxes below the root that are made when a query first asks; the fault takes back the mark of every fifth
+/// node and makes nothing.
+template <class S, class Count, LazyFault fault>
+class FaultyLazy : public StoredHierarchyStrategy<S, Count> {
+  using Base = StoredHierarchyStrategy<S, Count>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  using Base::Base;
+  QueryStatus candidates_at(double, PairBuffer& out, const Budget& budget) override {
+    std::uint64_t tests = 0;
+    for (const BodyPair& pair : this->scene_.pairs()) {
+      const auto a = side(pair.first), b = side(pair.second);
+      this->query_.start_lazy(a, b, budget);
+      while (const auto wanted = this->query_.proceed(a, b, this->scene_, this->sampled_, out, tests)) {
+        if (wanted.first != wanted.none) make(pair.first, wanted.first);
+        if (wanted.second != wanted.none) make(pair.second, wanted.second);
+      }
+    }
+    return {};
+  }
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    auto view = Base::audit_view(body);
+    for (std::uint32_t node = 0; node < view->topology.size(); ++node) {
+      const std::uint32_t parent = this->hierarchies_[body].wide_parent(node);
+      view->stale.push_back(!stale_.empty() && parent != this->hierarchies_[body].no_node &&
+                            stale_[body][parent]);
+    }
+    return view;
+  }
+
+ private:
+  typename WideQuery<S>::LazySide side(std::uint32_t body) {
+    stale_.resize(this->hierarchies_.size());
+    stale_[body].resize(this->hierarchies_[body].node_count());
+    return {&this->hierarchies_[body], body, stale_[body].data()};
+  }
+  void update(std::uint32_t body) override {
+    this->refit(body);  // of which only the root's box is used
+    const std::uint32_t nodes = this->hierarchies_[body].node_count();
+    stale_.resize(this->hierarchies_.size());
+    stale_[body].assign(nodes, 1);
+    auto arrays = this->hierarchies_[body].arrays();
+    const std::size_t row = lane_scalars(this->hierarchies_[body].topology().width);
+    for (std::size_t i = 0; i < nodes * row; ++i) arrays.lanes[i] *= S(0.5);
+  }
+  void make(std::uint32_t body, std::uint32_t node) {
+    stale_[body][node] = 0;
+    if (fault != LazyFault::none && ++made_ % 5 == 0) return;
+    this->hierarchies_[body].refit_nodes(this->sampled_.positions(body), node, node + 1);
+  }
+  std::vector<std::vector<std::uint8_t>> stale_;
+  std::uint64_t made_ = 0;
+};
+template <class S, class C>
+using SoundLazy = FaultyLazy<S, C, LazyFault::none>;
+template <class S, class C>
+using ForgetfulLazy = FaultyLazy<S, C, LazyFault::half_bound>;
+
 Info info(const char* id) {
   Info result;
   result.id = id;
@@ -198,10 +316,15 @@ Info info(const char* id) {
 }
 
 template <template <class, class> class Strategy>
-std::string violation(const char* id) {
-  const StrategyEntry entry = make_entry<Strategy>(info(id));
-  return check(entry, synthetic_scene<float>("soups"), 7, {}, entry.info.topology.preferred) + "|" +
-         check(entry, synthetic_scene<double>("soups"), 7, {}, entry.info.topology.preferred);
+std::string violation(const char* id, Tightness tightness = Tightness::tight, const char* scene = "soups",
+                      std::uint32_t frames_per_keyframe = 7) {
+  StrategyEntry entry = make_entry<Strategy>(info(id));
+  entry.info.tightness = tightness;
+  entry.info.can.plan_changes = true;
+  const BuilderConfig& builder = entry.info.topology.preferred;
+  const std::uint32_t l = frames_per_keyframe;
+  return check(entry, synthetic_scene<float>(scene, l), l, {}, builder) + "|" +
+         check(entry, synthetic_scene<double>(scene, l), l, {}, builder);
 }
 
 void expect_caught(const std::string& violations, const std::string& expected) {
@@ -236,6 +359,26 @@ TEST(Faults, TooLooseThoughDeclaredTight) {
 }
 TEST(Faults, BodiesExchanged) {
   expect_caught(violation<WrongOrder>("wrong_order"), "malformed");
+}
+TEST(Faults, SoundMarginPasses) {
+  for (const char* scene : {"soups", "plan_changes", "keyframes_a_millionth_apart"})
+    for (const std::uint32_t l : {1u, 7u, 30u})
+      EXPECT_EQ(violation<SoundMargin>("sound_margin", Tightness::conservative, scene, l), "|") << scene << l;
+}
+TEST(Faults, MarginTooSmall) {
+  // Where the fastest vertex flies along an axis, at the side of its box: at frames that use up most of the
+  // margin.
+  expect_caught(violation<SmallMargin>("small_margin", Tightness::conservative, "all_cross_at_once", 100),
+                "protrudes");
+}
+TEST(Faults, BoundOnMotionTooSmall) {
+  expect_caught(violation<HalfBound>("half_bound", Tightness::conservative, "soups", 30), "protrudes");
+}
+TEST(Faults, SoundLazyPasses) {
+  EXPECT_EQ(violation<SoundLazy>("sound_lazy"), "|");
+}
+TEST(Faults, BoxesNotMadeWhenAsked) {
+  expect_caught(violation<ForgetfulLazy>("forgetful"), "t = ");
 }
 TEST(Faults, LostEvent) {
   expect_caught(violation<LostEvent>("lost_event"), "protrudes");

@@ -151,20 +151,19 @@ class Writer {
 }  // namespace
 
 template <class S>
-PlanScript<S> make_geometry_script(const Scene<S>& scene, std::uint32_t frames_per_keyframe,
+PlanScript<S> make_geometry_script(const Scene<S>& scene, const std::vector<double>& frames,
                                    const GeometryScriptStyle& style) {
   Writer<S> writer(scene, style);
   Random random(style.seed + 1000);
   PlanScript<S> script;
-  const std::vector<double> frames = frame_times(scene, frames_per_keyframe);
   for (std::size_t f = 0; f + 1 < frames.size(); f += 1 + random.below(2))
     script.steps.push_back(writer.step(frames[f]));
   return script;
 }
 
-template PlanScript<float> make_geometry_script(const Scene<float>&, std::uint32_t,
+template PlanScript<float> make_geometry_script(const Scene<float>&, const std::vector<double>&,
                                                 const GeometryScriptStyle&);
-template PlanScript<double> make_geometry_script(const Scene<double>&, std::uint32_t,
+template PlanScript<double> make_geometry_script(const Scene<double>&, const std::vector<double>&,
                                                  const GeometryScriptStyle&);
 
 }  // namespace kbvh::test

@@ -15,7 +15,7 @@ struct GeometryScriptStyle {
 /// vertices; primitives removed with and without the vertices that nobody uses any more, and inserted again
 /// on the same vertices in the same change.
 template <class S>
-PlanScript<S> make_geometry_script(const Scene<S>& scene, std::uint32_t frames_per_keyframe,
+PlanScript<S> make_geometry_script(const Scene<S>& scene, const std::vector<double>& frames,
                                    const GeometryScriptStyle& style);
 
 }  // namespace kbvh::test

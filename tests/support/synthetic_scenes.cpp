@@ -1,9 +1,11 @@
 #include "tests/support/synthetic_scenes.hpp"
 
 #include <functional>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 
+#include "core/geometry/predicates.hpp"
 #include "tests/support/geometry_scripts.hpp"
 
 namespace kbvh::test {
@@ -80,13 +82,26 @@ void make_polygons(RawBody& body, std::uint32_t smallest, std::uint32_t largest,
   body.primitives = polygons;
 }
 
+/// Which plan changes a scene is played with.
+enum class Script : std::uint8_t {
+  none,
+  random,     // at frames of every kind, with and without knots
+  takes_off,  // the same, for bodies of which no keyframe moves
+  extreme,    // velocities of the largest and the smallest magnitude
+};
+
 struct RawScene {
   std::vector<RawBody> bodies;
-  bool script = false;
+  Script script = Script::none;
   std::optional<GeometryScriptStyle> geometry{};
 };
 
-RawScene raw_scene(const std::string& name) {
+/// The scalar's largest admissible coordinate or velocity, and the smallest above zero.
+struct Range {
+  double largest, smallest;
+};
+
+RawScene raw_scene(const std::string& name, const Range& range) {
   const auto wave = [](double lift) {
     return [lift](int x, int y, int k, int axis) {
       if (axis == 0) return 0.1 * x + 0.01 * ((x * 7 + y * 3 + k * 5) % 11);
@@ -94,20 +109,20 @@ RawScene raw_scene(const std::string& name) {
       return lift + 0.07 * ((x * 3 + y * 5 + k * 4) % 9) - 0.05 * k;
     };
   };
-  if (name == "soups") return {{soup(150, 1, 5, 0.2, 0.3), soup(120, 2, 5, 0.2, 0.3)}, false};
-  if (name == "sheets") return {{sheet(10, 6, wave(0.3)), sheet(8, 6, wave(0.0))}, false};
-  if (name == "static_obstacle") return {{sheet(10, 6, wave(0.2)), soup(60, 3, 1, 0.2, 0)}, false};
-  if (name == "nothing_moves") return {{soup(80, 4, 1, 0.3, 0), soup(80, 5, 1, 0.3, 0)}, false};
+  if (name == "soups") return {{soup(150, 1, 5, 0.2, 0.3), soup(120, 2, 5, 0.2, 0.3)}, Script::none};
+  if (name == "sheets") return {{sheet(10, 6, wave(0.3)), sheet(8, 6, wave(0.0))}, Script::none};
+  if (name == "static_obstacle") return {{sheet(10, 6, wave(0.2)), soup(60, 3, 1, 0.2, 0)}, Script::none};
+  if (name == "nothing_moves") return {{soup(80, 4, 1, 0.3, 0), soup(80, 5, 1, 0.3, 0)}, Script::none};
   if (name == "four_bodies_own_keyframes") {
     RawScene scene{{soup(60, 6, 4, 0.3, 0.3), soup(50, 7, 3, 0.3, 0.3), soup(40, 8, 1, 0.3, 0),
                     soup(30, 9, 2, 0.3, 0.5)},
-                   false};
+                   Script::none};
     scene.bodies[1].times = {0.1, 0.30000000000000004, 2.0};
     scene.bodies[3].times = {-0.5, 0.25};
     return scene;
   }
   if (name == "one_triangle_and_none") {
-    RawScene scene{{soup(1, 10, 3, 0.5, 0.5), soup(40, 11, 3, 0.5, 0.5), RawBody{}}, false};
+    RawScene scene{{soup(1, 10, 3, 0.5, 0.5), soup(40, 11, 3, 0.5, 0.5), RawBody{}}, Script::none};
     return scene;
   }
   // Integer coordinates: vertices coincide for whole segments, cross at one instant, touch without crossing.
@@ -119,7 +134,7 @@ RawScene raw_scene(const std::string& name) {
         return double((x * y + k * shift) % 3);
       };
     };
-    return {{sheet(8, 5, grid(0)), sheet(7, 5, grid(1))}, false};
+    return {{sheet(8, 5, grid(0)), sheet(7, 5, grid(1))}, Script::none};
   }
   // Mirrored in the plane x = 1 between two keyframes: every pair of vertices crosses at the same instant.
   if (name == "all_cross_at_once")
@@ -129,7 +144,7 @@ RawScene raw_scene(const std::string& name) {
                      return axis == 1 ? 0.25 * y : 0.125 * ((x + y) % 3);
                    }),
              soup(50, 12, 3, 0.4, 0.2)},
-            false};
+            Script::none};
   if (name == "pure_translation_far")
     return {{sheet(10, 4,
                    [](int x, int y, int k, int axis) {
@@ -141,25 +156,25 @@ RawScene raw_scene(const std::string& name) {
                      const double at[3] = {0.15 * x, 0.15 * y, 0.0625 * ((x + y * 2) % 6)};
                      return 1e6 + at[axis];
                    })},
-            false};
+            Script::none};
   if (name == "tiny") {
-    RawScene scene{{soup(80, 13, 4, 0.3, 0.3), soup(80, 14, 4, 0.3, 0.3)}, false};
+    RawScene scene{{soup(80, 13, 4, 0.3, 0.3), soup(80, 14, 4, 0.3, 0.3)}, Script::none};
     for (RawBody& body : scene.bodies) transform(body, 1e-30, 0);
     return scene;
   }
   if (name == "huge") {
-    RawScene scene{{soup(80, 15, 4, 0.3, 0.3), soup(80, 16, 4, 0.3, 0.3)}, false};
+    RawScene scene{{soup(80, 15, 4, 0.3, 0.3), soup(80, 16, 4, 0.3, 0.3)}, Script::none};
     for (RawBody& body : scene.bodies) transform(body, 1e29, 0);
     return scene;
   }
   if (name == "keyframes_a_millionth_apart") {
-    RawScene scene{{soup(80, 17, 6, 0.3, 0.3), soup(60, 18, 6, 0.3, 0.3)}, false};
+    RawScene scene{{soup(80, 17, 6, 0.3, 0.3), soup(60, 18, 6, 0.3, 0.3)}, Script::none};
     scene.bodies[0].times = {0, 1, 1.000001, 1.000002, 5, 5.000001};
     scene.bodies[1].times = {0, 1.0000005, 1.000001, 3, 5, 5.0000005};
     return scene;
   }
   if (name == "degenerate_triangles") {
-    RawScene scene{{soup(90, 19, 4, 0.4, 0.3), soup(90, 20, 4, 0.4, 0.3)}, false};
+    RawScene scene{{soup(90, 19, 4, 0.4, 0.3), soup(90, 20, 4, 0.4, 0.3)}, Script::none};
     for (RawBody& body : scene.bodies)
       for (std::size_t k = 0; k < body.times.size(); ++k)
         for (std::uint32_t p = 0; p < body.primitives.count(); p += 3)
@@ -173,25 +188,72 @@ RawScene raw_scene(const std::string& name) {
     return scene;
   }
   if (name == "polygons") {
-    RawScene scene{{soup(90, 21, 4, 0.4, 0.3), soup(70, 22, 4, 0.4, 0.3)}, false};
+    RawScene scene{{soup(90, 21, 4, 0.4, 0.3), soup(70, 22, 4, 0.4, 0.3)}, Script::none};
     make_polygons(scene.bodies[0], 1, 6, PrimitiveKind::polygons);
     make_polygons(scene.bodies[1], 3, 5, PrimitiveKind::polygons);
     return scene;
   }
   if (name == "points_against_nets") {
-    RawScene scene{{soup(90, 23, 4, 0.4, 0.3), soup(70, 24, 4, 0.4, 0.3)}, false};
+    RawScene scene{{soup(90, 23, 4, 0.4, 0.3), soup(70, 24, 4, 0.4, 0.3)}, Script::none};
     make_polygons(scene.bodies[0], 1, 1, PrimitiveKind::points);
     make_polygons(scene.bodies[1], 9, 16, PrimitiveKind::control_nets);
     return scene;
   }
-  if (name == "plan_changes") return {{soup(70, 25, 5, 0.3, 0.3), soup(60, 26, 5, 0.3, 0.3)}, true};
+  if (name == "plan_changes") return {{soup(70, 25, 5, 0.3, 0.3), soup(60, 26, 5, 0.3, 0.3)}, Script::random};
   if (name == "plan_changes_ties") {
-    RawScene scene = raw_scene("integer_ties");
-    scene.script = true;
+    RawScene scene = raw_scene("integer_ties", range);
+    scene.script = Script::random;
     return scene;
   }
-  const auto with_geometry = [](const char* base, const GeometryScriptStyle& style) {
-    RawScene scene = raw_scene(base);
+  // Several keyframes, but nothing moves: every certificate is a tie for ever.
+  if (name == "zero_motion") {
+    RawScene scene{{soup(80, 27, 4, 0.3, 0), sheet(9, 4,
+                                                   [](int x, int y, int, int axis) {
+                                                     return axis == 2 ? 0.1 * ((x + y) % 3)
+                                                                      : 0.2 * (axis == 0 ? x : y) - 0.8;
+                                                   })},
+                   Script::none};
+    return scene;
+  }
+  // Every triangle has a twin that flies with it, apart only in some of the keyframe intervals: to a side of
+  // a box neither twin is better while they are together, and either may be when they part.
+  if (name == "coincident_intervals") {
+    RawScene scene{{soup(60, 28, 7, 0.3, 0.3), soup(50, 29, 7, 0.3, 0.3)}, Script::none};
+    for (RawBody& body : scene.bodies)
+      for (std::size_t k = 0; k < body.times.size(); ++k)
+        for (std::size_t p = 0; p + 1 < body.primitives.count(); p += 2)
+          for (std::size_t i = 0; i < 9; ++i) {
+            double* corner = body.positions.data() + 3 * (k * body.vertex_count + 3 * p) + i;
+            const bool apart = k == 2 || (k == 5 && p % 4 == 0);
+            corner[9] = apart ? corner[9] : corner[0];
+          }
+    return scene;
+  }
+  // Across the whole admissible range within a second, or by the smallest step that the scalar knows.
+  if (name == "extreme_velocities" || name == "extreme_plan_changes") {
+    RawScene scene{{soup(60, 30, 5, 0.3, 0.3), soup(50, 31, 5, 0.3, 0.3)}, Script::none};
+    if (name == "extreme_plan_changes") scene.script = Script::extreme;
+    for (RawBody& body : scene.bodies) {
+      body.times = {0, 1, 2, 3, 4};
+      for (std::size_t k = 0; k < body.times.size(); ++k)
+        for (std::uint32_t p = 0; p < body.primitives.count(); p += 3)
+          for (std::size_t i = 0; i < 9; ++i) {
+            double& x = body.positions[3 * (k * body.vertex_count + 3 * p) + i];
+            if (p % 2 == 0)
+              x = ((k + i + p) % 2 == 0 ? 1 : -1) * range.largest;
+            else
+              x = double((k * (i + 1)) % 5) * range.smallest;
+          }
+    }
+    return scene;
+  }
+  // Single keyframes: nobody can know that these bodies will move before their plans are changed.
+  if (name == "plans_start_at_rest")
+    return {{soup(70, 32, 1, 0.3, 0), soup(60, 33, 1, 0.3, 0)}, Script::takes_off};
+  if (name == "plans_move_the_obstacle")
+    return {{soup(70, 34, 5, 0.3, 0.3), soup(60, 35, 1, 0.3, 0), soup(20, 36, 1, 0.3, 0)}, Script::random};
+  const auto with_geometry = [&range](const char* base, const GeometryScriptStyle& style) {
+    RawScene scene = raw_scene(base, range);
     scene.geometry = style;
     return scene;
   };
@@ -211,10 +273,9 @@ RawScene raw_scene(const std::string& name) {
 /// Changes at the first frame, at keyframes and in between; several at once; some with knots, some for ever,
 /// some that stop; the same vertex repeatedly.
 template <class S>
-PlanScript<S> make_script(const Scene<S>& scene, std::uint32_t frames_per_keyframe) {
+PlanScript<S> make_script(const Scene<S>& scene, const std::vector<double>& frames) {
   Random random(77);
   PlanScript<S> script;
-  const std::vector<double> frames = frame_times(scene, frames_per_keyframe);
   for (std::size_t f = 0; f + 1 < frames.size(); f += 1 + random.below(3)) {
     typename PlanScript<S>::Step step{frames[f], {}};
     const std::uint32_t changes = 1 + random.below(12);
@@ -242,6 +303,28 @@ PlanScript<S> make_script(const Scene<S>& scene, std::uint32_t frames_per_keyfra
   return script;
 }
 
+/// A third of the vertices, each changed once: how far the fastest come stays within the scalar's own range.
+template <class S>
+PlanScript<S> extreme_script(const Scene<S>& scene, const std::vector<double>& frames, const Range& range) {
+  Random random(78);
+  PlanScript<S> script;
+  const std::size_t last = frames.size() < 2 ? 1 : frames.size() - 1;
+  for (std::uint32_t body = 0; body < scene.bodies.size(); ++body)
+    for (std::uint32_t v = 0; v < scene.bodies[body].plans.vertex_count(); v += 3) {
+      PlanChange<S> change;
+      change.body = body;
+      change.vertex = v;
+      for (S& speed : change.velocity) {
+        const double sizes[4] = {range.largest, range.smallest, 0, 0.5};
+        speed = S(sizes[random.below(4)] * (random.below(2) == 0 ? 1 : -1));
+      }
+      const std::size_t frame = (body + v) % std::min<std::size_t>(last, 5);
+      while (script.steps.size() <= frame) script.steps.push_back({frames[script.steps.size()], {}});
+      script.steps[frame].changes.push_back(change);
+    }
+  return script;
+}
+
 }  // namespace
 
 const std::vector<std::string>& synthetic_scene_names() {
@@ -261,7 +344,13 @@ const std::vector<std::string>& synthetic_scene_names() {
                                               "polygons",
                                               "points_against_nets",
                                               "plan_changes",
-                                              "plan_changes_ties"};
+                                              "plan_changes_ties",
+                                              "zero_motion",
+                                              "coincident_intervals",
+                                              "extreme_velocities",
+                                              "extreme_plan_changes",
+                                              "plans_start_at_rest",
+                                              "plans_move_the_obstacle"};
   return names;
 }
 
@@ -275,7 +364,8 @@ const std::vector<std::string>& geometry_scene_names() {
 
 template <class S>
 TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_keyframe) {
-  const RawScene raw = raw_scene(name);
+  const Range range{double(admissible_magnitude<S>), double(std::numeric_limits<S>::denorm_min())};
+  const RawScene raw = raw_scene(name, range);
   TestScene<S> result;
   result.scene.name = name;
   for (std::size_t b = 0; b < raw.bodies.size(); ++b) {
@@ -286,8 +376,17 @@ TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_k
   }
   result.scene.pairs = all_pairs(result.scene.bodies);
   validate(result.scene);
-  if (raw.geometry) result.script = make_geometry_script(result.scene, frames_per_keyframe, *raw.geometry);
-  if (raw.script) result.script = make_script(result.scene, frames_per_keyframe);
+  result.frames = frame_times(result.scene, frames_per_keyframe);
+  if (raw.script == Script::takes_off) {
+    result.frames.clear();
+    for (std::uint32_t f = 0; f < 4 * frames_per_keyframe; ++f)
+      result.frames.push_back(0.25 * double(f) / double(frames_per_keyframe));
+  }
+  if (raw.script == Script::extreme)
+    result.script = extreme_script(result.scene, result.frames, range);
+  else if (raw.script != Script::none)
+    result.script = make_script(result.scene, result.frames);
+  if (raw.geometry) result.script = make_geometry_script(result.scene, result.frames, *raw.geometry);
   return result;
 }
 

@@ -12,6 +12,8 @@ template <class S>
 struct TestScene {
   Scene<S> scene;
   PlanScript<S> script;  ///< empty unless plans change
+  /// l for each keyframe interval, or the scene's own where single keyframes say nothing of time.
+  std::vector<double> frames;
 };
 
 /// Names of all synthetic scenes, each aimed at one thing that goes wrong in practice.

@@ -5,13 +5,23 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "tests/theory/kinetic_log.hpp"
+#include "experiments/theory/kinetic_log.hpp"
+#include "tests/support/synthetic_scenes.hpp"
 #ifdef KBVH_TEST_HAS_IO
 #include "experiments/io/load.hpp"
 #endif
 
 namespace kbvh::test {
 namespace {
+
+using namespace kbvh::theory;
+
+template <class S, template <class> class Queue>
+Recording<S> record(const TestScene<S>& test, const Play& play) {
+  Play with_frames = play;
+  if (!test.script.steps.empty()) with_frames.frames = test.frames;  // changes are at frames
+  return theory::record<S, Queue>(test.scene, test.script, with_frames);
+}
 
 std::string summary(const EnvelopeReport& r) {
   return std::to_string(r.bounds) + " bounds, " + std::to_string(r.logged) + " entries, " +
@@ -23,7 +33,7 @@ std::string summary(const EnvelopeReport& r) {
 /// Both queues over one play: their logs must be one, which is then proved.
 template <class S>
 EnvelopeReport prove(const TestScene<S>& test, const Play& play) {
-  const auto recording = record<S, AvlQueue>(test, play);
+  const auto recording = test::record<S, AvlQueue>(test, play);
   EXPECT_EQ(recording.log(), (record<S, BinaryHeapQueue>(test, play).log())) << "queues differ";
   const EnvelopeReport report = check(test.scene, recording);
   EXPECT_EQ(report.violation, "");

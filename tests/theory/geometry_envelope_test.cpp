@@ -5,10 +5,13 @@
 
 #include <cstdio>
 
-#include "tests/theory/kinetic_log.hpp"
+#include "experiments/theory/kinetic_log.hpp"
+#include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
 namespace {
+
+using namespace kbvh::theory;
 
 /// A change of a bound at an event, as it was told.
 template <class S>

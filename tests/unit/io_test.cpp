@@ -38,7 +38,7 @@ TEST_F(IoObj, NamesLineAndValue) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> bad{
       {"", {"empty"}},
       {"# nothing\n", {"no vertices"}},
-      {v3, {"no faces"}},
+      {v3 + "l 1 2\n", {"no faces"}},
       {"v 0 0 nan\n", {"line 1", "z", "nan"}},
       {"v 0 0 0\nv -inf 0 0\n", {"line 2", "x", "-inf"}},
       {"v 0 0\n", {"line 1", "vertex 1", "no coordinate z"}},
@@ -199,7 +199,6 @@ TEST_F(IoPly, NamesElementAndValue) {
       {ply("ascii", xyz + face, body + "3 0 1\n"), {"face 0", "file ends"}},
       {ply("ascii", xyz + face, "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n"), {"line 12, vertex 1", "y", "nan"}},
       {ply("ascii", xyz + face, "0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n"), {"line 12, vertex 1", "'x'"}},
-      {ply("ascii", xyz, body), {"no faces"}},
       {ply("ascii", "element vertex 3\nproperty float x\nproperty float y\n" + face, body), {"property z"}},
       {ply("ascii", "element vertex 0\nproperty float x\nproperty float y\nproperty float z\n", ""),
        {"no vertices"}},

@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "core/kinetic/kinetic_forest.hpp"
-#include "core/registry.hpp"
-#include "tests/support/synthetic_scenes.hpp"
-#include "tests/theory/envelope.hpp"
+#include "core/session.hpp"
+#include "experiments/theory/envelope.hpp"
 
-namespace kbvh::test {
+namespace kbvh::theory {
 
 /// A change notice as it came, with the numbers of its instant copied.
 template <class S>
@@ -19,6 +18,7 @@ struct Notice {
   double begin;
   bool at_event;
   Crossing<S> crossing;
+  std::uint64_t event;  ///< how many events were handled before this one; not part of what is compared
 
   bool operator==(const Notice& other) const {
     const auto same = [](const Piece<S>& a, const Piece<S>& b) {
@@ -35,13 +35,15 @@ struct Notice {
 template <class S>
 struct Recorder {
   std::vector<Notice<S>>* log;
+  const std::uint64_t* event;
 
   template <class T>
   void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t old_vertex,
                         std::uint32_t new_vertex, const Instant<T>& now) {
     log->push_back({body, node, side, old_vertex, new_vertex, now.begin, now.exact != nullptr,
-                    now.exact != nullptr ? *now.exact : Crossing<S>{}});
+                    now.exact != nullptr ? *now.exact : Crossing<S>{}, *event});
   }
+  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
 };
 
 /// What happened between two changes of plans (or the ends of the clip): the plans that held, the notices of
@@ -85,16 +87,32 @@ StoredPlans stored_plans(const FlightPlans<S>& plans) {
 struct Play {
   BuilderConfig builder;
   std::uint32_t frames_per_keyframe = 1;
-  double start_after = 0;  ///< fraction of the clip that is skipped
+  double start_after = 0;          ///< fraction of the clip that is skipped
+  std::vector<double> instants{};  ///< further times to stop at
+  std::vector<double> frames{};    ///< ascending; empty: as frames_per_keyframe says
 };
 
-/// Plays a scene through a kinetic forest and keeps all that its observer was told.
-template <class S, template <class> class Queue>
-Recording<S> record(const TestScene<S>& test, const Play& play) {
+/// Told what a kinetic forest does while it is recorded: `event` after each one it handled, `stop` at each
+/// time that it was brought to (frames, instants), and before and after each change of plans.
+struct NoWatcher {
+  template <class Forest>
+  void event(const Forest&, const Event&) {}
+  template <class Forest>
+  void stop(const Forest&, double) {}
+};
+
+/// Plays a scene, with plan changes if there are any, through a kinetic forest and keeps all that its
+/// observer was told. Throws std::bad_alloc where the log does not fit: 100 bytes and more per change.
+template <class S, template <class> class Queue, class Watcher = NoWatcher>
+Recording<S> record(const Scene<S>& scene, const PlanScript<S>& script, const Play& play,
+                    Watcher&& watcher = {}) {
   using Forest = KineticForest<S, Queue<S>, Counting, Recorder<S>>;
-  const Scene<S>& scene = test.scene;
   const SceneView<S> view(scene);
-  std::vector<double> frames = frame_times(scene, play.frames_per_keyframe);
+  std::vector<double> frames =
+      play.frames.empty() ? frame_times(scene, play.frames_per_keyframe) : play.frames;
+  frames.insert(frames.end(), play.instants.begin(), play.instants.end());
+  std::sort(frames.begin(), frames.end());
+  frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
   const double first = frames.front() + play.start_after * (frames.back() - frames.front());
   std::erase_if(frames, [&](double t) { return t <= first; });
 
@@ -103,9 +121,19 @@ Recording<S> record(const TestScene<S>& test, const Play& play) {
   Recording<S> recording;
   recording.topologies = build_topologies(view, playback, play.builder);
   std::vector<Notice<S>> log;
+  std::uint64_t handled = 0;
   Counting count;
-  Forest forest(view, ClipMotion<S>(playback), recording.topologies, count, Recorder<S>{&log});
+  Forest forest(view, ClipMotion<S>(playback), recording.topologies, count, Recorder<S>{&log, &handled});
   forest.reset(first);
+  const auto advance = [&](double t) {
+    while (forest.due(t)) {
+      const Event event = forest.queue().top();
+      forest.handle_next();
+      watcher.event(forest, event);
+      ++handled;
+    }
+    watcher.stop(forest, t);
+  };
 
   const std::uint32_t bodies = view.body_count();
   const auto realisers = [&] {
@@ -128,15 +156,15 @@ Recording<S> record(const TestScene<S>& test, const Play& play) {
     recording.epochs.push_back(epoch);
   };
 
-  auto step = test.script.steps.begin();
-  while (step != test.script.steps.end() && step->time < first) ++step;
+  auto step = script.steps.begin();
+  while (step != script.steps.end() && step->time < first) ++step;
   frames.insert(frames.begin(), first);
   double last = first;
   for (double t : frames) {
     playback.seek(t);
-    forest.advance(t);
+    advance(t);
     last = t;
-    if (step == test.script.steps.end() || step->time != t) continue;
+    if (step == script.steps.end() || step->time != t) continue;
     close(t);
     for (const PlanChange<S>& change : step->changes) {
       OwnKnots knots;
@@ -164,8 +192,8 @@ Recording<S> record(const TestScene<S>& test, const Play& play) {
     epoch.start = realisers();
   }
   // Past the last keyframe bodies rest; plans of their own go on.
-  last += test.script.steps.empty() ? 1.0 : 3.0;
-  forest.advance(last);
+  last += script.steps.empty() ? 1.0 : 3.0;
+  advance(last);
   close(last);
   recording.events = count.table[Counter::certificates_failed];
   recording.values_written = count.table[Counter::values_written];
@@ -221,6 +249,7 @@ struct Case {
   VerticesBelow below;
   std::vector<std::uint32_t> start, end;
   std::vector<BoundChange> log;
+  std::vector<std::uint64_t> events;  ///< of each entry: which event it belongs to
 
   EnvelopeReport check() const { return check_envelopes(motion, below, start, log, end); }
 };
@@ -232,6 +261,7 @@ Case make_case(const Scene<S>& scene, const Recording<S>& recording, const Epoch
               vertices_below(recording.topologies[body], scene.bodies[body].primitives),
               epoch.start[body],
               epoch.end[body],
+              {},
               {}};
   const Notice<S>* before = nullptr;
   for (const Notice<S>& notice : epoch.events) {
@@ -243,6 +273,7 @@ Case make_case(const Scene<S>& scene, const Recording<S>& recording, const Epoch
     change.when = same ? result.log.back().when : when_of(notice.crossing, result.motion);
     before = &notice;
     result.log.push_back(std::move(change));
+    result.events.push_back(notice.event);
   }
   return result;
 }
@@ -290,4 +321,4 @@ EnvelopeReport check(const Scene<S>& scene, const Recording<S>& recording) {
   return total;
 }
 
-}  // namespace kbvh::test
+}  // namespace kbvh::theory

@@ -1,4 +1,4 @@
-#include "tests/theory/envelope.hpp"
+#include "experiments/theory/envelope.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -7,7 +7,7 @@
 #include <set>
 #include <stdexcept>
 
-namespace kbvh::test {
+namespace kbvh::theory {
 
 namespace {
 
@@ -248,6 +248,10 @@ void EnvelopeReport::add(const EnvelopeReport& other) {
   canonical += other.canonical;
   several_steps += other.several_steps;
   choices += other.choices;
+  pieces += other.pieces;
+  over_lambda += other.over_lambda;
+  most_breakpoints = std::max(most_breakpoints, other.most_breakpoints);
+  fullest = std::max(fullest, other.fullest);
 }
 
 namespace {
@@ -274,6 +278,7 @@ class BoundCheck {
     const auto guided = wrap(start, net_, choices);
     report_->envelope += guided.size();
     report_->net += net_.size();
+    count_breakpoints(guided);
     report_->choices += choices;
     report_->canonical += choices == 0 ? guided.size() : wrap(start, {}, choices).size();
     for (std::size_t i = 0; i < std::max(guided.size(), net_.size()); ++i) {
@@ -290,6 +295,20 @@ class BoundCheck {
     std::uint32_t vertex;
   };
   static std::string text(const Step& step) { return std::to_string(step.vertex); }
+
+  void count_breakpoints(const std::vector<Step>& steps) {
+    const std::size_t most = below_->size() - 1;
+    report_->pieces += motion_->last_row();
+    for (std::size_t i = 0; i < steps.size();) {
+      std::size_t next = i;
+      while (next < steps.size() && steps[next].when.row == steps[i].when.row) ++next;
+      const std::size_t breakpoints = next - i;
+      report_->over_lambda += breakpoints > most;
+      report_->most_breakpoints = std::max<std::uint64_t>(report_->most_breakpoints, breakpoints);
+      if (most >= 7) report_->fullest = std::max(report_->fullest, double(breakpoints) / double(most));
+      i = next;
+    }
+  }
 
   bool is_below(std::uint32_t vertex) const {
     return std::binary_search(below_->begin(), below_->end(), vertex);
@@ -424,9 +443,10 @@ EnvelopeReport check_envelopes(const ExactMotion& motion, const VerticesBelow& b
   for (std::uint32_t node = 0; node < below.size(); ++node)
     for (std::uint32_t side = 0; side < 6; ++side) {
       const std::size_t at = 6 * std::size_t(node) + side;
+      if (start[at] == no_bound && end[at] == no_bound && by_bound[at].empty()) continue;
       BoundCheck(motion, below[node], node, side, report).run(start[at], by_bound[at], end[at]);
     }
   return report;
 }
 
-}  // namespace kbvh::test
+}  // namespace kbvh::theory

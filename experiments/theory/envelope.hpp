@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace kbvh::test {
+namespace kbvh::theory {
 
 /// Exact envelopes of flight plans, computed apart from the kinetic tree that is to be proved by them: from
 /// the stored numbers, in rationals, with no code of core/kinetic or core/motion.
@@ -112,11 +112,20 @@ struct EnvelopeReport {
   std::uint64_t canonical = 0;      ///< the same when they are resolved by the smallest vertex id
   std::uint64_t several_steps = 0;  ///< entries beyond one per net change: several vertices met at one point
   std::uint64_t choices = 0;        ///< forced changes with more than one best successor (coincident lines)
+  /// Of every bound over every row: breakpoints of the envelope against the longest Davenport-Schinzel
+  /// sequence of lines, lambda_1(n) - 1 = n - 1 for n vertices below.
+  std::uint64_t pieces = 0;            ///< (bound, row) pairs
+  std::uint64_t over_lambda = 0;       ///< of these, with more than n - 1 breakpoints
+  std::uint64_t most_breakpoints = 0;  ///< of one bound in one row
+  double fullest = 0;                  ///< largest share of n - 1 that was used, over n >= 8
 
   bool holds() const { return violation.empty(); }
   bool general_position() const { return several_steps == 0 && choices == 0; }
   void add(const EnvelopeReport& other);
 };
+
+/// In place of a realiser: nobody realises this bound, nor need it be proved.
+inline constexpr std::uint32_t no_bound = 0xffffffff;
 
 /// Vertices below every node, ascending.
 using VerticesBelow = std::vector<std::vector<std::uint32_t>>;
@@ -127,9 +136,10 @@ using VerticesBelow = std::vector<std::vector<std::uint32_t>>;
 /// changes all coordinates are linear, so a realiser that nobody exceeds at both ends is exceeded nowhere in
 /// between. Apart from that, the envelope is computed anew by gift wrapping, from `start` alone, staying with
 /// a vertex until it is strictly beaten; its breakpoints must be the log's, at equal rational times.
-/// `log` is in the order of happening. O(vertices below) per row and change.
+/// `log` is in the order of happening. O(vertices below) per row and change. A bound that starts as
+/// `no_bound` does not exist (BoxTrees store but one per node): it may not change.
 EnvelopeReport check_envelopes(const ExactMotion& motion, const VerticesBelow& below,
                                std::span<const std::uint32_t> start, std::span<const BoundChange> log,
                                std::span<const std::uint32_t> end);
 
-}  // namespace kbvh::test
+}  // namespace kbvh::theory

@@ -1,0 +1,162 @@
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/hierarchy/realiser_boxes.hpp"
+#include "core/hierarchy/topology.hpp"
+#include "core/pairs.hpp"
+
+namespace kbvh {
+
+// A BoxTree (Zachmann 1995): a binary hierarchy of which every node but the root owns one side of its box and
+// inherits the other five from its parent. Sides are numbered 2 * axis + (0 lower, 1 upper).
+
+/// The unique vertices of leaves, ascending, found by the primitives a leaf holds and not by its node: they
+/// stay what they are when leaves move to other nodes.
+class BoxTreeLeaves {
+ public:
+  BoxTreeLeaves(const Topology& topology, const Primitives& primitives)
+      : offsets_(topology.primitives.size() + 1, 0) {
+    const LeafVertices by_node = unique_leaf_vertices(topology, primitives);
+    // Leaves tile the list of primitives: the entry behind a leaf is where the next begins.
+    for (std::uint32_t node = 0; node < topology.size(); ++node)
+      if (const TopologyNode n = topology.nodes[node]; n.is_leaf())
+        offsets_[n.first() + n.count()] = std::uint32_t(by_node[node].size());
+    for (std::size_t i = 1; i < offsets_.size(); ++i) offsets_[i] += offsets_[i - 1];
+    vertices_.resize(offsets_.back());
+    for (std::uint32_t node = 0; node < topology.size(); ++node)
+      if (const TopologyNode n = topology.nodes[node]; n.is_leaf())
+        std::copy(by_node[node].begin(), by_node[node].end(), vertices_.begin() + offsets_[n.first()]);
+  }
+
+  std::span<const std::uint32_t> operator[](TopologyNode leaf) const {
+    return {vertices_.data() + offsets_[leaf.first()],
+            vertices_.data() + offsets_[leaf.first() + leaf.count()]};
+  }
+  template <class S>
+  Box<S> box(TopologyNode leaf, const S* positions) const {
+    return LaneBox<S>::of((*this)[leaf], positions).box();
+  }
+  std::size_t bytes() const { return (offsets_.size() + vertices_.size()) * sizeof(std::uint32_t); }
+
+ private:
+  std::vector<std::uint32_t> offsets_;  ///< by the leaf's first entry in the topology's primitives
+  std::vector<std::uint32_t> vertices_;
+};
+
+/// Chooses the planes of a subtree: per inner node the axis and which child is the left one, such that the
+/// children's boxes, sides inherited, have the least summed area x primitives (the local surface-area cost);
+/// the least summed edges where areas are equal; then the first. Parents before children, for a child can
+/// only cut what its ancestors left.
+template <class S>
+class BoxTreePlanes {
+ public:
+  /// `nodes`: a node and all below it, ascending.
+  BoxTreePlanes(const Topology& topology, std::span<const std::uint32_t> nodes)
+      : topology_(&topology), nodes_(nodes), tight_(nodes.size()), weights_(nodes.size()) {}
+
+  /// The tight box of leaf nodes[i].
+  void set_leaf(std::size_t i, const Box<S>& box) {
+    tight_[i] = box;
+    weights_[i] = topology_->nodes[nodes_[i]].count();
+  }
+
+  /// Sets own_sides[node] for all nodes but the first, whose box is `box`, or the tight one. axis(node)
+  /// forces a split axis; 3 does not. O(nodes log nodes).
+  template <class Axis>
+  void choose(const Box<S>* box, Axis&& axis, std::vector<std::uint8_t>& own_sides) {
+    for (std::size_t i = nodes_.size(); i-- > 0;) {
+      if (topology_->nodes[nodes_[i]].is_leaf()) continue;
+      for (std::size_t child : children(i)) {
+        tight_[i].extend(tight_[child]);
+        weights_[i] += weights_[child];
+      }
+    }
+    inherited_.assign(nodes_.size(), {});
+    inherited_[0] = box != nullptr ? *box : tight_[0];
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+      if (!topology_->nodes[nodes_[i]].is_leaf()) split(i, axis(nodes_[i]), own_sides);
+  }
+
+ private:
+  std::array<std::size_t, 2> children(std::size_t i) const {
+    const std::uint32_t first = topology_->nodes[nodes_[i]].first();
+    const auto at = std::size_t(std::lower_bound(nodes_.begin(), nodes_.end(), first) - nodes_.begin());
+    return {at, at + 1};
+  }
+
+  void split(std::size_t i, int forced, std::vector<std::uint8_t>& own_sides) {
+    const auto pair = children(i);
+    std::pair<double, double> best;
+    bool found = false;
+    for (int axis = forced == 3 ? 0 : forced; axis < (forced == 3 ? 3 : forced + 1); ++axis)
+      for (const std::size_t left : {0, 1}) {
+        const std::array<Box<S>, 2> boxes =
+            cut(inherited_[i], axis, tight_[pair[left]], tight_[pair[1 - left]]);
+        const double weights[2] = {double(weights_[pair[left]]), double(weights_[pair[1 - left]])};
+        const std::pair<double, double> cost{
+            surface_area(boxes[0]) * weights[0] + surface_area(boxes[1]) * weights[1],
+            edges(boxes[0]) * weights[0] + edges(boxes[1]) * weights[1]};
+        if (found && !(cost < best)) continue;
+        found = true;
+        best = cost;
+        inherited_[pair[left]] = boxes[0];
+        inherited_[pair[1 - left]] = boxes[1];
+        own_sides[nodes_[pair[left]]] = std::uint8_t(2 * axis + 1);
+        own_sides[nodes_[pair[1 - left]]] = std::uint8_t(2 * axis);
+      }
+  }
+  static std::array<Box<S>, 2> cut(const Box<S>& box, int axis, const Box<S>& left, const Box<S>& right) {
+    std::array<Box<S>, 2> boxes{box, box};
+    boxes[0].upper[axis] = left.upper[axis];
+    boxes[1].lower[axis] = right.lower[axis];
+    return boxes;
+  }
+  static double edges(const Box<S>& box) {
+    double sum = 0;
+    for (int axis = 0; axis < 3; ++axis) sum += double(box.upper[axis]) - double(box.lower[axis]);
+    return sum;
+  }
+
+  const Topology* topology_;
+  std::span<const std::uint32_t> nodes_;
+  std::vector<Box<S>> tight_, inherited_;
+  std::vector<std::uint32_t> weights_;  ///< primitives below
+};
+
+/// A bounds view (traversal.hpp) of a kinetic BoxTree: a node's box is its parent's with the own side read
+/// from the realising vertex. Extents are reconstructed on the way down, each once per frame: a query asks
+/// for a parent first.
+template <class S, class Tree>
+class InheritedBoxes {
+ public:
+  InheritedBoxes(const Tree& tree, const SampledMotion<S>& motion, std::uint32_t body, BoxCache<S>& cache)
+      : tree_(&tree), motion_(&motion), body_(body), cache_(&cache) {}
+
+  void ensure(std::uint32_t node) {
+    if (cache_->current(node)) return;
+    if (node == 0) {
+      cache_->store(0, box_of_realisers(tree_->root_realisers(), *motion_, body_));
+      return;
+    }
+    Box<S> box = cache_->box(tree_->topology().parents[node]);
+    const std::uint32_t side = tree_->own_side(node);
+    const std::size_t axis = side >> 1;
+    const S value = motion_->position(body_, tree_->realiser(node))[axis];
+    ((side & 1) != 0 ? box.upper : box.lower)[axis] = value;
+    cache_->store(node, box);
+  }
+  const Box<S>& operator()(std::uint32_t node) const { return cache_->box(node); }
+
+ private:
+  const Tree* tree_;
+  const SampledMotion<S>* motion_;
+  std::uint32_t body_;
+  BoxCache<S>* cache_;
+};
+
+}  // namespace kbvh

@@ -1,0 +1,85 @@
+#pragma once
+#include "core/kinetic/separation_list.hpp"
+
+namespace kbvh {
+
+/// Kinetic incremental collision detection (Z&W s.7): the kinetic AABB trees of a scene, and the separation
+/// lists of its body pairs on top, advanced together in the exact order of their events. `Queue` is a queue
+/// over a clock (event_queue.hpp); trees and lists have one each, whose tops are compared exactly.
+template <class S, template <class> class Queue, class Count>
+class KineticCollision {
+ public:
+  using Forest = KineticForest<S, Queue<EventClock<S>>, Count, ChangedBoxes>;
+  using List = SeparationList<S, Queue, Count>;
+
+  KineticCollision(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+                   Count& count)
+      : forest_(scene, motion, std::move(topologies), count, ChangedBoxes{&changed_}),
+        list_(scene, forest_, count) {}
+  KineticCollision(const KineticCollision&) = delete;  // the trees point to `changed_`
+  KineticCollision& operator=(const KineticCollision&) = delete;
+
+  void reset(double t) {
+    forest_.reset(t);
+    changed_.clear();
+    list_.reset(t);
+  }
+  /// Handles every event up to and including t.
+  void advance(double t) {
+    while (due(t)) handle_next();
+  }
+  bool due(double t) const { return forest_.due(t) || list_.due(t); }
+  /// Is the first event of all one of a tree? At one instant trees come first: the list is then decided with
+  /// their new realisers.
+  bool tree_is_first() const {
+    if (list_.empty()) return true;
+    if (forest_.queue().empty()) return false;
+    const Event& tree = forest_.queue().top();
+    const OverlapEvent<S>& pair = list_.top();
+    const double error = tree.error + pair.error;
+    if (tree.hint + error < pair.hint) return true;
+    if (pair.hint + error < tree.hint) return false;
+    return compare_crossings(forest_.clock().crossing(tree), pair.crossing) <= 0;
+  }
+
+  /// A double after the first event of all, if by little.
+  double after_next() const {
+    if (!tree_is_first()) return list_.top().not_before();
+    const Event& event = forest_.queue().top();
+    return std::nextafter(event.hint + event.error, std::numeric_limits<double>::infinity());
+  }
+  /// Handles the first event of all; `due` for some time.
+  void handle_next() {
+    if (!tree_is_first()) {
+      list_.handle_next();
+      return;
+    }
+    const Event event = forest_.queue().top();
+    const Crossing<S> crossing = forest_.clock().crossing(event);
+    changed_.clear();
+    forest_.handle_next();
+    list_.boxes_changed(changed_, {event.begin, event.end, &crossing});
+  }
+
+  /// The plans of these vertices changed at t; `vertices` of each body are ascending and unique.
+  void plans_changed(double t, std::span<const std::vector<std::uint32_t>> vertices) {
+    changed_.clear();
+    for (std::uint32_t body = 0; body < vertices.size(); ++body)
+      if (!vertices[body].empty()) forest_.tree(body).plans_changed(t, vertices[body]);
+    list_.boxes_changed(changed_, Instant<S>::at(t));
+  }
+
+  Forest& forest() { return forest_; }
+  const Forest& forest() const { return forest_; }
+  List& list() { return list_; }
+  const List& list() const { return list_; }
+  std::uint64_t queue_steps() const { return forest_.queue().steps() + list_.steps(); }
+  std::size_t bytes() const { return forest_.bytes() + list_.bytes(); }
+
+ private:
+  std::vector<ChangedBoxes::Box> changed_;
+  Forest forest_;
+  List list_;
+};
+
+}  // namespace kbvh

@@ -1,0 +1,385 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/assert.hpp"
+#include "core/kinetic/kinetic_forest.hpp"
+#include "core/kinetic/overlap_clock.hpp"
+
+namespace kbvh {
+
+/// Boxes that an event of a kinetic tree has changed, in the order of the notices.
+struct ChangedBoxes {
+  struct Box {
+    std::uint32_t body, node;
+  };
+  std::vector<Box>* boxes;
+
+  template <class S>
+  void realiser_changed(std::uint32_t body, std::uint32_t node, Side /*side*/, std::uint32_t /*old_vertex*/,
+                        std::uint32_t /*new_vertex*/, const Instant<S>& /*now*/) {
+    boxes->push_back({body, node});
+  }
+  void realiser_plan_changed(std::uint32_t body, std::uint32_t node) { boxes->push_back({body, node}); }
+};
+
+/// The separation list of kinetic incremental collision detection (Z&W s.7), for every body pair of a scene:
+/// the pairs of boxes at which a simultaneous traversal would stop now, kept from event to event.
+///
+/// The pairs form a tree: a pair's father is the pair of their fathers (a leaf against an inner node
+/// descends on one side only). Pairs that do not overlap, and overlapping pairs of leaves, are the list;
+/// overlapping inner pairs stand above it. Each has one event in the queue:
+///   apart: the boxes overlap ("BV-overlap"): an inner pair gets children, which may overlap in their turn;
+///   inner, overlapping: they are apart ("fathers do not overlap"): all below goes. The paper schedules this
+///     with each child and has to insert the father once; here it is the father's own;
+///   leaves, overlapping: they are apart ("leaves do not overlap").
+/// When a box changes ("BV change": another realiser, or another plan of one), the pairs that it takes part
+/// in, which are linked from it, are decided anew.
+///
+/// Boxes are compared on the flight plans with the margin of OverlapClock: the list may hold a pair of boxes
+/// that are apart by some ulps, and misses none whose rounded boxes touch.
+template <class S, template <class> class Queue, class Count>
+class SeparationList {
+  using Event = OverlapEvent<S>;
+
+ public:
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  /// Two boxes of a body pair and where they stand in the tree of pairs.
+  struct Pair {
+    std::uint32_t a, b;                  ///< nodes of the first and the second body
+    std::uint32_t father = none;         ///< slot
+    std::uint32_t children = none;       ///< first of a block of slots, none of which may be in use
+    std::uint32_t next[2], previous[2];  ///< among the pairs linked from a, and from b
+    std::uint32_t place = none;          ///< among the overlapping leaves of the body pair
+    std::uint32_t depth = 0;
+    std::uint16_t bodies = 0;  ///< index of the body pair
+    bool used = false, overlapping = false;
+  };
+  /// Overlapping leaves, and since when at the earliest.
+  struct LeafPair {
+    std::uint32_t a, b, slot;
+    double since;
+  };
+
+  /// An overlap that is over: of which body pair, and until when at the latest.
+  struct EndedLeafPair {
+    std::uint16_t bodies;
+    LeafPair leaf;
+    double until;
+  };
+
+  template <class Forest>
+  SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count)
+      : queue_(clock_, 0), count_(&count), leaves_(scene.pairs().size()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+      const auto& tree = forest.tree(body);
+      bodies_.push_back({&tree.topology(), tree.topology().empty() ? nullptr : tree.realisers(0),
+                         &forest.clock().plans(body),
+                         std::vector<std::uint32_t>(tree.topology().size(), none)});
+      block_ = std::max(block_, tree.topology().width * tree.topology().width);
+    }
+    for (const BodyPair& pair : scene.pairs()) body_pairs_.push_back(pair);
+  }
+  SeparationList(const SeparationList&) = delete;
+  SeparationList& operator=(const SeparationList&) = delete;
+
+  /// Starts over at t by one traversal.
+  void reset(double t) {
+    queue_.clear();
+    pairs_.clear();
+    free_blocks_.clear();
+    list_size_ = 0;
+    time_ = t;
+    for (auto& leaves : leaves_) leaves.clear();
+    for (auto& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
+    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) {
+      if (bodies_[body_pairs_[i].first].topology->empty() || bodies_[body_pairs_[i].second].topology->empty())
+        continue;
+      const std::uint32_t root = new_block();
+      insert(root, i, 0, 0, none, 0);
+      work_.assign(1, root);
+      settle_new(Instant<S>::at(t));
+    }
+  }
+
+  bool due(double t) const { return !queue_.empty() && clock_.due(queue_.top(), t); }
+  bool empty() const { return queue_.empty(); }
+  const Event& top() const { return queue_.top(); }
+
+  /// Takes the first event off the queue and handles it.
+  void handle_next() {
+    const Event event = queue_.top();
+    queue_.pop();
+    count_->add(Counter::queue_operations);
+    count_->add(Counter::certificates_failed);
+    count_->add(pairs_[event.slot].overlapping ? kind_of_separation(event.slot) : Counter::overlap_events);
+    time_ = event.not_after();
+    end_ = event.not_before();
+    turn(event.slot, event.instant());
+  }
+
+  /// These boxes have other realisers, or realisers with other plans, from `now` on. Boxes may be named
+  /// twice.
+  void boxes_changed(std::span<const ChangedBoxes::Box> boxes, const Instant<S>& now) {
+    time_ = now.begin;
+    end_ = now.end;
+    for (const auto& box : boxes) {
+      linked_.clear();
+      for (std::uint32_t slot = bodies_[box.body].first_pair[box.node]; slot != none;
+           slot = pairs_[slot].next[side_of(slot, box.body)])
+        linked_.push_back(slot);
+      if (linked_.empty()) continue;
+      count_->add(Counter::bound_change_events);
+      for (const std::uint32_t slot : linked_) {
+        // What a collapse has removed, or an expansion made anew in its place, needs nothing.
+        if (!pairs_[slot].used || node_of(slot, box.body) != box.node) continue;
+        count_->add(Counter::nodes_visited);
+        if (overlap_after(slot, now) != pairs_[slot].overlapping)
+          turn(slot, now);
+        else
+          schedule(slot, now);
+      }
+    }
+  }
+
+  /// The overlapping leaves of one body pair, in no order.
+  std::span<const LeafPair> leaf_pairs(std::size_t body_pair) const { return leaves_[body_pair]; }
+  /// Pairs in the list: apart, or overlapping leaves.
+  std::size_t size() const { return list_size_; }
+  /// All pairs by slot, for audits.
+  std::span<const Pair> pairs() const { return pairs_; }
+  const OverlapClock<S>& clock() const { return clock_; }
+  RealisedBox<S> box(std::uint32_t body, std::uint32_t node) const {
+    return {bodies_[body].plans, bodies_[body].realisers + std::size_t(6) * node};
+  }
+
+  /// From now on ended overlaps of leaves are kept; those that last already count from t.
+  void start_spans(double t) {
+    for (auto& leaves : leaves_)
+      for (LeafPair& leaf : leaves) leaf.since = t;
+    ended_.clear();
+    recording_ = true;
+  }
+  /// The overlaps that ended since `start_spans`; those that last are the leaf pairs.
+  std::span<const EndedLeafPair> stop_spans() {
+    recording_ = false;
+    return ended_;
+  }
+
+  std::uint64_t steps() const { return queue_.steps(); }
+  std::size_t bytes() const {
+    std::size_t total = queue_.bytes() + pairs_.capacity() * sizeof(Pair) +
+                        (free_blocks_.capacity() + work_.capacity() + linked_.capacity()) * 4;
+    for (const auto& body : bodies_) total += body.first_pair.size() * 4;
+    for (const auto& leaves : leaves_) total += leaves.capacity() * sizeof(LeafPair);
+    return total;
+  }
+
+ private:
+  struct BodyBoxes {
+    const Topology* topology;
+    const std::uint32_t* realisers;
+    const FlightPlans<S>* plans;
+    std::vector<std::uint32_t> first_pair;  ///< linked from each node, or none
+  };
+
+  std::uint32_t body_of(const Pair& pair, int side) const {
+    return side == 0 ? body_pairs_[pair.bodies].first : body_pairs_[pair.bodies].second;
+  }
+  int side_of(std::uint32_t slot, std::uint32_t body) const {
+    return body_pairs_[pairs_[slot].bodies].first == body ? 0 : 1;
+  }
+  std::uint32_t node_of(std::uint32_t slot, std::uint32_t body) const {
+    return side_of(slot, body) == 0 ? pairs_[slot].a : pairs_[slot].b;
+  }
+  TopologyNode node(const Pair& pair, int side) const {
+    return bodies_[body_of(pair, side)].topology->nodes[side == 0 ? pair.a : pair.b];
+  }
+  bool both_leaves(const Pair& pair) const { return node(pair, 0).is_leaf() && node(pair, 1).is_leaf(); }
+  Counter kind_of_separation(std::uint32_t slot) const {
+    return both_leaves(pairs_[slot]) ? Counter::leaves_apart_events : Counter::fathers_apart_events;
+  }
+  RealisedBox<S> box_a(const Pair& pair) const { return box(body_of(pair, 0), pair.a); }
+  RealisedBox<S> box_b(const Pair& pair) const { return box(body_of(pair, 1), pair.b); }
+  bool overlap_after(std::uint32_t slot, const Instant<S>& now) const {
+    return clock_.overlap_after(box_a(pairs_[slot]), box_b(pairs_[slot]), now);
+  }
+
+  std::uint32_t new_block() {
+    if (!free_blocks_.empty()) {
+      const std::uint32_t block = free_blocks_.back();
+      free_blocks_.pop_back();
+      return block;
+    }
+    const std::size_t block = pairs_.size();
+    if (block + block_ >= none) throw std::length_error("a separation list of more than 2^32 pairs");
+    pairs_.resize(block + block_);
+    queue_.grow(std::uint32_t(pairs_.capacity()));
+    return std::uint32_t(block);
+  }
+
+  void insert(std::uint32_t slot, std::uint16_t bodies, std::uint32_t a, std::uint32_t b,
+              std::uint32_t father, std::uint32_t depth) {
+    Pair& pair = pairs_[slot];
+    pair = {};
+    pair.a = a;
+    pair.b = b;
+    pair.father = father;
+    pair.depth = depth;
+    pair.bodies = bodies;
+    pair.used = true;
+    for (const int side : {0, 1}) {
+      std::uint32_t& first = bodies_[body_of(pair, side)].first_pair[side == 0 ? a : b];
+      pair.previous[side] = none;
+      pair.next[side] = first;
+      if (first != none) pairs_[first].previous[side_of(first, body_of(pair, side))] = slot;
+      first = slot;
+    }
+  }
+  void remove(std::uint32_t slot) {
+    Pair& pair = pairs_[slot];
+    for (const int side : {0, 1}) {
+      const std::uint32_t body = body_of(pair, side), next = pair.next[side], previous = pair.previous[side];
+      if (next != none) pairs_[next].previous[side_of(next, body)] = previous;
+      if (previous != none)
+        pairs_[previous].next[side_of(previous, body)] = next;
+      else
+        bodies_[body].first_pair[side == 0 ? pair.a : pair.b] = next;
+    }
+    cancel(slot);
+    pair.used = false;
+  }
+  void cancel(std::uint32_t slot) {
+    if (!queue_.cancel(slot)) return;
+    count_->add(Counter::certificates_discarded);
+    count_->add(Counter::queue_operations);
+  }
+
+  /// Decides the pairs in `work_`, which are new, and all below them that have to be there.
+  void settle_new(const Instant<S>& now) {
+    while (!work_.empty()) {
+      const std::uint32_t slot = work_.back();
+      work_.pop_back();
+      count_->add(Counter::nodes_visited);
+      list_changed(1);
+      if (overlap_after(slot, now))
+        begin_overlap(slot, now);
+      else
+        schedule(slot, now);
+    }
+  }
+
+  /// A pair in the list overlaps: notes it, schedules its end, and leaves its new children, if there are any,
+  /// in `work_`.
+  void begin_overlap(std::uint32_t slot, const Instant<S>& now) {
+    pairs_[slot].overlapping = true;
+    schedule(slot, now);
+    const Pair pair = pairs_[slot];  // by value: blocks move
+    const TopologyNode a = node(pair, 0), b = node(pair, 1);
+    if (a.is_leaf() && b.is_leaf()) {
+      auto& leaves = leaves_[pair.bodies];
+      pairs_[slot].place = std::uint32_t(leaves.size());
+      leaves.push_back({pair.a, pair.b, slot, time_});
+      return;
+    }
+    list_changed(-1);
+    const std::uint32_t block = new_block();
+    pairs_[slot].children = block;
+    const std::uint32_t begin_a = a.is_leaf() ? pair.a : a.first(), count_a = a.is_leaf() ? 1 : a.count();
+    const std::uint32_t begin_b = b.is_leaf() ? pair.b : b.first(), count_b = b.is_leaf() ? 1 : b.count();
+    std::uint32_t child = block;
+    for (std::uint32_t i = begin_a; i < begin_a + count_a; ++i)
+      for (std::uint32_t j = begin_b; j < begin_b + count_b; ++j) {
+        insert(child, pair.bodies, i, j, slot, pair.depth + 1);
+        work_.push_back(child++);
+      }
+  }
+
+  /// A pair changes between apart and overlapping at `now`.
+  void turn(std::uint32_t slot, const Instant<S>& now) {
+    if (!pairs_[slot].overlapping) {
+      work_.clear();
+      begin_overlap(slot, now);
+      settle_new(now);
+      return;
+    }
+    pairs_[slot].overlapping = false;
+    if (pairs_[slot].place != none)
+      end_leaf(slot);
+    else {
+      remove_below(slot);
+      list_changed(1);
+    }
+    schedule(slot, now);
+  }
+
+  void end_leaf(std::uint32_t slot) {
+    Pair& pair = pairs_[slot];
+    auto& leaves = leaves_[pair.bodies];
+    if (recording_) ended_.push_back({pair.bodies, leaves[pair.place], end_});
+    pairs_[leaves.back().slot].place = pair.place;
+    leaves[pair.place] = leaves.back();
+    leaves.pop_back();
+    pair.place = none;
+  }
+
+  void remove_below(std::uint32_t top) {
+    work_.assign(1, pairs_[top].children);
+    pairs_[top].children = none;
+    while (!work_.empty()) {
+      const std::uint32_t block = work_.back();
+      work_.pop_back();
+      for (std::uint32_t slot = block; slot < block + block_ && pairs_[slot].used; ++slot) {
+        count_->add(Counter::nodes_visited);
+        if (pairs_[slot].place != none) end_leaf(slot);
+        if (pairs_[slot].children != none)
+          work_.push_back(pairs_[slot].children);
+        else
+          list_changed(-1);
+        remove(slot);
+      }
+      free_blocks_.push_back(block);
+    }
+  }
+
+  /// Puts the pair's next event into the queue, in place of the one that stood.
+  void schedule(std::uint32_t slot, const Instant<S>& now) {
+    cancel(slot);
+    Event event;
+    event.slot = slot;
+    event.depth = pairs_[slot].depth;
+    count_->add(Counter::certificates_made);
+    const RealisedBox<S> a = box_a(pairs_[slot]), b = box_b(pairs_[slot]);
+    const bool found = pairs_[slot].overlapping ? clock_.next_separation(a, b, now, event)
+                                                : clock_.next_overlap(a, b, now, event);
+    if (!found) return;
+    queue_.schedule(event);
+    count_->add(Counter::queue_operations);
+    count_->peak(Counter::queue_peak, queue_.size());
+  }
+
+  void list_changed(int by) {
+    list_size_ += std::size_t(by);
+    count_->peak(Counter::list_peak, list_size_);
+  }
+
+  OverlapClock<S> clock_;
+  Queue<OverlapClock<S>> queue_;
+  Count* count_;
+  std::vector<BodyBoxes> bodies_;
+  std::vector<BodyPair> body_pairs_;
+  std::uint32_t block_ = 4;  ///< most children of a pair
+  std::vector<Pair> pairs_;  ///< in blocks of siblings; the used ones come first in a block
+  std::vector<std::uint32_t> free_blocks_;
+  std::vector<std::vector<LeafPair>> leaves_;  ///< [body pair]
+  std::size_t list_size_ = 0;
+  std::vector<std::uint32_t> work_, linked_;
+  double time_ = 0, end_ = 0;  ///< around the instant of the event at hand
+  bool recording_ = false;
+  std::vector<EndedLeafPair> ended_;
+};
+
+}  // namespace kbvh

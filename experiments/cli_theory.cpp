@@ -1,0 +1,84 @@
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "experiments/cli.hpp"
+#include "experiments/io/bytes.hpp"
+#include "experiments/machine.hpp"
+#include "experiments/program.hpp"
+#include "experiments/progress.hpp"
+#include "experiments/text.hpp"
+#include "experiments/theory/theory.hpp"
+
+namespace kbvh::experiments {
+
+namespace {
+
+constexpr const char* examples = R"(Examples:
+  kbvh theory
+  kbvh theory --scenes waving_sheet --sizes 500,1000,2000,4000,8000,16000 --out results/theory
+  kbvh theory --full --out results/theory
+Holds the claims of Zachmann & Weller 2006 against counts and exact arithmetic; no clock decides anything.
+DIR/theory.json has the table with all numbers, DIR/theory.jsonl each measurement as soon as it is made: a run that
+was stopped goes on where it was. `kbvh report` is not needed: analysis/theory_figures.py DIR draws the figures.)";
+
+struct TheoryArguments {
+  std::string out;
+  std::vector<std::string> scenes;
+  std::vector<std::uint32_t> sizes;
+  std::uint32_t keyframes = 0, exact_limit = 0, instants = 0;
+  bool quick = false, full = false;
+};
+
+int run(const TheoryArguments& arguments) {
+  theory::TheoryOptions options = arguments.full ? theory::full_theory() : theory::quick_theory();
+  if (!arguments.scenes.empty()) options.scenes = arguments.scenes;
+  if (!arguments.sizes.empty()) options.sizes = arguments.sizes;
+  if (arguments.keyframes > 0) options.keyframes = arguments.keyframes;
+  if (arguments.exact_limit > 0) options.exact_limit = arguments.exact_limit;
+  if (arguments.instants > 0) options.instants = arguments.instants;
+  const std::filesystem::path folder = arguments.out;
+  if (!arguments.out.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) throw io::InputError("cannot make " + folder.string() + ": " + error.message());
+  }
+  theory::MeasurementStore store(arguments.out.empty() ? std::filesystem::path() : folder / "theory.jsonl",
+                                 program_identity());
+  Progress progress;
+  const theory::TheoryReport report =
+      theory::run_theory(options, store, [&](const std::string& what) { progress.show(what); });
+  progress.clear();
+  std::fputs(theory::claims_table(report.claims).c_str(), stdout);
+  for (const std::string& note : report.notes) say(note);
+  if (!arguments.out.empty()) {
+    const std::filesystem::path file = folder / "theory.json";
+    io::write_file_atomically(file, theory::to_json(report, options).dump(1) + "\n");
+    say("all numbers are in " + file.string());
+  }
+  return success;
+}
+
+}  // namespace
+
+void add_theory(CLI::App& program, Action& action) {
+  CLI::App* command = program.add_subcommand("theory", "hold the paper's claims against exact counts");
+  command->footer(examples);
+  auto a = std::make_shared<TheoryArguments>();
+  command->add_option("--scenes", a->scenes, "built-in scenes; `kbvh list` shows them")->delimiter(',');
+  command->add_option("--sizes", a->sizes, "triangles of each; six or more for a fit (250 to 8000)")
+      ->delimiter(',')
+      ->check(CLI::Range(1u, 1u << 24));
+  command->add_option("--keyframes", a->keyframes, "of built-in scenes (30)")->check(CLI::Range(2, 100000));
+  command->add_option("--exact-limit", a->exact_limit, "most triangles held against exact envelopes (1000)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--instants", a->instants, "audited between keyframes (200)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--out", a->out, "folder for theory.json (none: the table only)");
+  CLI::Option* quick = command->add_flag("--quick", a->quick, "what CI runs: the default");
+  command->add_flag("--full", a->full, "up to 580k triangles, exact up to 16k, whole sequences: hours")
+      ->excludes(quick);
+  command->callback([&action, a] { action = [a] { return run(*a); }; });
+}
+
+}  // namespace kbvh::experiments

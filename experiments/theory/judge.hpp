@@ -1,0 +1,36 @@
+#pragma once
+#include <vector>
+
+#include "experiments/theory/claim.hpp"
+#include "experiments/theory/measurements.hpp"
+
+/// Verdicts: pure functions of what was measured. Each returns "not decided here" if it is given nothing.
+namespace kbvh::theory {
+
+Claim judge_valid_at_all_times(const std::vector<ExactRun>& exact);                              // T1
+Claim judge_compact(const std::vector<CountRun>& counts);                                        // T2
+Claim judge_responsive(const std::vector<CountRun>& counts);                                     // T3
+Claim judge_local(const std::vector<CountRun>& counts, const std::vector<CountRun>& fans);       // T4
+Claim judge_efficient(const std::vector<CountRun>& counts, const std::vector<ExactRun>& exact);  // T5
+Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vector<ExactRun>& exact,
+                             const std::vector<GrowthFit>& fits);                             // T6
+Claim judge_independent_of_frames(const std::vector<FrameRun>& frames);                       // T7
+Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseRun>& loose);  // T8
+/// `constructed` are the frames of scenes made to refute the claim, `frames` those of the others.
+Claim judge_never_more_updates(const std::vector<FrameRun>& frames,
+                               const std::vector<FrameRun>& constructed);  // T9
+Claim judge_translation(const std::vector<TranslationRun>& translations);  // T10
+Claim judge_plan_changes(const std::vector<PlanRun>& plans);               // T15
+Claim judge_lower_bound(const std::vector<LooseRun>& loose);               // T16
+
+/// A claim that nothing here can decide, and why.
+Claim undecided(Claim claim, const std::string& why);
+
+/// Fits the growth of each scene that has at least `fewest` sizes, all with events.
+std::vector<GrowthFit> fit_growth(const std::vector<CountRun>& counts, std::size_t fewest);
+
+/// Comparisons that one event may cost the AVL queue: on each node of its path one insertion, which compares
+/// once per level and once more, in a tree of at most 1.4405 log2(entries + 2) levels (Knuth, 6.2.3).
+double queue_steps_bound(const CountRun& run);
+
+}  // namespace kbvh::theory

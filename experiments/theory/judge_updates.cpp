@@ -1,0 +1,405 @@
+// T6 to T10, T15, T16: how many updates there are, and whether there have to be.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "experiments/text.hpp"
+#include "experiments/theory/fit.hpp"
+#include "experiments/theory/judge.hpp"
+
+namespace kbvh::theory {
+
+using experiments::counted;
+using experiments::joined;
+
+namespace {
+constexpr Role always = Role::always, as_stated = Role::as_stated;
+
+template <class Run>
+std::string place(const Run& run) {
+  return run.scene + ", " + number(run.triangles) + " polygons";
+}
+std::string place(const FrameRun& run) {
+  return run.scene + ", " + counted(run.triangles, "polygon") + ", l = " + std::to_string(run.l);
+}
+std::string percent(double share) {
+  return fmt::format("{:.3g}%", 100 * share);
+}
+}  // namespace
+
+std::vector<GrowthFit> fit_growth(const std::vector<CountRun>& counts, std::size_t fewest) {
+  std::map<std::string, std::vector<const CountRun*>> families;
+  for (const CountRun& run : counts) families[run.scene].push_back(&run);
+  std::vector<GrowthFit> fits;
+  for (auto& [scene, runs] : families) {
+    std::sort(runs.begin(), runs.end(), [](auto a, auto b) { return a->vertices < b->vertices; });
+    GrowthFit fit;
+    fit.scene = scene;
+    std::vector<double> x, y;
+    for (const CountRun* run : runs) {
+      if (run->events == 0) break;
+      fit.triangles.push_back(run->triangles);
+      fit.vertices.push_back(run->vertices);
+      fit.events.push_back(run->events);
+      x.push_back(n_log_n(double(run->vertices)));
+      y.push_back(double(run->events));
+    }
+    if (x.size() < std::max<std::size_t>(fewest, 3) || x.size() < runs.size()) continue;
+    const PowerFit power = fit_power(x, y);
+    const ProportionalFit line = fit_proportional(x, y);
+    fit.exponent = power.exponent, fit.low = power.low, fit.high = power.high;
+    fit.constant = line.constant, fit.worst = line.worst, fit.residuals = line.residuals;
+    fits.push_back(std::move(fit));
+  }
+  return fits;
+}
+
+Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vector<ExactRun>& exact,
+                             const std::vector<GrowthFit>& fits) {
+  constexpr double tolerance = 0.05;
+  Claim claim{.id = "T6",
+              .title = "a clip has O(lambda_s(n) log n) events, nearly O(n log n)",
+              .statement =
+                  "If two flight plans cross at most s times, all events of a clip are "
+                  "O(lambda_s(n) log n), which is nearly O(n log n).",
+              .citation = "Theorems 2 to 4",
+              .counter = "events and changes of a clip; breakpoints of exact envelopes",
+              .bound =
+                  "segments x sum over nodes and sides of (vertices below - 1); lambda_1(n) - 1 = n - 1 "
+                  "breakpoints per bound and segment; exponent of n log n not above 1 + 5%",
+              .condition =
+                  "what grows is the bound with its factor, the number of segments; over the sizes "
+                  "measured some families grow faster than n log n",
+              .data = {{"counts", counts}, {"exact", exact}, {"fits", fits}}};
+  if (counts.empty()) return undecided(claim, "Nothing was counted.");
+  double share = 0, fullest = 0;
+  std::uint64_t pieces = 0, over = 0, most = 0;
+  for (const CountRun& run : counts) {
+    claim.criteria.push_back({"changes of a clip, " + place(run), double(run.values), Relation::at_most,
+                              run.breakpoint_bound, 0, always});
+    claim.criteria.push_back({"events of a clip, " + place(run), double(run.events), Relation::at_most,
+                              run.breakpoint_bound, 0, always});
+    share = std::max(share, double(run.values) / run.breakpoint_bound);
+  }
+  for (const ExactRun& run : exact) {
+    claim.criteria.push_back({"envelopes with more than n - 1 breakpoints in a segment, " + place(run),
+                              double(run.over_lambda), Relation::equal, 0, 0, always});
+    pieces += run.pieces, over += run.over_lambda;
+    fullest = std::max(fullest, run.fullest), most = std::max(most, run.most_breakpoints);
+  }
+  std::vector<std::string> exponents, faster;
+  double worst = 0;
+  std::size_t sizes = 0;
+  for (const GrowthFit& fit : fits) {
+    claim.criteria.push_back({"lower end of the exponent's 95% interval, " + fit.scene, fit.low,
+                              Relation::at_most, 1, tolerance, as_stated});
+    exponents.push_back(fmt::format("{} {:.2f} ({:.2f} to {:.2f}), {:.3g} n log n", fit.scene, fit.exponent,
+                                    fit.low, fit.high, fit.constant));
+    if (fit.low > 1 + tolerance) faster.push_back(fit.scene);
+    worst = std::max(worst, fit.worst);
+    sizes = std::max(sizes, fit.events.size());
+  }
+  claim.measured =
+      fmt::format("at most {} of the bound; {} of {} envelopes over lambda_1; exponents: {}", percent(share),
+                  number(over), number(pieces), exponents.empty() ? "none fitted" : joined(exponents, "; "));
+  claim.why = fmt::format("{} used at most {} of the bound", counted(counts.size(), "clip"), percent(share));
+  if (!exact.empty())
+    claim.why += fmt::format(
+        ", and no exact envelope of {} (bounds x segments) {} n - 1 breakpoints (the fullest has {} of them, "
+        "the "
+        "longest {})",
+        number(pieces), over == 0 ? "has more than" : "should have more than", percent(fullest), most);
+  if (fits.empty())
+    claim.why += "; no family has enough sizes with events for a fit.";
+  else
+    claim.why += fmt::format(
+        "; a fit is no proof: over up to {} sizes c n log n leaves residuals of up to {}, and {}.", sizes,
+        percent(worst),
+        faster.empty() ? "no family's exponent lies significantly above 1"
+                       : joined(faster) + " significantly above 1: finer meshes carry motion of their own");
+  return claim;
+}
+
+Claim judge_independent_of_frames(const std::vector<FrameRun>& frames) {
+  Claim claim{.id = "T7",
+              .title = "the number of events does not depend on the number of frames",
+              .statement = "Updates are independent of the frame rate; bottom-up needs O(k n) for k frames.",
+              .citation = "section 5",
+              .counter = "events and changes of one clip at several l; values written by bottom_up",
+              .bound = "spread 0; bottom-up proportional to frames",
+              .data = frames};
+  std::map<std::string, std::vector<const FrameRun*>> scenes;
+  for (const FrameRun& run : frames) scenes[run.scene + std::to_string(run.triangles)].push_back(&run);
+  double spread = 0, grows = 0, most_l = 0;
+  std::uint64_t events = 0, differ = 0;
+  for (const auto& [key, runs] : scenes) {
+    if (runs.size() < 2) continue;
+    const FrameRun& first = *runs[0];
+    for (const FrameRun* run : runs) {
+      const double off = std::abs(double(run->events) - double(first.events)) +
+                         std::abs(double(run->values) - double(first.values));
+      claim.criteria.push_back(
+          {"events and changes beside those of l = " + std::to_string(first.l) + ", " + place(*run), off,
+           Relation::equal, 0, 0, always});
+      claim.criteria.push_back({"the log of changes is the same (1), " + place(*run), double(run->same_log),
+                                Relation::equal, 1, 0, always});
+      const double expected = double(run->frames) / double(first.frames);
+      const double measured = double(run->bottom_up_values) / double(first.bottom_up_values);
+      claim.criteria.push_back(
+          {"bottom-up's values beside those of l = " + std::to_string(first.l) + ", " + place(*run), measured,
+           Relation::equal, expected, 0, always});
+      spread = std::max(spread, off);
+      differ += run->same_log != 1;
+      grows = std::max(grows, measured);
+      most_l = std::max(most_l, double(run->l));
+    }
+    events += first.events;
+  }
+  if (claim.criteria.empty()) return undecided(claim, "No clip was played at two frame rates.");
+  claim.measured = fmt::format("spread {}; bottom-up's values times {:.4g}", number(spread), grows);
+  claim.why = fmt::format(
+      "{} with {} events in all, played at up to {} frames per keyframe interval: {}, while bottom-up writes "
+      "{:.4g} "
+      "times as many values as at the lowest rate.",
+      counted(scenes.size(), "clip"), number(events), number(most_l),
+      spread == 0 && differ == 0 ? "events, changes and their order are the same at every rate"
+                                 : "events or changes differ by up to " + number(spread) + ", and " +
+                                       number(differ) + " logs differ",
+      grows);
+  return claim;
+}
+
+Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseRun>& loose) {
+  Claim claim{.id = "T8",
+              .title = "optimal: no valid AABB hierarchy makes fewer updates",
+              .statement = "Every AABB hierarchy that performs fewer updates is invalid at some time.",
+              .citation = "section 1, Theorem 1, section 5",
+              .counter =
+                  "changes per node, side and instant; breakpoints of exact envelopes; updates of a "
+                  "hierarchy of constant boxes",
+              .bound = "changes equal breakpoints; no valid hierarchy with fewer updates",
+              .condition = "among tight hierarchies, and counting net changes of a bound at one instant",
+              .data = {{"exact", exact}, {"loose", loose}}};
+  if (exact.empty()) return undecided(claim, "No clip was proved.");
+  std::uint64_t logged = 0, net = 0, envelope = 0, ties = 0, general = 0;
+  for (const ExactRun& run : exact) {
+    claim.criteria.push_back({"logs that differ from the envelopes, " + place(run),
+                              run.violation.empty() ? 0.0 : 1.0, Relation::equal, 0, 0, always});
+    claim.criteria.push_back(
+        {"net changes, " + place(run), double(run.net), Relation::equal, double(run.envelope), 0, always});
+    claim.criteria.push_back({"changes beyond net ones, beside those of ties, " + place(run),
+                              double(run.logged) - double(run.net), Relation::equal,
+                              double(run.several_steps), 0, always});
+    claim.criteria.push_back({"changes beyond net ones, " + place(run), double(run.logged) - double(run.net),
+                              Relation::equal, 0, 0, as_stated});
+    logged += run.logged, net += run.net, envelope += run.envelope, ties += run.several_steps;
+    general += run.several_steps == 0 && run.choices == 0;
+  }
+  std::uint64_t kinetic = 0, outside = 0;
+  double least_loose = 1e300, most_loose = 0;
+  for (const LooseRun& run : loose) {
+    claim.criteria.push_back({"constant boxes that do not contain a vertex at a frame, " + place(run),
+                              double(run.swept_outside), Relation::equal, 0, 0, always});
+    claim.criteria.push_back(
+        {"changes of the kinetic tree beside the updates of constant boxes, " + place(run),
+         double(run.kinetic_values), Relation::at_most, double(run.swept_updates), 0, as_stated});
+    kinetic += run.kinetic_values, outside += run.swept_outside;
+    least_loose = std::min(least_loose, run.swept_looseness);
+    most_loose = std::max(most_loose, run.swept_looseness);
+  }
+  claim.measured =
+      fmt::format("{} net changes, {} breakpoints, {} more changes at ties; constant boxes: 0 updates",
+                  number(net), number(envelope), number(ties));
+  claim.why = fmt::format(
+      "Among tight hierarchies {}: {} net changes against {} breakpoints in {} ({} of them in general "
+      "position, where "
+      "every logged change is one); {} changes more are hand-overs through ties at one instant.",
+      net == envelope ? "none makes fewer" : "some make fewer", number(net), number(envelope),
+      counted(exact.size(), "clip"), general, number(logged - net));
+  if (!loose.empty())
+    claim.why += fmt::format(
+        " Definition 1 asks for containment only, and one constant box per node, swept over the clip, {} at "
+        "every "
+        "frame with no update at all beside {} changes; the price is a looseness of {:.3g} to {:.3g}.",
+        outside == 0 ? "contains everything" : "does not contain everything", number(kinetic), least_loose,
+        most_loose);
+  return claim;
+}
+
+Claim judge_never_more_updates(const std::vector<FrameRun>& frames,
+                               const std::vector<FrameRun>& constructed) {
+  Claim claim{.id = "T9",
+              .title = "the kinetic tree never performs more updates than bottom-up",
+              .statement = "The kinetic algorithm never performs more updates than the brute-force update.",
+              .citation = "section 5",
+              .counter = "values written in each frame by the kinetic tree and by bottom-up on its topology",
+              .bound = "in every frame at most bottom-up's six per node",
+              .condition = "no bound changes hands more than once between two frames (enough, not necessary)",
+              .data = {{"frames", frames}, {"constructed", constructed}}};
+  if (frames.empty() && constructed.empty()) return undecided(claim, "No frames were compared.");
+  std::uint64_t all = 0, repeated = 0, worse = 0, made_worse = 0;
+  double worst = 0;
+  const auto judge = [&](const FrameRun& run) {
+    claim.criteria.push_back(
+        {"frames with more values than bottom-up though no bound changes twice, " + place(run),
+         double(run.worse_without_repeat), Relation::equal, 0, 0, always});
+    claim.criteria.push_back({"frames with more values than bottom-up, " + place(run),
+                              double(run.worse_frames), Relation::equal, 0, 0, as_stated});
+  };
+  for (const FrameRun& run : frames) {
+    judge(run);
+    all += run.frames, repeated += run.repeated_frames, worse += run.worse_frames;
+    worst = std::max(worst, run.worst_share);
+  }
+  for (const FrameRun& run : constructed) judge(run), made_worse += run.worse_frames;
+  claim.measured = fmt::format("more values in {} of {} frames, and in {} of the constructed ones",
+                               number(worse), number(all), number(made_worse));
+  for (const FrameRun& run : constructed)
+    claim.why += fmt::format(
+        "{}: in one frame one bound changes hands {} times and the kinetic tree writes {} values where "
+        "bottom-up "
+        "writes {}. ",
+        place(run), run.most_of_bound, number(run.values), number(run.bottom_up_values));
+  if (!frames.empty())
+    claim.why += fmt::format(
+        "In the other clips some bound changes more than once in {} of {} frames, but {} frames cost more "
+        "than "
+        "bottom-up (the worst writes {} of its values).",
+        number(repeated), number(all), worse == 0 ? "no" : number(worse), percent(worst));
+  return claim;
+}
+
+Claim judge_translation(const std::vector<TranslationRun>& translations) {
+  Claim claim{
+      .id = "T10",
+      .title = "a translation of all vertices causes no event",
+      .statement = "If all vertices are translated, nothing needs to be done: no events occur.",
+      .citation = "section 5",
+      .counter = "events of translations; of these, those between vertices at one place before",
+      .bound = "0 events",
+      .condition = "the translated coordinates are exact in the scalar; else ties of rounded ones separate",
+      .data = translations};
+  if (translations.empty()) return undecided(claim, "No translation was played.");
+  for (const TranslationRun& run : translations) {
+    claim.criteria.push_back(
+        {"events, " + run.scene, double(run.events), Relation::equal, 0, 0, run.exact ? always : as_stated});
+    if (!run.exact)
+      claim.criteria.push_back({"events that are no separating ties, " + run.scene,
+                                double(run.events) - double(run.separated_ties), Relation::equal, 0, 0,
+                                always});
+    const std::string keyframes = counted(run.keyframes, "keyframe");
+    claim.measured +=
+        fmt::format("{}{}: {} events", claim.measured.empty() ? "" : "; ", run.scene, number(run.events));
+    if (run.exact)
+      claim.why += fmt::format("{} ({} vertices, {}, every coordinate exact): {} events. ", run.scene,
+                               number(run.vertices), keyframes, number(run.events));
+    else
+      claim.why += fmt::format(
+          "{} ({} vertices, {}, {} coordinates rounded): {} events, {} of them between vertices whose "
+          "coordinates "
+          "were equal before: rounding made ties, and these separate. ",
+          run.scene, number(run.vertices), keyframes, number(run.rounded), number(run.events),
+          number(run.separated_ties));
+  }
+  claim.why.pop_back();
+  return claim;
+}
+
+Claim judge_plan_changes(const std::vector<PlanRun>& plans) {
+  Claim claim{
+      .id = "T15",
+      .title = "flight-plan updates do not change the combinatorial structure",
+      .statement =
+          "A flight-plan update does not change the combinatorial structure of the hierarchy, "
+          "which stays valid.",
+      .citation = "section 4, proof of Theorem 1",
+      .counter = "nodes that differ; realisers exceeded before and after; realisers changed by the update",
+      .bound = "0",
+      .condition =
+          "the new plan starts where the old one is; a position rounded to the scalar may pass "
+          "another",
+      .data = plans};
+  if (plans.empty()) return undecided(claim, "No plan was changed.");
+  std::uint64_t updates = 0, at_keyframes = 0, changed = 0, moved = 0, moved_at_keyframes = 0, invalid = 0,
+                topology = 0, wrong = 0;
+  for (const PlanRun& run : plans) {
+    claim.criteria.push_back({"stops at which the topology differs, " + place(run),
+                              double(run.topology_changes), Relation::equal, 0, 0, always});
+    claim.criteria.push_back({"bounds exceeded before and after updates, " + place(run),
+                              double(run.invalid_before + run.invalid_after), Relation::equal, 0, 0, always});
+    claim.criteria.push_back({"clips that differ from their envelopes, " + place(run),
+                              run.violation.empty() ? 0.0 : 1.0, Relation::equal, 0, 0, always});
+    claim.criteria.push_back({"realisers changed by updates that start where the plan is, " + place(run),
+                              double(run.moved_at_keyframes), Relation::equal, 0, 0, always});
+    claim.criteria.push_back({"realisers changed by updates, " + place(run),
+                              double(run.moved_at_keyframes + run.moved_between), Relation::equal, 0, 0,
+                              as_stated});
+    updates += run.updates, at_keyframes += run.updates_at_keyframes, changed += run.changed_plans;
+    moved += run.moved_between, moved_at_keyframes += run.moved_at_keyframes;
+    invalid += run.invalid_before + run.invalid_after, topology += run.topology_changes;
+    wrong += !run.violation.empty();
+  }
+  claim.measured = fmt::format("{} realisers changed at keyframes, {} between; {} bounds exceeded",
+                               number(moved_at_keyframes), number(moved), number(invalid));
+  claim.why = fmt::format(
+      "{} updates of {} plans: the topology differed {} times, {} bounds were exceeded before or after in "
+      "exact "
+      "arithmetic, and {} clips differ from their envelopes; {} updates at keyframes changed {} realisers, "
+      "{} between "
+      "keyframes, where a vertex starts from its rounded position, changed {}.",
+      number(updates), number(changed), number(topology), number(invalid), number(wrong),
+      number(at_keyframes), number(moved_at_keyframes), number(updates - at_keyframes), number(moved));
+  return claim;
+}
+
+Claim judge_lower_bound(const std::vector<LooseRun>& loose) {
+  Claim claim{.id = "T16",
+              .title = "a lower bound on updates for every BVH update strategy",
+              .statement =
+                  "There is a lower bound for the total number of BV updates, independent of the number of "
+                  "frames, which holds for every BVH updating strategy.",
+              .citation = "abstract, sections 1 and 5",
+              .counter =
+                  "updates between keyframes of boxes that move linearly, and of the kinetic tree; values "
+                  "computed in all",
+              .bound = "no valid hierarchy needs fewer updates than the kinetic tree has events",
+              .data = loose};
+  std::uint64_t events = 0, values = 0, computed = 0, bottom_up = 0, bounds = 0, frames = 0;
+  double most_loose = 0;
+  std::size_t clips = 0;
+  std::set<std::uint64_t> ls;
+  for (const LooseRun& run : loose) {
+    // Only hierarchies that do contain everything can refute the claim, and only where there are events.
+    if (run.linear_outside != 0 || run.swept_outside != 0 || run.kinetic_events == 0) continue;
+    claim.criteria.push_back(
+        {"updates between keyframes of a hierarchy that contains everything, " + place(run),
+         double(run.linear_updates), Relation::at_least, double(run.kinetic_events), 0, always});
+    events += run.kinetic_events, values += run.kinetic_values, computed += run.linear_values;
+    bottom_up += run.bottom_up_values, bounds += run.bounds, frames += run.frames;
+    most_loose = std::max(most_loose, run.linear_looseness);
+    ls.insert(run.l);
+    ++clips;
+  }
+  if (clips == 0)
+    return undecided(claim,
+                     "No loose hierarchy that contains everything was compared with a clip that has events.");
+  claim.measured =
+      fmt::format("linear boxes: 0 updates between keyframes, {} values at keyframes; kinetic: {} changes",
+                  number(computed), number(values));
+  claim.why = fmt::format(
+      "In {} boxes computed at keyframes ({} values) and linear in between contain every vertex at all {} "
+      "frames with "
+      "no update in between, at most {:.2g} looser than tight, where the kinetic tree has {} events ({} "
+      "changes, "
+      "bottom-up {} values); constant boxes need {} values for a whole clip. What does hold is T8: for tight "
+      "hierarchies the changes are forced; and the paper's argument bounds events from above, not from "
+      "below.",
+      counted(clips, "clip"), number(computed), number(frames), most_loose, number(events), number(values),
+      number(bottom_up), number(bounds));
+  return claim;
+}
+
+}  // namespace kbvh::theory

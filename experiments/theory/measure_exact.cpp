@@ -1,0 +1,206 @@
+#include "experiments/theory/measure_exact.hpp"
+
+#include <algorithm>
+
+#include "experiments/scenes/shapes.hpp"
+#include "experiments/theory/kinetic_log.hpp"
+#include "experiments/theory/measure_counts.hpp"
+
+namespace kbvh::theory {
+
+namespace {
+
+/// Is `vertex` further out than `realiser`?
+template <class Where>
+bool ahead(const ExactMotion& motion, const Where& where, Side side, std::uint32_t vertex,
+           std::uint32_t realiser) {
+  if (vertex == realiser) return false;
+  const int sign = motion.compare(where, axis_of(side), vertex, realiser);
+  return (is_upper(side) ? sign : -sign) > 0;
+}
+
+/// Candidates of a bound that are further out than its realiser, or 1 if that is not a candidate itself. None
+/// at any node: by induction from the leaves every realiser is an extremum of all vertices below.
+template <class Tree, class Where>
+std::uint64_t exceeded(const Tree& tree, const ExactMotion& motion, const Where& where, std::uint32_t node,
+                       Side side, std::uint64_t& compared) {
+  const std::uint32_t realiser = tree.realiser(node, side);
+  std::uint64_t faults = 0;
+  bool known = false;
+  const auto look = [&](std::uint32_t candidate) {
+    known = known || candidate == realiser;
+    faults += ahead(motion, where, side, candidate, realiser);
+  };
+  const TopologyNode n = tree.topology().nodes[node];
+  if (n.is_leaf())
+    for (const std::uint32_t v : tree.leaf_vertices()[node]) look(v);
+  else
+    for (std::uint32_t child = n.first(); child < n.first() + n.count(); ++child)
+      look(tree.realiser(child, side));
+  ++compared;
+  return faults + !known;
+}
+
+/// Audits while a clip is recorded: everything at each stop, its path after each event.
+class Auditor {
+ public:
+  Auditor(const Scene<float>& scene, ExactRun& run) : run_(&run) {
+    const std::vector<double> keyframes = overlaid_keyframes(scene);
+    for (const Body<float>& body : scene.bodies)
+      motions_.emplace_back(stored_plans(body.plans), keyframes.front(), keyframes.back());
+  }
+
+  template <class Forest>
+  void event(Forest& forest, const Event& event) {
+    const auto& tree = forest.tree(event.body);
+    const ExactMotion& motion = motions_[event.body];
+    const When when = when_of(forest.clock().crossing(event), motion);
+    std::uint32_t node = (event.slot - tree.first_slot()) / 6;
+    for (;;) {
+      const bool passed = tree.realiser(node, event.side) == event.loser;
+      run_->path_faults += exceeded(tree, motion, when, node, event.side, run_->path_bounds);
+      if (node == 0 || !passed) break;
+      node = tree.topology().parents[node];
+    }
+  }
+
+  template <class Forest>
+  void stop(Forest& forest, double t) {
+    ++run_->audited_instants;
+    for (std::uint32_t body = 0; body < motions_.size(); ++body) {
+      const auto& tree = forest.tree(body);
+      const When when = motions_[body].locate(exact(std::min(t, last_time(body))));
+      for (std::uint32_t node = 0; node < tree.topology().size(); ++node)
+        for (Side side = 0; side < 6; ++side)
+          run_->faults += exceeded(tree, motions_[body], when, node, side, run_->audited);
+    }
+  }
+
+ private:
+  double last_time(std::uint32_t body) const { return motions_[body].times()[motions_[body].last_row()]; }
+  ExactRun* run_;
+  std::vector<ExactMotion> motions_;
+};
+
+/// Events all of whose changes last for no time: the next change of the same bound has the same instant.
+std::uint64_t momentary(const Case& one, std::size_t bounds) {
+  std::vector<std::size_t> next_of_bound(bounds, one.log.size());
+  std::vector<std::uint64_t> lasting;
+  std::uint64_t all = 0;
+  for (std::size_t i = one.log.size(); i-- > 0;) {
+    const BoundChange& change = one.log[i];
+    std::size_t& next = next_of_bound[6 * std::size_t(change.node) + change.side];
+    if (next == one.log.size() || !(one.log[next].when == change.when)) lasting.push_back(one.events[i]);
+    next = i;
+    all += i == 0 || one.events[i - 1] != one.events[i];
+  }
+  std::sort(lasting.begin(), lasting.end());
+  lasting.erase(std::unique(lasting.begin(), lasting.end()), lasting.end());
+  return all - lasting.size();
+}
+
+}  // namespace
+
+ExactRun measure_exact(const Scene<float>& scene, std::uint32_t instants) {
+  ExactRun run;
+  run.scene = scene.name;
+  run.triangles = scene.primitive_count();
+  run.vertices = scene.vertex_count();
+  const std::vector<double> keyframes = overlaid_keyframes(scene);
+  run.keyframes = keyframes.size();
+  Play play{paper_builder, 1};
+  const scenes::SeededNoise noise(200);
+  for (std::uint32_t i = 0; i < instants; ++i)
+    play.instants.push_back(keyframes.front() +
+                            (0.5 + 0.5 * noise.signed_unit(i)) * (keyframes.back() - keyframes.front()));
+  const auto recording = record<float, AvlQueue>(scene, {}, play, Auditor(scene, run));
+  run.events = recording.events;
+
+  EnvelopeReport total;
+  for (const Epoch<float>& epoch : recording.epochs)
+    for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+      try {
+        const Case one = make_case(scene, recording, epoch, body);
+        total.add(one.check());
+        run.momentary_events += momentary(one, 6 * one.below.size());
+      } catch (const std::logic_error& error) {
+        total.violation = error.what();  // an event whose pieces do not meet, or not in the clip
+      }
+    }
+  run.violation = total.violation;
+  run.bounds = total.bounds;
+  run.logged = total.logged;
+  run.net = total.net;
+  run.envelope = total.envelope;
+  run.canonical = total.canonical;
+  run.several_steps = total.several_steps;
+  run.choices = total.choices;
+  run.pieces = total.pieces;
+  run.over_lambda = total.over_lambda;
+  run.most_breakpoints = total.most_breakpoints;
+  run.fullest = total.fullest;
+  return run;
+}
+
+namespace {
+std::uint64_t exceeded_anywhere(const ExactMotion& motion, const When& when, const VerticesBelow& below,
+                                const std::vector<std::uint32_t>& realisers) {
+  std::uint64_t faults = 0;
+  for (std::size_t node = 0; node < below.size(); ++node)
+    for (Side side = 0; side < 6; ++side)
+      for (const std::uint32_t v : below[node])
+        if (ahead(motion, when, side, v, realisers[6 * node + side])) {
+          ++faults;
+          break;
+        }
+  return faults;
+}
+
+/// Counts stops at which a tree is not the one that was built.
+struct SameNodes {
+  const Topologies* built;
+  std::uint64_t* changes;
+  template <class Forest>
+  void event(Forest&, const Event&) {}
+  template <class Forest>
+  void stop(Forest& forest, double) {
+    for (std::uint32_t body = 0; body < built->size(); ++body)
+      *changes += !(forest.tree(body).topology() == (*built)[body]);
+  }
+};
+}  // namespace
+
+PlanRun measure_plan_changes(const Scene<float>& scene, const PlanScript<float>& script,
+                             std::uint32_t frames_per_keyframe) {
+  PlanRun run;
+  run.scene = scene.name;
+  run.triangles = scene.primitive_count();
+  const std::vector<double> keyframes = overlaid_keyframes(scene);
+  Play play{paper_builder, frames_per_keyframe};
+  const SceneView<float> view(scene);
+  Playback<float> playback(scene);
+  playback.seek(keyframes.front());
+  const Topologies topologies = build_topologies(view, playback, play.builder);
+  const auto recording =
+      record<float, AvlQueue>(scene, script, play, SameNodes{&topologies, &run.topology_changes});
+  run.violation = check(scene, recording).violation;
+  run.updates = script.steps.size();
+  for (const auto& step : script.steps) run.changed_plans += step.changes.size();
+  for (std::size_t e = 1; e < recording.epochs.size(); ++e) {
+    const Epoch<float>&before = recording.epochs[e - 1], &after = recording.epochs[e];
+    const bool at_keyframe = std::binary_search(keyframes.begin(), keyframes.end(), after.begin);
+    run.updates_at_keyframes += at_keyframe;
+    (at_keyframe ? run.moved_at_keyframes : run.moved_between) += after.at_change.size();
+    for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+      const VerticesBelow below = vertices_below(recording.topologies[body], scene.bodies[body].primitives);
+      const ExactMotion old_motion(before.plans[body], before.begin, before.until);
+      const ExactMotion new_motion(after.plans[body], after.begin, after.until);
+      run.invalid_before +=
+          exceeded_anywhere(old_motion, {old_motion.last_row(), 0, 0}, below, before.end[body]);
+      run.invalid_after += exceeded_anywhere(new_motion, {0, 0, 0}, below, after.start[body]);
+    }
+  }
+  return run;
+}
+
+}  // namespace kbvh::theory

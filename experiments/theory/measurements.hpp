@@ -1,0 +1,141 @@
+#pragma once
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+/// What is counted for the checks, as plain numbers: verdicts are functions of these alone.
+namespace kbvh::theory {
+
+/// One clip through the kinetic AABB tree (AVL queue, binary, one primitive per leaf), event by event. Sums
+/// and maxima are over events; trees of all moving bodies are taken together.
+struct CountRun {
+  std::string scene;  ///< its family
+  std::uint64_t triangles = 0, vertices = 0, nodes = 0;
+  std::uint64_t depth = 0;     ///< of the deepest leaf; the root has 0
+  std::uint64_t segments = 0;  ///< of the flight plans: keyframes - 1
+  std::uint64_t events = 0, values = 0;
+  std::uint64_t silent_events = 0;  ///< that changed no realiser at all
+  /// Segments x sum over nodes and sides of (vertices below - 1): no envelopes of lines have more
+  /// breakpoints.
+  double breakpoint_bound = 0;
+  std::uint64_t queue_peak = 0;                          ///< most events scheduled at once
+  std::uint64_t most_of_node = 0;                        ///< most events scheduled for one node at a keyframe
+  std::uint64_t bytes = 0;                               ///< of trees and queue
+  std::uint64_t sum_visited = 0, max_visited = 0;        ///< nodes of the path upwards
+  std::uint64_t sum_steps = 0, max_steps = 0;            ///< comparisons in the queue
+  std::uint64_t sum_operations = 0, max_operations = 0;  ///< on the queue
+  std::uint64_t sum_certificates = 0, max_certificates = 0;  ///< candidate pairs that were looked at
+  /// Certificates (of a node and side) that a vertex takes part in, as winner or as one of those that may
+  /// become loser; over the first, a middle and the last keyframe.
+  std::uint64_t max_vertex_certificates = 0;
+  double mean_vertex_certificates = 0;
+  std::uint64_t max_leaves_of_vertex = 0;
+  /// Plans of single vertices changed at the first keyframe: candidate pairs looked at, queue comparisons.
+  std::uint64_t updates = 0, sum_update_certificates = 0, max_update_certificates = 0, max_update_steps = 0;
+  /// Largest share that an update took of 6 x the candidates of all nodes above the vertex.
+  double update_share = 0;
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CountRun, scene, triangles, vertices, nodes, depth, segments, events,
+                                   values, silent_events, breakpoint_bound, queue_peak, most_of_node, bytes,
+                                   sum_visited, max_visited, sum_steps, max_steps, sum_operations,
+                                   max_operations, sum_certificates, max_certificates,
+                                   max_vertex_certificates, mean_vertex_certificates, max_leaves_of_vertex,
+                                   updates, sum_update_certificates, max_update_certificates,
+                                   max_update_steps, update_share)
+
+/// The same clip with the log of every change, held against exact envelopes computed apart (envelope.hpp).
+struct ExactRun {
+  std::string scene;
+  std::uint64_t triangles = 0, vertices = 0, keyframes = 0;
+  std::string violation;                            ///< the first, empty if the log is right
+  std::uint64_t bounds = 0;                         ///< (node, side) pairs proved over the whole clip
+  std::uint64_t events = 0, logged = 0, net = 0;    ///< events; changes; net changes per bound and instant
+  std::uint64_t envelope = 0, canonical = 0;        ///< breakpoints; with ties resolved by smallest id
+  std::uint64_t several_steps = 0, choices = 0;     ///< ties: changes beyond the net ones, equal successors
+  std::uint64_t momentary_events = 0;               ///< all of whose changes last for no time
+  std::uint64_t pieces = 0, over_lambda = 0;        ///< bounds x segments; with too many breakpoints
+  std::uint64_t most_breakpoints = 0;               ///< of one bound in one segment
+  double fullest = 0;                               ///< share of lambda_1(n) - 1, n >= 8
+  std::uint64_t audited_instants = 0, audited = 0;  ///< between events and at keyframes; realisers compared
+  std::uint64_t faults = 0;                         ///< of these, exceeded by a vertex
+  std::uint64_t path_bounds = 0, path_faults = 0;   ///< on the paths that events touched, at their instants
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ExactRun, scene, triangles, vertices, keyframes, violation, bounds, events,
+                                   logged, net, envelope, canonical, several_steps, choices, momentary_events,
+                                   pieces, over_lambda, most_breakpoints, fullest, audited_instants, audited,
+                                   faults, path_bounds, path_faults)
+
+/// One clip at one number l of frames per keyframe interval.
+struct FrameRun {
+  std::string scene;
+  std::uint64_t triangles = 0, l = 0, frames = 0;  ///< frames after the first
+  std::uint64_t events = 0, values = 0;            ///< of the kinetic tree
+  std::uint64_t same_log = 0;                      ///< 1: every change is the one of the smallest l, in order
+  std::uint64_t bottom_up_values = 0;              ///< of the strategy bottom_up on the same topology
+  /// Frame by frame: those in which the kinetic tree writes more values than bottom-up, those in which some
+  /// bound changes hands more than once, and those of the former that are not of the latter.
+  std::uint64_t worse_frames = 0, repeated_frames = 0, worse_without_repeat = 0;
+  std::uint64_t most_of_bound = 0;  ///< changes of one bound in one frame
+  double worst_share = 0;           ///< of kinetic values over bottom-up's in one frame
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FrameRun, scene, triangles, l, frames, events, values, same_log,
+                                   bottom_up_values, worse_frames, repeated_frames, worse_without_repeat,
+                                   most_of_bound, worst_share)
+
+/// All vertices moved by the same step per keyframe.
+struct TranslationRun {
+  std::string scene;
+  std::uint64_t exact = 0;  ///< 1: no coordinate was rounded
+  std::uint64_t triangles = 0, vertices = 0, keyframes = 0;
+  std::uint64_t rounded = 0;  ///< keyframe coordinates that are not where the translation takes them
+  std::uint64_t events = 0;
+  std::uint64_t separated_ties = 0;  ///< events of vertices that had one coordinate when their segment began
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TranslationRun, scene, exact, triangles, vertices, keyframes, rounded,
+                                   events, separated_ties)
+
+/// Changes of flight plans at keyframes (where the stored position is the plan's) and at frames between them
+/// (where it is the plan's, rounded).
+struct PlanRun {
+  std::string scene;
+  std::uint64_t triangles = 0, updates = 0, updates_at_keyframes = 0, changed_plans = 0;
+  std::uint64_t topology_changes = 0;                   ///< updates after which nodes or primitives differ
+  std::uint64_t invalid_before = 0, invalid_after = 0;  ///< realisers exceeded by a vertex, exact
+  std::uint64_t moved_at_keyframes = 0, moved_between = 0;  ///< realisers that the update itself changed
+  std::string violation;                                    ///< of the envelopes between updates
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PlanRun, scene, triangles, updates, updates_at_keyframes, changed_plans,
+                                   topology_changes, invalid_before, invalid_after, moved_at_keyframes,
+                                   moved_between, violation)
+
+/// Hierarchies that contain everything without being tight, beside the kinetic tree of the same topology.
+struct LooseRun {
+  std::string scene;
+  std::uint64_t triangles = 0, bounds = 0, l = 0, frames = 0, segments = 0;
+  std::uint64_t swept_outside = 0, linear_outside = 0;  ///< (node, frame) pairs that do not contain a vertex
+  double swept_looseness = 0, linear_looseness = 0;     ///< summed area over tight, minus one
+  std::uint64_t swept_values = 0;                       ///< computed once, before the clip
+  std::uint64_t swept_updates = 0;                      ///< after that
+  std::uint64_t linear_values = 0;                      ///< computed at keyframes
+  std::uint64_t linear_updates = 0;                     ///< between them
+  std::uint64_t kinetic_events = 0, kinetic_values = 0, bottom_up_values = 0;
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LooseRun, scene, triangles, bounds, l, frames, segments, swept_outside,
+                                   linear_outside, swept_looseness, linear_looseness, swept_values,
+                                   swept_updates, linear_values, linear_updates, kinetic_events,
+                                   kinetic_values, bottom_up_values)
+
+/// How the number of events of a family of scenes grows with its vertices.
+struct GrowthFit {
+  std::string scene;
+  std::vector<std::uint64_t> triangles, vertices, events;
+  double exponent = 0, low = 0, high = 0;  ///< of events ~ (n log2 n)^exponent, with its 95% interval
+  double constant = 0;                     ///< of events ~ constant n log2 n
+  double worst = 0;                        ///< largest relative residual of that
+  std::vector<double> residuals;           ///< events / (constant n log2 n) - 1
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(GrowthFit, scene, triangles, vertices, events, exponent, low, high,
+                                   constant, worst, residuals)
+
+}  // namespace kbvh::theory

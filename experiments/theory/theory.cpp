@@ -1,0 +1,273 @@
+#include "experiments/theory/theory.hpp"
+
+#include <fstream>
+#include <optional>
+
+#include "experiments/io/animated_mesh.hpp"
+#include "experiments/machine.hpp"
+#include "experiments/text.hpp"
+#include "experiments/theory/judge.hpp"
+#include "experiments/theory/measure_counts.hpp"
+#include "experiments/theory/measure_exact.hpp"
+#include "experiments/theory/theory_scenes.hpp"
+
+namespace kbvh::theory {
+
+using nlohmann::json;
+
+TheoryOptions quick_theory() {
+  return {};
+}
+
+TheoryOptions full_theory() {
+  TheoryOptions options;
+  options.sizes = {250, 500, 1000, 2000, 4000, 8000, 16000, 32000, 65000, 130000, 260000, 580000};
+  options.keyframes = 60;
+  options.exact_limit = 16000;
+  options.simulation_limit = 65000;
+  options.sequence_keyframes = 0;
+  return options;
+}
+
+MeasurementStore::MeasurementStore(std::filesystem::path file, std::string program)
+    : file_(std::move(file)), program_(std::move(program)) {
+  if (file_.empty()) return;
+  std::ifstream in(file_);
+  for (std::string line; std::getline(in, line);) {
+    // The last line of a run that was stopped may be incomplete.
+    const json record = json::parse(line, nullptr, false);
+    if (record.is_object() && record.value("program", "") == program_)
+      kept_[record.value("key", "")] = record["value"];
+  }
+  // What follows must not be glued to a half line.
+  std::ofstream out(file_, std::ios::app);
+  out << "\n" << std::flush;
+  if (!out) throw io::InputError("cannot write " + file_.string());
+}
+
+const json* MeasurementStore::find(const std::string& key) const {
+  const auto at = kept_.find(key);
+  return at == kept_.end() ? nullptr : &*at;
+}
+
+void MeasurementStore::keep(const std::string& key, const json& value) {
+  kept_[key] = value;
+  if (file_.empty()) return;
+  std::ofstream out(file_, std::ios::app);
+  out << json{{"program", program_}, {"key", key}, {"value", value}}.dump() << "\n" << std::flush;
+  if (!out) throw io::InputError("cannot write " + file_.string());
+}
+
+namespace {
+
+constexpr std::uint32_t ls[] = {1, 3, 10, 30, 100};
+
+/// Makes a scene once, and only if something is to be measured on it.
+class LazyScene {
+ public:
+  explicit LazyScene(std::function<Scene<float>()> make) : make_(std::move(make)) {}
+  const Scene<float>& operator()() {
+    if (!scene_) scene_ = make_();
+    return *scene_;
+  }
+
+ private:
+  std::function<Scene<float>()> make_;
+  std::optional<Scene<float>> scene_;
+};
+
+class Runner {
+ public:
+  Runner(const TheoryOptions& options, MeasurementStore& store, const TheoryProgress& progress)
+      : options_(&options), store_(&store), progress_(&progress) {}
+
+  TheoryReport run() {
+    for (const std::string& family : options_->scenes) {
+      bool too_large = false;
+      for (std::size_t i = 0; i < options_->sizes.size(); ++i) {
+        const std::uint32_t size = options_->sizes[i];
+        if (family == "tablecloth" && size > options_->simulation_limit) {
+          too_large = true;
+          continue;
+        }
+        family_at(family, size);
+      }
+      if (too_large)
+        report_.notes.push_back(family + " is simulated, and left out above " +
+                                number(std::uint64_t(options_->simulation_limit)) + " triangles.");
+    }
+    for (const std::string& name : options_->sequences) sequence(name);
+    constructed();
+    report_.fits = fit_growth(report_.counts, 6);
+    judge();
+    return std::move(report_);
+  }
+
+ private:
+  /// Which size is used where one is enough: the smallest from `wanted` on, else the largest.
+  bool chosen(std::uint32_t size, std::uint32_t wanted) const {
+    std::uint32_t best = 0, largest = 0;
+    for (const std::uint32_t s : options_->sizes) {
+      largest = std::max(largest, s);
+      if (s >= wanted && (best == 0 || s < best)) best = s;
+    }
+    return size == (best == 0 ? largest : best);
+  }
+
+  template <class Measurement, class Make>
+  Measurement get(const std::string& what, const std::string& scene, const std::string& parameters,
+                  Make make) {
+    if (*progress_) (*progress_)(what + ": " + scene + " " + parameters);
+    return store_->get<Measurement>(what + "|" + scene + "|" + parameters, make);
+  }
+
+  void family_at(const std::string& family, std::uint32_t size) {
+    const std::string parameters = std::to_string(size) + "x" + std::to_string(options_->keyframes);
+    LazyScene scene([&] {
+      Scene<float> made = moving_scene(family, size, options_->keyframes);
+      made.name = family;
+      return made;
+    });
+    report_.counts.push_back(
+        get<CountRun>("counts", family, parameters, [&] { return measure_counts(scene()); }));
+    if (size == exact_size())
+      exact_.push_back(get<ExactRun>("exact envelopes", family,
+                                     parameters + "+" + std::to_string(options_->instants),
+                                     [&] { return measure_exact(scene(), options_->instants); }));
+    if (!chosen(size, 500)) return;
+    const auto frames =
+        get<std::vector<FrameRun>>("frames", family, parameters, [&] { return measure_frames(scene(), ls); });
+    report_.frames.insert(report_.frames.end(), frames.begin(), frames.end());
+    loose_.push_back(
+        get<LooseRun>("loose boxes", family, parameters, [&] { return measure_loose(scene(), 10); }));
+    if (report_.counts.back().events > 0)
+      plans_.push_back(get<PlanRun>("plan changes", family, parameters, [&] {
+        return measure_plan_changes(scene(), velocity_script(scene(), 10, 20), 10);
+      }));
+  }
+
+  /// The largest size that is held against exact envelopes.
+  std::uint32_t exact_size() const {
+    std::uint32_t largest = 0;
+    for (const std::uint32_t s : options_->sizes)
+      if (s <= options_->exact_limit) largest = std::max(largest, s);
+    return largest;
+  }
+
+  void sequence(const std::string& name) {
+    const std::string parameters = std::to_string(options_->sequence_keyframes) + " keyframes";
+    auto loaded = data_scene(name, options_->sequence_keyframes);
+    if (!loaded) {
+      report_.notes.push_back("There is no sequence " + name + " in the data folder; it is left out.");
+      return;
+    }
+    const Scene<float>& scene = *loaded;
+    report_.counts.push_back(
+        get<CountRun>("counts", name, parameters, [&] { return measure_counts(scene); }));
+    exact_.push_back(get<ExactRun>("exact envelopes", name,
+                                   parameters + "+" + std::to_string(options_->instants),
+                                   [&] { return measure_exact(scene, options_->instants); }));
+    const std::uint32_t l = 10;
+    const auto frames = get<std::vector<FrameRun>>("frames", name, parameters, [&] {
+      return measure_frames(scene, std::vector<std::uint32_t>{1, l});
+    });
+    report_.frames.insert(report_.frames.end(), frames.begin(), frames.end());
+    loose_.push_back(get<LooseRun>("loose boxes", name, parameters, [&] { return measure_loose(scene, l); }));
+  }
+
+  void constructed() {
+    for (const std::uint32_t triangles : {1000u, 4000u})
+      fans_.push_back(get<CountRun>("counts", "fan", std::to_string(triangles),
+                                    [&] { return measure_counts(fan_scene(triangles)); }));
+    constructed_ = get<std::vector<FrameRun>>("frames", "tangents", "16", [&] {
+      return measure_frames(tangents_scene(16), std::vector<std::uint32_t>{1});
+    });
+    const std::string parameters = "5000x" + std::to_string(options_->keyframes);
+    translations_.push_back(get<TranslationRun>("translation", "near", parameters, [&] {
+      const Translation near = near_translation(5000, options_->keyframes);
+      return measure_translation(near.scene, near.rounded);
+    }));
+    translations_.push_back(get<TranslationRun>("translation", "far", parameters, [&] {
+      const Translation far = far_translation(5000, options_->keyframes);
+      return measure_translation(far.scene, far.rounded);
+    }));
+  }
+
+  void judge() {
+    std::vector<Claim>& claims = report_.claims;
+    claims.push_back(judge_valid_at_all_times(exact_));
+    claims.push_back(judge_compact(report_.counts));
+    claims.push_back(judge_responsive(report_.counts));
+    claims.push_back(judge_local(report_.counts, fans_));
+    claims.push_back(judge_efficient(report_.counts, exact_));
+    claims.push_back(judge_number_of_events(report_.counts, exact_, report_.fits));
+    claims.push_back(judge_independent_of_frames(report_.frames));
+    claims.push_back(judge_optimal(exact_, loose_));
+    claims.push_back(judge_never_more_updates(report_.frames, constructed_));
+    claims.push_back(judge_translation(translations_));
+    claims.push_back(undecided({.id = "T11",
+                                .title = "BoxTree: at most two events per node, less memory, fewer events",
+                                .citation = "section 6"},
+                               "The strategy kinetic_boxtree is not built."));
+    claims.push_back(undecided({.id = "T12",
+                                .title = "BoxTree: compact, local, efficient; responsive in 1D only",
+                                .citation = "Theorem 5"},
+                               "The strategy kinetic_boxtree is not built."));
+    claims.push_back(undecided({.id = "T13",
+                                .title = "separation list: valid at every time; storage and costs as stated",
+                                .citation = "Theorem 6, Definition 2"},
+                               "The strategy kinetic_separation_list is not built."));
+    claims.push_back(undecided({.id = "T14",
+                                .title = "the number of overlapping pairs is nearly linear in practice",
+                                .citation = "section 7"},
+                               "The strategy kinetic_separation_list is not built."));
+    claims.push_back(judge_plan_changes(plans_));
+    claims.push_back(judge_lower_bound(loose_));
+  }
+
+  const TheoryOptions* options_;
+  MeasurementStore* store_;
+  const TheoryProgress* progress_;
+  TheoryReport report_;
+  std::vector<CountRun> fans_;
+  std::vector<ExactRun> exact_;
+  std::vector<FrameRun> constructed_;
+  std::vector<LooseRun> loose_;
+  std::vector<PlanRun> plans_;
+  std::vector<TranslationRun> translations_;
+};
+
+}  // namespace
+
+TheoryReport run_theory(const TheoryOptions& options, MeasurementStore& store,
+                        const TheoryProgress& progress) {
+  return Runner(options, store, progress).run();
+}
+
+json to_json(const TheoryReport& report, const TheoryOptions& options) {
+  json claims = json::array();
+  for (const Claim& claim : report.claims) claims.push_back(to_json(claim));
+  json counts = report.counts;
+  for (std::size_t i = 0; i < report.counts.size(); ++i)
+    counts[i]["queue_steps_bound"] = queue_steps_bound(report.counts[i]);
+  return {{"schema", "kbvh-theory-1"},
+          {"commit", experiments::commit()},
+          {"dirty", experiments::dirty()},
+          {"scalar", "float"},
+          {"options",
+           {{"scenes", options.scenes},
+            {"sizes", options.sizes},
+            {"keyframes", options.keyframes},
+            {"exact_limit", options.exact_limit},
+            {"simulation_limit", options.simulation_limit},
+            {"instants", options.instants},
+            {"sequences", options.sequences},
+            {"sequence_keyframes", options.sequence_keyframes}}},
+          {"claims", claims},
+          {"counts", counts},
+          {"fits", report.fits},
+          {"frames", report.frames},
+          {"notes", report.notes}};
+}
+
+}  // namespace kbvh::theory

@@ -1,0 +1,75 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "experiments/theory/claim.hpp"
+#include "experiments/theory/measurements.hpp"
+
+namespace kbvh::theory {
+
+/// How much is measured.
+struct TheoryOptions {
+  std::vector<std::string> scenes{"tablecloth", "waving_sheet", "expanding_sphere", "turning_box",
+                                  "random_soups"};
+  std::vector<std::uint32_t> sizes{250, 500, 1000, 2000, 4000, 8000};  ///< triangles
+  std::uint32_t keyframes = 30;
+  std::uint32_t exact_limit = 1000;       ///< largest size held against exact envelopes; a clip per scene
+  std::uint32_t simulation_limit = 8000;  ///< largest size of scenes that are simulated: O(triangles^1.5)
+  std::uint32_t instants = 200;           ///< audited between keyframes
+  std::vector<std::string> sequences{"robot-Dance", "MorphStressTest"};
+  std::uint32_t sequence_keyframes = 8;  ///< of the data folder's sequences; 0: all
+};
+
+/// In CI, in under a minute.
+TheoryOptions quick_theory();
+/// By hand: counting up to 580k triangles, exact envelopes up to 16k and whole sequences. Hours.
+TheoryOptions full_theory();
+
+/// What was found.
+struct TheoryReport {
+  std::vector<Claim> claims;  ///< T1 to T16
+  std::vector<CountRun> counts;
+  std::vector<GrowthFit> fits;
+  std::vector<FrameRun> frames;
+  std::vector<std::string> notes;  ///< what was left out, one sentence each
+};
+
+/// Told what is being measured; may be empty.
+using TheoryProgress = std::function<void(const std::string&)>;
+
+/// Measurements that are kept as they are made, so that a run that was stopped goes on where it was. A folder
+/// belongs to one version of the program: records of another are not used.
+class MeasurementStore {
+ public:
+  /// Reads `file`, if it exists, and appends to it. An empty path keeps nothing. Throws io::InputError if it
+  /// cannot be written.
+  MeasurementStore(std::filesystem::path file, std::string program);
+
+  /// The measurement of that name: as it was kept, or made now.
+  template <class Measurement, class Make>
+  Measurement get(const std::string& key, Make&& make) {
+    if (const nlohmann::json* kept = find(key)) return kept->get<Measurement>();
+    Measurement measurement = make();
+    keep(key, measurement);
+    return measurement;
+  }
+
+ private:
+  const nlohmann::json* find(const std::string& key) const;
+  void keep(const std::string& key, const nlohmann::json& value);
+  std::filesystem::path file_;
+  std::string program_;
+  nlohmann::json kept_ = nlohmann::json::object();
+};
+
+/// Measures and judges. Throws io::InputError on scenes that do not exist.
+TheoryReport run_theory(const TheoryOptions& options, MeasurementStore& store,
+                        const TheoryProgress& progress = {});
+
+/// theory.json, see RESULTS.md.
+nlohmann::json to_json(const TheoryReport& report, const TheoryOptions& options);
+
+}  // namespace kbvh::theory

@@ -1,0 +1,174 @@
+#include "experiments/theory/theory_scenes.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "experiments/environment.hpp"
+#include "experiments/io/load.hpp"
+#include "experiments/scene_spec.hpp"
+#include "experiments/scenes/shapes.hpp"
+
+namespace kbvh::theory {
+
+namespace {
+
+Scene<float> only_moving(Scene<float> scene) {
+  std::erase_if(scene.bodies, [](const Body<float>& body) { return !body.plans.moving(); });
+  scene.pairs = all_pairs(scene.bodies);
+  return scene;
+}
+
+Scene<float> scene_of(const io::AnimatedMesh& mesh) {
+  experiments::LoadedScene loaded;
+  loaded.name = mesh.name;
+  loaded.meshes = {mesh};
+  loaded.sources = {mesh.name};
+  return experiments::assemble<float>(loaded);
+}
+
+io::AnimatedMesh sphere(std::uint32_t triangles) {
+  // Multiples of 2^-12: steps of 2^-6 stay on the lattice, and within float's 24 bits, below 2^12.
+  return scenes::snapped(scenes::icosphere(triangles, {0, 0, 0}, 1.0), 12);
+}
+
+}  // namespace
+
+Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes,
+                          const experiments::MakeProgress& progress) {
+  experiments::SceneSpec spec;
+  spec.builtin = family;
+  spec.options.triangles = triangles;
+  spec.options.keyframes = keyframes;
+  // Bodies at rest are left out: as few triangles of them as possible, but for clouds, which come in pairs.
+  if (family != "random_soups" && family != "passing_spheres") spec.options.obstacle_triangles = 20;
+  // The cloth's table decides what the cloth does; it has its usual number.
+  if (family == "tablecloth") spec.options.obstacle_triangles = 0;
+  experiments::find_builtin_scene(family);
+  return only_moving(experiments::assemble<float>(experiments::load(spec, progress)));
+}
+
+std::optional<Scene<float>> data_scene(const std::string& name, std::size_t keyframes) {
+  const auto folder = experiments::data_folder() / "sequences" / name;
+  std::error_code error;
+  if (!std::filesystem::exists(folder / "mesh.obj", error)) return {};
+  io::AnimatedMesh mesh = io::load_animated_mesh({folder / "mesh.obj", folder / "motion.pc2", "", 30});
+  if (keyframes > 0 && keyframes < mesh.keyframe_times.size()) {
+    mesh.keyframe_times.resize(keyframes);
+    mesh.positions.resize(std::size_t(3) * keyframes * mesh.vertex_count);
+  }
+  Scene<float> scene = scene_of(mesh);
+  scene.name = name;
+  return scene;
+}
+
+Scene<float> tangents_scene(std::uint32_t vertices) {
+  // The tangent of x = c s^2 at s = a, over s from 0 to 1, goes from -c a^2 to c (2 a - a^2). With a = i / 16
+  // and c = 256 that is from -i^2 to 32 i - i^2: whole numbers. It is the highest for s around a.
+  const float scale = 32.0f;
+  std::vector<float> positions;
+  for (int k = 0; k < 2; ++k)
+    for (std::uint32_t i = 0; i < vertices; ++i) {
+      const float tangent = float(i);
+      positions.push_back(float(k) * scale * tangent - tangent * tangent);
+      positions.push_back(0.5f * tangent);
+      positions.push_back(0);
+    }
+  Scene<float> scene;
+  scene.name = "tangents";
+  Body<float> body;
+  body.name = "polygon";
+  std::vector<std::uint32_t> corners(vertices);
+  for (std::uint32_t i = 0; i < vertices; ++i) corners[i] = i;
+  body.primitives.add(corners);
+  body.plans = FlightPlans<float>(vertices, {0.0, 1.0}, std::move(positions));
+  scene.bodies.push_back(std::move(body));
+  validate(scene);
+  return scene;
+}
+
+Scene<float> fan_scene(std::uint32_t triangles) {
+  Scene<float> scene;
+  scene.name = "fan";
+  Body<float> body;
+  body.name = "fan";
+  std::vector<float> positions{0, 0, 0};
+  for (std::uint32_t i = 0; i <= triangles; ++i) {
+    const double turns = double(i) / double(triangles + 1);
+    positions.push_back(float(scenes::cosine_of_turns(turns)));
+    positions.push_back(float(scenes::sine_of_turns(turns)));
+    positions.push_back(0);
+    if (i < triangles) body.primitives.add(std::vector<std::uint32_t>{0, i + 1, i + 2});
+  }
+  std::vector<float> twice = positions;
+  twice.insert(twice.end(), positions.begin(), positions.end());
+  body.plans = FlightPlans<float>(triangles + 2, {0.0, 1.0}, std::move(twice));
+  scene.bodies.push_back(std::move(body));
+  validate(scene);
+  return scene;
+}
+
+namespace {
+Translation translation(const io::AnimatedMesh& start, const std::array<double, 3>& from,
+                        const std::array<double, 3>& step, std::uint32_t keyframes, const std::string& name) {
+  Translation result;
+  io::AnimatedMesh mesh = start;
+  mesh.name = name;
+  mesh.keyframe_times = scenes::keyframe_times(keyframes, 30.0);
+  mesh.positions.clear();
+  for (std::uint32_t k = 0; k < keyframes; ++k)
+    for (std::size_t i = 0; i < std::size_t(3) * mesh.vertex_count; ++i) {
+      // Exact in double: few bits, and a step that is a multiple of 2^-20.
+      const double exact = start.positions[i] + from[i % 3] + double(k) * step[i % 3];
+      const double stored = scenes::rounded_to_float(exact);
+      result.rounded += stored != exact;
+      mesh.positions.push_back(stored);
+    }
+  result.scene = scene_of(mesh);
+  return result;
+}
+}  // namespace
+
+Translation near_translation(std::uint32_t triangles, std::uint32_t keyframes) {
+  return translation(sphere(triangles), {0, 0, 0}, {0.015625, 0.03125, -0.046875}, keyframes,
+                     "translation near the origin");
+}
+
+Translation far_translation(std::uint32_t triangles, std::uint32_t keyframes) {
+  // Float's spacing at 1e6 is 2^-4; the steps are multiples of 2^-12 only.
+  const double unit = 0x1p-12;
+  return translation(sphere(triangles), {1e6, 1e6, -1e6}, {101 * unit, 57 * unit, -83 * unit}, keyframes,
+                     "translation at 1e6");
+}
+
+PlanScript<float> velocity_script(const Scene<float>& scene, std::uint32_t frames_per_keyframe,
+                                  std::uint32_t changed) {
+  const scenes::SeededNoise noise(2006);
+  std::uint64_t index = 0;
+  PlanScript<float> script;
+  const std::vector<double> frames = frame_times(scene, frames_per_keyframe);
+  const std::vector<double> keyframes = overlaid_keyframes(scene);
+  for (std::size_t f = 1; f + 1 < frames.size(); ++f) {
+    const auto after = std::upper_bound(keyframes.begin(), keyframes.end(), frames[f]);
+    const std::size_t k = std::size_t(after - keyframes.begin()) - 1;
+    const bool at_keyframe = keyframes[k] == frames[f];
+    const std::size_t half = frames_per_keyframe / 2;
+    const bool in_the_middle = !at_keyframe && f >= half && frames[f - half] == keyframes[k];
+    if (!(at_keyframe && k % 4 == 2) && !(in_the_middle && k % 4 == 0)) continue;
+    PlanScript<float>::Step step{frames[f], {}};
+    std::vector<std::vector<bool>> taken;
+    for (const auto& body : scene.bodies) taken.emplace_back(body.plans.vertex_count(), false);
+    for (std::uint32_t i = 0; i < changed; ++i) {
+      PlanChange<float> change;
+      change.body = std::uint32_t(noise.bits(index++) % scene.bodies.size());
+      change.vertex = std::uint32_t(noise.bits(index++) % scene.bodies[change.body].plans.vertex_count());
+      for (float& v : change.velocity) v = float(0.25 * noise.signed_unit(index++));
+      if (taken[change.body][change.vertex]) continue;
+      taken[change.body][change.vertex] = true;
+      step.changes.push_back(change);
+    }
+    script.steps.push_back(std::move(step));
+  }
+  return script;
+}
+
+}  // namespace kbvh::theory

@@ -1,0 +1,40 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/scene.hpp"
+#include "core/session.hpp"
+#include "experiments/builtin_scenes.hpp"
+
+namespace kbvh::theory {
+
+/// The bodies of a built-in scene that move: those at rest have no events. Throws io::InputError.
+Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes,
+                          const experiments::MakeProgress& progress = {});
+
+/// A sequence of the data folder, with at most so many keyframes (0: all); nothing if it is not there.
+std::optional<Scene<float>> data_scene(const std::string& name, std::size_t keyframes);
+
+/// One polygon of `vertices` vertices whose x are tangents to a parabola: over one segment, of one second,
+/// its upper x bound passes through all of them (claim T9). All coordinates are exact in float.
+Scene<float> tangents_scene(std::uint32_t vertices);
+
+/// A fan: `triangles` around one vertex, at rest. Its hub takes part in every leaf's certificates (T4).
+Scene<float> fan_scene(std::uint32_t triangles);
+
+/// A sphere's vertices on a lattice, moved by lattice steps: a translation that float holds exactly, near the
+/// origin. `far` moves it to coordinates of 1e6, by steps that are not multiples of float's spacing there.
+struct Translation {
+  Scene<float> scene;
+  std::uint64_t rounded = 0;  ///< coordinates of keyframes that differ from those of the exact translation
+};
+Translation near_translation(std::uint32_t triangles, std::uint32_t keyframes);
+Translation far_translation(std::uint32_t triangles, std::uint32_t keyframes);
+
+/// Velocities that change at run time: at every fourth keyframe, and in the middle of every fourth interval,
+/// up to `changed` vertices get a plan of their own. Deterministic.
+PlanScript<float> velocity_script(const Scene<float>& scene, std::uint32_t frames_per_keyframe,
+                                  std::uint32_t changed);
+
+}  // namespace kbvh::theory

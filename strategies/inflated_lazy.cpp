@@ -1,0 +1,301 @@
+// Inflated boxes, updated lazily (Mezger, Kimmerle & Etzmuss 2003): leaf boxes are larger than their vertices
+// by a margin, and stay as they are until a vertex may have moved through it. With a bound on the motion of a
+// body nothing is looked at before the margin can have been used up, not even positions: most frames cost one
+// addition. Without it every frame reads every vertex to learn which boxes were left.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/hierarchy/stored_hierarchy.hpp"
+#include "core/kernels/wide_inflate.hpp"
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+enum class MarginKind : std::uint8_t { tuned, absolute, relative };
+
+/// The smallest number above, so that sums of bounds stay bounds.
+double above(double value) {
+  return std::nextafter(value, std::numeric_limits<double>::infinity());
+}
+
+/// What is known of one body since its vertices were last looked at.
+template <class S>
+struct InflatedBody {
+  S margin = 0;          // of the boxes made last
+  double leaf_size = 0;  // mean side of a leaf's box at the reset, before inflation
+  double room = 0;       // every vertex was at least so far inside all boxes above it, at the last look
+  double moved = 0;      // no vertex has moved further since then
+  double rounding = 0;   // a stored position differs from the plan by at most this
+  double step = 0;       // motion from one frame to the next, as a bound or as observed
+  std::uint64_t leaves = 0;
+  std::uint64_t tests = 0;       // box tests of the last query that had to do with it
+  bool looked = false;           // at this frame
+  bool query_takes_all = false;  // the last query after a frame without a look evaluated all positions itself
+  bool changed = false;          // plans of its own: it is no body at rest any more
+  std::vector<std::uint8_t> remade;
+};
+
+template <class S, class Count>
+class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
+  using Base = StoredHierarchyStrategy<S, Count>;
+  using Body = InflatedBody<S>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::step_bound;
+  InflatedLazy(const SceneView<S>& scene, const SteppedMotion<S>& motion, Topologies topologies,
+               const Params& params)
+      : Base(scene, motion, std::move(topologies), params),
+        stepped_(motion),
+        kind_(params.word("margin_is") == "tuned"      ? MarginKind::tuned
+              : params.word("margin_is") == "absolute" ? MarginKind::absolute
+                                                       : MarginKind::relative),
+        margin_(params.number("margin")),
+        bounded_(params.word("bound") == "step") {
+    bodies_.resize(scene.body_count());
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      bodies_[body].remade.assign(this->hierarchies_[body].node_count(), 0);
+  }
+
+  void reset(double t) override {
+    this->start_at(t);
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+      Body& body = bodies_[index];
+      this->hierarchies_[index].positions_changed();
+      body.step = 0;
+      body.tests = 0;
+      body.margin = 0;
+      body.query_takes_all = false;
+      look(index, WhichStay::none);
+      measure_leaves(index);
+      if (!may_move(index)) continue;  // boxes of bodies at rest stay tight
+      body.margin = wanted_margin(index);
+      if (body.margin > 0) look(index, WhichStay::none);
+    }
+    this->count_.table = {};
+    first_fetch_ = this->sampled_.fetched();
+  }
+
+  void advance(double t) override {
+    const double before = this->time();
+    this->move_to(t);
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+      bodies_[index].looked = false;
+      if (!may_move(index)) continue;
+      this->hierarchies_[index].positions_changed();
+      if (bounded_)
+        advance_bounded(index, before, t);
+      else
+        advance_scanning(index);
+    }
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+    QueryStatus status;
+    for (Body& body : bodies_) body.tests = 0;
+    for (const BodyPair& pair : this->scene_.pairs()) {
+      std::uint64_t tests = 0;
+      status.pending += this->query_
+                            .run(this->hierarchies_[pair.first], pair.first, this->hierarchies_[pair.second],
+                                 pair.second, this->scene_, this->sampled_, budget, out, tests)
+                            .pending;
+      bodies_[pair.first].tests += tests;
+      bodies_[pair.second].tests += tests;
+      this->count_.add(Counter::box_tests, tests);
+    }
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index)
+      if (!bodies_[index].looked) bodies_[index].query_takes_all = this->sampled_.all_current(index);
+    return status;
+  }
+
+  /// The way so far stays bounded; from the stored position on, rounding starts over.
+  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
+    if (t != this->time())
+      throw std::invalid_argument("plans changed at t = " + std::to_string(t) +
+                                  ", but the hierarchy stands at " + std::to_string(this->time()));
+    for (const PlanChange<S>& change : changes) bodies_[change.body].changed = true;
+    for (Body& body : bodies_)
+      if (body.changed) body.moved = above(body.moved + body.rounding);
+  }
+
+ protected:
+  Counters counted() const override {
+    Counters table = this->count_.table;
+    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
+    return table;
+  }
+
+ private:
+  enum class WhichStay : std::uint8_t { none, inside_margin };
+
+  bool may_move(std::uint32_t index) const { return this->scene_.moving(index) || bodies_[index].changed; }
+  void update(std::uint32_t /*body*/) override {}  // `advance` is this strategy's own
+
+  void advance_bounded(std::uint32_t index, double before, double t) {
+    Body& body = bodies_[index];
+    const double way = stepped_.displacement_bound(index, before, t);
+    if (way == 0) return;  // at rest all the way: every position is what it was
+    body.moved = above(body.moved + way);
+    // The plan is at most `rounding` from the position that was looked at, and `moved` further on now. Boxes
+    // are numbers of the scalar, so that a plan inside rounds to a position inside.
+    const bool inside = above(body.moved + body.rounding) <= body.room;
+    body.step = stepped_.speed_bound(index) * (t - before);
+    if (inside && !(kind_ == MarginKind::tuned && too_large(index))) return;
+    body.margin = wanted_margin(index);
+    this->sampled_.fetch_all(index);
+    look(index, WhichStay::inside_margin);
+  }
+
+  void advance_scanning(std::uint32_t index) {
+    if (kind_ == MarginKind::tuned) bodies_[index].margin = wanted_margin(index);
+    this->sampled_.fetch_all(index);
+    look(index, WhichStay::inside_margin);
+  }
+
+  /// Reads all vertices below the leaves; makes boxes anew where the margin is used up.
+  void look(std::uint32_t index, WhichStay stay) {
+    auto& hierarchy = this->hierarchies_[index];
+    if (hierarchy.empty()) return;
+    Body& body = bodies_[index];
+    constexpr S infinity = std::numeric_limits<S>::infinity();
+    WideLook<S> state{hierarchy.arrays(),
+                      hierarchy.node_count(),
+                      this->sampled_.positions(index),
+                      body.remade.data(),
+                      body.margin,
+                      infinity,
+                      0,
+                      0,
+                      0,
+                      0,
+                      0};
+    if (stay == WhichStay::inside_margin) {
+      // Who looks at every frame makes only what was left: all that the margin allows is used. A body that
+      // can skip frames skips more if all have nearly their whole margin; what does not move stays all the
+      // same.
+      const S used = bounded_ ? body.margin / 32 : body.margin;
+      state.keep_from = body.margin - used;
+      state.keep_to = body.margin + used;
+    }
+    wide_inflate_kernels<S>(hierarchy.kernels()).of(hierarchy.topology().width)(state);
+    if (!bounded_) {
+      // The most that a side came nearer in one frame.
+      const double room_before = double(state.room_before);
+      if (stay == WhichStay::inside_margin) body.step = std::max(0.0, body.room - room_before);
+    }
+    constexpr double unit = std::numeric_limits<S>::epsilon() / 2;
+    body.room = double(state.room) * (1 - 4 * unit);
+    body.moved = 0;
+    body.looked = true;
+    const Box<S> root = hierarchy.box(0);
+    double largest = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      largest = std::max({largest, std::abs(double(root.lower[axis])), std::abs(double(root.upper[axis]))});
+    body.rounding = above(largest * unit) + double(std::numeric_limits<S>::denorm_min());
+    this->count_.add(Counter::nodes_visited, body.leaves + state.inner_boxes);
+    this->count_.add(Counter::values_written, 6 * (state.leaf_boxes + state.inner_boxes));
+    this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
+  }
+
+  /// Mean side of the leaves' boxes, which have no margin yet.
+  void measure_leaves(std::uint32_t index) {
+    const auto& hierarchy = this->hierarchies_[index];
+    double sum = 0;
+    std::uint64_t leaves = 0;
+    for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
+      if (!hierarchy.topology().nodes[node].is_leaf()) continue;
+      const Box<S> box = hierarchy.box(node);
+      for (int axis = 0; axis < 3; ++axis) sum += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
+      ++leaves;
+    }
+    bodies_[index].leaves = leaves;
+    bodies_[index].leaf_size = leaves == 0 ? 0 : sum / double(leaves);
+  }
+
+  S wanted_margin(std::uint32_t index) const {
+    const Body& body = bodies_[index];
+    double margin = margin_;
+    if (kind_ == MarginKind::relative) margin *= body.leaf_size;
+    if (kind_ == MarginKind::tuned) margin = margin_for(body, best_steps(index));
+    return S(std::min(margin, double(admissible_magnitude<S>)));
+  }
+  /// So much that it lasts for this many steps, roundings and what `look` leaves as it is included.
+  static double margin_for(const Body& body, double steps) {
+    return steps == 0 ? 0 : (steps * body.step + 4 * body.rounding) * (1 + 1.0 / 16);
+  }
+
+  // The tuned margin weighs what a look costs against what larger boxes cost the query, both by counts, so
+  // that it does not depend on a machine or its load. A margin of k steps needs one look in k + 1 frames.
+  // Where surfaces of leaves with mean side a meet, boxes that are larger by m on every side cost about (1 +
+  // m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the rest is leaves that
+  // are opened in vain).
+
+  /// What a look costs, in box tests. Positions count only if the query would not ask for them all anyhow. A
+  /// look that is due at every frame only costs what it writes.
+  double look_cost(std::uint32_t index) const {
+    constexpr double reading = 0.6, evaluating = 1.2, writing = 0.2;  // per vertex
+    const double each = !bounded_ ? writing : bodies_[index].query_takes_all ? reading : reading + evaluating;
+    return each * this->scene_.vertex_count(index);
+  }
+  static double query_cost(const Body& body, double margin) {
+    const double side = 1 + margin / body.leaf_size;
+    return double(body.tests) / (1 + 0.4 * double(body.margin) / body.leaf_size) * side * side;
+  }
+  double best_steps(std::uint32_t index) const {
+    const Body& body = bodies_[index];
+    if (!(body.leaf_size > 0)) return 0;
+    double best = 0, least = std::numeric_limits<double>::infinity();
+    for (const double steps : {0., 1., 2., 3., 4., 6., 8., 12., 16., 24., 32., 48., 64.}) {
+      const double cost = look_cost(index) / (steps + 1) + query_cost(body, margin_for(body, steps));
+      if (!(cost < least)) continue;
+      best = steps;
+      least = cost;
+    }
+    return best;
+  }
+  /// The last query lost more to the present margin, against the best one now, than a look costs.
+  bool too_large(std::uint32_t index) const {
+    const Body& body = bodies_[index];
+    if (!(body.leaf_size > 0)) return false;
+    return query_cost(body, double(body.margin)) - query_cost(body, margin_for(body, best_steps(index))) >
+           look_cost(index);
+  }
+
+  SteppedMotion<S> stepped_;
+  MarginKind kind_;
+  double margin_;
+  bool bounded_;
+  std::vector<Body> bodies_;
+  std::uint64_t first_fetch_ = 0;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(inflated_lazy) {
+  using namespace kbvh;
+  return {make_entry<InflatedLazy>({
+      .id = "inflated_lazy",
+      .title = "inflated boxes, lazy refit",
+      .family = "lazy",
+      .citation = "Mezger, Kimmerle & Etzmuss 2003",
+      .tightness = Tightness::conservative,
+      .positions = PositionUse::fetched,
+      .can = {.plan_changes = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+      .parameters = {{"margin_is",
+                      "tuned",
+                      {"tuned", "absolute", "relative"},
+                      "what `margin` means: nothing, for it follows from the motion and the last query's "
+                      "work; units of the "
+                      "scene; or a fraction of the mean side of the leaves' boxes at the reset"},
+                     {"margin", "0.1", {}, "by how much leaf boxes are inflated on every side"},
+                     {"bound",
+                      "step",
+                      {"step", "scan"},
+                      "how it knows whether a margin is used up: from the caller's bound on the motion, "
+                      "which skips frames, "
+                      "or by reading every vertex"}},
+  })};
+}

@@ -1,0 +1,225 @@
+// The kinetic BoxTree (Z&W 2006, s.6), with the errata of the reproduction: two planes per inner node, all
+// other sides inherited, valid at every time, updated at events only; parts that have degenerated can be
+// rebuilt.
+
+#include <variant>
+
+#include "core/hierarchy/boxtree_degradation.hpp"
+#include "core/kinetic/kinetic_boxtree.hpp"
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class Count>
+class KineticBox final : public Strategy<S> {
+ public:
+  static constexpr Foresight foresight = Foresight::whole_clip;
+
+  KineticBox(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+             const Params& params)
+      : Strategy<S>(scene, motion),
+        rebuilds_(params.word("rebuild") != "never"),
+        threshold_(params.number("degradation")),
+        frames_per_check_(std::uint64_t(params.number("check_every"))) {
+    if (rebuilds_) method_ = build_method(params.word("rebuild"));
+    for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
+    if (rebuilds_) degradations_.resize(topologies.size());
+    if (params.word("queue") == AvlQueue<S>::name)
+      forest_ = std::make_unique<KineticBoxForest<S, AvlQueue<S>, Count>>(scene, motion,
+                                                                          std::move(topologies), count_);
+    else
+      forest_ = std::make_unique<KineticBoxForest<S, BinaryHeapQueue<S>, Count>>(
+          scene, motion, std::move(topologies), count_);
+  }
+
+  void reset(double t) override {
+    this->start_at(t);
+    on_forest([&](auto& forest) { forest.reset(t); });
+    new_frame();
+    frames_ = 0;
+    for (std::uint32_t body = 0; body < degradations_.size(); ++body)
+      on_forest([&](auto& forest) {
+        const auto& tree = forest.tree(body);
+        degradations_[body].start(tree.topology(), all_boxes(tree, body));
+      });
+    // What starting costs is not what running costs: counts begin here.
+    count_.table = {};
+    first_step_ = on_forest([](auto& forest) { return forest.queue().steps(); });
+    first_fetch_ = this->sampled_.fetched();
+  }
+
+  void advance(double t) override {
+    this->move_to(t);
+    on_forest([&](auto& forest) { forest.advance(t); });
+    new_frame();
+    if (rebuilds_ && ++frames_ % frames_per_check_ == 0)
+      for (std::uint32_t body = 0; body < degradations_.size(); ++body)
+        if (this->scene_.moving(body) || plans_changed_) rebuild_degenerate(body);
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+    QueryStatus status;
+    on_forest([&](auto& forest) {
+      for (const BodyPair& pair : this->scene_.pairs()) {
+        const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
+        LeafPairs<S, Count> several(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
+                                    b.topology(), count_, out);
+        // Boxes of leaves are not tight: primitives have to show that theirs overlap.
+        const auto leaves = [&](std::uint32_t leaf_a, std::uint32_t leaf_b) {
+          const TopologyNode na = a.topology().nodes[leaf_a], nb = b.topology().nodes[leaf_b];
+          if (na.count() == 1 && nb.count() == 1) {
+            count_.add(Counter::box_tests);
+            if (!tight_box(a, na, pair.first).overlaps(tight_box(b, nb, pair.second))) return;
+          }
+          several(leaf_a, leaf_b);
+        };
+        status.pending += traverse(a.topology(), boxes(a, pair.first), b.topology(), boxes(b, pair.second),
+                                   stack_, count_, budget, leaves)
+                              .pending;
+      }
+    });
+    return status;
+  }
+
+  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
+    if (t != this->time())
+      throw std::invalid_argument("plans changed at t = " + std::to_string(t) +
+                                  ", but the hierarchy stands at " + std::to_string(this->time()));
+    for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
+      changed_.clear();
+      for (const PlanChange<S>& change : changes)
+        if (change.body == body) changed_.push_back(change.vertex);
+      if (changed_.empty()) continue;
+      std::sort(changed_.begin(), changed_.end());
+      changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+      on_forest([&](auto& forest) { forest.tree(body).plans_changed(t, changed_); });
+    }
+    plans_changed_ = true;
+    new_frame();  // realisers may differ now
+  }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    return on_forest([&](auto& forest) {
+      const auto& tree = forest.tree(body);
+      AuditView view{tree.topology(), {}, {}};
+      BoxCache<S> cache = caches_[body];  // what a query read counts; the rest is made from it
+      InheritedBoxes<S, std::remove_cvref_t<decltype(tree)>> boxes(tree, this->sampled_, body, cache);
+      for (std::uint32_t node = 0; node < tree.topology().size(); ++node) {
+        boxes.ensure(node);
+        view.boxes.push_back(to_double(boxes(node)));
+      }
+      return view;
+    });
+  }
+
+  std::size_t bytes() const override {
+    std::size_t total = on_forest([](auto& forest) { return forest.bytes(); });
+    for (const auto& cache : caches_) total += cache.bytes();
+    for (const auto& degradation : degradations_) total += degradation.bytes();
+    return total;
+  }
+
+ protected:
+  Counters counted() const override {
+    Counters table = count_.table;
+    if constexpr (Count::enabled) {
+      table[Counter::queue_steps] =
+          on_forest([](auto& forest) { return forest.queue().steps(); }) - first_step_;
+      table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
+    }
+    return table;
+  }
+
+ private:
+  template <class Work>
+  decltype(auto) on_forest(Work&& work) const {
+    return std::visit([&](const auto& forest) -> decltype(auto) { return work(*forest); }, forest_);
+  }
+  void new_frame() {
+    for (auto& cache : caches_) cache.new_frame();
+  }
+  template <class Tree>
+  InheritedBoxes<S, Tree> boxes(const Tree& tree, std::uint32_t body) {
+    return {tree, this->sampled_, body, caches_[body]};
+  }
+  template <class Tree>
+  InheritedBoxes<S, Tree> all_boxes(const Tree& tree, std::uint32_t body) {
+    auto all = boxes(tree, body);
+    for (std::uint32_t node = 0; node < tree.topology().size(); ++node) all.ensure(node);
+    return all;
+  }
+  /// Of the only primitive of a leaf.
+  template <class Tree>
+  LaneBox<S> tight_box(const Tree& tree, TopologyNode leaf, std::uint32_t body) const {
+    const auto vertices = this->scene_.primitives(body)[tree.topology().primitives[leaf.first()]];
+    this->sampled_.fetch(body, vertices);
+    return LaneBox<S>::of(vertices, this->sampled_.positions(body));
+  }
+
+  void rebuild_degenerate(std::uint32_t body) {
+    on_forest([&](auto& forest) {
+      auto& tree = forest.tree(body);
+      auto all = all_boxes(tree, body);
+      count_.add(Counter::nodes_visited, tree.topology().size());
+      const auto& nodes = degradations_[body].beyond(threshold_, tree.topology(), all);
+      if (nodes.empty()) return;
+      for (const std::uint32_t node : nodes) tree.rebuild_below(node, all(node), this->sampled_, method_);
+      caches_[body].new_frame();
+      degradations_[body].rebuilt(tree.topology(), all_boxes(tree, body));
+      count_.add(Counter::nodes_visited, tree.topology().size());
+    });
+  }
+
+  Count count_;
+  std::variant<std::unique_ptr<KineticBoxForest<S, AvlQueue<S>, Count>>,
+               std::unique_ptr<KineticBoxForest<S, BinaryHeapQueue<S>, Count>>>
+      forest_;
+  std::vector<BoxCache<S>> caches_;
+  std::vector<NodePair> stack_;
+  std::vector<std::uint32_t> changed_;
+  std::uint64_t first_step_ = 0, first_fetch_ = 0;
+  bool rebuilds_;
+  bool plans_changed_ = false;
+  BuildMethod method_ = BuildMethod::median;
+  double threshold_;
+  std::uint64_t frames_per_check_, frames_ = 0;
+  std::vector<BoxTreeDegradation> degradations_;  ///< [body]; none if nothing is rebuilt
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(kinetic_boxtree) {
+  using namespace kbvh;
+  return {make_entry<KineticBox>({
+      .id = "kinetic_boxtree",
+      .title = "kinetic BoxTree",
+      .family = "kinetic",
+      .citation = "Zachmann & Weller 2006, s.6; Zachmann 1995",
+      .tightness = Tightness::conservative,
+      .positions = PositionUse::fetched,
+      .can = {.event_driven = true,
+              .continuous = true,
+              .restructures = true,  // with rebuild=median or sah
+              .plan_changes = true,
+              .time_budget = true},
+      .topology = {.widths = {2}, .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+      .parameters =
+          {{"queue",
+            "avl",
+            {"avl", "binary_heap"},
+            "event queue: the paper's AVL tree, or an indexed binary heap"},
+           {"rebuild",
+            "never",
+            {"never", "median", "sah"},
+            "rebuilds the inner nodes of subtrees that have degenerated: how; never is the paper's"},
+           {"degradation",
+            "1.5",
+            {},
+            "a subtree is rebuilt when its summed box area over its own box's exceeds this many times "
+            "what it was when built",
+            1},
+           {"check_every", "10", {}, "frames from one check for degradation to the next", 1}},
+  })};
+}

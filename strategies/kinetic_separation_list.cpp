@@ -1,0 +1,158 @@
+// Kinetic incremental collision detection (Z&W 2006, s.7): two kinetic AABB trees and the separation list of
+// their pairs, all kept at events; a query reads the overlapping leaves and traverses nothing.
+
+#include <variant>
+
+#include "core/hierarchy/realiser_boxes.hpp"
+#include "core/kinetic/kinetic_collision.hpp"
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class Count>
+class KineticSeparationList final : public Strategy<S> {
+  template <template <class> class Queue>
+  using Collision = KineticCollision<S, Queue, Count>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::whole_clip;
+
+  KineticSeparationList(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+                        const Params& params)
+      : Strategy<S>(scene, motion), changed_(scene.body_count()) {
+    if (params.word("queue") == AvlQueue<S>::name)
+      collision_ = std::make_unique<Collision<AvlEventQueue>>(scene, motion, std::move(topologies), count_);
+    else
+      collision_ =
+          std::make_unique<Collision<BinaryHeapEventQueue>>(scene, motion, std::move(topologies), count_);
+  }
+
+  void reset(double t) override {
+    this->start_at(t);
+    on_collision([&](auto& collision) { collision.reset(t); });
+    // What starting costs is not what running costs: counts begin here.
+    count_.table = {};
+    first_step_ = on_collision([](auto& collision) { return collision.queue_steps(); });
+    first_fetch_ = this->sampled_.fetched();
+    on_collision([&](auto& collision) { count_.peak(Counter::list_peak, collision.list().size()); });
+  }
+
+  void advance(double t) override {
+    this->move_to(t);
+    on_collision([&](auto& collision) { collision.advance(t); });
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
+    on_collision([&](auto& collision) {
+      for (std::size_t i = 0; i < this->scene_.pairs().size(); ++i) {
+        const BodyPair& pair = this->scene_.pairs()[i];
+        LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first,
+                                   collision.forest().tree(pair.first).topology(), pair.second,
+                                   collision.forest().tree(pair.second).topology(), count_, out);
+        for (const auto& leaf : collision.list().leaf_pairs(i)) leaves(leaf.a, leaf.b);
+      }
+    });
+    return {};
+  }
+
+  void spans(double t0, double t1, SpanBuffer& out) override {
+    if (t0 != this->time())
+      throw std::invalid_argument("spans from t = " + std::to_string(t0) + ", but the list stands at " +
+                                  std::to_string(this->time()));
+    this->move_to(t1);
+    on_collision([&](auto& collision) {
+      auto& list = collision.list();
+      list.start_spans(t0);
+      collision.advance(t1);
+      for (const auto& ended : list.stop_spans())
+        append_spans(collision, ended.bodies, ended.leaf, t0, std::min(ended.until, t1), out);
+      for (std::size_t i = 0; i < this->scene_.pairs().size(); ++i)
+        for (const auto& leaf : list.leaf_pairs(i)) append_spans(collision, i, leaf, t0, t1, out);
+    });
+  }
+
+  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
+    if (t != this->time())
+      throw std::invalid_argument("plans changed at t = " + std::to_string(t) + ", but the list stands at " +
+                                  std::to_string(this->time()));
+    for (auto& vertices : changed_) vertices.clear();
+    for (const PlanChange<S>& change : changes) changed_[change.body].push_back(change.vertex);
+    for (auto& vertices : changed_) {
+      std::sort(vertices.begin(), vertices.end());
+      vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+    }
+    on_collision([&](auto& collision) { collision.plans_changed(t, changed_); });
+  }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    return on_collision([&](auto& collision) {
+      const auto& tree = collision.forest().tree(body);
+      AuditView view{tree.topology(), {}, {}};
+      for (std::uint32_t node = 0; node < tree.topology().size(); ++node)
+        view.boxes.push_back(to_double(box_of_realisers(tree.realisers(node), this->sampled_, body)));
+      return view;
+    });
+  }
+
+  std::size_t bytes() const override {
+    return on_collision([](auto& collision) { return collision.bytes(); });
+  }
+
+ protected:
+  Counters counted() const override {
+    Counters table = count_.table;
+    if constexpr (Count::enabled) {
+      table[Counter::queue_steps] =
+          on_collision([](auto& collision) { return collision.queue_steps(); }) - first_step_;
+      table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
+    }
+    return table;
+  }
+
+ private:
+  template <class Work>
+  decltype(auto) on_collision(Work&& work) const {
+    return std::visit([&](const auto& collision) -> decltype(auto) { return work(*collision); }, collision_);
+  }
+
+  /// Every primitive pair of two leaves for as long as the leaves overlap.
+  template <class System, class LeafPair>
+  void append_spans(const System& collision, std::size_t body_pair, const LeafPair& leaf, double t0,
+                    double end, SpanBuffer& out) const {
+    const BodyPair& pair = this->scene_.pairs()[body_pair];
+    const Topology& a = collision.forest().tree(pair.first).topology();
+    const Topology& b = collision.forest().tree(pair.second).topology();
+    const TopologyNode na = a.nodes[leaf.a], nb = b.nodes[leaf.b];
+    for (std::uint32_t i = na.first(); i < na.first() + na.count(); ++i)
+      for (std::uint32_t j = nb.first(); j < nb.first() + nb.count(); ++j)
+        out.push_back(
+            {{pair.first, a.primitives[i], pair.second, b.primitives[j]}, std::max(leaf.since, t0), end});
+  }
+
+  Count count_;
+  std::variant<std::unique_ptr<Collision<AvlEventQueue>>, std::unique_ptr<Collision<BinaryHeapEventQueue>>>
+      collision_;
+  std::vector<std::vector<std::uint32_t>> changed_;  ///< vertices, [body]
+  std::uint64_t first_step_ = 0, first_fetch_ = 0;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(kinetic_separation_list) {
+  using namespace kbvh;
+  return {make_entry<KineticSeparationList>({
+      .id = "kinetic_separation_list",
+      .title = "kinetic separation list",
+      .family = "kinetic",
+      .citation = "Zachmann & Weller 2006, s.7",
+      .positions = PositionUse::fetched,
+      .can = {.event_driven = true, .continuous = true, .plan_changes = true, .spans = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+      .parameters = {{"queue",
+                      "avl",
+                      {"avl", "binary_heap"},
+                      "event queue: the paper's AVL tree, or an indexed binary heap"}},
+  })};
+}

@@ -1,0 +1,308 @@
+// The kinetic BoxTree's log of realiser changes against exact envelopes computed apart; validity between
+// events; what its certificate searches cost (claims T11, T12).
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+
+#include "core/hierarchy/audit.hpp"
+#include "tests/theory/boxtree_log.hpp"
+
+namespace kbvh::test {
+namespace {
+
+std::string summary(const BoxTreeReport& r) {
+  return std::to_string(r.envelope.bounds) + " bounds, " + std::to_string(r.events) + " events, " +
+         std::to_string(r.envelope.net) + " net changes = " + std::to_string(r.envelope.envelope) +
+         " envelope breakpoints; several steps " + std::to_string(r.envelope.several_steps) + ", choices " +
+         std::to_string(r.envelope.choices) + ", rebuilt " + std::to_string(r.rebuilt);
+}
+
+template <class S>
+BoxTreeReport prove(const TestScene<S>& test, const BoxTreePlay& play) {
+  const BoxTreeReport report = BoxTreeProof<S, AvlQueue>::run(test, play);
+  const BoxTreeReport other = BoxTreeProof<S, BinaryHeapQueue>::run(test, play);
+  EXPECT_EQ(report.envelope.violation, "");
+  EXPECT_EQ(other.envelope.violation, "");
+  EXPECT_EQ(report.envelope.net, report.envelope.envelope);
+  EXPECT_EQ(report.events, other.events) << "queues differ";
+  EXPECT_EQ(report.values_written, other.values_written) << "queues differ";
+  return report;
+}
+
+// ---- All synthetic scenes ------------------------------------------------------------------------------
+
+class BoxTreeEnvelopes : public testing::TestWithParam<std::string> {};
+
+template <class S>
+void prove_synthetic(const std::string& name) {
+  std::vector<BoxTreeReport> reports;
+  for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
+    for (const std::uint32_t leaf_size : {1u, 3u}) {
+      SCOPED_TRACE(name + " " + kbvh::name(method) + " leaf size " + std::to_string(leaf_size));
+      BoxTreePlay play{.builder = {.method = method, .width = 2, .leaf_size = leaf_size},
+                       .frames_per_keyframe = 2};
+      const auto test = synthetic_scene<S>(name, play.frames_per_keyframe);
+      reports.push_back(prove(test, play));
+      play.rebuild_seed = leaf_size + 5;
+      prove(test, play);
+      if (method != BuildMethod::median || !test.script.steps.empty()) continue;
+      play.rebuild_seed = 0;
+      play.start_after = 0.37;  // between keyframes
+      prove(test, play);
+    }
+  std::printf("%s %s: %s\n", name.c_str(), sizeof(S) == 4 ? "float" : "double", summary(reports[0]).c_str());
+}
+
+TEST_P(BoxTreeEnvelopes, Float) {
+  prove_synthetic<float>(GetParam());
+}
+TEST_P(BoxTreeEnvelopes, Double) {
+  prove_synthetic<double>(GetParam());
+}
+INSTANTIATE_TEST_SUITE_P(Scenes, BoxTreeEnvelopes, testing::ValuesIn(synthetic_scene_names()),
+                         [](const auto& param_info) { return param_info.param; });
+
+TEST(BoxTree, LogIsTheEnvelopeEntryByEntryInGeneralPosition) {
+  const BoxTreeReport report = prove(synthetic_scene<double>("soups"), {});
+  EXPECT_TRUE(report.envelope.general_position()) << summary(report);
+  EXPECT_EQ(report.envelope.logged, report.envelope.envelope);
+  EXPECT_EQ(report.changes_by_event, report.values_written);  // no internal events
+  EXPECT_GT(report.envelope.net, 300u);
+}
+
+TEST(BoxTree, EventsDoNotDependOnTheNumberOfFrames) {
+  for (const char* name : {"soups", "integer_ties", "keyframes_a_millionth_apart"}) {
+    const auto test = synthetic_scene<float>(name);
+    const BoxTreeReport coarse = prove(test, {.frames_per_keyframe = 1});
+    for (const std::uint32_t l : {7u, 100u}) {
+      const BoxTreeReport fine = prove(test, {.frames_per_keyframe = l});
+      EXPECT_EQ(coarse.events, fine.events) << name;
+      EXPECT_EQ(coarse.values_written, fine.values_written) << name;
+    }
+  }
+}
+
+// ---- Seeded faults that the proof must catch -------------------------------------------------------------
+
+/// A certificate search that does not go down to children that are split on another axis.
+struct ForgetsOtherAxes : BoxTreeRules {
+  static bool descends(Side own, Side sought) { return axis_of(own) == axis_of(sought); }
+};
+/// One that takes a child split to the other side for answered.
+struct ForgetsTheOtherChild : BoxTreeRules {
+  static bool descends(Side own, Side sought) { return axis_of(own) != axis_of(sought); }
+};
+template <class S>
+class LosesEvents : public BinaryHeapQueue<S> {
+ public:
+  using BinaryHeapQueue<S>::BinaryHeapQueue;
+  void schedule(const Event& event) {
+    if (++scheduled_ % 50 != 0) BinaryHeapQueue<S>::schedule(event);
+  }
+
+ private:
+  std::uint64_t scheduled_ = 0;
+};
+
+TEST(BoxTreeFaults, AreCaught) {
+  for (const char* name : {"soups", "sheets", "integer_ties"}) {
+    const auto test = synthetic_scene<float>(name);
+    EXPECT_TRUE((BoxTreeProof<float, AvlQueue>::run(test, {}).envelope.holds())) << name;
+    EXPECT_FALSE((BoxTreeProof<float, AvlQueue, ForgetsOtherAxes>::run(test, {}).envelope.holds())) << name;
+    EXPECT_FALSE((BoxTreeProof<float, AvlQueue, ForgetsTheOtherChild>::run(test, {}).envelope.holds()))
+        << name;
+    EXPECT_FALSE((BoxTreeProof<float, LosesEvents>::run(test, {}).envelope.holds())) << name;
+  }
+}
+
+// ---- Between events --------------------------------------------------------------------------------------
+
+/// Brings a forest to times that frames do not know, right before, at and after events, and audits the boxes
+/// that a query would read there.
+template <class S>
+std::uint64_t audit_between_events(const std::string& name) {
+  const auto test = synthetic_scene<S>(name);
+  const SceneView<S> view(test.scene);
+  Playback<S> playback(test.scene);
+  const double first = frame_times(test.scene, 1).front(), last = frame_times(test.scene, 1).back();
+  playback.seek(first);
+  const Topologies topologies = build_topologies(view, playback, {.width = 2, .leaf_size = 1});
+  Counting count;
+  KineticBoxForest<S, AvlQueue<S>, Counting> forest(view, ClipMotion<S>(playback), topologies, count);
+  forest.reset(first);
+  std::uint64_t audits = 0;
+  const auto audit_at = [&](double t) {
+    forest.advance(t);
+    playback.seek(t);
+    playback.evaluate_all();
+    for (std::uint32_t body = 0; body < view.body_count(); ++body) {
+      AuditView seen{forest.tree(body).topology(), {}, {}};
+      for (const Box<S>& box : reconstructed_boxes(forest.tree(body), ClipMotion<S>(playback), body))
+        seen.boxes.push_back(to_double(box));
+      const Audit found = audit(seen, view.primitives(body), playback.positions(body));
+      EXPECT_EQ(found.first_fault + found.topology_error, "") << name << " at " << t;
+      EXPECT_EQ(found.protrusion, 0);
+      ++audits;
+    }
+  };
+  audit_at(first);
+  double before = first;
+  const auto& queue = forest.queue();
+  while (!queue.empty() && forest.due(last)) {
+    const double event = queue.top().hint, error = queue.top().error;
+    if (event > before) {
+      const double between = before + 0.5 * (event - before);
+      audit_at(between);
+      // The hint is off by a rounding or two: this lies before, at or after the event.
+      if (event > between) audit_at(event);
+      before = std::max(between, event);
+    } else {
+      // What happens now must not be looked at from a time before.
+      before = std::max(before, std::nextafter(event + error, last + 1));
+      forest.handle_next();
+    }
+  }
+  audit_at(last);
+  return audits;
+}
+
+TEST(BoxTree, IsValidBetweenEvents) {
+  for (const std::string& name : synthetic_scene_names()) {
+    const std::uint64_t audits = audit_between_events<float>(name) + audit_between_events<double>(name);
+    EXPECT_GT(audits, name == "soups" ? 400u : 3u);
+  }
+}
+
+// ---- The cost of certificate searches (T12)
+// -----------------------------------------------------------------
+
+struct OneAxis : BoxTreeRules {
+  static int split_axis(int) { return 0; }
+};
+/// The root is split on x, all else on y (Z&W fig. 10).
+struct Adversarial : BoxTreeRules {
+  static int split_axis(int depth) { return depth == 0 ? 0 : 1; }
+};
+
+/// Points that wander on the first `axes` axes from keyframe to keyframe; the others stay 0.
+TestScene<double> wandering_points(std::uint32_t count, int axes) {
+  Random random(count);
+  Body<double> body;
+  body.name = "points";
+  body.primitives.kind = PrimitiveKind::points;
+  std::vector<double> positions, times;
+  for (std::uint32_t p = 0; p < count; ++p) body.primitives.add(std::vector<std::uint32_t>{p});
+  for (int keyframe = 0; keyframe < 4; ++keyframe) {
+    times.push_back(keyframe);
+    for (std::uint32_t p = 0; p < count; ++p)
+      for (int axis = 0; axis < 3; ++axis) positions.push_back(axis < axes ? random.unit() : 0);
+  }
+  body.plans = FlightPlans<double>(count, times, std::move(positions));
+  TestScene<double> test;
+  test.scene.name = "wandering points";
+  test.scene.bodies.push_back(std::move(body));
+  return test;
+}
+
+struct EventCost {
+  std::uint64_t events = 0, searches = 0, nodes = 0, most_per_search = 0;
+  double per_search() const { return double(nodes) / double(searches); }
+};
+
+/// What the events cost that happen at `node` (none: at any).
+template <class Rules>
+EventCost cost_of_events(const TestScene<double>& test, std::optional<std::uint32_t> at_node = {}) {
+  const SceneView<double> view(test.scene);
+  Playback<double> playback(test.scene);
+  playback.seek(0);
+  Counting count;
+  typename RuledBoxTrees<Rules>::template Forest<double, AvlQueue<double>> forest(
+      view, ClipMotion<double>(playback), build_topologies(view, playback, {.width = 2, .leaf_size = 1}),
+      count);
+  forest.reset(0);
+  auto& tree = forest.tree(0);
+  EventCost cost;
+  while (forest.due(3)) {
+    const std::uint32_t slot = forest.queue().top().slot, node = slot < 6 ? 0 : slot - 5;
+    tree.search_cost().forget();
+    forest.handle_next();
+    if (at_node && node != *at_node) continue;
+    ++cost.events;
+    cost.searches += tree.search_cost().searches;
+    cost.nodes += tree.search_cost().nodes;
+    cost.most_per_search = std::max(cost.most_per_search, tree.search_cost().most_nodes);
+  }
+  return cost;
+}
+
+TEST(BoxTreeSearch, IsLogarithmicOnOneAxis) {
+  for (const std::uint32_t n : {64u, 256u, 1024u, 4096u}) {
+    const EventCost cost = cost_of_events<OneAxis>(wandering_points(n, 1));
+    std::printf("one axis, %u leaves: %llu events, %.2f nodes per search, at most %llu\n", n,
+                (unsigned long long)cost.events, cost.per_search(), (unsigned long long)cost.most_per_search);
+    EXPECT_GT(cost.events, n / 2);
+    // Down one path, and at each of its nodes the other child's realiser.
+    EXPECT_LE(cost.most_per_search, 2 * std::uint64_t(std::log2(n)) + 1);
+  }
+}
+
+TEST(BoxTreeSearch, TakesTheWholeSubtreeWhereOnlyTheRootIsSplitOnItsAxis) {
+  for (const std::uint32_t n : {64u, 256u, 1024u, 4096u}) {
+    const TestScene<double> test = wandering_points(n, 2);
+    // Node 1 is a child of the root: n / 2 leaves below it, none of whose inner nodes is split on x.
+    const EventCost cost = cost_of_events<Adversarial>(test, 1);
+    std::printf("root x, else y, %u leaves: %llu events at the root's child, %llu nodes per search\n", n,
+                (unsigned long long)cost.events, (unsigned long long)cost.most_per_search);
+    EXPECT_GT(cost.events, 3u);
+    EXPECT_GE(cost.most_per_search, n - 1);  // 2 (n / 2) - 1 nodes
+    EXPECT_GE(cost.nodes, cost.events * (n - 1));
+  }
+}
+
+TEST(BoxTreeSearch, OnMixedAxesLiesBetween) {
+  for (const std::uint32_t n : {64u, 256u, 1024u, 4096u}) {
+    const EventCost cost = cost_of_events<BoxTreeRules>(wandering_points(n, 3));
+    std::printf("mixed axes, %u leaves: %llu events, %.2f nodes per search, at most %llu\n", n,
+                (unsigned long long)cost.events, cost.per_search(), (unsigned long long)cost.most_per_search);
+    EXPECT_LT(cost.most_per_search, 2 * n);
+  }
+}
+
+TEST(BoxTreeSearch, AdversarialTreesAreSoundToo) {
+  for (const char* name : {"soups", "integer_ties", "plan_changes"}) {
+    const auto test = synthetic_scene<float>(name);
+    EXPECT_EQ((BoxTreeProof<float, AvlQueue, Adversarial>::run(test, {}).envelope.violation), "") << name;
+    EXPECT_EQ((BoxTreeProof<float, AvlQueue, OneAxis>::run(test, {}).envelope.violation), "") << name;
+  }
+}
+
+// ---- Its size (T11)
+// -----------------------------------------------------------------------------------------
+
+TEST(BoxTree, StoresTwoRealisersPerInnerNodeAndSixMore) {
+  const auto test = synthetic_scene<float>("soups");
+  const SceneView<float> view(test.scene);
+  Playback<float> playback(test.scene);
+  const Topologies topologies = build_topologies(view, playback, {.width = 2, .leaf_size = 1});
+  std::uint64_t inner = 0;
+  for (const TopologyNode node : topologies[0].nodes) inner += node.is_leaf() ? 0 : 1;
+  using Tree = KineticBoxForest<float, AvlQueue<float>, Counting>::Tree;
+  EXPECT_EQ(Tree::slot_count(topologies[0]), 2 * inner + 6);
+}
+
+TEST(BoxTree, RefusesWideTopologies) {
+  const auto test = synthetic_scene<float>("soups");
+  const SceneView<float> view(test.scene);
+  Playback<float> playback(test.scene);
+  Counting count;
+  EXPECT_THROW((KineticBoxForest<float, AvlQueue<float>, Counting>(
+                   view, ClipMotion<float>(playback),
+                   build_topologies(view, playback, {.width = 4, .leaf_size = 1}), count)),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace kbvh::test

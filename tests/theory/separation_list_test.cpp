@@ -1,0 +1,248 @@
+// The separation list between events (claim T13, Definition 2): equal to a traversal from scratch, with
+// rational arithmetic, at instants between the events of a clip.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <set>
+
+#include "core/kinetic/kinetic_collision.hpp"
+#include "core/registry.hpp"
+#include "experiments/theory/kinetic_log.hpp"
+#include "tests/support/synthetic_scenes.hpp"
+
+namespace kbvh::test {
+namespace {
+
+using theory::exact;
+using theory::Rational;
+
+template <class S>
+Rational value_at(const Piece<S>& piece, const Rational& t) {
+  const theory::ExactLine line = theory::exact_line(piece);
+  return line.x0 + line.slope * (t - line.t0);
+}
+
+/// A side of a box at t, widened as the list does it: at the knots of its piece.
+template <class S>
+Rational side_at(const FlightPlans<S>& plans, std::uint32_t vertex, int axis, int widening, double t) {
+  Piece<S> piece = plans.piece_after(vertex, axis, t);
+  const auto widened = [&](S x) { return widening > 0 ? widened_up(x) : S(-widened_up(S(-x))); };
+  if (widening != 0) {
+    piece.x0 = widened(piece.x0);
+    if (piece.kind == PieceKind::chord || piece.x1 != 0) piece.x1 = widened(piece.x1);
+  }
+  return value_at(piece, exact(t));
+}
+
+using ListEntry = std::tuple<std::uint32_t, std::uint32_t, bool>;  // nodes, overlapping leaves?
+
+template <class S, class Collision>
+class Auditor {
+ public:
+  Auditor(const Collision& collision, const SceneView<S>& scene) : collision_(collision), scene_(scene) {}
+
+  /// Compares list and traversal at t, which no event is at; says what differs, or nothing.
+  std::string compare(double t) {
+    for (std::uint16_t i = 0; i < scene_.pairs().size(); ++i) {
+      std::set<ListEntry> fresh, kept;
+      const auto& body_pair = scene_.pairs()[i];
+      if (!collision_.forest().tree(body_pair.first).topology().empty() &&
+          !collision_.forest().tree(body_pair.second).topology().empty())
+        traverse(body_pair, 0, 0, t, fresh);
+      std::size_t overlapping = 0;
+      for (const auto& pair : collision_.list().pairs())
+        if (pair.used && pair.children == collision_.list().none && pair.bodies == i) {
+          kept.insert({pair.a, pair.b, pair.overlapping});
+          overlapping += pair.overlapping;
+        }
+      if (fresh != kept)
+        return "t = " + std::to_string(t) + ": a traversal finds " + std::to_string(fresh.size()) +
+               " entries, the list has " + std::to_string(kept.size()) + ", or others";
+      if (overlapping != collision_.list().leaf_pairs(i).size())
+        return "leaf pairs are not those of the list";
+      for (const auto& leaf : collision_.list().leaf_pairs(i))
+        if (kept.count({leaf.a, leaf.b, true}) == 0) return "a leaf pair that is not in the list";
+      entries += kept.size();
+    }
+    ++audits;
+    return {};
+  }
+  std::uint64_t audits = 0, entries = 0;
+
+ private:
+  void traverse(const BodyPair& bodies, std::uint32_t a, std::uint32_t b, double t,
+                std::set<ListEntry>& list) const {
+    const auto &tree_a = collision_.forest().tree(bodies.first),
+               &tree_b = collision_.forest().tree(bodies.second);
+    const TopologyNode na = tree_a.topology().nodes[a], nb = tree_b.topology().nodes[b];
+    const bool meet = overlap(bodies, a, b, t);
+    if (!meet || (na.is_leaf() && nb.is_leaf())) {
+      list.insert({a, b, meet});
+      return;
+    }
+    for (std::uint32_t i = na.is_leaf() ? a : na.first();
+         i < (na.is_leaf() ? a + 1 : na.first() + na.count()); ++i)
+      for (std::uint32_t j = nb.is_leaf() ? b : nb.first();
+           j < (nb.is_leaf() ? b + 1 : nb.first() + nb.count()); ++j)
+        traverse(bodies, i, j, t, list);
+  }
+  bool overlap(const BodyPair& bodies, std::uint32_t a, std::uint32_t b, double t) const {
+    const auto& forest = collision_.forest();
+    const auto &plans_a = forest.clock().plans(bodies.first), &plans_b = forest.clock().plans(bodies.second);
+    const std::uint32_t* ra = forest.tree(bodies.first).realisers(a);
+    const std::uint32_t* rb = forest.tree(bodies.second).realisers(b);
+    for (int axis = 0; axis < 3; ++axis)
+      if (side_at(plans_a, ra[2 * axis + 1], axis, 1, t) < side_at(plans_b, rb[2 * axis], axis, 0, t) ||
+          side_at(plans_b, rb[2 * axis + 1], axis, 0, t) < side_at(plans_a, ra[2 * axis], axis, -1, t))
+        return false;
+    return true;
+  }
+  const Collision& collision_;
+  SceneView<S> scene_;
+};
+
+struct Kinds {
+  std::uint64_t overlap = 0, fathers = 0, leaves = 0, changes = 0;
+};
+
+/// Plays a scene event by event and audits some `audits` times.
+template <class S, template <class> class Queue>
+Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t audits) {
+  using Collision = KineticCollision<S, Queue, Counting>;
+  const auto test = synthetic_scene<S>(name, 2);
+  const SceneView<S> view(test.scene);
+  const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 2) : test.frames;
+  Kinds kinds;
+  std::uint64_t every = 1, compared = 0;
+  bool wanted = false;
+  // The first run counts the events, the second audits between as many as asked for.
+  for (const bool auditing : {false, true}) {
+    Playback<S> playback(test.scene);
+    playback.seek(frames.front());
+    Counting count;
+    Collision collision(view, ClipMotion<S>(playback), build_topologies(view, playback, builder), count);
+    collision.reset(frames.front());
+    count.table = {};
+    Auditor<S, Collision> auditor(collision, view);
+    auto step = test.script.steps.begin();
+    std::uint64_t events = 0;
+    for (const double t : frames) {
+      while (collision.due(t)) {
+        const double after = collision.after_next();
+        collision.handle_next();
+        ++events;
+        wanted = wanted || events % every == 0;
+        if (!auditing || !wanted || collision.due(after)) continue;
+        wanted = false;
+        EXPECT_EQ(auditor.compare(after), "") << name;
+      }
+      const double after = std::nextafter(t, 1e300);
+      if (auditing && !collision.due(after)) {
+        EXPECT_EQ(auditor.compare(after), "") << name;
+      }
+      for (; step != test.script.steps.end() && step->time <= t; ++step) {
+        playback.seek(t);
+        playback.change_plans(t, step->changes);
+        std::vector<std::vector<std::uint32_t>> changed(view.body_count());
+        for (const auto& change : step->changes) changed[change.body].push_back(change.vertex);
+        for (auto& vertices : changed) {
+          std::sort(vertices.begin(), vertices.end());
+          vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+        }
+        collision.plans_changed(t, changed);
+      }
+    }
+    every = std::max<std::uint64_t>(1, events / audits);
+    compared = auditor.audits;
+    const Counters& table = count.table;
+    kinds = {table[Counter::overlap_events], table[Counter::fathers_apart_events],
+             table[Counter::leaves_apart_events], table[Counter::bound_change_events]};
+    if (auditing)
+      std::printf(
+          "%s: %llu audits of %llu entries in all; events: overlap %llu, fathers %llu, leaves %llu, "
+          "changes %llu; list at most %llu\n",
+          name.c_str(), (unsigned long long)compared, (unsigned long long)auditor.entries,
+          (unsigned long long)kinds.overlap, (unsigned long long)kinds.fathers,
+          (unsigned long long)kinds.leaves, (unsigned long long)kinds.changes,
+          (unsigned long long)table[Counter::list_peak]);
+  }
+  return kinds;
+}
+
+class SeparationLists : public testing::TestWithParam<std::string> {};
+
+TEST_P(SeparationLists, EqualATraversalBetweenEvents) {
+  play<float, AvlEventQueue>(GetParam(), {.width = 2, .leaf_size = 1}, 40);
+  play<double, BinaryHeapEventQueue>(GetParam(), {.width = 4, .leaf_size = 3}, 20);
+}
+INSTANTIATE_TEST_SUITE_P(Scenes, SeparationLists, testing::ValuesIn(synthetic_scene_names()),
+                         [](const auto& param_info) { return param_info.param; });
+
+TEST(SeparationListEvents, EachKindHappensOftenInTheTestScenes) {
+  Kinds all;
+  for (const char* name : {"soups", "sheets", "plan_changes"}) {
+    const Kinds kinds = play<float, AvlEventQueue>(name, {.width = 2, .leaf_size = 1}, 1);
+    all.overlap += kinds.overlap;
+    all.fathers += kinds.fathers;
+    all.leaves += kinds.leaves;
+    all.changes += kinds.changes;
+  }
+  EXPECT_GE(all.overlap, 1000u);
+  EXPECT_GE(all.fathers, 1000u);
+  EXPECT_GE(all.leaves, 1000u);
+  EXPECT_GE(all.changes, 1000u);
+}
+
+// A list that hears only some of its trees' changes is found out.
+TEST(SeparationListFaults, MissedNotices) {
+  const auto test = synthetic_scene<float>("sheets");
+  const SceneView<float> view(test.scene);
+  using Collision = KineticCollision<float, AvlEventQueue, Silent>;
+  for (const std::uint64_t missed : {1u, 10u, 50u}) {  // every such notice
+    Playback<float> playback(test.scene);
+    Silent count;
+    Collision collision(view, ClipMotion<float>(playback),
+                        build_topologies(view, playback, {.width = 2, .leaf_size = 1}), count);
+    collision.reset(0);
+    Auditor<float, Collision> auditor(collision, view);
+    bool found = false;
+    std::uint64_t events = 0;
+    try {
+      for (const double t : frame_times(test.scene, 4)) {
+        while (collision.due(t))
+          if (collision.tree_is_first() && ++events % missed == 0)
+            collision.forest().handle_next();  // of which the list hears nothing
+          else
+            collision.handle_next();
+        const double after = std::nextafter(t, 1e300);
+        if (!collision.due(after) && !auditor.compare(after).empty()) found = true;
+        if (found) break;
+      }
+    } catch (const std::invalid_argument&) {  // an event that cannot be
+      found = true;
+    }
+    EXPECT_TRUE(found) << "every notice of " << missed;
+  }
+}
+
+TEST(Widening, ExceedsFourUnitsInTheLastPlace) {
+  Random random(5);
+  const auto check = [&](auto zero) {
+    using S = decltype(zero);
+    for (int i = 0; i < 100000; ++i) {
+      const S x = S(std::ldexp(random.unit(), int(random.below(200)) - 100));
+      S above = x;
+      for (int k = 0; k < 4; ++k) above = std::nextafter(above, std::numeric_limits<S>::infinity());
+      ASSERT_GE(widened_up(x), above) << x;
+      ASSERT_LE(double(widened_up(x)) - double(x), std::abs(double(x)) * 0x1p-19 + 1e-300) << x;
+    }
+    const S tiny = std::numeric_limits<S>::denorm_min();
+    for (const S x : {S(0), S(-0.0), tiny, -tiny, S(-2) * tiny, S(3) * tiny, S(-3) * tiny})
+      ASSERT_GT(widened_up(x), x);
+  };
+  check(0.0f);
+  check(0.0);
+}
+
+}  // namespace
+}  // namespace kbvh::test
