@@ -27,7 +27,7 @@ Claim judge_separation_list(const std::vector<SeparationRun>& separations) {
           "is valid at every time: exactly the pairs at which a traversal stops.",
       .citation = "Theorem 6, Definition 2",
       .counter =
-          "entries that differ from a traversal between events; pairs touched and comparisons per event of "
+          "entries that differ from a traversal between events; pairs and comparisons per event of "
           "each kind; pairs of a box",
       .bound =
           "0 differences; four pairs per overlap and fathers event; 1.4405 log2(events + 2) + 1 comparisons "
