@@ -76,7 +76,7 @@ void add_theory(CLI::App& program, Action& action) {
       ->delimiter(',')
       ->check(CLI::Range(1u, 1u << 24));
   command->add_option("--keyframes", a->keyframes, "of built-in scenes (30)")->check(CLI::Range(2, 100000));
-  command->add_option("--exact-limit", a->exact_limit, "most triangles held against exact envelopes (1000)")
+  command->add_option("--exact-limit", a->exact_limit, "most triangles held against exact envelopes (500)")
       ->check(CLI::PositiveNumber);
   command->add_option("--instants", a->instants, "audited between keyframes (200)")
       ->check(CLI::PositiveNumber);

@@ -29,6 +29,7 @@ TheoryOptions full_theory() {
   options.simulation_limit = 65000;
   options.boxtree_limit = 65000;
   options.separation_size = 2000;
+  options.list_limit = 65000;
   options.list_audits = 100;
   options.sequence_keyframes = 0;
   return options;
@@ -140,13 +141,17 @@ class Runner {
       exact_.push_back(get<ExactRun>("exact envelopes", family,
                                      parameters + "+" + std::to_string(options_->instants),
                                      [&] { return measure_exact(scene(), options_->instants); }));
-    separation(family, size, parameters);
+    if (size <= options_->list_limit) separation(family, size, parameters);
+    if (chosen(size, 250)) plan_changes(family, parameters, scene);
     if (!chosen(size, 500)) return;
     const auto frames =
         get<std::vector<FrameRun>>("frames", family, parameters, [&] { return measure_frames(scene(), ls); });
     report_.frames.insert(report_.frames.end(), frames.begin(), frames.end());
     loose_.push_back(
         get<LooseRun>("loose boxes", family, parameters, [&] { return measure_loose(scene(), 10); }));
+  }
+
+  void plan_changes(const std::string& family, const std::string& parameters, LazyScene& scene) {
     if (report_.counts.back().events > 0)
       plans_.push_back(get<PlanRun>("plan changes", family, parameters, [&] {
         return measure_plan_changes(scene(), velocity_script(scene(), 10, 20), 10);
@@ -169,9 +174,9 @@ class Runner {
     list_sizes_.push_back(
         get<ListSizeRun>("list size", family, parameters, [&] { return measure_list_size(scene()); }));
     if (chosen(size, options_->separation_size))
-      separations_.push_back(get<SeparationRun>("separation list", family, parameters, [&] {
-        return measure_separation(scene(), options_->list_audits);
-      }));
+      separations_.push_back(get<SeparationRun>(
+          "separation list", family, parameters + "+" + std::to_string(options_->list_audits),
+          [&] { return measure_separation(scene(), options_->list_audits); }));
   }
 
   /// The largest size that is held against exact envelopes.

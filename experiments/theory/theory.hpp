@@ -16,10 +16,11 @@ struct TheoryOptions {
                                   "random_soups"};
   std::vector<std::uint32_t> sizes{250, 500, 1000, 2000, 4000, 8000};  ///< triangles
   std::uint32_t keyframes = 30;
-  std::uint32_t exact_limit = 1000;       ///< largest size held against exact envelopes; a clip per scene
+  std::uint32_t exact_limit = 500;        ///< largest size held against exact envelopes; a clip per scene
   std::uint32_t simulation_limit = 8000;  ///< largest size of scenes that are simulated: O(triangles^1.5)
   std::uint32_t boxtree_limit = 4000;     ///< largest size played through BoxTrees
   std::uint32_t separation_size = 250;    ///< triangles of clips played through separation lists
+  std::uint32_t list_limit = 4000;        ///< largest size of which separation lists are made
   std::uint32_t list_audits = 20;         ///< traversals that each is compared with
   std::uint32_t instants = 200;           ///< audited between keyframes
   std::vector<std::string> sequences{"robot-Dance", "MorphStressTest"};

@@ -47,7 +47,7 @@ class Binary : public testing::Test {
 const std::string tiny = "--scene waving_sheet --triangles 100 --keyframes 3 --l 2 --repetitions 2 ";
 
 TEST_F(Binary, HelpHasExamples) {
-  for (const char* command : {"list", "run", "bench", "report"}) {
+  for (const char* command : {"list", "run", "bench", "report", "theory"}) {
     const Outcome help = kbvh(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find("Example"), std::string::npos) << command;
