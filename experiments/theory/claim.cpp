@@ -18,11 +18,12 @@ const char* symbol(Relation relation) {
   return relation == Relation::at_most ? "<=" : relation == Relation::equal ? "==" : ">=";
 }
 
-/// Words in lines of at most `columns` characters, every line after `indent` spaces.
-std::string wrapped(const std::string& text, std::size_t indent) {
-  std::string result, line(indent, ' ');
+/// A label and a text beside it, in lines of at most `columns` characters; further lines start where it did.
+std::string labelled(const std::string& label, const std::string& text) {
+  constexpr std::size_t indent = 15;
+  std::string result, line = "     " + label;
+  line.resize(indent, ' ');
   for (const std::string& word : experiments::split(text, ' ')) {
-    if (word.empty()) continue;
     if (line.size() > indent && line.size() + 1 + word.size() > columns) {
       result += line + "\n";
       line.assign(indent, ' ');
@@ -103,11 +104,11 @@ std::string claims_table(const std::vector<Claim>& claims) {
     const std::string says = name(claim.verdict());
     const std::size_t room = columns - 5 - says.size() - 2;
     text += fmt::format("{:<4} {:<{}}  {}\n", claim.id, claim.title.substr(0, room), room, says);
-    if (!claim.bound.empty()) text += wrapped("bound:    " + claim.bound, 5);
-    if (!claim.measured.empty()) text += wrapped("measured: " + claim.measured, 5);
+    if (!claim.bound.empty()) text += labelled("bound", claim.bound);
+    if (!claim.measured.empty()) text += labelled("measured", claim.measured);
     if (claim.verdict() == Verdict::with_condition && !claim.condition.empty())
-      text += wrapped("holds if: " + claim.condition, 5);
-    text += wrapped("why:      " + claim.why, 5);
+      text += labelled("holds if", claim.condition);
+    text += labelled("why", claim.why);
     text += "\n";
   }
   return text;
