@@ -24,14 +24,29 @@ Rational value_at(const Piece<S>& piece, const Rational& t) {
 
 /// A side of a box at t, widened as the list does it: at the knots of its piece.
 template <class S>
-Rational side_at(const FlightPlans<S>& plans, std::uint32_t vertex, int axis, int widening, double t) {
+Piece<S> side_piece(const FlightPlans<S>& plans, std::uint32_t vertex, int axis, int widening, double t) {
   Piece<S> piece = plans.piece_after(vertex, axis, t);
   const auto widened = [&](S x) { return widening > 0 ? widened_up(x) : S(-widened_up(S(-x))); };
   if (widening != 0) {
     piece.x0 = widened(piece.x0);
     if (piece.kind == PieceKind::chord || piece.x1 != 0) piece.x1 = widened(piece.x1);
   }
-  return value_at(piece, exact(t));
+  return piece;
+}
+
+/// Is a below b at t? In rationals, but where doubles leave no doubt by far.
+template <class S>
+bool below(const Piece<S>& a, const Piece<S>& b, double t) {
+  double difference = 0, scale = 0;
+  for (const auto& [piece, sign] : {std::pair(a, -1), std::pair(b, 1)}) {
+    const double x0 = double(piece.x0), x1 = double(piece.x1), elapsed = t - piece.t0;
+    const double way =
+        piece.kind == PieceKind::ray ? x1 * elapsed : (x1 - x0) * (elapsed / (piece.t1 - piece.t0));
+    difference += sign * (x0 + way);
+    scale += std::abs(x0) + std::abs(x1) + std::abs(way);
+  }
+  if (std::abs(difference) > 1e-9 * scale) return difference > 0;
+  return value_at(a, exact(t)) < value_at(b, exact(t));
 }
 
 using ListEntry = std::tuple<std::uint32_t, std::uint32_t, bool>;  // nodes, overlapping leaves?
@@ -92,8 +107,10 @@ class Auditor {
     const std::uint32_t* ra = forest.tree(bodies.first).realisers(a);
     const std::uint32_t* rb = forest.tree(bodies.second).realisers(b);
     for (int axis = 0; axis < 3; ++axis)
-      if (side_at(plans_a, ra[2 * axis + 1], axis, 1, t) < side_at(plans_b, rb[2 * axis], axis, 0, t) ||
-          side_at(plans_b, rb[2 * axis + 1], axis, 0, t) < side_at(plans_a, ra[2 * axis], axis, -1, t))
+      if (below(side_piece(plans_a, ra[2 * axis + 1], axis, 1, t),
+                side_piece(plans_b, rb[2 * axis], axis, 0, t), t) ||
+          below(side_piece(plans_b, rb[2 * axis + 1], axis, 0, t),
+                side_piece(plans_a, ra[2 * axis], axis, -1, t), t))
         return false;
     return true;
   }
