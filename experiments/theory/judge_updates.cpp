@@ -71,8 +71,8 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
                   "segments x sum over nodes and sides of (vertices below - 1); lambda_1(n) - 1 = n - 1 "
                   "breakpoints per bound and segment; exponent of n log n not above 1 + 5%",
               .condition =
-                  "what grows is the bound with its factor, the number of segments; over the sizes measured "
-                  "some families grow faster than n log n",
+                  "the bound with its factor, the number of segments, is meant; how close to n log n events "
+                  "stay depends on the motion",
               .data = {{"counts", counts}, {"exact", exact}, {"fits", fits}}};
   if (counts.empty()) return undecided(claim, "Nothing was counted.");
   double share = 0, fullest = 0;
@@ -118,7 +118,7 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
         "; a fit is no proof: over up to {} sizes c n log n leaves residuals of up to {}, and {}.", sizes,
         percent(worst),
         faster.empty() ? "no family's exponent lies significantly above 1"
-                       : joined(faster) + " significantly above 1: finer meshes carry motion of their own");
+                       : "the exponent lies significantly above 1 for " + joined(faster));
   return claim;
 }
 
