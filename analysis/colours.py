@@ -21,12 +21,12 @@ FAMILIES: dict[str, tuple[str, str]] = {
     "fcl": ("#56B4E9", "D"),
     "bullet": ("#E69F00", "v"),
     "embree": ("#CC79A7", "P"),
+    "lazy": ("#8C7A00", "<"),
 }
 
 #: What families that are not known choose from.
 FREE: tuple[tuple[str, str], ...] = (
     ("#882255", "h"),
-    ("#8C7A00", "<"),
     ("#44AA99", "p"),
     ("#5D4A9C", ">"),
     ("#AA4499", "8"),
