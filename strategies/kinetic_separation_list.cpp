@@ -85,11 +85,18 @@ class KineticSeparationList final : public Strategy<S> {
     on_collision([&](auto& collision) { collision.plans_changed(t, changed_); });
   }
 
+  void geometry_changed(double t, const GeometryChange<S>& change) override {
+    const std::vector<BodyChange> changes = body_changes(this->scene_, change);
+    on_collision(
+        [&](auto& collision) { collision.geometry_changed(t, this->scene_, this->sampled_, changes); });
+  }
+
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     return on_collision([&](auto& collision) {
       const auto& tree = collision.forest().tree(body);
-      AuditView view{tree.topology(), {}, {}};
-      for (std::uint32_t node = 0; node < tree.topology().size(); ++node)
+      std::vector<std::uint32_t> order;
+      AuditView view{tree.compacted_topology(order), {}, {}};
+      for (const std::uint32_t node : order)
         view.boxes.push_back(to_double(box_of_realisers(tree.realisers(node), this->sampled_, body)));
       return view;
     });
@@ -148,7 +155,11 @@ KBVH_STRATEGY(kinetic_separation_list) {
       .family = "kinetic",
       .citation = "Zachmann & Weller 2006, s.7",
       .positions = PositionUse::fetched,
-      .can = {.event_driven = true, .continuous = true, .plan_changes = true, .spans = true},
+      .can = {.event_driven = true,
+              .continuous = true,
+              .plan_changes = true,
+              .geometry_changes = true,
+              .spans = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"queue",
                       "avl",

@@ -14,9 +14,9 @@ class KineticCollision {
 
   KineticCollision(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                    Count& count)
-      : forest_(scene, motion, std::move(topologies), count, ChangedBoxes{&changed_}),
+      : forest_(scene, motion, std::move(topologies), count, ChangedBoxes{&changed_, &nodes_}),
         list_(scene, forest_, count) {}
-  KineticCollision(const KineticCollision&) = delete;  // the trees point to `changed_`
+  KineticCollision(const KineticCollision&) = delete;  // the trees point to `changed_` and `nodes_`
   KineticCollision& operator=(const KineticCollision&) = delete;
 
   void reset(double t) {
@@ -69,6 +69,16 @@ class KineticCollision {
     list_.boxes_changed(changed_, Instant<S>::at(t));
   }
 
+  /// Follows a change of geometry at t that scene and motion show already: first the trees, each edit as it
+  /// comes, then the lists at once. Says what the lists had to do.
+  ListEdit geometry_changed(double t, const SceneView<S>& scene, const SampledMotion<S>& motion,
+                            std::span<const BodyChange> changes) {
+    changed_.clear();
+    nodes_.clear();
+    forest_.geometry_changed(t, scene, motion, changes);
+    return list_.geometry_changed(t, forest_, nodes_, changed_);
+  }
+
   Forest& forest() { return forest_; }
   const Forest& forest() const { return forest_; }
   List& list() { return list_; }
@@ -78,6 +88,7 @@ class KineticCollision {
 
  private:
   std::vector<ChangedBoxes::Box> changed_;
+  std::vector<ChangedBoxes::Node> nodes_;
   Forest forest_;
   List list_;
 };

@@ -10,12 +10,21 @@
 
 namespace kbvh {
 
-/// Boxes that an event of a kinetic tree has changed, in the order of the notices.
+/// What kinetic trees tell a separation list: boxes that have changed, in the order of the notices, and nodes
+/// that are not what they were.
 struct ChangedBoxes {
   struct Box {
     std::uint32_t body, node;
+    auto operator<=>(const Box&) const = default;
+  };
+  /// A node that insertions or deletions have changed: it has other children, or became a leaf or ceased to
+  /// be one; or it is gone, and its id means nothing or something else now.
+  struct Node {
+    std::uint32_t body, node;
+    bool gone;
   };
   std::vector<Box>* boxes;
+  std::vector<Node>* nodes;
 
   template <class S>
   void realiser_changed(std::uint32_t body, std::uint32_t node, Side /*side*/, std::uint32_t /*old_vertex*/,
@@ -23,6 +32,21 @@ struct ChangedBoxes {
     boxes->push_back({body, node});
   }
   void realiser_plan_changed(std::uint32_t body, std::uint32_t node) { boxes->push_back({body, node}); }
+  void leaf_split(std::uint32_t body, std::uint32_t node, std::uint32_t /*first_child*/) {
+    nodes->push_back({body, node, false});
+  }
+  void node_removed(std::uint32_t body, std::uint32_t node) { nodes->push_back({body, node, true}); }
+  void node_moved(std::uint32_t body, std::uint32_t from, std::uint32_t to) {
+    nodes->push_back({body, from, true});
+    nodes->push_back({body, to, false});
+  }
+  void subtree_rebuilt(std::uint32_t body, std::uint32_t node) { nodes->push_back({body, node, false}); }
+};
+
+/// What a change of geometry cost a separation list, in pairs.
+struct ListEdit {
+  std::uint64_t removed = 0;  ///< taken out of the tree of pairs
+  std::uint64_t decided = 0;  ///< decided anew: new ones, those with other children, those with other boxes
 };
 
 /// The separation list of kinetic incremental collision detection (Z&W s.7), for every body pair of a scene:
@@ -37,6 +61,10 @@ struct ChangedBoxes {
 ///   leaves, overlapping: they are apart ("leaves do not overlap").
 /// When a box changes ("BV change": another realiser, or another plan of one), the pairs that it takes part
 /// in, which are linked from it, are decided anew.
+///
+/// Insertions and deletions change the trees below a few nodes. The pairs of such a node stay, what is below
+/// them goes, and they are decided anew on the trees as they are then; a pair of a node that is gone lies
+/// below a pair of its former parent, which counts as changed. Nothing else is looked at.
 ///
 /// Boxes are compared on the flight plans with the margin of OverlapClock: the list may hold a pair of boxes
 /// that are apart by some ulps, and misses none whose rounded boxes touch.
@@ -57,6 +85,7 @@ class SeparationList {
     std::uint32_t depth = 0;
     std::uint16_t bodies = 0;  ///< index of the body pair
     bool used = false, overlapping = false;
+    bool dirty = false;  ///< has a node with other children, while a change of geometry is followed
   };
   /// Overlapping leaves, and since when at the earliest.
   struct LeafPair {
@@ -76,12 +105,12 @@ class SeparationList {
       : queue_(clock_, 0), count_(&count), leaves_(scene.pairs().size()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const auto& tree = forest.tree(body);
-      bodies_.push_back({&tree.topology(), tree.topology().empty() ? nullptr : tree.realisers(0),
-                         &forest.clock().plans(body),
-                         std::vector<std::uint32_t>(tree.topology().size(), none)});
+      bodies_.push_back({&tree.topology(), nullptr, &forest.clock().plans(body), {}, {}});
       block_ = std::max(block_, tree.topology().width * tree.topology().width);
     }
+    read_trees(forest);
     for (const BodyPair& pair : scene.pairs()) body_pairs_.push_back(pair);
+    roots_.resize(body_pairs_.size(), none);
   }
   SeparationList(const SeparationList&) = delete;
   SeparationList& operator=(const SeparationList&) = delete;
@@ -96,12 +125,8 @@ class SeparationList {
     for (auto& leaves : leaves_) leaves.clear();
     for (auto& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
     for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) {
-      if (bodies_[body_pairs_[i].first].topology->empty() || bodies_[body_pairs_[i].second].topology->empty())
-        continue;
-      const std::uint32_t root = new_block();
-      insert(root, i, 0, 0, none, 0);
-      work_.assign(1, root);
-      settle_new(Instant<S>::at(t));
+      roots_[i] = none;
+      if (both_have_nodes(i)) start_pair(i, Instant<S>::at(t));
     }
   }
 
@@ -126,6 +151,7 @@ class SeparationList {
   void boxes_changed(std::span<const ChangedBoxes::Box> boxes, const Instant<S>& now) {
     time_ = now.begin;
     end_ = now.end;
+    // Of a node that went while the geometry changed, no pair is left.
     for (const auto& box : boxes) {
       linked_.clear();
       for (std::uint32_t slot = bodies_[box.body].first_pair[box.node]; slot != none;
@@ -137,12 +163,38 @@ class SeparationList {
         // What a collapse has removed, or an expansion made anew in its place, needs nothing.
         if (!pairs_[slot].used || node_of(slot, box.body) != box.node) continue;
         count_->add(Counter::nodes_visited);
+        ++work_done_.decided;
         if (overlap_after(slot, now) != pairs_[slot].overlapping)
           turn(slot, now);
         else
           schedule(slot, now);
       }
     }
+  }
+
+  /// Follows a change of geometry at t that the trees of `forest` have made already, all of them: `nodes` and
+  /// `boxes` are what they told of it, in their order (boxes are sorted here). Costs what hangs below the
+  /// pairs of changed nodes, and the pairs of changed boxes; the whole list of a body pair if a root changes.
+  /// O(nodes) room the first time, amortised O(change) after. Not between start_spans and stop_spans.
+  template <class Forest>
+  ListEdit geometry_changed(double t, const Forest& forest, std::span<const ChangedBoxes::Node> nodes,
+                            std::vector<ChangedBoxes::Box>& boxes) {
+    KBVH_ASSERT(!recording_);
+    const auto now = Instant<S>::at(t);
+    time_ = t;
+    work_done_ = {};
+    read_trees(forest);
+    remove_changed(nodes);
+    for (const std::uint32_t slot : tops_) {
+      work_.assign(1, slot);
+      settle_new(now);
+    }
+    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i)
+      if (roots_[i] == none && both_have_nodes(i)) start_pair(i, now);
+    std::sort(boxes.begin(), boxes.end());
+    boxes.erase(std::unique(boxes.begin(), boxes.end()), boxes.end());
+    boxes_changed(boxes, now);
+    return work_done_;
   }
 
   /// The overlapping leaves of one body pair, in no order.
@@ -171,9 +223,11 @@ class SeparationList {
 
   std::uint64_t steps() const { return queue_.steps(); }
   std::size_t bytes() const {
-    std::size_t total = queue_.bytes() + pairs_.capacity() * sizeof(Pair) +
-                        (free_blocks_.capacity() + work_.capacity() + linked_.capacity()) * 4;
-    for (const auto& body : bodies_) total += body.first_pair.size() * 4;
+    std::size_t total =
+        queue_.bytes() + pairs_.capacity() * sizeof(Pair) +
+        (free_blocks_.capacity() + work_.capacity() + linked_.capacity() + roots_.size() + tops_.capacity()) *
+            4;
+    for (const auto& body : bodies_) total += body.first_pair.size() * 4 + body.gone.size();
     for (const auto& leaves : leaves_) total += leaves.capacity() * sizeof(LeafPair);
     return total;
   }
@@ -184,7 +238,88 @@ class SeparationList {
     const std::uint32_t* realisers;
     const FlightPlans<S>* plans;
     std::vector<std::uint32_t> first_pair;  ///< linked from each node, or none
+    std::vector<std::uint8_t> gone;         ///< nodes, while a change of geometry is followed
   };
+
+  /// Where the trees keep their realisers now, and room for all their nodes; ids are never given up.
+  template <class Forest>
+  void read_trees(const Forest& forest) {
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
+      BodyBoxes& own = bodies_[body];
+      own.realisers = own.topology->empty() ? nullptr : forest.tree(body).realisers(0);
+      if (own.first_pair.size() < own.topology->size()) own.first_pair.resize(own.topology->size(), none);
+    }
+  }
+  bool both_have_nodes(std::uint16_t bodies) const {
+    return !bodies_[body_pairs_[bodies].first].topology->empty() &&
+           !bodies_[body_pairs_[bodies].second].topology->empty();
+  }
+  /// Makes the list of a body pair that has none.
+  void start_pair(std::uint16_t bodies, const Instant<S>& now) {
+    roots_[bodies] = new_block();
+    insert(roots_[bodies], bodies, 0, 0, none, 0);
+    work_.assign(1, roots_[bodies]);
+    settle_new(now);
+  }
+
+  bool has_gone_node(const Pair& pair) const {
+    const auto gone = [&](std::uint32_t body, std::uint32_t node) {
+      return node < bodies_[body].gone.size() && bodies_[body].gone[node] != 0;
+    };
+    return gone(body_of(pair, 0), pair.a) || gone(body_of(pair, 1), pair.b);
+  }
+  /// Removes all pairs below those of changed nodes, and leaves the highest of these in `tops_`, as pairs of
+  /// which nothing is known. Root pairs of a body that has nothing left go.
+  ///
+  /// All goes by the tree of pairs, which is that of the trees before the change, whatever the ids mean now:
+  /// an id that lost its meaning lay, then, below a node that the trees named.
+  void remove_changed(std::span<const ChangedBoxes::Node> nodes) {
+    for (const auto& changed : nodes) {
+      BodyBoxes& body = bodies_[changed.body];
+      if (!changed.gone) continue;
+      body.gone.resize(body.first_pair.size(), 0);
+      body.gone[changed.node] = 1;
+    }
+    linked_.clear();
+    for (const auto& changed : nodes)
+      for (std::uint32_t slot = bodies_[changed.body].first_pair[changed.node]; slot != none;
+           slot = pairs_[slot].next[side_of(slot, changed.body)]) {
+        std::uint32_t top = slot;
+        while (pairs_[top].father != none && has_gone_node(pairs_[top])) top = pairs_[top].father;
+        if (pairs_[top].dirty) continue;
+        pairs_[top].dirty = true;
+        linked_.push_back(top);
+      }
+    tops_.clear();
+    for (const std::uint32_t slot : linked_) {
+      std::uint32_t above = pairs_[slot].father;
+      while (above != none && !pairs_[above].dirty) above = pairs_[above].father;
+      if (above == none) tops_.push_back(slot);
+    }
+    for (const std::uint32_t slot : linked_) pairs_[slot].dirty = false;
+    for (const std::uint32_t slot : tops_) unsettle(slot);
+    for (const auto& changed : nodes)
+      if (changed.gone) bodies_[changed.body].gone[changed.node] = 0;
+    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) {
+      const std::uint32_t root = roots_[i];
+      if (root == none || both_have_nodes(i)) continue;
+      // The body's last node was its root, so this pair is one of them, and the only one of its list.
+      [[maybe_unused]] const std::size_t found = std::erase(tops_, root);
+      KBVH_ASSERT(found == 1);
+      remove(root);
+      free_blocks_.push_back(root);
+      roots_[i] = none;
+    }
+  }
+  /// Makes a pair one that `settle_new` has still to decide.
+  void unsettle(std::uint32_t slot) {
+    pairs_[slot].overlapping = false;
+    if (pairs_[slot].place != none) end_leaf(slot);
+    if (pairs_[slot].children != none)
+      remove_below(slot);
+    else
+      list_changed(-1);
+  }
 
   std::uint32_t body_of(const Pair& pair, int side) const {
     return side == 0 ? body_pairs_[pair.bodies].first : body_pairs_[pair.bodies].second;
@@ -251,6 +386,7 @@ class SeparationList {
     }
     cancel(slot);
     pair.used = false;
+    ++work_done_.removed;
   }
   void cancel(std::uint32_t slot) {
     if (!queue_.cancel(slot)) return;
@@ -264,6 +400,7 @@ class SeparationList {
       const std::uint32_t slot = work_.back();
       work_.pop_back();
       count_->add(Counter::nodes_visited);
+      ++work_done_.decided;
       list_changed(1);
       if (overlap_after(slot, now))
         begin_overlap(slot, now);
@@ -376,7 +513,9 @@ class SeparationList {
   std::vector<std::uint32_t> free_blocks_;
   std::vector<std::vector<LeafPair>> leaves_;  ///< [body pair]
   std::size_t list_size_ = 0;
-  std::vector<std::uint32_t> work_, linked_;
+  std::vector<std::uint32_t> roots_;  ///< slot of each body pair's root pair, or none
+  std::vector<std::uint32_t> work_, linked_, tops_;
+  ListEdit work_done_;         ///< since the last change of geometry began
   double time_ = 0, end_ = 0;  ///< around the instant of the event at hand
   bool recording_ = false;
   std::vector<EndedLeafPair> ended_;

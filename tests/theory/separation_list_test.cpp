@@ -119,7 +119,7 @@ class Auditor {
 };
 
 struct Kinds {
-  std::uint64_t overlap = 0, fathers = 0, leaves = 0, changes = 0;
+  std::uint64_t overlap = 0, fathers = 0, leaves = 0, changes = 0, geometry = 0;
 };
 
 /// Plays a scene event by event and audits some `audits` times.
@@ -127,13 +127,14 @@ template <class S, template <class> class Queue>
 Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t audits) {
   using Collision = KineticCollision<S, Queue, Counting>;
   const auto test = synthetic_scene<S>(name, 2);
-  const SceneView<S> view(test.scene);
   const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 2) : test.frames;
   Kinds kinds;
   std::uint64_t every = 1, compared = 0;
   bool wanted = false;
   // The first run counts the events, the second audits between as many as asked for.
   for (const bool auditing : {false, true}) {
+    ChangingScene<S> changing(test.scene);
+    const SceneView<S> view(changing.scene());
     Playback<S> playback(test.scene);
     playback.seek(frames.front());
     Counting count;
@@ -142,7 +143,8 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
     count.table = {};
     Auditor<S, Collision> auditor(collision, view);
     auto step = test.script.steps.begin();
-    std::uint64_t events = 0;
+    std::uint64_t events = 0, geometry = 0;
+    ListEdit edits;
     for (const double t : frames) {
       while (collision.due(t)) {
         const double after = collision.after_next();
@@ -167,13 +169,28 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
           vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
         }
         collision.plans_changed(t, changed);
+        if (step->geometry.empty()) continue;
+        changing.apply(step->geometry, playback);
+        const ListEdit edit =
+            collision.geometry_changed(t, view, ClipMotion<S>(playback), body_changes(view, step->geometry));
+        edits.removed += edit.removed;
+        edits.decided += edit.decided;
+        ++geometry;
+        wanted = true;  // and once more after the next event
+        if (auditing && !collision.due(after)) {
+          EXPECT_EQ(auditor.compare(after), "") << name << ", after a change of geometry";
+        }
       }
     }
     every = std::max<std::uint64_t>(1, events / audits);
     compared = auditor.audits;
     const Counters& table = count.table;
     kinds = {table[Counter::overlap_events], table[Counter::fathers_apart_events],
-             table[Counter::leaves_apart_events], table[Counter::bound_change_events]};
+             table[Counter::leaves_apart_events], table[Counter::bound_change_events], geometry};
+    if (auditing && geometry != 0)
+      std::printf("%s: %llu changes of geometry: %llu pairs removed, %llu decided\n", name.c_str(),
+                  (unsigned long long)geometry, (unsigned long long)edits.removed,
+                  (unsigned long long)edits.decided);
     if (auditing)
       std::printf(
           "%s: %llu audits of %llu entries in all; events: overlap %llu, fathers %llu, leaves %llu, "
@@ -194,6 +211,104 @@ TEST_P(SeparationLists, EqualATraversalBetweenEvents) {
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, SeparationLists, testing::ValuesIn(synthetic_scene_names()),
                          [](const auto& param_info) { return param_info.param; });
+
+class SeparationListsOfChangingGeometry : public testing::TestWithParam<std::string> {};
+
+// After every insertion and deletion, and between the events that follow.
+TEST_P(SeparationListsOfChangingGeometry, EqualATraversal) {
+  for (const std::uint32_t width : {2u, 4u})
+    for (const std::uint32_t leaf_size : {1u, 3u}) {
+      const BuilderConfig builder{.width = width, .leaf_size = leaf_size};
+      EXPECT_GT((play<float, AvlEventQueue>(GetParam(), builder, 40).geometry), 0u);
+      EXPECT_GT((play<double, BinaryHeapEventQueue>(GetParam(), builder, 20).geometry), 0u);
+    }
+}
+INSTANTIATE_TEST_SUITE_P(Scenes, SeparationListsOfChangingGeometry, testing::ValuesIn(geometry_scene_names()),
+                         [](const auto& param_info) { return param_info.param; });
+
+/// Two sheets of n x n quads, two triangles each, that move through each other: one level, one inclined.
+Scene<float> crossing_sheets(std::uint32_t n) {
+  Scene<float> scene;
+  for (const int inclined : {0, 1}) {
+    std::vector<float> positions;
+    for (const float lift : {-0.2f, 0.2f})
+      for (std::uint32_t i = 0; i <= n; ++i)
+        for (std::uint32_t j = 0; j <= n; ++j) {
+          const float x = float(i) / float(n) - 0.5f, y = float(j) / float(n) - 0.5f;
+          positions.insert(positions.end(), {x, y, inclined != 0 ? 0.9f * x + 0.3f * y + lift : 0.0f});
+        }
+    Primitives primitives;
+    for (std::uint32_t i = 0; i < n; ++i)
+      for (std::uint32_t j = 0; j < n; ++j) {
+        const std::uint32_t v = i * (n + 1) + j;
+        primitives.add(std::vector<std::uint32_t>{v, v + 1, v + n + 1});
+        primitives.add(std::vector<std::uint32_t>{v + 1, v + n + 2, v + n + 1});
+      }
+    scene.bodies.push_back({inclined != 0 ? "inclined" : "level", primitives,
+                            FlightPlans<float>((n + 1) * (n + 1), {0.0, 1.0}, std::move(positions))});
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  return scene;
+}
+
+struct Locality {
+  double work, list;  ///< pairs per primitive inserted or deleted; pairs in the list
+};
+
+/// Triangles of either sheet are taken out, one at a time, and inserted again on their vertices.
+Locality locality(std::uint32_t n) {
+  using Collision = KineticCollision<float, AvlEventQueue, Silent>;
+  const Scene<float> scene = crossing_sheets(n);
+  ChangingScene<float> changing(scene);
+  const SceneView<float> view(changing.scene());
+  Playback<float> playback(scene);
+  const double t = 0.53;  // when no two corners meet
+  playback.seek(t);
+  Silent count;
+  Collision collision(view, ClipMotion<float>(playback),
+                      build_topologies(view, playback, {.width = 2, .leaf_size = 1}), count);
+  collision.reset(t);
+  Auditor<float, Collision> auditor(collision, view);
+  Random random(n);
+  ListEdit total;
+  constexpr std::uint32_t rounds = 100;
+  for (std::uint32_t i = 0; i < rounds; ++i) {
+    const std::uint32_t body = i % 2;
+    std::uint32_t id = random.below(2 * n * n);
+    while (!view.primitives(body).alive(id)) id = random.below(2 * n * n);
+    const auto vertices = view.primitives(body)[id];
+    const std::vector<std::uint32_t> corners(vertices.begin(), vertices.end());
+    for (const bool again : {false, true}) {
+      GeometryChange<float> change;
+      if (again)
+        change.primitives = {{body, corners}};
+      else
+        change.removed_primitives = {{body, id}};
+      changing.apply(change, playback);
+      const ListEdit edit =
+          collision.geometry_changed(t, view, ClipMotion<float>(playback), body_changes(view, change));
+      total.removed += edit.removed;
+      total.decided += edit.decided;
+    }
+    const double after = std::nextafter(t, 1.0);
+    if (i % 20 != 0 || collision.due(after)) continue;
+    EXPECT_EQ(auditor.compare(after), "") << n;
+  }
+  EXPECT_GE(auditor.audits, 4u);
+  return {double(total.removed + total.decided) / (2 * rounds), double(collision.list().size())};
+}
+
+// What an insertion or deletion costs is what stands below a few nodes, not the list.
+TEST(SeparationListGeometry, ChangesAreLocal) {
+  std::vector<Locality> found;
+  for (const std::uint32_t n : {8u, 16u, 32u, 64u}) {
+    found.push_back(locality(n));
+    std::printf("%u triangles a body: %.1f pairs per change, of a list of %.0f\n", 2 * n * n,
+                found.back().work, found.back().list);
+  }
+  EXPECT_GT(found.back().list, 8 * found.front().list);
+  EXPECT_LT(found.back().work, 2 * found.front().work);
+}
 
 TEST(SeparationListEvents, EachKindHappensOftenInTheTestScenes) {
   Kinds all;
