@@ -116,6 +116,19 @@ class KineticBoxTree {
   std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const {
     return leaves_[topology_.nodes[node]];
   }
+  /// A node's box at the motion's time, as inherited. O(depth).
+  Box<S> box_of(std::uint32_t node, const SampledMotion<S>& motion) const {
+    std::uint32_t realisers[6] = {}, open = all_sides;
+    for (; open != 0; node = topology_.parents[node]) {
+      const std::uint32_t here = open & sides_of(node);
+      for (std::uint32_t sides = here; sides != 0; sides &= sides - 1) {
+        const Side side = Side(std::countr_zero(sides));
+        realisers[side] = realiser(node, side);
+      }
+      open &= ~here;
+    }
+    return box_of_realisers(realisers, motion, body_);
+  }
   SearchCost& search_cost() { return search_cost_; }
 
   /// Chooses the planes, finds every realiser at t and schedules every certificate. O(nodes log nodes +
@@ -588,19 +601,6 @@ class KineticBoxTree {
       concerned_[start] = std::uint8_t(concerned_[start] | sides_of(start));
     }
     repair(t, unchanged);
-  }
-  /// A node's box at the motion's time, as inherited. O(depth).
-  Box<S> box_of(std::uint32_t node, const SampledMotion<S>& motion) const {
-    std::uint32_t realisers[6] = {}, open = all_sides;
-    for (; open != 0; node = topology_.parents[node]) {
-      const std::uint32_t here = open & sides_of(node);
-      for (std::uint32_t sides = here; sides != 0; sides &= sides - 1) {
-        const Side side = Side(std::countr_zero(sides));
-        realisers[side] = realiser(node, side);
-      }
-      open &= ~here;
-    }
-    return box_of_realisers(realisers, motion, body_);
   }
   void place_leaves() {
     for (std::uint32_t node = 0; node < topology_.size(); ++node) leaves_.placed(topology_.nodes[node], node);
