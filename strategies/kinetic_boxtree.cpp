@@ -2,6 +2,7 @@
 // other sides inherited, valid at every time, updated at events only; parts that have degenerated can be
 // rebuilt.
 
+#include <numeric>
 #include <variant>
 
 #include "core/hierarchy/boxtree_degradation.hpp"
@@ -42,7 +43,8 @@ class KineticBox final : public Strategy<S> {
     for (std::uint32_t body = 0; body < degradations_.size(); ++body)
       on_forest([&](auto& forest) {
         const auto& tree = forest.tree(body);
-        degradations_[body].start(tree.topology(), all_boxes(tree, body));
+        const auto boxes = all_boxes(tree, body);
+        degradations_[body].start(tree.topology(), order_, boxes);
       });
     // What starting costs is not what running costs: counts begin here.
     count_.table = {};
@@ -100,14 +102,33 @@ class KineticBox final : public Strategy<S> {
     new_frame();  // realisers may differ now
   }
 
+  void geometry_changed(double t, const GeometryChange<S>& change) override {
+    const std::vector<BodyChange> changes = body_changes(this->scene_, change);
+    on_forest([&](auto& forest) {
+      forest.geometry_changed(t, this->scene_, this->sampled_, changes);
+      for (const BodyChange& own : changes) caches_[own.body].resize(forest.tree(own.body).topology().size());
+    });
+    plans_changed_ = true;  // bodies may move that did not
+    new_frame();
+    if (!rebuilds_) return;
+    on_forest([&](auto& forest) {
+      for (const BodyChange& own : changes) {
+        const auto& tree = forest.tree(own.body);
+        const auto boxes = all_boxes(tree, own.body);
+        degradations_[own.body].edited(tree.topology(), order_, boxes);
+      }
+    });
+  }
+
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     return on_forest([&](auto& forest) {
       const auto& tree = forest.tree(body);
-      AuditView view{tree.topology(), {}, {}};
+      std::vector<std::uint32_t> order;
+      AuditView view{tree.compacted_topology(order), {}, {}};
       BoxCache<S> cache = caches_[body];  // what a query read counts; the rest is made from it
       InheritedBoxes<S, std::remove_cvref_t<decltype(tree)>> boxes(tree, this->sampled_, body, cache,
                                                                    leaf_boxes_);
-      for (std::uint32_t node = 0; node < tree.topology().size(); ++node) {
+      for (const std::uint32_t node : order) {
         boxes.ensure(node);
         view.boxes.push_back(to_double(boxes(node)));
       }
@@ -145,10 +166,17 @@ class KineticBox final : public Strategy<S> {
   InheritedBoxes<S, Tree> boxes(const Tree& tree, std::uint32_t body) {
     return {tree, this->sampled_, body, caches_[body], leaf_boxes_};
   }
+  /// The boxes of all nodes; these are in `order_` then, parents before children.
   template <class Tree>
   InheritedBoxes<S, Tree> all_boxes(const Tree& tree, std::uint32_t body) {
+    if (tree.edited()) {
+      tree.compacted_topology(order_);
+    } else {
+      order_.resize(tree.topology().size());
+      std::iota(order_.begin(), order_.end(), 0u);
+    }
     auto all = boxes(tree, body);
-    for (std::uint32_t node = 0; node < tree.topology().size(); ++node) all.ensure(node);
+    for (const std::uint32_t node : order_) all.ensure(node);
     return all;
   }
   /// Of the only primitive of a leaf.
@@ -164,11 +192,12 @@ class KineticBox final : public Strategy<S> {
       auto& tree = forest.tree(body);
       auto all = all_boxes(tree, body);
       count_.add(Counter::nodes_visited, tree.topology().size());
-      const auto& nodes = degradations_[body].beyond(threshold_, tree.topology(), all);
+      const auto& nodes = degradations_[body].beyond(threshold_, tree.topology(), order_, all);
       if (nodes.empty()) return;
       for (const std::uint32_t node : nodes) tree.rebuild_below(node, all(node), this->sampled_, method_);
       caches_[body].new_frame();
-      degradations_[body].rebuilt(tree.topology(), all_boxes(tree, body));
+      const auto rebuilt = all_boxes(tree, body);
+      degradations_[body].rebuilt(tree.topology(), order_, rebuilt);
       count_.add(Counter::nodes_visited, tree.topology().size());
     });
   }
@@ -179,7 +208,7 @@ class KineticBox final : public Strategy<S> {
       forest_;
   std::vector<BoxCache<S>> caches_;
   std::vector<NodePair> stack_;
-  std::vector<std::uint32_t> changed_;
+  std::vector<std::uint32_t> changed_, order_;
   std::uint64_t first_step_ = 0, first_fetch_ = 0;
   LeafBoxes leaf_boxes_;
   bool rebuilds_;
@@ -206,6 +235,7 @@ KBVH_STRATEGY(kinetic_boxtree) {
               .continuous = true,
               .restructures = true,  // with rebuild=median or sah
               .plan_changes = true,
+              .geometry_changes = true,
               .time_budget = true},
       .topology = {.widths = {2}, .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters =

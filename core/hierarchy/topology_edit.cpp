@@ -169,6 +169,12 @@ void TopologyEditor::remove(Topology& topology, std::uint32_t primitive, Topolog
   free_pairs_.push_back(siblings.first());
 }
 
+void TopologyEditor::placed(const Topology& topology, std::uint32_t leaf) {
+  const TopologyNode content = topology.nodes[leaf];
+  for (std::uint32_t k = content.first(); k < content.first() + content.count(); ++k)
+    leaf_of_[topology.primitives[k]] = leaf;
+}
+
 std::uint32_t TopologyEditor::unbalanced_above(const Topology& topology, std::uint32_t primitive) const {
   const std::uint32_t leaf = leaf_of_[primitive];
   std::uint32_t depth = 0;

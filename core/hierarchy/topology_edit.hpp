@@ -73,6 +73,9 @@ class TopologyEditor {
     rebuild(topology, node, leaves, edit);
   }
 
+  /// Takes note that someone else has moved a leaf's content to this node.
+  void placed(const Topology& topology, std::uint32_t leaf);
+
   std::size_t bytes() const {
     return (leaf_of_.size() + free_pairs_.size() + free_entries_.size()) * sizeof(std::uint32_t);
   }

@@ -3,12 +3,15 @@
 #include <array>
 #include <bit>
 #include <cstdint>
-#include <functional>
+#include <limits>
+#include <numeric>
+#include <optional>
 #include <vector>
 
 #include "core/assert.hpp"
 #include "core/counters.hpp"
 #include "core/hierarchy/boxtree.hpp"
+#include "core/hierarchy/topology_edit.hpp"
 #include "core/kinetic/kinetic_forest.hpp"
 
 namespace kbvh {
@@ -19,6 +22,8 @@ struct BoxTreeRules {
   static int split_axis(int /*depth*/) { return 3; }
   /// Does a certificate search of `sought` go down to a child whose own side is another? It must.
   static bool descends(Side /*own*/, Side /*sought*/) { return true; }
+  /// Is a certificate looked at again when a change has replaced a realiser among its candidates? It must.
+  static bool carries_up() { return true; }
 };
 
 /// What the certificate searches of a BoxTree cost since it was made or `forget` was called.
@@ -49,8 +54,13 @@ struct SearchCost {
 /// other; and there, if its own realiser stays, the search is needed only if it was the replaced vertex that
 /// would have come next.
 ///
-/// Slots of the queue are first_slot + side at the root, else first_slot + 5 + node. Events are handled and
-/// observers told as by KineticAabbTree, but for nodes' own sides only.
+/// Slots of the queue are first_slot + side at the root, else first_slot + 5 + node, for the nodes that there
+/// were at the start; later ones get theirs in chunks. Events are handled and observers told as by
+/// KineticAabbTree, but for nodes' own sides only, and not of what insertions and deletions do to nodes.
+///
+/// Primitives can be inserted and removed at any time. The edit of the topology is local; where it was, the
+/// one certificate per side that searches there is made again, those of new nodes are made, and from there up
+/// those are made again below whose node a realiser has changed.
 template <class S, class Queue, class Count, class Observer = NoObserver, class Rules = BoxTreeRules>
 class KineticBoxTree {
  public:
@@ -62,12 +72,13 @@ class KineticBoxTree {
         leaves_(topology_, primitives),
         body_(body),
         first_slot_(first_slot),
+        packed_places_(std::uint32_t(slot_count(topology_))),
         clock_(&clock),
         queue_(&queue),
         count_(&count),
         observer_(observer),
         own_sides_(topology_.size(), 0),
-        realisers_(slot_count(topology_), 0),
+        realisers_(packed_places_, 0),
         seen_(clock.plans(body).vertex_count(), 0) {
     if (topology_.width != 2)
       throw std::invalid_argument("a BoxTree is binary, the topology's width is " +
@@ -78,7 +89,22 @@ class KineticBoxTree {
     return topology.empty() ? 0 : std::uint64_t(topology.size()) + 5;
   }
   std::uint32_t first_slot() const { return first_slot_; }
+  /// After insertions or deletions it is laid out as TopologyEditor says, with ids that mean nothing.
   const Topology& topology() const { return topology_; }
+  /// Has it been edited since it was made?
+  bool edited() const { return editor_.has_value(); }
+  /// The topology as a builder lays it out: node i of it is node order[i] of the tree.
+  Topology compacted_topology(std::vector<std::uint32_t>& order) const {
+    if (editor_) return compacted(topology_, order);
+    order.resize(topology_.size());
+    std::iota(order.begin(), order.end(), 0u);
+    return topology_;
+  }
+  /// The node that a slot of the queue belongs to.
+  std::uint32_t node_of(std::uint32_t slot) const {
+    const std::uint32_t place = place_of(slot);
+    return place < 6 ? 0 : place - 5;
+  }
   /// The one side that a node does not inherit; not for the root, which inherits none.
   Side own_side(std::uint32_t node) const { return own_sides_[node]; }
   /// The vertex that realises a node's own side; any side of the root.
@@ -90,21 +116,34 @@ class KineticBoxTree {
   std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const {
     return leaves_[topology_.nodes[node]];
   }
+  /// A node's box at the motion's time, as inherited. O(depth).
+  Box<S> box_of(std::uint32_t node, const SampledMotion<S>& motion) const {
+    std::uint32_t realisers[6] = {}, open = all_sides;
+    for (; open != 0; node = topology_.parents[node]) {
+      const std::uint32_t here = open & sides_of(node);
+      for (std::uint32_t sides = here; sides != 0; sides &= sides - 1) {
+        const Side side = Side(std::countr_zero(sides));
+        realisers[side] = realiser(node, side);
+      }
+      open &= ~here;
+    }
+    return box_of_realisers(realisers, motion, body_);
+  }
   SearchCost& search_cost() { return search_cost_; }
 
   /// Chooses the planes, finds every realiser at t and schedules every certificate. O(nodes log nodes +
   /// vertices of leaves).
   void initialise(double t) {
     if (topology_.empty()) return;
-    if (!original_.empty()) topology_ = original_;
-    leaf_offsets_.clear();
+    if (!original_.empty()) {
+      topology_ = original_;
+      place_leaves();
+    }
     std::vector<S> positions(std::size_t(3) * clock_->plans(body_).vertex_count() + 1);
     clock_->plans(body_).evaluate(t, positions.data());
-    std::vector<std::uint32_t> all(topology_.size());
-    for (std::uint32_t node = 0; node < all.size(); ++node) all[node] = node;
-    choose_planes(all, positions.data(), nullptr);
+    const std::vector<std::uint32_t> all = choose_planes(0, positions.data(), nullptr);
     const auto now = Instant<S>::at(t);
-    for (std::uint32_t node = topology_.size(); node-- > 1;) start(node, own_sides_[node], now);
+    for (std::size_t i = all.size(); i-- > 1;) start(all[i], own_sides_[all[i]], now);
     for (Side side = 0; side < 6; ++side) start(0, side, now);
   }
 
@@ -116,8 +155,7 @@ class KineticBoxTree {
     const Crossing<S> crossing = clock_->crossing(event);
     const Instant<S> now{event.begin, event.end, &crossing};
     const Side side = event.side;
-    const std::uint32_t slot = event.slot - first_slot_;
-    std::uint32_t node = slot < 6 ? 0 : slot - 5;
+    std::uint32_t node = node_of(event.slot);
     KBVH_ASSERT(realiser(node, side) == event.winner);
     count_->add(Counter::certificates_failed);
     for (;;) {
@@ -133,30 +171,80 @@ class KineticBoxTree {
   /// The plans of `vertices` (ascending, unique) changed at t, each from its stored position: rechecks every
   /// certificate that they, or realisers that change in consequence, take part in.
   void plans_changed(double t, std::span<const std::uint32_t> vertices) {
-    const auto now = Instant<S>::at(t);
-    index_leaves();
+    leaves_.index(topology_, clock_->plans(body_).vertex_count());
     const auto changed = [&](std::uint32_t v) {
       return std::binary_search(vertices.begin(), vertices.end(), v);
     };
-    affected_.clear();
+    concerned_.resize(topology_.size(), 0);
     for (std::uint32_t v : vertices)
-      for (std::uint32_t i = leaf_offsets_[v]; i < leaf_offsets_[v + 1]; ++i)
-        mark_certificates_of(leaf_nodes_[i], changed);
-    // Children have larger ids than their parents: descending order is bottom-up. Certificates that come to
-    // be concerned on the way lie further up, on a path that was marked.
-    std::sort(affected_.begin(), affected_.end(), std::greater<>());
-    for (std::uint32_t node : affected_) {
-      std::uint32_t sides = concerned_[node];
-      concerned_[node] = 0;
-      for (; sides != marked_only; sides &= sides - 1) {
-        const Side side = Side(std::countr_zero(sides));
-        count_->add(Counter::nodes_visited);
-        const std::uint32_t old = realiser(node, side), best = best_at(node, side, t, old);
-        if (best != old) replace(node, side, best, now);
-        certify(node, side, now);
-        if (node != 0 && (best != old || changed(old))) concern(above(node, side), side);
-      }
+      leaves_.for_leaves_of(v, [&](std::uint32_t leaf) { mark_certificates_of(leaf, changed); });
+    repair(t, changed);
+  }
+
+  /// Inserts a primitive that the body has now, at t: at the leaf whose boxes on the way down grow least. At
+  /// most two certificates of new nodes, one above for each side, and more where realisers change; what their
+  /// searches cost is the tree's to say (search_cost). O(nodes) the first time for what edits need. Where a
+  /// leaf gets deeper than 2 log2(leaves), a subtree is balanced anew, amortised O(log) leaves per insertion.
+  void insert(double t, std::uint32_t primitive, const Primitives& primitives,
+              const SampledMotion<S>& motion) {
+    start_editing(primitives);
+    const std::uint32_t vertex_count = clock_->plans(body_).vertex_count();
+    seen_.resize(vertex_count, 0);
+    const auto vertices = primitives[primitive];
+    motion.fetch(body_, vertices);
+    const Box<S> box = primitive_box(vertices, motion.positions(body_));
+    const std::uint32_t old_leaf =
+        leaf_for(topology_, box, [&](std::uint32_t node) { return box_of(node, motion); });
+    Box<S> top_box = box;
+    unique_.assign(vertices.begin(), vertices.end());
+    TopologyNode before;
+    if (old_leaf != TopologyEditor::none) {
+      before = topology_.nodes[old_leaf];
+      top_box.extend(box_of(old_leaf, motion));
     }
+    const std::uint32_t leaf = editor_->insert(topology_, old_leaf, primitive, edit_);
+    follow_edit();
+    if (leaf == old_leaf) {  // had room
+      unique_.insert(unique_.end(), leaves_[before].begin(), leaves_[before].end());
+      leaves_.drop(before);  // its entries may be others
+    }
+    set_leaf_vertices(leaf, vertex_count);
+    if (leaf != old_leaf && old_leaf != TopologyEditor::none) {
+      motion.fetch(body_, leaves_[before]);
+      choose_planes(old_leaf, motion.positions(body_), &top_box);
+    }
+    repair_edit(t);
+    for (std::uint32_t top;
+         (top = editor_->unbalanced_above(topology_, primitive)) != TopologyEditor::none;) {
+      top_box = box_of(top, motion);
+      editor_->rebalance(topology_, top, edit_, [&](std::uint32_t node) {
+        motion.fetch(body_, leaves_[topology_.nodes[node]]);
+        return to_double(leaves_.box(topology_.nodes[node], motion.positions(body_)));
+      });
+      follow_edit();
+      choose_planes(top, motion.positions(body_), &top_box);
+      repair_edit(t);
+    }
+  }
+
+  /// Takes a primitive out at t: the certificates above are made again as after an insertion.
+  void remove(double t, std::uint32_t primitive, const Primitives& primitives) {
+    start_editing(primitives);
+    const std::uint32_t leaf = editor_->leaf_of(primitive);
+    const bool removed = topology_.nodes[leaf].count() == 1;
+    if (removed) leaves_.drop(topology_.nodes[leaf]);
+    editor_->remove(topology_, primitive, edit_);
+    follow_edit();
+    if (!removed) {
+      const TopologyNode content = topology_.nodes[leaf];
+      unique_.clear();
+      for (std::uint32_t k = content.first(); k < content.first() + content.count(); ++k) {
+        const auto vertices = primitives[topology_.primitives[k]];
+        unique_.insert(unique_.end(), vertices.begin(), vertices.end());
+      }
+      set_leaf_vertices(leaf, clock_->plans(body_).vertex_count());
+    }
+    repair_edit(t);
   }
 
   /// Builds the tree below a node anew, from positions at the motion's time, to which the tree has been
@@ -166,9 +254,9 @@ class KineticBoxTree {
   void rebuild_below(std::uint32_t top, const Box<S>& box, const SampledMotion<S>& motion,
                      BuildMethod method) {
     if (topology_.nodes[top].is_leaf()) return;
-    if (original_.empty()) original_ = topology_;
-    const std::vector<std::uint32_t> ids = regrow(top, motion, method);
-    choose_planes(ids, motion.positions(body_), &box);
+    if (original_.empty() && !editor_) original_ = topology_;
+    regrow(top, motion, method);
+    const std::vector<std::uint32_t> ids = choose_planes(top, motion.positions(body_), &box);
     const auto now = Instant<S>::at(motion.time());
     for (std::size_t i = ids.size(); i-- > 1;) start(ids[i], own_sides_[ids[i]], now);
     std::uint32_t open = all_sides;
@@ -182,8 +270,8 @@ class KineticBoxTree {
 
   std::size_t bytes() const {
     return topology_.bytes() + original_.bytes() + leaves_.bytes() + own_sides_.size() + concerned_.size() +
-           (realisers_.size() + seen_.size() + leaf_offsets_.size() + leaf_nodes_.size()) *
-               sizeof(std::uint32_t);
+           (realisers_.size() + seen_.size() + late_chunks_.size()) * sizeof(std::uint32_t) +
+           (editor_ ? editor_->bytes() : 0);
   }
 
  private:
@@ -191,7 +279,23 @@ class KineticBoxTree {
   static constexpr std::uint32_t all_sides = 0x3f;
   static constexpr std::uint32_t marked_only = 0x40;  ///< above all sides: a node on a marked path
 
+  static constexpr std::uint32_t chunk_places = 256;
+
   std::size_t place(std::uint32_t node, Side side) const { return node == 0 ? side : node + 5; }
+  std::uint32_t slot(std::uint32_t node, Side side) const {
+    const auto at = std::uint32_t(place(node, side));
+    return at < packed_places_ ? first_slot_ + at : late_slot(at - packed_places_);
+  }
+  std::uint32_t late_slot(std::uint32_t late) const {
+    return late_chunks_[late / chunk_places] + late % chunk_places;
+  }
+  std::uint32_t place_of(std::uint32_t slot) const {
+    const std::uint32_t at = slot - first_slot_;
+    if (at < packed_places_) return at;
+    const auto above = std::upper_bound(late_chunks_.begin(), late_chunks_.end(), slot);
+    const auto chunk = std::uint32_t(above - late_chunks_.begin()) - 1;
+    return packed_places_ + chunk * chunk_places + (slot - late_chunks_[chunk]);
+  }
   /// The sides that the node owns, one bit each.
   std::uint32_t sides_of(std::uint32_t node) const { return node == 0 ? all_sides : 1u << own_sides_[node]; }
   /// The node whose certificate has this node's realiser among its candidates.
@@ -241,12 +345,14 @@ class KineticBoxTree {
     if constexpr (Count::enabled) search_cost_.add(visited);
   }
 
-  std::uint32_t best_at(std::uint32_t node, Side side, double t, std::uint32_t best) {
+  /// The best candidate; of equal ones `preferred`, if it is among them, or else the first.
+  std::uint32_t best_at(std::uint32_t node, Side side, double t, std::uint32_t preferred) {
     std::uint64_t reads = 0;
+    std::uint32_t best = no_vertex;
     for_candidates(node, side, [&](std::uint32_t challenger) {
       ++reads;
-      if (challenger != best && clock_->compare_values(body_, side, challenger, best, t) > 0)
-        best = challenger;
+      const int order = best == no_vertex ? 1 : clock_->compare_values(body_, side, challenger, best, t);
+      if (order > 0 || (order == 0 && challenger == preferred)) best = challenger;
     });
     count_->add(Counter::vertex_reads, reads);
     return best;
@@ -276,7 +382,7 @@ class KineticBoxTree {
 
   /// Schedules the earliest failure of the side's certificate from now on, in place of the one that stood.
   void certify(std::uint32_t node, Side side, const Instant<S>& now) {
-    const std::uint32_t slot = first_slot_ + std::uint32_t(place(node, side)), winner = realiser(node, side);
+    const std::uint32_t slot = this->slot(node, side), winner = realiser(node, side);
     Event event, earliest;
     bool found = false;
     event.winner = winner;
@@ -311,7 +417,7 @@ class KineticBoxTree {
   /// realiser. As long as it was not `before` who comes next, the others need not be looked at again.
   void exchange_candidate(std::uint32_t node, Side side, std::uint32_t before, std::uint32_t after,
                           const Instant<S>& now) {
-    const std::uint32_t slot = first_slot_ + std::uint32_t(place(node, side)), winner = realiser(node, side);
+    const std::uint32_t slot = this->slot(node, side), winner = realiser(node, side);
     const bool scheduled = queue_->scheduled(slot);
     if (scheduled && queue_->event(slot).loser == before) return certify(node, side, now);
     if (after == winner) return;
@@ -339,28 +445,40 @@ class KineticBoxTree {
 
   // ---- Planes and rebuilding
 
-  /// Chooses the own sides of the nodes `ids`, a node and all below it, ascending; the first keeps its own.
-  /// Its box is `box`, or the tight one.
-  void choose_planes(std::span<const std::uint32_t> ids, const S* positions, const Box<S>* box) {
-    BoxTreePlanes<S> planes(topology_, ids);
+  /// Chooses the own sides of all nodes below `top`, whose box is `box`, or the tight one. Returns `top` and
+  /// all below it, parents before children.
+  std::vector<std::uint32_t> choose_planes(std::uint32_t top, const S* positions, const Box<S>* box) {
+    // Edited topologies are in no order: the part is laid out in a topology of its own.
+    std::vector<std::uint32_t> ids{top};
+    Topology part;
+    for (std::uint32_t i = 0; i < ids.size(); ++i) {
+      const TopologyNode n = topology_.nodes[ids[i]];
+      part.nodes.push_back(n.is_leaf() ? n : TopologyNode::inner(std::uint32_t(ids.size()), 2));
+      if (!n.is_leaf()) ids.insert(ids.end(), {n.first(), n.first() + 1});
+    }
+    std::vector<std::uint32_t> places(ids.size());
+    std::iota(places.begin(), places.end(), 0u);
+    std::vector<std::uint8_t> own_sides(ids.size(), 0);
+    BoxTreePlanes<S> planes(part, places);
     for (std::size_t i = ids.size(); i-- > 0;)
-      if (const TopologyNode n = topology_.nodes[ids[i]]; n.is_leaf())
-        planes.set_leaf(i, leaves_.box(n, positions));
+      if (part.nodes[i].is_leaf()) planes.set_leaf(i, leaves_.box(part.nodes[i], positions));
     planes.choose(
-        box, [this](std::uint32_t node) { return Rules::split_axis(topology_.depths[node]); }, own_sides_);
+        box, [&](std::uint32_t place) { return Rules::split_axis(topology_.depths[ids[place]]); }, own_sides);
+    for (std::size_t i = 1; i < ids.size(); ++i) own_sides_[ids[i]] = own_sides[i];
+    return ids;
   }
 
-  /// Replaces the inner nodes below `top`; returns their ids and those of the leaves, ascending from `top`.
-  std::vector<std::uint32_t> regrow(std::uint32_t top, const SampledMotion<S>& motion, BuildMethod method) {
+  /// Replaces the inner nodes below `top`.
+  void regrow(std::uint32_t top, const SampledMotion<S>& motion, BuildMethod method) {
     std::vector<std::uint32_t> ids{top};
     std::vector<TopologyNode> leaves;
     for (std::size_t i = 0; i < ids.size(); ++i)
       if (const TopologyNode n = topology_.nodes[ids[i]]; !n.is_leaf())
         ids.insert(ids.end(), {n.first(), n.first() + 1});
-    std::sort(ids.begin(), ids.end());
+    std::sort(ids.begin() + 1, ids.end());
     std::vector<Box<S>> boxes;
     for (std::uint32_t id : ids) {
-      if (id != top) withdraw(first_slot_ + std::uint32_t(place(id, own_sides_[id])));
+      if (id != top) withdraw(slot(id, own_sides_[id]));
       const TopologyNode n = topology_.nodes[id];
       if (!n.is_leaf()) continue;
       motion.fetch(body_, leaves_[n]);
@@ -380,17 +498,17 @@ class KineticBoxTree {
       topology_.depths[id] = std::uint8_t(std::min(255, topology_.depths[topology_.parents[id]] + 1));
     }
     topology_.perfect = false;
-    leaf_offsets_.clear();  // leaves have other ids
+    for (const std::uint32_t id : ids) {
+      if (!topology_.nodes[id].is_leaf()) continue;
+      leaves_.placed(topology_.nodes[id], id);
+      if (editor_) editor_->placed(topology_, id);
+    }
     count_->add(Counter::vertex_reads, ids.size());
-    return ids;
   }
 
-  // ---- Changes of plans
+  // ---- Changes of plans and of geometry
 
-  void mark(std::uint32_t node) {
-    if (concerned_[node] == 0) affected_.push_back(node);
-    concerned_[node] |= marked_only;
-  }
+  void mark(std::uint32_t node) { concerned_[node] |= marked_only; }
   void concern(std::uint32_t node, Side side) { concerned_[node] |= std::uint8_t(1u << side); }
 
   /// Marks the path above a leaf whose vertices changed: for each side the certificate that takes the leaf's
@@ -410,19 +528,82 @@ class KineticBoxTree {
     }
   }
 
-  void index_leaves() {
-    if (!leaf_offsets_.empty()) return;
-    leaf_offsets_.assign(clock_->plans(body_).vertex_count() + 1, 0);
-    concerned_.assign(topology_.size(), 0);
-    for (const TopologyNode n : topology_.nodes)
-      if (n.is_leaf())
-        for (std::uint32_t v : leaves_[n]) ++leaf_offsets_[v + 1];
-    for (std::size_t v = 1; v < leaf_offsets_.size(); ++v) leaf_offsets_[v] += leaf_offsets_[v - 1];
-    leaf_nodes_.resize(leaf_offsets_.back());
-    std::vector<std::uint32_t> next(leaf_offsets_.begin(), leaf_offsets_.end() - 1);
-    for (std::uint32_t node = 0; node < topology_.size(); ++node)
-      if (topology_.nodes[node].is_leaf())
-        for (std::uint32_t v : leaves_[topology_.nodes[node]]) leaf_nodes_[next[v]++] = node;
+  /// Looks at every concerned certificate on the marked paths, from the leaves up. Realisers that `changed`
+  /// have another plan.
+  template <class Changed>
+  void repair(double t, Changed&& changed) {
+    const auto now = Instant<S>::at(t);
+    affected_.clear();
+    if (!topology_.empty() && concerned_[0] != 0) affected_.push_back(0);
+    for (std::size_t i = 0; i < affected_.size(); ++i) {
+      const TopologyNode n = topology_.nodes[affected_[i]];
+      if (n.is_leaf()) continue;
+      for (std::uint32_t child = n.first(); child < n.first() + 2; ++child)
+        if (concerned_[child] != 0) affected_.push_back(child);
+    }
+    // Level by level from the root, so backwards it is bottom-up. Certificates that come to be concerned on
+    // the way lie further up, on a path that was marked.
+    for (std::size_t i = affected_.size(); i-- > 0;) {
+      const std::uint32_t node = affected_[i];
+      std::uint32_t sides = concerned_[node];
+      concerned_[node] = 0;
+      for (; sides != marked_only; sides &= sides - 1) {
+        const Side side = Side(std::countr_zero(sides));
+        count_->add(Counter::nodes_visited);
+        const std::uint32_t old = realiser(node, side), best = best_at(node, side, t, old);
+        if (best != old) replace(node, side, best, now);
+        certify(node, side, now);
+        if (node != 0 && Rules::carries_up() && (best != old || changed(old)))
+          concern(above(node, side), side);
+      }
+    }
+  }
+
+  void start_editing(const Primitives& primitives) {
+    if (editor_) return;
+    editor_.emplace(topology_, primitives.count());
+    original_ = {};  // starting over starts with what is there
+  }
+  /// Brings all that is kept by node in line with what the editor did.
+  void follow_edit() {
+    for (const std::uint32_t node : edit_.vacated)
+      for (Side side = 0; side < 6; ++side) {
+        if (node != 0 && side != own_sides_[node]) continue;
+        withdraw(slot(node, side));
+        clock_->remember(slot(node, side), {});
+        realisers_[place(node, side)] = no_vertex;
+      }
+    const std::uint32_t nodes = topology_.size(), places = std::uint32_t(slot_count(topology_));
+    while (packed_places_ + late_chunks_.size() * chunk_places < places) {
+      const std::uint32_t first = queue_->slots();
+      if (first > std::numeric_limits<std::uint32_t>::max() - chunk_places)
+        throw std::length_error("more certificates than a queue can number");
+      late_chunks_.push_back(first);
+      queue_->grow(first + chunk_places);
+    }
+    if (realisers_.size() < places) realisers_.resize(places, no_vertex);
+    if (own_sides_.size() < nodes) own_sides_.resize(nodes, 0);
+    for (const TopologyEdit::Move& move : edit_.moved) leaves_.placed(topology_.nodes[move.to], move.to);
+  }
+  /// Makes `unique_`, in any order and with repetitions, the list of a leaf.
+  void set_leaf_vertices(std::uint32_t leaf, std::uint32_t vertex_count) {
+    std::sort(unique_.begin(), unique_.end());
+    unique_.erase(std::unique(unique_.begin(), unique_.end()), unique_.end());
+    leaves_.assign(topology_.nodes[leaf], leaf, unique_, vertex_count);
+  }
+  /// After an edit: certificates of nodes that are new, and all that searched through those that changed.
+  void repair_edit(double t) {
+    const auto unchanged = [](std::uint32_t) { return false; };
+    if (concerned_.size() < topology_.size()) concerned_.resize(topology_.size(), 0);
+    for (const std::uint32_t node : edit_.changed) mark_certificates_of(node, unchanged);
+    for (const std::uint32_t start : edit_.fresh) {
+      for (std::uint32_t node = start; concerned_[node] == 0; node = topology_.parents[node]) mark(node);
+      concerned_[start] = std::uint8_t(concerned_[start] | sides_of(start));
+    }
+    repair(t, unchanged);
+  }
+  void place_leaves() {
+    for (std::uint32_t node = 0; node < topology_.size(); ++node) leaves_.placed(topology_.nodes[node], node);
   }
 
   Topology topology_;
@@ -430,6 +611,7 @@ class KineticBoxTree {
   BoxTreeLeaves leaves_;
   std::uint16_t body_;
   std::uint32_t first_slot_;
+  std::uint32_t packed_places_;  ///< realisers at the start
   EventClock<S>* clock_;
   Queue* queue_;
   Count* count_;
@@ -440,9 +622,14 @@ class KineticBoxTree {
   std::vector<std::uint32_t> seen_;  ///< [vertex]: the last search that met it, for leaves share vertices
   std::uint32_t search_ = 0;
   SearchCost search_cost_;
-  // For plan changes, made when the first one comes: leaves of each vertex, marks of affected nodes.
-  std::vector<std::uint32_t> leaf_offsets_, leaf_nodes_, affected_;
+  // For changes, made when the first one comes.
+  std::vector<std::uint32_t> affected_;
   std::vector<std::uint8_t> concerned_;  ///< [node]: sides whose certificate is to be rechecked, one bit each
+  // For changes of geometry.
+  std::optional<TopologyEditor> editor_;
+  TopologyEdit edit_;
+  std::vector<std::uint32_t> late_chunks_;  ///< first slots of 256 realisers each; ascending
+  std::vector<std::uint32_t> unique_;
 };
 
 /// The plain tree, as a parameter of KineticForest.

@@ -33,6 +33,8 @@ TEST_P(EagerRebuilding, Conforms) {
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, EagerRebuilding, testing::ValuesIn(synthetic_scene_names()),
                          [](const auto& test) { return test.param; });
+INSTANTIATE_TEST_SUITE_P(ChangingGeometry, EagerRebuilding, testing::ValuesIn(geometry_scene_names()),
+                         [](const auto& test) { return test.param; });
 
 TEST(Rebuilding, ChangesTheTopologyAndStartingOverUndoesIt) {
   const auto test = synthetic_scene<float>("soups", 7);
