@@ -355,7 +355,7 @@ class KineticBoxTree {
       if (order > 0 || (order == 0 && challenger == preferred)) best = challenger;
     });
     count_->add(Counter::vertex_reads, reads);
-    return best;
+    return best == no_vertex ? preferred : best;  // none: only where rules are faulty
   }
 
   /// Finds the realiser and schedules its certificate, with those below in place.
