@@ -168,6 +168,12 @@ class Strategy {
                                   std::to_string(t));
     time_ = t;
   }
+  /// For calls that need the strategy to stand at t. Throws std::invalid_argument if it does not.
+  void stand_at(double t) const {
+    if (t != time_)
+      throw std::invalid_argument("asked for t = " + std::to_string(t) + ", but the strategy stands at " +
+                                  std::to_string(time_));
+  }
   /// Of the last `start_at` or `move_to`.
   double time() const { return time_; }
   [[noreturn]] static void unsupported(const char* what) {

@@ -111,9 +111,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
 
   /// The way so far stays bounded; from the stored position on, rounding starts over.
   void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    if (t != this->time())
-      throw std::invalid_argument("plans changed at t = " + std::to_string(t) +
-                                  ", but the hierarchy stands at " + std::to_string(this->time()));
+    this->stand_at(t);
     for (const PlanChange<S>& change : changes) bodies_[change.body].changed = true;
     for (Body& body : bodies_)
       if (body.changed) body.moved = above(body.moved + body.rounding);

@@ -86,18 +86,8 @@ class KineticBox final : public Strategy<S> {
   }
 
   void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    if (t != this->time())
-      throw std::invalid_argument("plans changed at t = " + std::to_string(t) +
-                                  ", but the hierarchy stands at " + std::to_string(this->time()));
-    for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
-      changed_.clear();
-      for (const PlanChange<S>& change : changes)
-        if (change.body == body) changed_.push_back(change.vertex);
-      if (changed_.empty()) continue;
-      std::sort(changed_.begin(), changed_.end());
-      changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
-      on_forest([&](auto& forest) { forest.tree(body).plans_changed(t, changed_); });
-    }
+    this->stand_at(t);
+    on_forest([&](auto& forest) { forest.plans_changed(t, changes); });
     plans_changed_ = true;
     new_frame();  // realisers may differ now
   }
@@ -208,7 +198,7 @@ class KineticBox final : public Strategy<S> {
       forest_;
   std::vector<BoxCache<S>> caches_;
   std::vector<NodePair> stack_;
-  std::vector<std::uint32_t> changed_, order_;
+  std::vector<std::uint32_t> order_;
   std::uint64_t first_step_ = 0, first_fetch_ = 0;
   LeafBoxes leaf_boxes_;
   bool rebuilds_;

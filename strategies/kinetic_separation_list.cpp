@@ -20,7 +20,7 @@ class KineticSeparationList final : public Strategy<S> {
 
   KineticSeparationList(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                         const Params& params)
-      : Strategy<S>(scene, motion), changed_(scene.body_count()) {
+      : Strategy<S>(scene, motion) {
     if (params.word("queue") == AvlQueue<S>::name)
       collision_ = std::make_unique<Collision<AvlEventQueue>>(scene, motion, std::move(topologies), count_);
     else
@@ -57,9 +57,7 @@ class KineticSeparationList final : public Strategy<S> {
   }
 
   void spans(double t0, double t1, SpanBuffer& out) override {
-    if (t0 != this->time())
-      throw std::invalid_argument("spans from t = " + std::to_string(t0) + ", but the list stands at " +
-                                  std::to_string(this->time()));
+    this->stand_at(t0);
     this->move_to(t1);
     on_collision([&](auto& collision) {
       auto& list = collision.list();
@@ -73,16 +71,8 @@ class KineticSeparationList final : public Strategy<S> {
   }
 
   void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    if (t != this->time())
-      throw std::invalid_argument("plans changed at t = " + std::to_string(t) + ", but the list stands at " +
-                                  std::to_string(this->time()));
-    for (auto& vertices : changed_) vertices.clear();
-    for (const PlanChange<S>& change : changes) changed_[change.body].push_back(change.vertex);
-    for (auto& vertices : changed_) {
-      std::sort(vertices.begin(), vertices.end());
-      vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-    }
-    on_collision([&](auto& collision) { collision.plans_changed(t, changed_); });
+    this->stand_at(t);
+    on_collision([&](auto& collision) { collision.plans_changed(t, changes); });
   }
 
   void geometry_changed(double t, const GeometryChange<S>& change) override {
@@ -140,7 +130,6 @@ class KineticSeparationList final : public Strategy<S> {
   Count count_;
   std::variant<std::unique_ptr<Collision<AvlEventQueue>>, std::unique_ptr<Collision<BinaryHeapEventQueue>>>
       collision_;
-  std::vector<std::vector<std::uint32_t>> changed_;  ///< vertices, [body]
   std::uint64_t first_step_ = 0, first_fetch_ = 0;
 };
 

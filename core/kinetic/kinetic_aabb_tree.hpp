@@ -11,6 +11,7 @@
 #include "core/hierarchy/list_pool.hpp"
 #include "core/hierarchy/realiser_boxes.hpp"
 #include "core/hierarchy/topology_edit.hpp"
+#include "core/kinetic/certificate_slots.hpp"
 #include "core/kinetic/event.hpp"
 #include "core/pairs.hpp"
 
@@ -61,8 +62,7 @@ class KineticAabbTree {
       : topology_(std::move(topology)),
         leaf_vertices_(packed_leaf_vertices(topology_, primitives)),
         body_(body),
-        first_slot_(first_slot),
-        packed_nodes_(topology_.size()),
+        slots_(first_slot, std::uint32_t(slot_count(topology_))),
         clock_(&clock),
         queue_(&queue),
         count_(&count),
@@ -81,17 +81,9 @@ class KineticAabbTree {
   }
   /// Unique vertices of a leaf, ascending.
   std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const { return leaf_vertices_[node]; }
-  std::uint32_t slot(std::uint32_t node, Side side) const {
-    return (node < packed_nodes_ ? first_slot_ + 6 * node : late_slots(node)) + side;
-  }
+  std::uint32_t slot(std::uint32_t node, Side side) const { return slots_.slot(6 * node + side); }
   /// The node that a slot of the queue belongs to.
-  std::uint32_t node_of(std::uint32_t slot) const {
-    const std::uint32_t at = slot - first_slot_;
-    if (at < 6 * packed_nodes_) return at / 6;
-    const auto above = std::upper_bound(late_chunks_.begin(), late_chunks_.end(), slot);
-    const auto chunk = std::uint32_t(above - late_chunks_.begin()) - 1;
-    return packed_nodes_ + chunk * chunk_nodes + (slot - late_chunks_[chunk]) / 6;
-  }
+  std::uint32_t node_of(std::uint32_t slot) const { return slots_.place(slot) / 6; }
   std::uint32_t realiser(std::uint32_t node, Side side) const {
     return realisers_[std::size_t(6) * node + side];
   }
@@ -205,9 +197,8 @@ class KineticAabbTree {
   }
 
   std::size_t bytes() const {
-    return topology_.bytes() + leaf_vertices_.bytes() + leaves_.bytes() + moved_.size() +
-           (realisers_.size() + marked_.size() + late_chunks_.size()) * sizeof(std::uint32_t) +
-           (editor_ ? editor_->bytes() : 0);
+    return topology_.bytes() + leaf_vertices_.bytes() + leaves_.bytes() + moved_.size() + slots_.bytes() +
+           (realisers_.size() + marked_.size()) * sizeof(std::uint32_t) + (editor_ ? editor_->bytes() : 0);
   }
 
  private:
@@ -334,12 +325,7 @@ class KineticAabbTree {
       }
     }
     const std::uint32_t nodes = topology_.size();
-    while (packed_nodes_ + late_chunks_.size() * chunk_nodes < nodes) {
-      late_chunks_.push_back(queue_->slots());
-      if (late_chunks_.back() > std::numeric_limits<std::uint32_t>::max() - 6 * chunk_nodes)
-        throw std::length_error("more certificates than a queue can number");
-      queue_->grow(late_chunks_.back() + 6 * chunk_nodes);
-    }
+    slots_.grow(6 * nodes, *queue_);
     realisers_.resize(std::size_t(6) * nodes, no_vertex);
     leaf_vertices_.resize(nodes);
     for (const auto& [to, list] : lists) {
@@ -412,20 +398,14 @@ class KineticAabbTree {
     }
     for (std::uint32_t node : affected_) moved_[node] = 0;
   }
-  std::uint32_t late_slots(std::uint32_t node) const {
-    const std::uint32_t late = node - packed_nodes_;
-    return late_chunks_[late / chunk_nodes] + 6 * (late % chunk_nodes);
-  }
   bool side_moved(std::uint32_t node, Side side) const { return (moved_[node] >> side) & 1; }
 
-  static constexpr std::uint32_t chunk_nodes = 64;
   static constexpr std::uint8_t other_candidates = 1 << 6;  ///< in `moved_`
 
   Topology topology_;
   ListPool leaf_vertices_;
   std::uint16_t body_;
-  std::uint32_t first_slot_;
-  std::uint32_t packed_nodes_;  ///< nodes at the start
+  CertificateSlots slots_;
   EventClock<S>* clock_;
   Queue* queue_;
   Count* count_;
@@ -439,7 +419,6 @@ class KineticAabbTree {
   // For changes of geometry, made when the first one comes.
   std::optional<TopologyEditor> editor_;
   TopologyEdit edit_;
-  std::vector<std::uint32_t> late_chunks_;  ///< first slots of 64 nodes each; ascending
   std::vector<std::uint32_t> unique_;
 };
 

@@ -12,6 +12,7 @@
 #include "core/counters.hpp"
 #include "core/hierarchy/boxtree.hpp"
 #include "core/hierarchy/topology_edit.hpp"
+#include "core/kinetic/certificate_slots.hpp"
 #include "core/kinetic/kinetic_forest.hpp"
 
 namespace kbvh {
@@ -71,14 +72,13 @@ class KineticBoxTree {
       : topology_(std::move(topology)),
         leaves_(topology_, primitives),
         body_(body),
-        first_slot_(first_slot),
-        packed_places_(std::uint32_t(slot_count(topology_))),
+        slots_(first_slot, std::uint32_t(slot_count(topology_))),
         clock_(&clock),
         queue_(&queue),
         count_(&count),
         observer_(observer),
         own_sides_(topology_.size(), 0),
-        realisers_(packed_places_, 0),
+        realisers_(slot_count(topology_), 0),
         seen_(clock.plans(body).vertex_count(), 0) {
     if (topology_.width != 2)
       throw std::invalid_argument("a BoxTree is binary, the topology's width is " +
@@ -88,7 +88,7 @@ class KineticBoxTree {
   static std::uint64_t slot_count(const Topology& topology) {
     return topology.empty() ? 0 : std::uint64_t(topology.size()) + 5;
   }
-  std::uint32_t first_slot() const { return first_slot_; }
+  std::uint32_t first_slot() const { return slots_.slot(0); }
   /// After insertions or deletions it is laid out as TopologyEditor says, with ids that mean nothing.
   const Topology& topology() const { return topology_; }
   /// Has it been edited since it was made?
@@ -102,7 +102,7 @@ class KineticBoxTree {
   }
   /// The node that a slot of the queue belongs to.
   std::uint32_t node_of(std::uint32_t slot) const {
-    const std::uint32_t place = place_of(slot);
+    const std::uint32_t place = slots_.place(slot);
     return place < 6 ? 0 : place - 5;
   }
   /// The one side that a node does not inherit; not for the root, which inherits none.
@@ -270,7 +270,7 @@ class KineticBoxTree {
 
   std::size_t bytes() const {
     return topology_.bytes() + original_.bytes() + leaves_.bytes() + own_sides_.size() + concerned_.size() +
-           (realisers_.size() + seen_.size() + late_chunks_.size()) * sizeof(std::uint32_t) +
+           slots_.bytes() + (realisers_.size() + seen_.size()) * sizeof(std::uint32_t) +
            (editor_ ? editor_->bytes() : 0);
   }
 
@@ -279,22 +279,9 @@ class KineticBoxTree {
   static constexpr std::uint32_t all_sides = 0x3f;
   static constexpr std::uint32_t marked_only = 0x40;  ///< above all sides: a node on a marked path
 
-  static constexpr std::uint32_t chunk_places = 256;
-
   std::size_t place(std::uint32_t node, Side side) const { return node == 0 ? side : node + 5; }
   std::uint32_t slot(std::uint32_t node, Side side) const {
-    const auto at = std::uint32_t(place(node, side));
-    return at < packed_places_ ? first_slot_ + at : late_slot(at - packed_places_);
-  }
-  std::uint32_t late_slot(std::uint32_t late) const {
-    return late_chunks_[late / chunk_places] + late % chunk_places;
-  }
-  std::uint32_t place_of(std::uint32_t slot) const {
-    const std::uint32_t at = slot - first_slot_;
-    if (at < packed_places_) return at;
-    const auto above = std::upper_bound(late_chunks_.begin(), late_chunks_.end(), slot);
-    const auto chunk = std::uint32_t(above - late_chunks_.begin()) - 1;
-    return packed_places_ + chunk * chunk_places + (slot - late_chunks_[chunk]);
+    return slots_.slot(std::uint32_t(place(node, side)));
   }
   /// The sides that the node owns, one bit each.
   std::uint32_t sides_of(std::uint32_t node) const { return node == 0 ? all_sides : 1u << own_sides_[node]; }
@@ -574,13 +561,7 @@ class KineticBoxTree {
         realisers_[place(node, side)] = no_vertex;
       }
     const std::uint32_t nodes = topology_.size(), places = std::uint32_t(slot_count(topology_));
-    while (packed_places_ + late_chunks_.size() * chunk_places < places) {
-      const std::uint32_t first = queue_->slots();
-      if (first > std::numeric_limits<std::uint32_t>::max() - chunk_places)
-        throw std::length_error("more certificates than a queue can number");
-      late_chunks_.push_back(first);
-      queue_->grow(first + chunk_places);
-    }
+    slots_.grow(places, *queue_);
     if (realisers_.size() < places) realisers_.resize(places, no_vertex);
     if (own_sides_.size() < nodes) own_sides_.resize(nodes, 0);
     for (const TopologyEdit::Move& move : edit_.moved) leaves_.placed(topology_.nodes[move.to], move.to);
@@ -610,8 +591,7 @@ class KineticBoxTree {
   Topology original_;  ///< what starting over starts with; empty as long as nothing was rebuilt
   BoxTreeLeaves leaves_;
   std::uint16_t body_;
-  std::uint32_t first_slot_;
-  std::uint32_t packed_places_;  ///< realisers at the start
+  CertificateSlots slots_;
   EventClock<S>* clock_;
   Queue* queue_;
   Count* count_;
@@ -628,7 +608,6 @@ class KineticBoxTree {
   // For changes of geometry.
   std::optional<TopologyEditor> editor_;
   TopologyEdit edit_;
-  std::vector<std::uint32_t> late_chunks_;  ///< first slots of 256 realisers each; ascending
   std::vector<std::uint32_t> unique_;
 };
 

@@ -61,11 +61,10 @@ class KineticCollision {
     list_.boxes_changed(changed_, {event.begin, event.end, &crossing});
   }
 
-  /// The plans of these vertices changed at t; `vertices` of each body are ascending and unique.
-  void plans_changed(double t, std::span<const std::vector<std::uint32_t>> vertices) {
+  /// Follows changes of plans at t that the motion shows already.
+  void plans_changed(double t, std::span<const PlanChange<S>> changes) {
     changed_.clear();
-    for (std::uint32_t body = 0; body < vertices.size(); ++body)
-      if (!vertices[body].empty()) forest_.tree(body).plans_changed(t, vertices[body]);
+    forest_.plans_changed(t, changes);
     list_.boxes_changed(changed_, Instant<S>::at(t));
   }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <vector>
 
 #include "core/kinetic/event_queue.hpp"
@@ -49,6 +50,19 @@ class KineticForest {
     trees_[event.body].handle(event);
   }
 
+  /// Follows changes of plans at t that the motion shows already; of each body's tree once.
+  void plans_changed(double t, std::span<const PlanChange<S>> changes) {
+    for (std::uint32_t body = 0; body < trees_.size(); ++body) {
+      changed_.clear();
+      for (const PlanChange<S>& change : changes)
+        if (change.body == body) changed_.push_back(change.vertex);
+      if (changed_.empty()) continue;
+      std::sort(changed_.begin(), changed_.end());
+      changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+      trees_[body].plans_changed(t, changed_);
+    }
+  }
+
   /// Follows a change of geometry at t that scene and motion show already. O(depth) certificates for each
   /// primitive, and O(nodes) the first time.
   void geometry_changed(double t, const SceneView<S>& scene, const SampledMotion<S>& motion,
@@ -92,6 +106,7 @@ class KineticForest {
   Queue queue_;
   Count* count_;
   std::vector<Tree> trees_;
+  std::vector<std::uint32_t> changed_;  ///< vertices of one body
 };
 
 }  // namespace kbvh

@@ -177,13 +177,7 @@ Recording<S> record(const Scene<S>& scene, const PlanScript<S>& script, const Pl
       epoch.plans[change.body].own[change.vertex] = knots;
     }
     playback.change_plans(t, step->changes);
-    for (std::uint32_t body = 0; body < bodies; ++body) {
-      std::vector<std::uint32_t> changed;
-      for (const PlanChange<S>& change : step->changes)
-        if (change.body == body) changed.push_back(change.vertex);
-      std::sort(changed.begin(), changed.end());
-      if (!changed.empty()) forest.tree(body).plans_changed(t, changed);
-    }
+    forest.plans_changed(t, step->changes);
     ++step;
     epoch.begin = t;
     epoch.before = epoch.end;

@@ -196,13 +196,7 @@ class BoxTreeProof {
       plans_[change.body].own[change.vertex] = knots;
     }
     playback_.change_plans(t, step.changes);
-    for (std::uint32_t body = 0; body < view_.body_count(); ++body) {
-      std::vector<std::uint32_t> changed;
-      for (const PlanChange<S>& change : step.changes)
-        if (change.body == body) changed.push_back(change.vertex);
-      std::sort(changed.begin(), changed.end());
-      if (!changed.empty()) forest_->tree(body).plans_changed(t, changed);
-    }
+    forest_->plans_changed(t, step.changes);
     check_notices(t);
     log_.clear();
     start_ = bounds();

@@ -120,13 +120,7 @@ class Prover {
     for (const PlanChange<S>& plan : step.changes)
       plans_[plan.body].own[plan.vertex] = own_knots(t, plan, playback_.position(plan.body, plan.vertex));
     playback_.change_plans(t, step.changes);
-    for (std::uint32_t body = 0; body < plans_.size(); ++body) {
-      std::vector<std::uint32_t> changed;
-      for (const PlanChange<S>& plan : step.changes)
-        if (plan.body == body) changed.push_back(plan.vertex);
-      std::sort(changed.begin(), changed.end());
-      if (!changed.empty()) forest_->tree(body).plans_changed(t, changed);
-    }
+    forest_->plans_changed(t, step.changes);
     changing_.apply(step.geometry, playback_);
     for (const auto& vertex : step.geometry.vertices) {
       StoredPlans& plans = plans_[vertex.body];

@@ -162,13 +162,7 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
       for (; step != test.script.steps.end() && step->time <= t; ++step) {
         playback.seek(t);
         playback.change_plans(t, step->changes);
-        std::vector<std::vector<std::uint32_t>> changed(view.body_count());
-        for (const auto& change : step->changes) changed[change.body].push_back(change.vertex);
-        for (auto& vertices : changed) {
-          std::sort(vertices.begin(), vertices.end());
-          vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-        }
-        collision.plans_changed(t, changed);
+        collision.plans_changed(t, step->changes);
         if (step->geometry.empty()) continue;
         changing.apply(step->geometry, playback);
         const ListEdit edit =

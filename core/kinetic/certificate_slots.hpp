@@ -1,0 +1,50 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+namespace kbvh {
+
+/// Which slots of a shared event queue the bounds of one tree have. A tree numbers its bounds as it likes
+/// (their places): those that there are at the start have slots in a row, later ones get theirs in chunks at
+/// the queue's end, so that no slot ever moves. O(1), the way back O(log chunks).
+class CertificateSlots {
+ public:
+  /// Places 0 .. places - 1 have slots from `first` on.
+  CertificateSlots(std::uint32_t first, std::uint32_t places) : first_(first), packed_(places) {}
+
+  std::uint32_t slot(std::uint32_t place) const {
+    if (place < packed_) return first_ + place;
+    const std::uint32_t late = place - packed_;
+    return chunks_[late / chunk] + late % chunk;
+  }
+  /// The place that has a slot of this tree.
+  std::uint32_t place(std::uint32_t slot) const {
+    const std::uint32_t at = slot - first_;
+    if (at < packed_) return at;
+    const auto above = std::upper_bound(chunks_.begin(), chunks_.end(), slot);
+    const auto index = std::uint32_t(above - chunks_.begin()) - 1;
+    return packed_ + index * chunk + (slot - chunks_[index]);
+  }
+  /// Makes room for so many places, in the queue as well. Throws std::length_error if it cannot number them.
+  template <class Queue>
+  void grow(std::uint32_t places, Queue& queue) {
+    while (packed_ + chunks_.size() * chunk < places) {
+      const std::uint32_t first = queue.slots();
+      if (first > std::numeric_limits<std::uint32_t>::max() - chunk)
+        throw std::length_error("more certificates than a queue can number");
+      chunks_.push_back(first);
+      queue.grow(first + chunk);
+    }
+  }
+  std::size_t bytes() const { return chunks_.size() * sizeof(std::uint32_t); }
+
+ private:
+  static constexpr std::uint32_t chunk = 384;  ///< 64 nodes of an AABB tree
+  std::uint32_t first_, packed_;
+  std::vector<std::uint32_t> chunks_;  ///< first slots; ascending
+};
+
+}  // namespace kbvh
