@@ -182,18 +182,18 @@ void WideHierarchy<S>::list_leaves(const Primitives& primitives) {
 }
 
 template <class S>
-Box<S> WideHierarchy<S>::box(std::uint32_t node) const {
+Box<S> WideHierarchy<S>::box_in(const S* lanes, const S* own, std::uint32_t node) const {
   const Place place = places_[node];
   Box<S> box;
   if (place.node == none) {
     for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] = own_[std::size_t(axis)];
-      box.upper[axis] = own_[std::size_t(axis) + 4];
+      box.lower[axis] = own[axis];
+      box.upper[axis] = own[axis + 4];
     }
     return box;
   }
   const std::uint32_t width = topology_.width;
-  const S* rows = lanes_.data() + place.node * lane_scalars(width) + place.lane;
+  const S* rows = lanes + place.node * lane_scalars(width) + place.lane;
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
     box.lower[axis] = rows[axis * width];
     box.upper[axis] = -rows[(axis + 3) * width];
@@ -241,6 +241,31 @@ QueryStatus WideQuery<S>::run(WideHierarchy<S>& a, std::uint32_t body_a, WideHie
   const auto traverse = overlap_kernels<S>(a.kernels()).traverse(a.topology().width);
   while (state.depth > 0 && state.tests < state.test_limit) {
     traverse(a.arrays(), b.arrays(), state);
+    leaves_to_pairs(a, body_a, b, body_b, scene, motion, state.found, out, tests);
+    state.found = 0;
+    grow(state);
+  }
+  tests += state.tests;
+  return {state.depth};
+}
+
+template <class S>
+QueryStatus WideQuery<S>::run_at(WideHierarchy<S>& a, const WideMoment<S>& moment_a, std::uint32_t body_a,
+                                 WideHierarchy<S>& b, const WideMoment<S>& moment_b, std::uint32_t body_b,
+                                 const SceneView<S>& scene, const SampledMotion<S>& motion,
+                                 const Budget& budget, PairBuffer& out, std::uint64_t& tests) {
+  if (a.empty() || b.empty()) return {};
+  const std::uint32_t width = a.topology().width;
+  const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(a.kernels());
+  WideTraversal state = fresh_traversal(budget);
+  for (const WideMoment<S>* moment : {&moment_a, &moment_b})
+    if (moment->stale[0] != 0) {
+      kernels.make(width)(*moment, 0);
+      moment->stale[0] = 0;
+    }
+  if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
+  while (state.depth > 0 && state.tests < state.test_limit) {
+    kernels.at(width)(moment_a, moment_b, state);
     leaves_to_pairs(a, body_a, b, body_b, scene, motion, state.found, out, tests);
     state.found = 0;
     grow(state);

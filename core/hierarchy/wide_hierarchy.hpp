@@ -7,6 +7,7 @@
 #include "core/hierarchy/topology.hpp"
 #include "core/hierarchy/traversal.hpp"
 #include "core/kernels/kernel_set.hpp"
+#include "core/kernels/wide_linear.hpp"
 #include "core/kernels/wide_overlap.hpp"
 #include "core/kernels/wide_refit.hpp"
 #include "core/motion/motion_view.hpp"
@@ -38,6 +39,10 @@ class WideHierarchy {
   void refit_nodes(const S* positions, std::uint32_t begin, std::uint32_t end) {
     refit_(arrays(), positions, begin, end);
   }
+  /// The same into rows and own boxes that lie elsewhere, in the layout of `arrays`.
+  void refit_into(S* lanes, S* own, const S* positions) const {
+    refit_({nodes_.data(), lanes, own, vertices_.data()}, positions, 0, node_count());
+  }
   std::uint32_t node_count() const { return std::uint32_t(nodes_.size()); }
   /// Ranges of wide nodes that do not depend on each other, and the nodes above them, children first: what
   /// threads can share. No ranges where it would not pay, or where the topology is not numbered depth first.
@@ -56,7 +61,9 @@ class WideHierarchy {
   std::uint32_t leaf_vertices_of(std::uint32_t wide) const { return listed_[wide]; }
 
   /// The box of a node of the topology.
-  Box<S> box(std::uint32_t node) const;
+  Box<S> box(std::uint32_t node) const { return box_in(lanes_.data(), own_.data(), node); }
+  /// The same from rows and own boxes that `refit_into` made.
+  Box<S> box_in(const S* lanes, const S* own, std::uint32_t node) const;
   void set_box(std::uint32_t node, const Box<S>& box);
   /// The unique vertices of a leaf, ascending; nothing for an inner node.
   std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const { return leaf_vertices_[node]; }
@@ -73,9 +80,12 @@ class WideHierarchy {
 
   WideArrays<S> arrays() { return {nodes_.data(), lanes_.data(), own_.data(), vertices_.data()}; }
   WideLeaves<S> leaves(const S* positions) {
-    return {first_entry_.data(), first_corner_.data(), corners_.data(), primitives_.data(),
-            rows_.data(),        stamps_.data(),       stamp_,          positions};
+    return {leaf_lists(), rows_.data(), stamps_.data(), stamp_, positions};
   }
+  WideLeafLists leaf_lists() const {
+    return {first_entry_.data(), first_corner_.data(), corners_.data(), primitives_.data()};
+  }
+  std::uint32_t leaf_count() const { return std::uint32_t(stamps_.size()); }
   /// The leaf numbered by `WideNode::first_leaf`: true when first asked since `positions_changed`.
   bool to_be_fetched(std::uint32_t leaf) {
     const bool first = fetched_[leaf] != stamp_;
@@ -140,6 +150,13 @@ class WideQuery {
   QueryStatus run(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
                   const SceneView<S>& scene, const SampledMotion<S>& motion, const Budget& budget,
                   PairBuffer& out, std::uint64_t& tests);
+
+  /// The same for the boxes of one moment of a segment in which they are linear in time: those that are read
+  /// are made from the moments' ends, into the hierarchies. All nodes are marked as stale before.
+  QueryStatus run_at(WideHierarchy<S>& a, const WideMoment<S>& moment_a, std::uint32_t body_a,
+                     WideHierarchy<S>& b, const WideMoment<S>& moment_b, std::uint32_t body_b,
+                     const SceneView<S>& scene, const SampledMotion<S>& motion, const Budget& budget,
+                     PairBuffer& out, std::uint64_t& tests);
 
   /// One side of a lazy query: `stale[wide node]` is not 0 while the boxes of the node's children are not
   /// those of the present. The boxes of the roots must be.

@@ -9,6 +9,7 @@
 #include "core/kernels/bounds.hpp"
 #include "core/kernels/limits.hpp"
 #include "core/kernels/wide_inflate.hpp"
+#include "core/kernels/wide_linear.hpp"
 
 namespace kbvh {
 
@@ -111,6 +112,15 @@ const WideInflateKernels<float>& wide_inflate_kernels(KernelSet set) {
 template <>
 const WideInflateKernels<double>& wide_inflate_kernels(KernelSet set) {
   return KBVH_SELECT_KERNELS(set, wide_inflate_double);
+}
+
+template <>
+const WideLinearKernels<float>& wide_linear_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, wide_linear_float);
+}
+template <>
+const WideLinearKernels<double>& wide_linear_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, wide_linear_double);
 }
 
 void use_kernel_set(KernelSet set) {

@@ -26,16 +26,21 @@ struct WideTraversal {
 /// One step may push, and find, so many pairs.
 inline constexpr std::size_t wide_step = 64;
 
-/// The primitives of a hierarchy's leaves, and their boxes, made when a query first asks for them.
-template <class S>
-struct WideLeaves {
+/// The primitives of a hierarchy's leaves.
+struct WideLeafLists {
   const std::uint32_t* first_entry;   ///< [leaf + 1]: entries of a leaf
   const std::uint32_t* first_corner;  ///< [entry + 1]: corners of an entry's primitive
   const std::uint32_t* corners;       ///< vertices, times 3
   const std::uint32_t* primitives;    ///< [entry]
-  S* rows;                            ///< [leaf][6][padded leaf size]: rows like those of a node
-  std::uint32_t* stamps;              ///< [leaf]: the rows are those of this refit
-  std::uint32_t stamp;                ///< of the present positions
+};
+
+/// And their boxes, made when a query first asks for them.
+template <class S>
+struct WideLeaves {
+  WideLeafLists lists;
+  S* rows;                ///< [leaf][6][padded leaf size]: rows like those of a node
+  std::uint32_t* stamps;  ///< [leaf]: the rows are those of this refit
+  std::uint32_t stamp;    ///< of the present positions
   const S* positions;
 };
 

@@ -39,6 +39,7 @@ FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> time
     if (positions[i] == S(0)) positions[i] = S(0);  // truth B holds no negative zero
   }
   longest_steps_.assign(times.size(), -1.0);
+  positions.push_back(S(0));  // for readers of four scalars
   keyframes_ = std::make_shared<const Keyframes>(Keyframes{std::move(times), std::move(positions)});
 }
 
@@ -167,6 +168,33 @@ double FlightPlans<S>::piece_end(std::uint32_t vertex, double t) const {
   const auto& times = has_own_plan(vertex) ? own_[own_of_vertex_[vertex]].times : keyframes_->times;
   const auto above = std::upper_bound(times.begin(), times.end(), t);
   return above == times.end() ? std::numeric_limits<double>::infinity() : *above;
+}
+
+template <class S>
+double FlightPlans<S>::lines_begin(double t) const {
+  const auto& times = keyframes_->times;
+  double begin =
+      keyframed_count_ == 0 || t < times[0] ? -std::numeric_limits<double>::infinity() : times[segment_at(t)];
+  for (const OwnPlan& plan : own_) {
+    const auto above = std::upper_bound(plan.times.begin(), plan.times.end(), t);
+    if (above != plan.times.begin()) begin = std::max(begin, *(above - 1));
+  }
+  return begin;
+}
+
+template <class S>
+double FlightPlans<S>::lines_end(double t) const {
+  const auto& times = keyframes_->times;
+  const auto above = std::upper_bound(times.begin(), times.end(), t);
+  double end = above == times.end() ? std::numeric_limits<double>::infinity() : *above;
+  for (const OwnPlan& plan : own_) end = std::min(end, piece_end(plan.vertex, t));
+  return end;
+}
+
+template <class S>
+bool FlightPlans<S>::at_rest(double t) const {
+  const auto& times = keyframes_->times;
+  return own_.empty() && (t < times.front() || t >= times.back());
 }
 
 template <class S>

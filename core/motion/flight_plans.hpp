@@ -40,7 +40,8 @@ class FlightPlans {
   std::uint32_t keyframed_count() const { return keyframed_count_; }
   std::size_t keyframe_count() const { return keyframes_->times.size(); }
   std::span<const double> keyframe_times() const { return keyframes_->times; }
-  /// Positions of keyframe k, [keyframed vertex][3]; own plans are not in them.
+  /// Positions of keyframe k, [keyframed vertex][3]; own plans are not in them. One scalar past the end may
+  /// be read.
   const S* keyframe(std::size_t k) const { return keyframes_->positions.data() + 3 * k * keyframed_count_; }
   bool moving() const { return keyframe_count() > 1 || !own_.empty(); }
   bool has_own_plans() const { return !own_.empty(); }
@@ -58,6 +59,13 @@ class FlightPlans {
   Piece<S> piece_after(std::uint32_t vertex, int axis, double t) const;
   /// The end of that piece, without building it.
   double piece_end(std::uint32_t vertex, double t) const;
+
+  /// From when on, and until when, every vertex is on the lines that it is on at t and right after it;
+  /// infinite where that is for ever. O(own plans).
+  double lines_begin(double t) const;
+  double lines_end(double t) const;
+  /// Nothing moves at t, and not before `lines_end(t)`. False if there are plans of their own.
+  bool at_rest(double t) const;
 
   /// No vertex is faster than this on the segment that holds at t (units per second, rounded up); own plans
   /// included. O(vertices) the first time a segment is asked for; O(own plans) after a change, or a knot of

@@ -1,4 +1,8 @@
 #pragma once
+#include <stdexcept>
+#include <string>
+#include <vector>
+
 #include "core/motion/playback.hpp"
 
 namespace kbvh {
@@ -63,6 +67,31 @@ class SegmentMotion : public SteppedMotion<S> {
   /// The linear piece a coordinate is on now; it ends at `t1`.
   Piece<S> piece(std::uint32_t body, std::uint32_t vertex, int axis) const {
     return this->playback_->plans(body).piece_after(vertex, axis, this->time());
+  }
+  /// From when on, and until when, every vertex of the body is on the line that it is on now; infinite where
+  /// that is for ever.
+  double lines_begin(std::uint32_t body) const {
+    return this->playback_->plans(body).lines_begin(this->time());
+  }
+  double lines_end(std::uint32_t body) const { return this->playback_->plans(body).lines_end(this->time()); }
+  /// The body does not move before `lines_end`.
+  bool at_rest(std::uint32_t body) const { return this->playback_->plans(body).at_rest(this->time()); }
+  /// Positions [vertex][3] at a time from `lines_begin` to `lines_end`, truth B, one scalar past the end
+  /// readable: the keyframe itself where there is one, else evaluated into `room`. Throws
+  /// std::invalid_argument for other times. O(vertices), or O(1).
+  const S* positions_on_lines(std::uint32_t body, double t, std::vector<S>& room) const {
+    const FlightPlans<S>& plans = this->playback_->plans(body);
+    if (!(t >= plans.lines_begin(this->time()) && t <= plans.lines_end(this->time())))
+      throw std::invalid_argument("positions at t = " + std::to_string(t) +
+                                  " are not foreseen at t = " + std::to_string(this->time()));
+    if (!plans.has_own_plans()) {
+      const std::size_t k = plans.segment_at(t);
+      const auto times = plans.keyframe_times();
+      if (t <= times[k] || k + 1 == times.size()) return plans.keyframe(k);
+    }
+    room.resize(std::size_t(3) * plans.vertex_count() + 1);
+    plans.evaluate(t, room.data());
+    return room.data();
   }
 };
 

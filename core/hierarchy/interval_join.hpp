@@ -1,0 +1,56 @@
+#pragma once
+#include <vector>
+
+#include "core/hierarchy/linear_bounds.hpp"
+
+namespace kbvh {
+
+/// The pairs of primitives of two bodies whose linear boxes overlap within a segment, with the fractions at
+/// which they begin and cease to: one traversal for a whole segment, from which frames are read.
+template <class S>
+class IntervalJoin {
+ public:
+  /// Joins anew for the bounds' present segment. Adds the box tests made to `tests`. Allocates only where
+  /// there are more pairs than ever before.
+  void join(LinearBounds<S>& bounds, std::uint32_t body_a, std::uint32_t body_b, std::uint64_t& tests);
+
+  /// Appends the pairs whose boxes overlap at a fraction of the segment, which never decreases within one.
+  /// O(pairs that overlap then or did at the last call).
+  void read(float fraction, PairBuffer& out);
+  /// Of the last `read`: for each of its pairs, in order, the place in `pairs`.
+  std::span<const std::uint32_t> alive() const { return {alive_.data(), alive_.size()}; }
+
+  /// All pairs of the segment, in the order in which they begin, roughly.
+  std::span<const JoinedPair> pairs() const { return {sorted_.data(), sorted_.size()}; }
+  std::uint32_t body_a() const { return body_a_; }
+  std::uint32_t body_b() const { return body_b_; }
+
+  std::size_t bytes() const;
+
+ private:
+  static constexpr std::uint32_t buckets = 64;
+  void sort_by_begin();
+  WideLinearLeaves<S> leaves(typename LinearBounds<S>::Side& side, std::uint32_t which);
+
+  /// Rows of one body's primitives at both ends, made where the join comes.
+  struct Leaves {
+    AlignedArray<S> rows[2];
+    std::vector<std::uint32_t> stamps;
+    std::uint32_t stamp = 0;
+    const S* positions[2] = {nullptr, nullptr};
+    bool at_rest = false;
+  };
+  std::uint32_t body_a_ = 0, body_b_ = 0;
+  Leaves leaves_[2];
+  std::vector<WidePair> stack_;
+  std::vector<LeafSlot> leaf_pairs_;
+  std::vector<JoinedPair> chunk_, found_, sorted_;
+  std::uint32_t bucket_end_[buckets] = {};
+  std::uint32_t next_ = 0;  ///< in sorted_: those before it have begun, or are in `waiting_`
+  std::vector<std::uint32_t> waiting_, alive_;
+};
+
+extern template class IntervalJoin<float>;
+extern template class IntervalJoin<double>;
+
+}  // namespace kbvh

@@ -1,0 +1,198 @@
+#include "core/hierarchy/linear_bounds.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace kbvh {
+
+namespace {
+/// The end of no segment.
+constexpr double none = -std::numeric_limits<double>::infinity();
+}  // namespace
+
+template <class S>
+LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>& motion,
+                              Topologies topologies, KernelSet kernels, std::uint32_t pieces)
+    : scene_(scene),
+      motion_(motion),
+      pieces_(pieces),
+      sides_(scene.body_count()),
+      refits_(scene.body_count(), 0) {
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    Side& side = sides_[body];
+    side.hierarchy.assign(std::move(topologies[body]), scene.primitives(body), kernels);
+    const std::size_t nodes = side.hierarchy.node_count();
+    for (int end = 0; end < 2; ++end) {
+      side.lanes[end].assign(nodes * lane_scalars(side.hierarchy.topology().width),
+                             std::numeric_limits<S>::infinity());
+      side.own[end].assign(nodes * 8, S(0));
+    }
+  }
+  for (const BodyPair& pair : scene.pairs())
+    if (!sides_[pair.first].hierarchy.suits(sides_[pair.second].hierarchy))
+      throw std::invalid_argument("topologies of all bodies need one width and leaf size");
+}
+
+template <class S>
+void LinearBounds<S>::choose_segment(double t) {
+  double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
+  bool rest = true;
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    begin = std::max(begin, motion_.lines_begin(body));
+    end = std::min(end, motion_.lines_end(body));
+    rest = rest && motion_.at_rest(body);
+  }
+  if (rest || begin == -std::numeric_limits<double>::infinity()) begin = t;
+  // Plans without an end: some frames ahead, as far as can be told.
+  if (!rest && end == std::numeric_limits<double>::infinity()) {
+    begin = std::max(begin, t);
+    end = t + (t > last_ ? 16 * (t - last_) : 1.0 / 16);
+    begin_ = begin;
+    end_ = end;
+    return;
+  }
+  begin_ = begin;
+  end_ = end;
+  if (pieces_ == 1 || rest) return;
+  const auto cut = [&](std::uint32_t k) {
+    return k == pieces_ ? end : begin + (end - begin) * (double(k) / double(pieces_));
+  };
+  std::uint32_t k = 0;
+  while (k + 1 < pieces_ && t >= cut(k + 1)) ++k;
+  if (!(cut(k) < cut(k + 1))) return;  // so short that the doubles between are all used up
+  begin_ = cut(k);
+  end_ = cut(k + 1);
+}
+
+template <class S>
+bool LinearBounds<S>::make_end(std::uint32_t body, std::uint32_t end, double t) {
+  Side& side = sides_[body];
+  const std::uint32_t array = side.array(end);
+  side.positions[end] = motion_.positions_on_lines(body, t, side.room[array]);
+  if (side.hierarchy.empty()) return true;
+  side.hierarchy.refit_into(side.lanes[array].data(), side.own[array].data(), side.positions[end]);
+  ++refits_[body];
+  const S* own = side.own[array].data();
+  return std::all_of(own, own + 3, [](S x) { return std::isfinite(x); }) &&
+         std::all_of(own + 4, own + 7, [](S x) { return std::isfinite(x); });
+}
+
+template <class S>
+void LinearBounds<S>::make_margin(Side& side) const {
+  S largest = 0;
+  if (!side.hierarchy.empty())
+    for (std::uint32_t end = 0; end < 2; ++end)
+      for (std::size_t i = 0; i < 8; ++i)
+        if (i % 4 != 3) largest = std::max(largest, std::abs(side.own[side.array(end)][i]));
+  side.margin = 8 * std::numeric_limits<S>::epsilon() * largest + 8 * std::numeric_limits<S>::denorm_min();
+}
+
+template <class S>
+void LinearBounds<S>::start() {
+  last_ = motion_.time();
+  std::fill(refits_.begin(), refits_.end(), 0);
+  plans_changed();
+}
+
+template <class S>
+void LinearBounds<S>::plans_changed() {
+  for (Side& side : sides_) side.current = false;
+  end_ = none;
+  advance();
+}
+
+template <class S>
+bool LinearBounds<S>::advance() {
+  const double t = motion_.time(), before = end_;
+  const bool anew = end_ == none;
+  if (!anew && t <= end_) {
+    last_ = t;
+    return false;
+  }
+  choose_segment(t);
+  last_ = t;
+  const bool goes_on = !anew && begin_ == before;
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    Side& side = sides_[body];
+    const bool rests = motion_.at_rest(body);
+    if (rests && side.current && side.at_rest) continue;  // where it was
+    if (goes_on && !side.at_rest) {
+      side.first = 1 - side.first;
+      side.positions[0] = side.positions[1];
+      side.at_rest = rests;
+    } else {
+      side.at_rest = rests;
+      make_end(body, 0, rests ? t : begin_);
+    }
+    side.current = true;
+    if (rests) {
+      side.positions[1] = side.positions[0];
+    } else {
+      // A line without end may leave the range of numbers: then less of it.
+      while (!make_end(body, 1, end_) && end_ > begin_) {
+        end_ = begin_ + (end_ - begin_) / 2;
+        for (std::uint32_t other = 0; other < body; ++other)
+          if (!sides_[other].at_rest) make_end(other, 1, end_);
+      }
+    }
+  }
+  for (Side& side : sides_) make_margin(side);
+  return true;
+}
+
+template <class S>
+S LinearBounds<S>::fraction(double t) const {
+  if (!(end_ > begin_) || end_ == std::numeric_limits<double>::infinity()) return 0;
+  return std::clamp(S((t - begin_) / (end_ - begin_)), S(0), S(1));
+}
+
+template <class S>
+std::vector<Box<double>> LinearBounds<S>::boxes_at(std::uint32_t body, double t) const {
+  const Side& side = sides_[body];
+  const double s = double(fraction(t)), margin = double(side.margin);
+  std::vector<Box<double>> boxes;
+  for (std::uint32_t node = 0; node < side.hierarchy.topology().size(); ++node) {
+    const Box<S> first =
+        side.hierarchy.box_in(side.lanes[side.array(0)].data(), side.own[side.array(0)].data(), node);
+    const Box<S> last =
+        side.hierarchy.box_in(side.lanes[side.array(1)].data(), side.own[side.array(1)].data(), node);
+    Box<double> box;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double low = double(first.lower[axis]), high = double(first.upper[axis]);
+      box.lower[axis] = low + s * (double(last.lower[axis]) - low) - margin;
+      box.upper[axis] = high + s * (double(last.upper[axis]) - high) + margin;
+    }
+    boxes.push_back(box);
+  }
+  return boxes;
+}
+
+template <class S>
+std::size_t LinearBounds<S>::bytes() const {
+  std::size_t total = 0;
+  for (const Side& side : sides_) {
+    total += side.hierarchy.bytes();
+    for (int end = 0; end < 2; ++end)
+      total += (side.lanes[end].size() + side.own[end].size() + side.room[end].capacity()) * sizeof(S);
+  }
+  return total;
+}
+
+Parameter segment_pieces_parameter() {
+  return {
+      "pieces", "1", {}, "each segment between keyframes is cut into so many, for tighter boxes; 1 to 64", 1};
+}
+
+std::uint32_t segment_pieces(const Params& params) {
+  const double wanted = params.number("pieces");
+  if (!(wanted >= 1 && wanted <= 64) || wanted != std::floor(wanted))
+    throw ConfigError("pieces must be a whole number from 1 to 64, got " + params.word("pieces"));
+  return std::uint32_t(wanted);
+}
+
+template class LinearBounds<float>;
+template class LinearBounds<double>;
+
+}  // namespace kbvh

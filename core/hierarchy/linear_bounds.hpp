@@ -1,0 +1,102 @@
+#pragma once
+#include <utility>
+#include <vector>
+
+#include "core/hierarchy/wide_hierarchy.hpp"
+#include "core/kernels/wide_linear.hpp"
+#include "core/strategy.hpp"
+
+namespace kbvh {
+
+/// Bounds of all bodies of a scene over a segment in which every vertex of every body keeps to one line:
+/// boxes at its begin and at its end, linear in between. A maximum of linear functions is convex and lies
+/// below its chord, so they hold every vertex throughout; they are tight at the ends. Nothing is updated
+/// within a segment, and the boxes at its end are those at the begin of the next one.
+///
+/// Segments are those of all bodies overlaid: from the latest knot of any plan to the next one, cut into
+/// `pieces` of one length. Every box is larger by a margin of 8 ulps of the largest coordinate of its body,
+/// which is more than all roundings between the flight plans and the positions of frames.
+template <class S>
+class LinearBounds {
+ public:
+  /// One body over the present segment; index 0 is its begin, 1 its end. A body at rest has one and the same.
+  struct Side {
+    WideHierarchy<S> hierarchy;  ///< its topology; its boxes are free to be used
+    AlignedArray<S> lanes[2], own[2];
+    std::vector<S> room[2];
+    const S* positions[2] = {nullptr, nullptr};  ///< by end
+    std::uint32_t first = 0;                     ///< which array holds the begin
+    bool at_rest = false, current = false;
+    S margin = 0;
+
+    std::uint32_t array(std::uint32_t end) const { return at_rest ? first : (first + end) % 2; }
+    WideEnds<S> ends() const {
+      return {{lanes[array(0)].data(), lanes[array(1)].data()},
+              {own[array(0)].data(), own[array(1)].data()},
+              margin};
+    }
+  };
+
+  /// Needs topologies of one width and leaf size for all bodies of a pair: throws std::invalid_argument.
+  LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
+               KernelSet kernels, std::uint32_t pieces);
+
+  /// Makes the bounds of a segment with the motion's present time in it, as if there had been none before.
+  void start();
+  /// The same if the present time is not in the segment any more. Returns whether it began a new one.
+  bool advance();
+  /// Plans have changed at the motion's present time: the rest of the segment is another one.
+  void plans_changed();
+
+  /// First and last time of the segment; its end may be infinite if nothing moves.
+  double begin() const { return begin_; }
+  double end() const { return end_; }
+  /// Where the segment a time lies in it, from 0 to 1.
+  S fraction(double t) const;
+
+  std::uint32_t body_count() const { return std::uint32_t(sides_.size()); }
+  Side& side(std::uint32_t body) { return sides_[body]; }
+  const Side& side(std::uint32_t body) const { return sides_[body]; }
+
+  /// Boxes of a body at a time of the segment, one for each node of its topology, in double; larger than
+  /// those that a query reads by nothing but rounding.
+  std::vector<Box<double>> boxes_at(std::uint32_t body, double t) const;
+
+  /// How often boxes were made at an end of a segment, since this was asked last.
+  std::uint64_t take_refits(std::uint32_t body) { return std::exchange(refits_[body], 0); }
+
+  std::size_t bytes() const;
+
+ private:
+  void choose_segment(double t);
+  bool make_end(std::uint32_t body, std::uint32_t end, double t);
+  void make_margin(Side& side) const;
+
+  SceneView<S> scene_;
+  SegmentMotion<S> motion_;
+  std::uint32_t pieces_;
+  double begin_ = 0, end_ = 0, last_ = 0;
+  std::vector<Side> sides_;
+  std::vector<std::uint64_t> refits_;
+};
+
+/// The parameter `pieces` of strategies with linear bounds, and its value: 1 to 64. Throws ConfigError.
+Parameter segment_pieces_parameter();
+std::uint32_t segment_pieces(const Params& params);
+
+/// Counts the ends that were made since `bounds` was asked last, as updates.
+template <class S, class Count>
+void count_linear_update(LinearBounds<S>& bounds, Count& count) {
+  for (std::uint32_t body = 0; body < bounds.body_count(); ++body) {
+    const auto& hierarchy = bounds.side(body).hierarchy;
+    const std::uint64_t ends = bounds.take_refits(body), nodes = hierarchy.topology().size();
+    count.add(Counter::nodes_visited, ends * nodes);
+    count.add(Counter::values_written, 6 * ends * nodes);
+    count.add(Counter::vertex_reads, ends * hierarchy.leaf_vertex_count());
+  }
+}
+
+extern template class LinearBounds<float>;
+extern template class LinearBounds<double>;
+
+}  // namespace kbvh

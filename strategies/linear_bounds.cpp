@@ -1,0 +1,116 @@
+// Boxes that are linear in time: made where all flight plans are known to be straight until, at the ends of
+// each such segment, and interpolated by the query where it comes. No frame updates anything.
+
+#include "core/hierarchy/linear_bounds.hpp"
+
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class Count>
+class LinearBoundsStrategy final : public Strategy<S> {
+ public:
+  static constexpr Foresight foresight = Foresight::next_keyframe;
+
+  LinearBoundsStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
+                       const Params& params)
+      : Strategy<S>(scene, motion),
+        bounds_(scene, motion, std::move(topologies), active_kernel_set(), segment_pieces(params)),
+        stale_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      stale_[body].resize(bounds_.side(body).hierarchy.node_count());
+  }
+
+  void reset(double t) override {
+    this->start_at(t);
+    count_.table = {};
+    bounds_.start();
+    new_frame();
+    first_fetch_ = this->sampled_.fetched();
+    count_update();
+  }
+
+  void advance(double t) override {
+    this->move_to(t);
+    if (bounds_.advance()) count_update();
+    new_frame();
+  }
+
+  QueryStatus candidates_at(double t, PairBuffer& out, const Budget& budget) override {
+    QueryStatus status;
+    std::uint64_t tests = 0;
+    for (const BodyPair& pair : this->scene_.pairs())
+      status.pending += query_
+                            .run_at(bounds_.side(pair.first).hierarchy, moment(pair.first, t), pair.first,
+                                    bounds_.side(pair.second).hierarchy, moment(pair.second, t), pair.second,
+                                    this->scene_, this->sampled_, budget, out, tests)
+                            .pending;
+    count_.add(Counter::box_tests, tests);
+    return status;
+  }
+
+  void flight_plans_changed(double t, std::span<const PlanChange<S>> /*changes*/) override {
+    this->stand_at(t);
+    bounds_.plans_changed();
+    count_update();
+    new_frame();
+  }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    return AuditView{bounds_.side(body).hierarchy.topology(), bounds_.boxes_at(body, this->time()), {}};
+  }
+
+  std::size_t bytes() const override {
+    std::size_t total = bounds_.bytes();
+    for (const auto& marks : stale_) total += marks.size();
+    return total;
+  }
+
+ protected:
+  Counters counted() const override {
+    Counters table = count_.table;
+    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
+    return table;
+  }
+
+ private:
+  void new_frame() {
+    for (std::uint32_t body = 0; body < bounds_.body_count(); ++body) {
+      bounds_.side(body).hierarchy.positions_changed();
+      std::fill(stale_[body].begin(), stale_[body].end(), 1);
+    }
+  }
+  WideMoment<S> moment(std::uint32_t body, double t) {
+    auto& side = bounds_.side(body);
+    return {side.hierarchy.arrays(), side.ends(), stale_[body].data(), bounds_.fraction(t)};
+  }
+  void count_update() {
+    if constexpr (Count::enabled) count_linear_update(bounds_, count_);
+  }
+
+  LinearBounds<S> bounds_;
+  WideQuery<S> query_;
+  std::vector<std::vector<std::uint8_t>> stale_;  ///< [body][wide node]
+  Count count_;
+  std::uint64_t first_fetch_ = 0;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(linear_bounds) {
+  using namespace kbvh;
+  return {make_entry<LinearBoundsStrategy>({
+      .id = "linear_bounds",
+      .title = "bounds linear in time",
+      .family = "linear",
+      .citation =
+          "kbvh; linear boxes of moving triangles as in motion-blur hierarchies (Christensen et al. 2006)",
+      .tightness = Tightness::conservative,
+      .positions = PositionUse::fetched,
+      .can = {.continuous = true, .plan_changes = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+      .parameters = {segment_pieces_parameter()},
+  })};
+}
