@@ -184,7 +184,7 @@ def markdown(targets: list[Target]) -> str:
         verdict = VERDICTS[target.verdict] + (f": {target.reason}" if target.reason else "")
         lines.append(_row([target.what, measured, wanted(target.at_least), wanted(target.aim), verdict]))
     names = columns(targets)
-    lines += ["", facts(targets) + " Each number says how many times slower the other side is, on the worst scene that counts; "
+    lines += ["", facts(targets) + " Each number says how many times slower the other side is, on the scenes that count; "
               "below it is given for every scene, in bold where the scene counts.", ""]  # fmt: skip
     lines += [_row(["what", *names]), _row(["---"] * (1 + len(names)))]
     for target in targets:

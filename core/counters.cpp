@@ -42,6 +42,10 @@ const char* name(Counter counter) {
       return "triangle_tests";
     case Counter::triangle_tests_exact:
       return "triangle_tests_exact";
+    case Counter::span_tests:
+      return "span_tests";
+    case Counter::span_verdicts:
+      return "span_verdicts";
     case Counter::bytes:
       return "bytes";
     case Counter::count:

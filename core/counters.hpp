@@ -26,6 +26,8 @@ enum class Counter : std::uint8_t {
   box_tests,               ///< box-box overlap tests of the query, primitive pre-tests included
   triangle_tests,          ///< exact triangle tests
   triangle_tests_exact,    ///< of these, the ones the filter left to exact arithmetic
+  span_tests,              ///< attempts to decide a pair of triangles for a span of time
+  span_verdicts,           ///< pairs that a frame found decided for a span already
   bytes,                   ///< memory held by the strategy's own structures, in bytes (a level, not a sum)
   count
 };

@@ -18,7 +18,8 @@ using nlohmann::json;
 
 namespace {
 
-const std::vector<std::string> phases{"motion", "update", "traversal", "triangle_tests", "query", "total"};
+const std::vector<std::string> phases{"motion", "update",     "traversal", "triangle_tests",
+                                      "query",  "candidates", "total"};
 
 template <class T>
 bool has(const std::vector<T>& list, const T& value) {
@@ -64,6 +65,10 @@ Target read_target(const json& value, const std::string& place) {
   target.denominator = read_selector(keys, "denominator");
   target.scenes = keys.words("scenes");
   if (target.scenes.empty()) keys.fail("scenes", "is missing");
+  const std::string over = keys.word("over").value_or("worst");
+  if (over != "worst" && over != "geometric_mean")
+    keys.fail("over", "expected worst or geometric_mean, got '" + over + "'");
+  target.mean = over == "geometric_mean";
   target.scalar = needed_word(keys, "scalar");
   if (target.scalar != "float" && target.scalar != "double")
     keys.fail("scalar", "expected float or double, got '" + target.scalar + "'");

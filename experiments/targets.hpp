@@ -14,8 +14,8 @@ struct Plan;
 /// Contestants by what is said of them, and the phase whose time counts. Several may match (say, several leaf
 /// sizes): the one with the smallest median stands for them all.
 struct TargetSelector {
-  std::string strategy;    ///< id
-  std::string phase;       ///< "motion", "update", "traversal", "triangle_tests", "query" or "total"
+  std::string strategy;  ///< id
+  std::string phase;  ///< "motion", "update", "traversal", "triangle_tests", "query", "candidates", "total"
   BuilderRequest builder;  ///< any of these values; empty: whatever was measured
   Sweep params;            ///< likewise
 };
@@ -24,7 +24,8 @@ struct TargetSelector {
 struct Target {
   std::string what, note;
   TargetSelector numerator, denominator;
-  std::vector<std::string> scenes;  ///< the worst of these counts
+  std::vector<std::string> scenes;  ///< the worst of these counts, or all
+  bool mean = false;                ///< their geometric mean counts, not the worst
   std::string scalar;
   std::uint32_t per_keyframe = 10;
   double at_least = 0, aim = 0;

@@ -1,7 +1,10 @@
 // One time-parametrised traversal for each segment of the flight plans, over boxes that are linear in time,
 // gives the pairs of primitives that come near each other in it and when; frames are read from that.
 
+#include <algorithm>
+
 #include "core/hierarchy/interval_join.hpp"
+#include "core/hierarchy/span_answers.hpp"
 #include "core/registry.hpp"
 
 namespace kbvh {
@@ -16,12 +19,20 @@ class IntervalJoinStrategy final : public Strategy<S> {
                        const Params& params)
       : Strategy<S>(scene, motion),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), segment_pieces(params)),
-        joins_(scene.pairs().size()) {}
+        joins_(scene.pairs().size()),
+        answers_(scene.pairs().size()),
+        by_spans_(scene.pairs().size(), params.word("triangle_tests") == "spans") {
+    for (std::size_t i = 0; i < scene.pairs().size(); ++i)
+      for (const std::uint32_t body : {scene.pairs()[i].first, scene.pairs()[i].second})
+        if (!all_triangles(scene.primitives(body))) by_spans_[i] = false;
+    any_by_spans_ = std::find(by_spans_.begin(), by_spans_.end(), true) != by_spans_.end();
+  }
 
   void reset(double t) override {
     this->start_at(t);
     count_.table = {};
     first_fetch_ = this->sampled_.fetched();
+    for (auto& answers : answers_) answers.clear_counts();
     bounds_.start();
     new_segment();
   }
@@ -31,11 +42,43 @@ class IntervalJoinStrategy final : public Strategy<S> {
     if (bounds_.advance()) new_segment();
   }
 
+  /// With span tests these are no candidates that are apart for certain, and first those that intersect.
   QueryStatus candidates_at(double t, PairBuffer& out, const Budget& /*budget*/) override {
     if (!joined_) join();
     const float fraction = float(bounds_.fraction(t));
-    for (IntervalJoin<S>& join : joins_) join.read(fraction, out);
+    const std::size_t before = out.size();
+    blocks_.clear();
+    for (std::size_t i = 0; i < joins_.size(); ++i) {
+      const std::size_t begin = out.size();
+      std::size_t open = 0;
+      if (by_spans_[i]) {
+        open = answers_[i].read(bounds_, this->scene_, joins_[i], fraction, out);
+      } else {
+        joins_[i].read(fraction, out);
+        open = out.size() - begin;
+      }
+      blocks_.push_back({out.size() - begin - open, open});
+    }
+    if (any_by_spans_) answered_.assign(out.begin() + std::ptrdiff_t(before), out.end());
     return {};
+  }
+
+  /// What is not certain is tested at the frame's positions.
+  void confirm(double t, PairBuffer& pairs) override {
+    if (!any_by_spans_ || pairs != answered_) return Strategy<S>::confirm(t, pairs);
+    to_test_.clear();
+    std::size_t kept = 0, at = 0;
+    for (const Block& block : blocks_) {
+      std::copy_n(pairs.begin() + std::ptrdiff_t(at), block.certain, pairs.begin() + std::ptrdiff_t(kept));
+      kept += block.certain;
+      at += block.certain;
+      to_test_.insert(to_test_.end(), pairs.begin() + std::ptrdiff_t(at),
+                      pairs.begin() + std::ptrdiff_t(at + block.open));
+      at += block.open;
+    }
+    confirm_pairs(this->scene_, this->sampled_, to_test_, this->triangle_stats_);
+    pairs.resize(kept);
+    pairs.insert(pairs.end(), to_test_.begin(), to_test_.end());
   }
 
   void flight_plans_changed(double t, std::span<const PlanChange<S>> /*changes*/) override {
@@ -51,6 +94,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
   std::size_t bytes() const override {
     std::size_t total = bounds_.bytes();
     for (const auto& join : joins_) total += join.bytes();
+    for (const auto& answers : answers_) total += answers.bytes();
     return total;
   }
 
@@ -58,10 +102,20 @@ class IntervalJoinStrategy final : public Strategy<S> {
   Counters counted() const override {
     Counters table = count_.table;
     if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
+    for (const auto& answers : answers_) {
+      table[Counter::span_tests] += answers.attempts();
+      table[Counter::span_verdicts] += answers.decided();
+    }
     return table;
   }
 
  private:
+  static bool all_triangles(const Primitives& primitives) {
+    if (primitives.kind != PrimitiveKind::polygons) return false;
+    for (std::uint32_t p = 0; p < primitives.count(); ++p)
+      if (primitives.offsets[p] != 3 * p || primitives.offsets[p + 1] != 3 * p + 3) return false;
+    return true;
+  }
   void new_segment() {
     if constexpr (Count::enabled) count_linear_update(bounds_, count_);
     joined_ = false;
@@ -70,13 +124,23 @@ class IntervalJoinStrategy final : public Strategy<S> {
     std::uint64_t tests = 0;
     for (std::size_t i = 0; i < joins_.size(); ++i)
       joins_[i].join(bounds_, this->scene_.pairs()[i].first, this->scene_.pairs()[i].second, tests);
+    for (std::size_t i = 0; i < joins_.size(); ++i)
+      if (by_spans_[i]) answers_[i].start(joins_[i]);
     count_.add(Counter::box_tests, tests);
     joined_ = true;
   }
 
   LinearBounds<S> bounds_;
   std::vector<IntervalJoin<S>> joins_;  ///< one for each pair of bodies
-  bool joined_ = false;
+  std::vector<SpanAnswers<S>> answers_;
+  std::vector<bool> by_spans_;
+  bool any_by_spans_ = false, joined_ = false;
+  /// What was read for one pair of bodies.
+  struct Block {
+    std::size_t certain, open;
+  };
+  std::vector<Block> blocks_;
+  PairBuffer answered_, to_test_;
   Count count_;
   std::uint64_t first_fetch_ = 0;
 };
@@ -95,6 +159,11 @@ KBVH_STRATEGY(interval_join) {
       .positions = PositionUse::fetched,
       .can = {.continuous = true, .plan_changes = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = {segment_pieces_parameter()},
+      .parameters =
+          {segment_pieces_parameter(),
+           {"triangle_tests",
+            "spans",
+            {"spans", "frames"},
+            "decide pairs of triangles for spans of time where that can be proved, or at every frame"}},
   })};
 }

@@ -116,7 +116,6 @@ void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
   waiting_.resize(room);
   for (std::uint32_t i = next_; i < open; ++i) waiting_[old + (i - next_)] = i;
   next_ = open;
-  alive_.resize(room);
   out.resize(before + room);
   std::size_t found = 0, kept = 0;
   PrimitivePair* const pairs = out.data() + before;
@@ -124,14 +123,12 @@ void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
     const std::uint32_t index = waiting_[i];
     const JoinedPair pair = sorted_[index];
     pairs[found] = {body_a_, pair.primitive_a, body_b_, pair.primitive_b};
-    alive_[found] = index;
     waiting_[kept] = index;
     const bool ended = pair.end < fraction;
     found += !ended && pair.begin <= fraction ? 1 : 0;
     kept += ended ? 0 : 1;
   }
   waiting_.resize(kept);
-  alive_.resize(found);
   out.resize(before + found);
 }
 
@@ -143,7 +140,7 @@ std::size_t IntervalJoin<S>::bytes() const {
         (own.rows[0].size() + own.rows[1].size()) * sizeof(S) + own.stamps.size() * sizeof(std::uint32_t);
   return total + stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
          (chunk_.size() + found_.capacity() + sorted_.capacity()) * sizeof(JoinedPair) +
-         (waiting_.capacity() + alive_.capacity()) * sizeof(std::uint32_t);
+         waiting_.capacity() * sizeof(std::uint32_t);
 }
 
 template class IntervalJoin<float>;

@@ -17,9 +17,6 @@ class IntervalJoin {
   /// Appends the pairs whose boxes overlap at a fraction of the segment, which never decreases within one.
   /// O(pairs that overlap then or did at the last call).
   void read(float fraction, PairBuffer& out);
-  /// Of the last `read`: for each of its pairs, in order, the place in `pairs`.
-  std::span<const std::uint32_t> alive() const { return {alive_.data(), alive_.size()}; }
-
   /// All pairs of the segment, in the order in which they begin, roughly.
   std::span<const JoinedPair> pairs() const { return {sorted_.data(), sorted_.size()}; }
   std::uint32_t body_a() const { return body_a_; }
@@ -47,7 +44,7 @@ class IntervalJoin {
   std::vector<JoinedPair> chunk_, found_, sorted_;
   std::uint32_t bucket_end_[buckets] = {};
   std::uint32_t next_ = 0;  ///< in sorted_: those before it have begun, or are in `waiting_`
-  std::vector<std::uint32_t> waiting_, alive_;
+  std::vector<std::uint32_t> waiting_;
 };
 
 extern template class IntervalJoin<float>;

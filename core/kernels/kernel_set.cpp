@@ -8,6 +8,7 @@
 
 #include "core/kernels/bounds.hpp"
 #include "core/kernels/limits.hpp"
+#include "core/kernels/span_tests.hpp"
 #include "core/kernels/wide_inflate.hpp"
 #include "core/kernels/wide_linear.hpp"
 
@@ -121,6 +122,15 @@ const WideLinearKernels<float>& wide_linear_kernels(KernelSet set) {
 template <>
 const WideLinearKernels<double>& wide_linear_kernels(KernelSet set) {
   return KBVH_SELECT_KERNELS(set, wide_linear_double);
+}
+
+template <>
+const SpanTestKernels<float>& span_test_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, span_tests_float);
+}
+template <>
+const SpanTestKernels<double>& span_test_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, span_tests_double);
 }
 
 void use_kernel_set(KernelSet set) {

@@ -309,7 +309,7 @@ TEST(Targets, TableShowsRowsAndScenes) {
   const std::string table = targets_table(target_rows(read(example_plan()), example_groups()));
   EXPECT_EQ(
       table,
-      "Targets: how many times slower the other is, on the worst scene that counts\n"
+      "Targets: how many times slower the other is, on the scenes that count\n"
       "target            measured  95 % interval  at least  aim  verdict    on\n"
       "flat over period       2.5       2.5 to 3         2    4  reached  soup\n"
       "\n"

@@ -1,0 +1,58 @@
+#pragma once
+#include <vector>
+
+#include "core/geometry/span_pair.hpp"
+#include "core/hierarchy/interval_join.hpp"
+#include "core/kernels/span_tests.hpp"
+
+namespace kbvh {
+
+/// Triangle tests of the pairs of an interval join, answered for spans of time where that can be proved. When
+/// a pair begins, or what was proved of it ends, the rest of its span is asked about, then a quarter of that.
+/// What is apart is not looked at again before its span is over, what intersects is only read out, and the
+/// rest is a candidate at each frame for as long as a quarter would have lasted.
+template <class S>
+class SpanAnswers {
+ public:
+  /// The join is that of a new segment.
+  void start(const IntervalJoin<S>& join);
+
+  /// Appends the pairs that intersect at a fraction of the segment for certain, and after them those that
+  /// may; returns how many these are. Fractions never decrease within a segment.
+  std::size_t read(const LinearBounds<S>& bounds, const SceneView<S>& scene, const IntervalJoin<S>& join,
+                   float fraction, PairBuffer& out);
+
+  /// Since they were cleared: attempts to decide a pair for a span, and pairs that frames read as decided.
+  std::uint64_t attempts() const { return attempts_; }
+  std::uint64_t decided() const { return decided_; }
+  void clear_counts() { attempts_ = decided_ = 0; }
+  std::size_t bytes() const;
+
+ private:
+  static constexpr std::uint32_t buckets = 256, none = ~std::uint32_t(0);
+  /// A pair by its place in the join, and until when it stays where it is.
+  struct Item {
+    std::uint32_t pair;
+    float until;
+  };
+  void wait(std::uint32_t pair, float until);
+  void collect_due(const IntervalJoin<S>& join, float fraction);
+  void attempt(const LinearBounds<S>& bounds, const SceneView<S>& scene, const IntervalJoin<S>& join,
+               float fraction, float share);
+
+  std::vector<Item> intersecting_, open_;
+  /// Pairs that wait for their time: lists by bucket of it.
+  std::vector<std::uint32_t> next_;
+  std::vector<float> time_;
+  std::uint32_t head_[buckets] = {}, bucket_ = 0;
+  float last_ = -1, step_ = 0;
+  std::vector<std::uint32_t> due_;
+  std::vector<SpanPair<S>> tries_;
+  std::vector<SpanVerdict> verdicts_;
+  std::uint64_t attempts_ = 0, decided_ = 0;
+};
+
+extern template class SpanAnswers<float>;
+extern template class SpanAnswers<double>;
+
+}  // namespace kbvh
