@@ -16,7 +16,7 @@ import matplotlib.image
 import numpy as np
 
 PALETTE = ((0.62, 0.30, 0.28), (0.86, 0.72, 0.60), (0.45, 0.55, 0.68))  # bodies, in the order of their files
-LIGHT = np.array((0.5, 0.35, 0.8))
+LIGHT = np.array((-0.45, 0.5, 0.75)) / 1.007  # as the viewer sees it: from the upper left, in front
 
 
 @dataclass
@@ -49,14 +49,14 @@ def read_pc2(path: Path) -> np.ndarray:
 
 
 def read_scene(folder: Path) -> list[Mesh]:
-    """Every OBJ of the folder with its PC2; the body with most vertices that moves comes first."""
+    """Every OBJ of the folder with its PC2, in the order of their names, which begin with the body's number."""
     meshes = []
     for path in sorted(folder.glob("*.obj")):
         vertices, triangles = read_obj(path)
         cache = path.with_suffix(".pc2")
         positions = read_pc2(cache) if cache.exists() else vertices[None]
         meshes.append(Mesh(path.stem, positions, triangles))
-    return sorted(meshes, key=lambda m: m.name.startswith(("avatar", "round")))
+    return meshes
 
 
 def camera(azimuth: float) -> np.ndarray:
@@ -80,9 +80,7 @@ def draw(image: np.ndarray, depth: np.ndarray, points: np.ndarray, triangles: np
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.where(size > 0, size, 1)
     normals *= np.sign(normals @ view[2])[:, None]  # cloth has two sides
-    light = LIGHT / np.linalg.norm(LIGHT)
-    shade = 0.30 + 0.70 * np.clip(normals @ (view.T @ np.array((-0.45, 0.5, 0.75)) / 1.01), 0, 1)
-    shade = 0.9 * shade + 0.1 * np.clip(normals @ light, 0, 1)
+    shade = 0.3 + 0.7 * np.clip(normals @ (view.T @ LIGHT), 0, 1)
     low = np.floor(corners.min(axis=1)).astype(int)
     high = np.ceil(corners.max(axis=1)).astype(int)
     for t in range(len(triangles)):
@@ -128,7 +126,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="as `kbvh scene NAME --out FOLDER` writes it")
     parser.add_argument("out", type=Path, help="PNG file")
     parser.add_argument("--keyframes", type=int, nargs="+", default=[0, 15, 30, 45])
-    parser.add_argument("--azimuth", type=float, default=50.0, help="of the viewer, degrees from the front (+x)")
+    parser.add_argument("--azimuth", type=float, default=50.0, help="of the viewer, degrees from +x")
     parser.add_argument("--height", type=int, default=700, help="pixels")
     options = parser.parse_args()
     meshes = read_scene(options.folder)

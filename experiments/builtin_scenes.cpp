@@ -67,6 +67,7 @@ Meshes garment(scenes::GarmentKind kind, const char* what, const BuiltinOptions&
   config.kind = kind;
   config.triangles = options.triangles;
   config.avatar_triangles = obstacle_triangles(options);
+  if (options.full_triangles > 0) config.full_triangles = options.full_triangles;
   config.seed = options.seed;
   config.keyframes = options.keyframes;
   return simulated(config, scenes::simulate_garment, what, progress);

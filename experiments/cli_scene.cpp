@@ -22,8 +22,8 @@ constexpr const char* examples = R"(Examples:
   kbvh scene shirt --triangles 32000
   kbvh scene dress --triangles 8000 --frame 30 --out dress.obj
   kbvh scene dress --triangles 8000 --out folder
-Prints counts and how violently the bodies move: the share of sides of a binary tree with one triangle per leaf
-whose realising vertex changes from one keyframe to the next. A folder gets every body as OBJ and PC2; a file
+Prints counts and how violently the bodies move: the share of the sides of a binary tree, one triangle per leaf,
+whose realising vertex changes from one keyframe to the next. A folder gets every body as OBJ, with PC2 if it moves; a file
 ending in .obj holds all bodies at one keyframe, one after the other.)";
 
 struct SceneOptions {
@@ -40,7 +40,8 @@ io::AnimatedMesh snapshot(const std::vector<io::AnimatedMesh>& bodies, std::size
   for (const io::AnimatedMesh& body : bodies) {
     const std::size_t k = std::min(frame, body.keyframe_times.size() - 1);
     const std::size_t size = std::size_t(3) * body.vertex_count;
-    for (const std::uint32_t v : body.primitive_vertices) all.primitive_vertices.push_back(all.vertex_count + v);
+    for (const std::uint32_t v : body.primitive_vertices)
+      all.primitive_vertices.push_back(all.vertex_count + v);
     const std::uint32_t base = all.primitive_offsets.back();
     for (std::size_t p = 1; p < body.primitive_offsets.size(); ++p)
       all.primitive_offsets.push_back(base + body.primitive_offsets[p]);
@@ -59,20 +60,22 @@ void write(const std::vector<io::AnimatedMesh>& bodies, const SceneOptions& opti
   }
   std::error_code error;
   std::filesystem::create_directories(out, error);
-  for (const io::AnimatedMesh& body : bodies) {
-    io::save_obj(body, out / (body.name + ".obj"));
-    if (body.moving()) io::save_pc2(body, out / (body.name + ".pc2"));
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const std::string file = std::to_string(i) + "-" + bodies[i].name;
+    io::save_obj(bodies[i], out / (file + ".obj"));
+    if (bodies[i].moving()) io::save_pc2(bodies[i], out / (file + ".pc2"));
   }
 }
 
 void print(const std::vector<BodyCard>& list) {
   for (const BodyCard& c : list) {
     std::string text =
-        fmt::format("{}: {}, {}, {}", c.name, counted(c.primitives, "primitive"), std::to_string(c.vertices) + " vertices",
-                    counted(c.keyframes, "keyframe"));
+        fmt::format("{}: {}, {}, {}", c.name, counted(c.primitives, "primitive"),
+                    std::to_string(c.vertices) + " vertices", counted(c.keyframes, "keyframe"));
     if (c.keyframes > 1)
       text += fmt::format(
-          " in {:.3g} s\n    {:.2f}% of the sides of {} nodes change their realiser per keyframe (at most {:.2f}%)\n"
+          " in {:.3g} s\n    {:.2f}% of the sides of {} nodes change their realiser per keyframe (at most "
+          "{:.2f}%)\n"
           "    a vertex moves by {:.2f} edges per keyframe (at most {:.2f})",
           c.seconds, 100 * c.sides_changed, c.nodes, 100 * c.most_sides_changed, c.mean_step, c.largest_step);
     std::printf("%s\n", text.c_str());
@@ -107,11 +110,14 @@ void add_scene(CLI::App& program, Action& action) {
   command->footer(examples);
   auto o = std::make_shared<SceneOptions>();
   command->add_option("name", o->name, "`kbvh list` shows them")->required();
-  command->add_option("--triangles", o->scene.triangles, "of the moving body (2000)")->check(CLI::PositiveNumber);
+  command->add_option("--triangles", o->scene.triangles, "of the moving body (2000)")
+      ->check(CLI::PositiveNumber);
   command->add_option("--obstacle", o->scene.obstacle_triangles, "triangles of the body beside it")
       ->check(CLI::PositiveNumber);
   command->add_option("--keyframes", o->scene.keyframes, "(60)")->check(CLI::PositiveNumber);
   command->add_option("--seed", o->scene.seed, "of what chance decides (1)");
+  command->add_option("--full-triangles", o->scene.full_triangles,
+                      "garments: most triangles that are simulated in full; above, a second level refines");
   command->add_option("--frame", o->frame, "keyframe of the OBJ file, from 0");
   command->add_option("--out", o->out, "OBJ file or folder to write");
   command->add_flag("--json", o->as_json, "for programs");

@@ -75,7 +75,8 @@ BodyCard card_of(const Body<float>& body) {
   card.primitives = body.primitives.live_count();
   card.keyframes = std::uint32_t(body.plans.keyframe_count());
   card.seconds = body.plans.keyframe_times().back() - body.plans.keyframe_times().front();
-  const Topology topology = build_topology(body.primitives, body.plans.keyframe(0), {BuildMethod::median, 2, 1});
+  const Topology topology =
+      build_topology(body.primitives, body.plans.keyframe(0), {BuildMethod::median, 2, 1});
   card.nodes = topology.size();
   if (card.keyframes < 2 || topology.empty()) return card;
   const LeafVertices leaves = unique_leaf_vertices(topology, body.primitives);

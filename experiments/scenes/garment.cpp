@@ -93,7 +93,8 @@ void simulate_guided(const GarmentConfig& config, const GarmentPattern& coarse_p
   Guide guide(coarse_pattern, pattern);
   // Keyframes k - 1 to k + 2 of the guide.
   std::array<std::vector<Vec>, 4> knots;
-  for (std::size_t i = 0; i < 4; ++i) guide.interpolate(coarse(std::min(last + 1, start + std::int64_t(i) - 1)), knots[i]);
+  for (std::size_t i = 0; i < 4; ++i)
+    guide.interpolate(coarse(std::min(last + 1, start + std::int64_t(i) - 1)), knots[i]);
   GarmentSolver solver(config, pattern, GarmentSolver::Layers::ignored);
   std::vector<Vec> wanted(pattern.rest.size());
   for (std::size_t p = 0; p < wanted.size(); ++p)
@@ -167,7 +168,8 @@ std::vector<io::AnimatedMesh> simulate_garment(const GarmentConfig& config, cons
     if (k >= 0) recorder.append(k, positions, garment);
   };
   const auto tell = [&](double from, double to, std::int64_t k) {
-    if (progress) progress(from + (to - from) * double(k - first) / double(std::max<std::int64_t>(1, last - first)));
+    if (progress)
+      progress(from + (to - from) * double(k - first) / double(std::max<std::int64_t>(1, last - first)));
   };
   if (config.triangles <= config.full_triangles) {
     simulate_in_full(config, pattern, last, [&](std::int64_t k, const std::vector<Vec>& positions) {
@@ -208,8 +210,9 @@ std::string cache_key(const GarmentConfig& c) {
        {c.keyframes_per_second, c.area_density, c.stretch_stiffness, c.shear_stiffness, c.bending_rigidity,
         c.air_drag, c.viscosity, c.friction, c.layer_distance, c.skin_bite})
     hash.add(value);
-  return std::string(name(c.kind)) + "-v" + std::to_string(solver_version) + "-" + std::to_string(c.triangles) +
-         "-seed" + std::to_string(c.seed) + "-" + std::to_string(c.keyframes) + "kf-" + hash.digits();
+  return std::string(name(c.kind)) + "-v" + std::to_string(solver_version) + "-" +
+         std::to_string(c.triangles) + "-seed" + std::to_string(c.seed) + "-" + std::to_string(c.keyframes) +
+         "kf-" + hash.digits();
 }
 
 }  // namespace kbvh::scenes

@@ -24,7 +24,7 @@ struct GarmentConfig {
 
   /// Garments of more triangles are simulated in two levels: one of about this number in full, and one of
   /// all triangles that is held to it on the average over the first one's squares.
-  std::uint32_t full_triangles = 33000;
+  std::uint32_t full_triangles = 66000;
   std::uint32_t fine_steps = 12;  ///< solver steps per keyframe of the second level
 
   double area_density = 0.18;         ///< kg/m^2
@@ -57,8 +57,9 @@ struct GarmentConfig {
 /// bending, inertia and contact with the figure. This second level does not keep layers of cloth apart.
 ///
 /// The result depends on the config alone, to the last bit, on every machine with IEEE doubles and
-/// -ffp-contract=off. Vertices of the garment never lie inside the solid by more than rounding, edges and
-/// triangles between them may. Throws io::InputError on values out of range.
+/// -ffp-contract=off. Vertices of the garment lie outside the solid but for a millimetre or two where it is
+/// pinched between arm and trunk; edges and triangles between them may cut it. Throws io::InputError on
+/// values out of range.
 std::vector<io::AnimatedMesh> simulate_garment(const GarmentConfig& config, const Progress& progress = {});
 
 /// Names the result of simulate_garment(config): readable, fit for a file name, different whenever any value

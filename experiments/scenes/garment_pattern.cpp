@@ -15,11 +15,13 @@ using cloth::Vec;
 GarmentShape garment_shape(GarmentKind kind) {
   GarmentShape g;
   if (kind == GarmentKind::shirt) {
-    g.levels = {{0.80, 0.235, 0.165, 0}, {0.95, 0.232, 0.162, 0}, {1.10, 0.222, 0.155, 0},
-                {1.28, 0.238, 0.165, 0.01}};
+    g.levels = {{0.84, 0.222, 0.150, 0},
+                {0.95, 0.220, 0.150, 0},
+                {1.10, 0.205, 0.140, 0},
+                {1.28, 0.225, 0.150, 0.01}};
     g.shoulder_y = 0.205;
     g.shoulder_z = 1.485;
-    g.armhole_depth = 0.085;
+    g.armhole_depth = 0.078;
     g.neck_y = 0.078;
     g.neck_z = 1.505;
     g.neck_front = 0.085;
@@ -27,10 +29,10 @@ GarmentShape garment_shape(GarmentKind kind) {
     g.neck_dip_front = 0.05;
     g.neck_dip_back = 0.01;
     g.sleeve = 0.50;
-    g.cuff_radius = 0.062;
+    g.cuff_radius = 0.050;
     return g;
   }
-  g.levels = {{0.46, 0.50, 0.47, 0},      {0.90, 0.235, 0.20, 0},     {0.98, 0.185, 0.15, 0},
+  g.levels = {{0.46, 0.50, 0.47, 0},     {0.90, 0.235, 0.20, 0},      {0.98, 0.185, 0.15, 0},
               {1.06, 0.148, 0.108, 0.0}, {1.14, 0.160, 0.130, 0.018}, {1.22, 0.172, 0.138, 0.022}};
   g.shoulder_y = 0.150;
   g.shoulder_z = 1.398;
@@ -46,6 +48,8 @@ GarmentShape garment_shape(GarmentKind kind) {
 }
 
 namespace {
+
+constexpr double shoulder_share = 0.24;  // of the front's columns, under each shoulder seam
 
 constexpr double pi = 3.14159265358979323846;
 
@@ -92,7 +96,7 @@ GarmentCounts counts_at(const GarmentShape& g, double edge, std::int64_t more_ro
   const auto& top = g.levels.back();
   GarmentCounts c;
   c.columns = squares(0.5 * around(top.width, top.depth), 4);
-  c.shoulder = std::max(1u, std::uint32_t(0.24 * c.columns + 0.5));
+  c.shoulder = std::max(1u, std::uint32_t(shoulder_share * c.columns + 0.5));
   const double doubled = doubled_way(g, way);
   c.doubled = doubled > 0 ? squares(doubled, 2) : 0;
   c.rows = std::uint32_t(std::max<std::int64_t>(2, squares(way.back() - doubled, 2) + more_rows)) + c.doubled;
@@ -134,6 +138,20 @@ class Sewing {
     return {l.front + l.depth * sine_of_turns(turns), l.width * cosine_of_turns(turns), l.z};
   }
 
+  /// Where a column is across the front or back, from 0 to 1. Columns under the shoulders have their share
+  /// of the width whatever their number is, so that patterns of all counts are of one cut.
+  double across(double column) const {
+    const double m = c_.shoulder, n = c_.columns;
+    if (column <= m) return shoulder_share * column / m;
+    if (column >= n - m) return 1 - shoulder_share * (n - column) / m;
+    return shoulder_share + (1 - 2 * shoulder_share) * (column - m) / (n - 2 * m);
+  }
+  /// Turns around the trunk, from the left over the front.
+  double turns(double column) const {
+    const double n = c_.columns;
+    return column < n ? 0.5 * across(column) : 0.5 + 0.5 * across(column - n);
+  }
+
   void lay_trunk() {
     const std::uint32_t round = 2 * c_.columns;
     const double doubled = c_.doubled > 0 ? doubled_way(g_, way_) : 0;
@@ -145,7 +163,7 @@ class Sewing {
       for (std::uint32_t j = 0; j <= skirt.rows; ++j)
         for (std::uint32_t i = 0; i < skirt.columns; ++i)
           skirt.ids.push_back(add(on_ellipse(level_at(g_, way_, doubled * double(j) / double(skirt.rows)),
-                                             double(i) / double(skirt.columns))));
+                                             turns(0.5 * double(i)))));
     }
     Piece& trunk = p_.pieces[1];
     trunk.closed = true;
@@ -158,7 +176,7 @@ class Sewing {
           continue;
         }
         const double s = doubled + (way_.back() - doubled) * double(j) / double(trunk.rows);
-        trunk.ids.push_back(add(on_ellipse(level_at(g_, way_, s), double(i) / double(round))));
+        trunk.ids.push_back(add(on_ellipse(level_at(g_, way_, s), turns(double(i)))));
       }
     for (const std::uint32_t mark : {0u, c_.shoulder, c_.columns - c_.shoulder}) trunk.marks.push_back(mark);
     for (std::size_t i = 0; i < 3; ++i) trunk.marks.push_back(trunk.marks[i] + c_.columns);
@@ -210,12 +228,11 @@ class Sewing {
           continue;
         }
         // Coons' patch through its four edges.
-        const double u = double(i) / double(panel.columns), v = double(j) / double(panel.rows);
+        const double u = across(double(i)), v = double(j) / double(panel.rows);
         const Vec l = armhole_edge(back, left, v), r = armhole_edge(back, -left, v);
         const Vec b = bottom(u), t = top_edge(back, double(i));
-        const Vec corners =
-            (bottom(0) * (1 - u) + bottom(1) * u) * (1 - v) +
-            (top_edge(back, 0) * (1 - u) + top_edge(back, double(c_.columns)) * u) * v;
+        const Vec corners = (bottom(0) * (1 - u) + bottom(1) * u) * (1 - v) +
+                            (top_edge(back, 0) * (1 - u) + top_edge(back, double(c_.columns)) * u) * v;
         panel.ids.push_back(add(l * (1 - u) + r * u + b * (1 - v) + t * v - corners));
       }
   }
@@ -250,11 +267,12 @@ class Sewing {
         // From the armhole's own shape to a tube around the arm.
         const double ring = t < 0.3 ? t / 0.3 : 1.0;
         const double blend = ring * ring * (3 - 2 * ring);
-        const double turns = double(k) / double(sleeve.columns);
+        const double angle = double(k) / double(sleeve.columns);  // turns
         const double size = radius + (g_.cuff_radius - radius) * t;
-        const Vec across{0, sign * c, s};
-        const Vec tube = shoulder + along * (g_.sleeve * t + 0.02) - across * (size * cosine_of_turns(turns)) +
-                         Vec{sign * size * sine_of_turns(turns), 0, 0};
+        const Vec outward{0, sign * c, s};
+        const Vec tube = shoulder + along * (g_.sleeve * t + 0.02) -
+                         outward * (size * cosine_of_turns(angle)) +
+                         Vec{sign * size * sine_of_turns(angle), 0, 0};
         const Vec rim_moved = p_.rest[rim(k)] + along * (g_.sleeve * t + 0.02 * t);
         sleeve.ids.push_back(add(rim_moved * (1 - blend) + tube * blend));
       }
@@ -263,7 +281,8 @@ class Sewing {
   void link() {
     const std::size_t n = p_.rest.size();
     p_.places.assign(n, {GarmentPattern::none, 0, 0});
-    p_.neighbours.assign(n, {GarmentPattern::none, GarmentPattern::none, GarmentPattern::none, GarmentPattern::none});
+    p_.neighbours.assign(
+        n, {GarmentPattern::none, GarmentPattern::none, GarmentPattern::none, GarmentPattern::none});
     for (std::uint32_t piece = 0; piece < p_.pieces.size(); ++piece) link(piece);
     finish(p_.threads);
     finish(p_.diagonals);

@@ -20,11 +20,11 @@ struct GarmentShape {
     double z, width, depth, front;
   };
   std::vector<Level> levels;
-  double shoulder_y = 0, shoulder_z = 0;                 ///< outer end of the shoulder seam
-  double armhole_depth = 0;                              ///< half of the armhole's width, front to back
+  double shoulder_y = 0, shoulder_z = 0;  ///< outer end of the shoulder seam
+  double armhole_depth = 0;               ///< half of the armhole's width, front to back
   double neck_y = 0, neck_z = 0, neck_front = 0, neck_back = 0;  ///< neck end of the seam; hole fore and aft
-  double neck_dip_front = 0, neck_dip_back = 0;          ///< how far the hole's edge falls
-  double sleeve = 0;                                     ///< length of a sleeve along the arm; 0: none
+  double neck_dip_front = 0, neck_dip_back = 0;                  ///< how far the hole's edge falls
+  double sleeve = 0;  ///< length of a sleeve along the arm; 0: none
   double cuff_radius = 0;
   double doubled_below = 0;  ///< height below which there are twice as many columns; 0: nowhere
 };
@@ -32,12 +32,12 @@ GarmentShape garment_shape(GarmentKind kind);
 
 /// Numbers of grid squares.
 struct GarmentCounts {
-  std::uint32_t columns = 4;    ///< across the front, and across the back
-  std::uint32_t shoulder = 1;   ///< of them under each shoulder seam
-  std::uint32_t doubled = 0;    ///< rows with twice as many columns, from the hem on
-  std::uint32_t rows = 2;       ///< from hem to armpit, the doubled ones included
-  std::uint32_t armhole = 2;    ///< rows from armpit to shoulder
-  std::uint32_t sleeve = 0;     ///< rows from armhole to cuff
+  std::uint32_t columns = 4;   ///< across the front, and across the back
+  std::uint32_t shoulder = 1;  ///< of them under each shoulder seam
+  std::uint32_t doubled = 0;   ///< rows with twice as many columns, from the hem on
+  std::uint32_t rows = 2;      ///< from hem to armpit, the doubled ones included
+  std::uint32_t armhole = 2;   ///< rows from armpit to shoulder
+  std::uint32_t sleeve = 0;    ///< rows from armhole to cuff
   std::uint64_t triangles() const;
 };
 /// The counts with nearly square grid squares whose triangles are nearest to the request.
@@ -49,8 +49,8 @@ struct GarmentPattern {
   struct Piece {
     std::uint32_t rows = 0, columns = 0;
     bool closed = false;
-    std::vector<std::uint32_t> ids;       ///< [row][column]
-    std::vector<std::uint32_t> marks;     ///< columns that correspond in patterns of other counts
+    std::vector<std::uint32_t> ids;    ///< [row][column]
+    std::vector<std::uint32_t> marks;  ///< columns that correspond in patterns of other counts
     std::uint32_t stride() const { return closed ? columns : columns + 1; }
     std::uint32_t at(std::uint32_t row, std::uint32_t column) const { return ids[row * stride() + column]; }
   };

@@ -30,7 +30,9 @@ Gait gait_of(const GarmentConfig& config) {
 }  // namespace
 
 WalkingFigure::WalkingFigure(const GarmentConfig& config)
-    : shape_(config.kind == GarmentKind::shirt ? man() : woman()), gait_(gait_of(config)), walker_(shape_, gait_) {}
+    : shape_(config.kind == GarmentKind::shirt ? man() : woman()),
+      gait_(gait_of(config)),
+      walker_(shape_, gait_) {}
 
 double WalkingFigure::walking(double t) {
   const double s = std::min(1.0, std::max(0.0, (t + lead_in - 0.1) / 0.8));
@@ -50,8 +52,7 @@ Guide::Guide(const GarmentPattern& coarse, const GarmentPattern& fine)
     // Rows and columns between corresponding marks correspond linearly.
     std::size_t m = 0;
     while (m + 2 < from.marks.size() && place.column >= from.marks[m + 1]) ++m;
-    const double share =
-        double(place.column - from.marks[m]) / double(from.marks[m + 1] - from.marks[m]);
+    const double share = double(place.column - from.marks[m]) / double(from.marks[m + 1] - from.marks[m]);
     const double column = double(to.marks[m]) + share * double(to.marks[m + 1] - to.marks[m]);
     const double row = double(place.row) * double(to.rows) / double(from.rows);
     Vertex vertex{};
@@ -91,8 +92,9 @@ void Guide::interpolate(const std::vector<Vec>& coarse, std::vector<Vec>& fine) 
     };
     const std::uint32_t r = vertex.row;
     const Vec a = along_row(r), b = along_row(r + 1);
-    fine[i] = spline({r > 0 ? along_row(r - 1) : a * 2 - b, a, b, r + 2 <= piece.rows ? along_row(r + 2) : b * 2 - a},
-                     vertex.v);
+    fine[i] = spline(
+        {r > 0 ? along_row(r - 1) : a * 2 - b, a, b, r + 2 <= piece.rows ? along_row(r + 2) : b * 2 - a},
+        vertex.v);
   }
 }
 
@@ -197,10 +199,16 @@ void GarmentSolver::solve_figure(const Walker& walker) {
     const double left = clear.distance - (travel_ - clear.travel);
     const Vec way = x - clear.at;
     if (left > 0.0 && dot(way, way) < left * left) continue;
-    const Walker::Contact near = walker.nearest(x, reach);
+    Walker::Contact near = walker.nearest(x, reach);
     if (near.distance < 0.0) {
       x -= near.normal * near.distance;
       cloth::resist_sliding(x, x - previous_[p] - near.moved, near.normal, -near.distance, config_.friction);
+      // Where the surface is curved, or one part of the figure meets another, once is not enough.
+      for (int again = 0; again < 3; ++again) {
+        near = walker.nearest(x, reach);
+        if (!(near.distance < 0.0)) break;
+        x -= near.normal * near.distance;
+      }
     }
     clear = {x, std::max(0.0, near.distance), travel_};
   }

@@ -113,8 +113,8 @@ Walker::Walker(const FigureShape& shape, const Gait& gait) : shape_(shape), gait
   const double skull = f.head_z - f.shoulders.z;
   add_cone(trunk, chest, {0, 0, f.shoulders.z}, f.neck_radius * 1.1, head,
            {0.01, 0, f.shoulders.z + 0.6 * skull}, f.neck_radius);
-  add_cone(trunk, head, {0.025, 0, f.head_z - 0.02}, f.head_radius * 0.85, head,
-           {0.005, 0, f.head_z + 0.035}, f.head_radius);
+  add_cone(trunk, head, {0.025, 0, f.head_z - 0.02}, f.head_radius * 0.85, head, {0.005, 0, f.head_z + 0.035},
+           f.head_radius);
   for (std::size_t side = 0; side < 2; ++side) {
     const auto at = [&](const Vec& v) { return mirrored(v, side); };
     add_cone(legs + side, limb(thigh, side), at(f.hip), f.hip_radius, limb(thigh, side), at(f.knee),
@@ -163,7 +163,8 @@ void Walker::pose(double t, double walking) {
   const double p = gait_.phase + gait_.cycles_per_second * t;
   const auto wave = [&](double turns) { return walking * cosine_of_turns(turns); };
   // The pelvis is lowest and the trunk leans most when both feet are down; it turns with the leg in front.
-  bones_[pelvis].joint = bones_[pelvis].rest + Vec{0, 0.018 * wave(p - 0.3), -0.012 * walking - 0.018 * wave(2 * p)};
+  bones_[pelvis].joint =
+      bones_[pelvis].rest + Vec{0, 0.018 * wave(p - 0.3), -0.012 * walking - 0.018 * wave(2 * p)};
   bones_[pelvis].turn = times(turn(z_axis, -5 * wave(p)), turn(x_axis, 3 * wave(p - 0.2)));
   set_bone(abdomen, pelvis, times(turn(z_axis, 4 * wave(p)), turn(x_axis, -2 * wave(p - 0.2))));
   set_bone(chest, abdomen, times(turn(z_axis, 6 * wave(p)), turn(y_axis, 3 * walking + 1.5 * wave(2 * p))));

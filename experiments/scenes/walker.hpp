@@ -22,7 +22,7 @@ struct FigureShape {
     double z, half, radius, front;
   };
   Bar pelvis{0.95, 0.075, 0.105, 0}, waist{1.10, 0.055, 0.095, 0}, chest{1.28, 0.08, 0.115, 0};
-  Bar bust{1.27, 0.07, 0.07, 0.03}, shoulders{1.42, 0.16, 0.055, 0};
+  Bar bust{1.32, 0.09, 0.07, 0.02}, shoulders{1.42, 0.16, 0.055, 0};
   double neck_radius = 0.056, head_radius = 0.095, head_z = 1.62;
   double hip_radius = 0.088, knee_radius = 0.058, ankle_radius = 0.042;
   double shoulder_radius = 0.052, elbow_radius = 0.042, hand_radius = 0.03;

@@ -63,8 +63,8 @@ class SkinPart {
     return plans;
   }
 
-  static Skin::Vertex vertex(const Walker& w, const PartPlan& plan, const Vec& origin, const Vec& ray, double at,
-                             double bite) {
+  static Skin::Vertex vertex(const Walker& w, const PartPlan& plan, const Vec& origin, const Vec& ray,
+                             double at, double bite) {
     Skin::Vertex v{};
     v.part = plan.part;
     double far = 0.5;
@@ -75,9 +75,9 @@ class SkinPart {
       if (std::fabs(d) < 1e-7) break;
     }
     v.rest = origin + ray * far;
-    const double patch = sine_of_turns(v.rest.x * 6 + v.rest.z * 3 + 0.1) * sine_of_turns(v.rest.y * 7 - 0.2) *
-                         sine_of_turns(v.rest.z * 6 + 0.3);
-    v.offset = -below_surface + (bite + below_surface) * smooth_step(4 * patch - 0.4);
+    const double patch = sine_of_turns(v.rest.x * 6 + v.rest.z * 3 + 0.1) *
+                         sine_of_turns(v.rest.y * 7 - 0.2) * sine_of_turns(v.rest.z * 6 + 0.3);
+    v.offset = -below_surface + (bite + below_surface) * smooth_step(4 * patch - 1.0);
     v.bone_a = v.bone_b = plan.joints[0].bone;
     const double half = 0.05;  // of the length along which a joint bends
     for (std::size_t j = 1; j < plan.joints.size(); ++j) {
