@@ -60,6 +60,10 @@ struct GarmentConfig {
 /// -ffp-contract=off. Vertices of the garment lie outside the solid but for a millimetre or two where it is
 /// pinched between arm and trunk; edges and triangles between them may cut it. Throws io::InputError on
 /// values out of range.
+///
+/// 99 of 100 threads stretch by less than 7% (shirt) or 4% (dress) at 8k triangles, the worst, short ones
+/// around the armholes, by 40% and 15% for an instant. Time on one core for 60 keyframes: 4 s for 8k
+/// triangles, 35 s for 32k, 2.5 minutes for 326k of shirt, 2 for 580k of dress.
 std::vector<io::AnimatedMesh> simulate_garment(const GarmentConfig& config, const Progress& progress = {});
 
 /// Names the result of simulate_garment(config): readable, fit for a file name, different whenever any value

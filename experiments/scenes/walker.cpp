@@ -43,7 +43,10 @@ Matrix turn(const Vec& n, double degrees) {
           {n.z * n.x * d - n.y * s, n.z * n.y * d + n.x * s, c + n.z * n.z * d}};
 }
 Vec mirrored(Vec v, std::size_t side) {
-  if (side == 1) v.y = -v.y;
+  // GCC 12.2 fuses products with sums and differences that alternate (vfmsubadd) where the hardware can, even
+  // under -ffp-contract=off: it must not see that this is a change of sign.
+  const volatile double sign = side == 0 ? 1.0 : -1.0;
+  v.y *= sign;
   return v;
 }
 constexpr Vec x_axis{1, 0, 0}, y_axis{0, 1, 0}, z_axis{0, 0, 1};
