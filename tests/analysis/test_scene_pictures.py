@@ -46,7 +46,8 @@ class ScenePictures(unittest.TestCase):
             self.assertTrue((image[0, 0] == 1).all())
 
     def test_keyframes_stand_side_by_side(self) -> None:
-        mesh = scene_pictures.Mesh("square", np.stack((square(0), square(0))), np.array(((0, 1, 2), (0, 2, 3))))
+        triangles = np.array(((0, 1, 2), (0, 2, 3)))
+        mesh = scene_pictures.Mesh("square", np.stack((square(0), square(0))), triangles)
         one = scene_pictures.picture([mesh], [0], 0.0, 60)
         two = scene_pictures.picture([mesh], [0, 1], 0.0, 60)
         self.assertEqual(two.shape, (60, 2 * one.shape[1], 3))
