@@ -49,7 +49,7 @@ def read_pc2(path: Path) -> np.ndarray:
 
 
 def read_scene(folder: Path) -> list[Mesh]:
-    """Every OBJ of the folder with its PC2, in the order of their names: they begin with the body's number."""
+    """Every OBJ of the folder with its PC2, in the order of their names (the body's number comes first)."""
     meshes = []
     for path in sorted(folder.glob("*.obj")):
         vertices, triangles = read_obj(path)

@@ -22,7 +22,7 @@ constexpr const char* examples = R"(Examples:
   kbvh scene shirt --triangles 32000
   kbvh scene dress --triangles 8000 --frame 30 --out dress.obj
   kbvh scene dress --triangles 8000 --out folder
-Prints counts and how violently the bodies move: the share of the sides of a binary tree, one triangle per leaf,
+Prints counts and how violently the bodies move: the share of the sides of a binary tree (a triangle per leaf)
 whose realising vertex changes from one keyframe to the next. A folder gets every body as OBJ, with PC2 if it
 moves; a file ending in .obj holds all bodies at one keyframe, one after the other.)";
 
