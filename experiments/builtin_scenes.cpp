@@ -6,6 +6,7 @@
 #include "experiments/environment.hpp"
 #include "experiments/io/animated_mesh_cache.hpp"
 #include "experiments/progress.hpp"
+#include "experiments/scenes/garment.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/scenes/tablecloth.hpp"
 #include "experiments/text.hpp"
@@ -16,12 +17,11 @@ namespace {
 
 using Meshes = std::vector<io::AnimatedMesh>;
 
-Meshes tablecloth(const BuiltinOptions& options, const MakeProgress& progress) {
-  scenes::TableclothConfig config;
-  config.triangles = options.triangles;
-  if (options.obstacle_triangles > 0) config.table_triangles = options.obstacle_triangles;
-  config.seed = options.seed;
-  config.keyframes = options.keyframes;
+/// What was simulated before is read from the cache, else simulate(progress) is called and its result kept.
+/// `what` names it in reports of progress.
+template <class Config, class Simulate>
+Meshes simulated(const Config& config, Simulate simulate, const std::string& what,
+                 const MakeProgress& progress) {
   const std::filesystem::path folder = cache_folder();
   const std::filesystem::path file = folder / (scenes::cache_key(config) + ".kbvhmesh");
   std::error_code error;
@@ -33,9 +33,9 @@ Meshes tablecloth(const BuiltinOptions& options, const MakeProgress& progress) {
   }
   const auto report = [&](double fraction) {
     if (progress)
-      progress("simulating a tablecloth of " + std::to_string(config.triangles) + " triangles", fraction);
+      progress("simulating a " + what + " of " + std::to_string(config.triangles) + " triangles", fraction);
   };
-  Meshes meshes = scenes::simulate_tablecloth(config, report);
+  Meshes meshes = simulate(config, report);
   if (!folder.empty()) {
     try {
       io::save_cache(meshes, file);
@@ -46,10 +46,39 @@ Meshes tablecloth(const BuiltinOptions& options, const MakeProgress& progress) {
   return meshes;
 }
 
+Meshes tablecloth(const BuiltinOptions& options, const MakeProgress& progress) {
+  scenes::TableclothConfig config;
+  config.triangles = options.triangles;
+  if (options.obstacle_triangles > 0) config.table_triangles = options.obstacle_triangles;
+  config.seed = options.seed;
+  config.keyframes = options.keyframes;
+  return simulated(config, scenes::simulate_tablecloth, "tablecloth", progress);
+}
+
 /// The obstacle has about as many triangles up to 20 000, which is what the measurements are defined for.
 std::uint32_t obstacle_triangles(const BuiltinOptions& options) {
   if (options.obstacle_triangles > 0) return options.obstacle_triangles;
   return options.triangles < 20000 ? options.triangles : 20000;
+}
+
+Meshes garment(scenes::GarmentKind kind, const char* what, const BuiltinOptions& options,
+               const MakeProgress& progress) {
+  scenes::GarmentConfig config;
+  config.kind = kind;
+  config.triangles = options.triangles;
+  config.avatar_triangles = obstacle_triangles(options);
+  if (options.full_triangles > 0) config.full_triangles = options.full_triangles;
+  config.seed = options.seed;
+  config.keyframes = options.keyframes;
+  return simulated(config, scenes::simulate_garment, what, progress);
+}
+
+Meshes shirt(const BuiltinOptions& options, const MakeProgress& progress) {
+  return garment(scenes::GarmentKind::shirt, "shirt", options, progress);
+}
+
+Meshes dress(const BuiltinOptions& options, const MakeProgress& progress) {
+  return garment(scenes::GarmentKind::dress, "dress", options, progress);
 }
 
 Meshes waving_sheet(const BuiltinOptions& options, const MakeProgress&) {
@@ -112,6 +141,8 @@ Meshes random_soups(const BuiltinOptions& options, const MakeProgress&) {
 const std::vector<BuiltinScene>& builtin_scenes() {
   static const std::vector<BuiltinScene> list{
       {"tablecloth", "a cloth, simulated, falls onto a round table and hangs over its rim", &tablecloth},
+      {"shirt", "a walking man and his shirt, simulated", &shirt},
+      {"dress", "a walking woman and her dress, simulated", &dress},
       {"waving_sheet", "a sheet in crossing waves cuts a sphere at rest", &waving_sheet},
       {"expanding_sphere", "a growing sphere reaches a sphere at rest", &expanding_sphere},
       {"reversing_spheres",

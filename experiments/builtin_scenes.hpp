@@ -16,6 +16,9 @@ struct BuiltinOptions {
   std::uint32_t obstacle_triangles = 0;  ///< of the body beside it; 0: what suits the scene
   std::uint64_t seed = 1;                ///< where chance plays a part
   std::uint32_t keyframes = 60;
+  /// Garments only: how many triangles are simulated in full before a second level refines; 0: the usual
+  /// number.
+  std::uint32_t full_triangles = 0;
 };
 
 /// Told what long work is doing and the finished fraction; may be empty.

@@ -17,6 +17,7 @@ void add_list(CLI::App& program, Action& action);
 void add_run(CLI::App& program, Action& action);
 void add_bench(CLI::App& program, Action& action);
 void add_report(CLI::App& program, Action& action);
+void add_scene(CLI::App& program, Action& action);
 void add_theory(CLI::App& program, Action& action);
 
 /// Runs a program of PATH and waits for it; its exit code. Throws io::InputError if it cannot be started.

@@ -42,6 +42,7 @@ int run_program(int argc, const char* const* argv) {
   add_run(program, action);
   add_bench(program, action);
   add_report(program, action);
+  add_scene(program, action);
   add_theory(program, action);
   // CLI11 would only say that a command is missing.
   std::vector<std::string> commands;

@@ -1,11 +1,7 @@
 #include "experiments/scenes/tablecloth.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdio>
-#include <numeric>
-#include <utility>
 
 namespace kbvh::scenes {
 namespace {
@@ -13,25 +9,9 @@ namespace {
 /// Part of every cache key: to be raised by every change that can alter a bit of the result.
 constexpr int solver_version = 3;
 
-constexpr double gravity = 9.81;
-
-struct Vec {
-  double x = 0, y = 0, z = 0;
-  Vec operator+(const Vec& o) const { return {x + o.x, y + o.y, z + o.z}; }
-  Vec operator-(const Vec& o) const { return {x - o.x, y - o.y, z - o.z}; }
-  Vec operator*(double s) const { return {x * s, y * s, z * s}; }
-  Vec& operator+=(const Vec& o) { return *this = *this + o; }
-  Vec& operator-=(const Vec& o) { return *this = *this - o; }
-};
-double dot(const Vec& a, const Vec& b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-Vec cross(const Vec& a, const Vec& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double length(const Vec& a) {
-  return std::sqrt(dot(a, a));
-}
+using cloth::dot;
+using cloth::length;
+using cloth::Vec;
 
 /// Signed distance to the solid that stops the cloth, and its outward unit normal.
 class TableSolid {
@@ -86,13 +66,12 @@ class ClothSolver {
         squares_(squares),
         row_(squares + 1),
         spacing_(config.side / double(squares)),
-        layer_distance_(config.layer_distance * spacing_),
         table_(config),
         x_(std::size_t(row_) * row_),
         previous_(x_.size()),
         v_(x_.size()),
         smooth_(x_.size()),
-        listed_at_(x_.size()) {
+        layers_(config.layer_distance * spacing_) {
     place();
   }
 
@@ -120,32 +99,20 @@ class ClothSolver {
   void solve_threads(double dt);
   void solve_bending(double dt);
   void solve_layers();
-  void list_layers();
   void solve_table();
 
   std::size_t at(std::uint32_t i, std::uint32_t j) const { return std::size_t(j) * row_ + i; }
 
   void solve_distance(std::size_t a, std::size_t b, double rest, double softness) {
-    const Vec d = x_[b] - x_[a];
-    const double now = length(d);
-    if (!(now > 0.0)) return;
-    const Vec move = d * ((now - rest) / (now * (2.0 + softness)));
-    x_[a] += move;
-    x_[b] -= move;
+    cloth::solve_distance(x_[a], x_[b], rest, softness);
   }
 
   const TableclothConfig& config_;
   std::uint32_t squares_, row_;
   double spacing_;
-  double layer_distance_;
   TableSolid table_;
   std::vector<Vec> x_, previous_, v_, smooth_;
-
-  // Candidates for contact between layers: pairs within layer_distance + margin when they were listed.
-  std::vector<Vec> listed_at_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> layer_pairs_;
-  std::vector<std::uint32_t> cell_start_, cell_of_, sorted_;
-  bool listed_ = false;
+  cloth::LayerContacts layers_;
 };
 
 /// The start: flat, a little turned, tilted, shifted and uneven, as drawn from the seed.
@@ -194,7 +161,7 @@ void ClothSolver::step(double dt) {
   }
   solve_threads(dt);
   solve_bending(dt);
-  if (layer_distance_ > 0) solve_layers();
+  solve_layers();
   // Last, so that no keyframe leaves a vertex inside the solid.
   solve_table();
   for (std::size_t p = 0; p < x_.size(); ++p) v_[p] = (x_[p] - previous_[p]) * (1.0 / dt);
@@ -206,14 +173,12 @@ void ClothSolver::apply_forces(double dt) {
     for (std::uint32_t i = 0; i < row_; ++i) {
       const std::uint32_t left = i > 0 ? i - 1 : i, right = i < squares_ ? i + 1 : i;
       Vec& v = v_[at(i, j)];
-      v.z -= dt * gravity;
-      const Vec n = cross(x_[at(right, j)] - x_[at(left, j)], x_[at(i, above)] - x_[at(i, below)]);
+      v.z -= dt * cloth::gravity;
+      const Vec n = cloth::cross(x_[at(right, j)] - x_[at(left, j)], x_[at(i, above)] - x_[at(i, below)]);
       const double square = dot(n, n);
       if (!(square > 0.0)) continue;
       const double across = dot(v, n) / std::sqrt(square);
-      // Implicit in the speed, so that drag can stop but never reverse it.
-      const double kept = 1.0 / (1.0 + dt * config_.air_drag * std::fabs(across));
-      v -= n * ((1.0 - kept) * across / std::sqrt(square));
+      v -= n * (cloth::dragged_speed(across, config_.air_drag, dt) / std::sqrt(square));
     }
   }
 }
@@ -265,10 +230,7 @@ void ClothSolver::solve_bending(double dt) {
   const double softness = mass * spacing_ * spacing_ / (config_.bending_rigidity * dt * dt);
   const double share = 1.0 / (6.0 + softness);
   const auto solve = [&](std::size_t a, std::size_t b, std::size_t c) {
-    const Vec bend = (x_[a] + x_[c] - x_[b] * 2.0) * share;
-    x_[a] -= bend;
-    x_[b] += bend * 2.0;
-    x_[c] -= bend;
+    cloth::solve_bend(x_[a], x_[b], x_[c], share);
   };
   for (std::uint32_t j = 0; j < row_; ++j)
     for (std::uint32_t i = 1; i < squares_; ++i) solve(at(i - 1, j), at(i, j), at(i + 1, j));
@@ -276,82 +238,12 @@ void ClothSolver::solve_bending(double dt) {
     for (std::uint32_t i = 0; i < row_; ++i) solve(at(i, j - 1), at(i, j), at(i, j + 1));
 }
 
-void ClothSolver::list_layers() {
-  const double reach = 1.5 * layer_distance_;
-  const double inverse = 1.0 / reach;
-  // Hashed cells, filled by counting: each cell holds its vertices in rising order.
-  const std::uint32_t cells = std::bit_ceil(std::uint32_t(2 * x_.size()));
-  const auto cell = [&](std::int64_t i, std::int64_t j, std::int64_t k) {
-    const std::uint64_t h =
-        std::uint64_t(i) * 73856093u ^ std::uint64_t(j) * 19349663u ^ std::uint64_t(k) * 83492791u;
-    return std::uint32_t(h) & (cells - 1);
-  };
-  const auto lattice = [&](double x) { return std::int64_t(std::floor(x * inverse)); };
-  cell_start_.assign(cells + 1, 0);
-  cell_of_.resize(x_.size());
-  sorted_.resize(x_.size());
-  for (std::size_t p = 0; p < x_.size(); ++p) {
-    cell_of_[p] = cell(lattice(x_[p].x), lattice(x_[p].y), lattice(x_[p].z));
-    ++cell_start_[cell_of_[p] + 1];
-  }
-  std::partial_sum(cell_start_.begin(), cell_start_.end(), cell_start_.begin());
-  std::vector<std::uint32_t> next(cell_start_.begin(), cell_start_.end() - 1);
-  for (std::size_t p = 0; p < x_.size(); ++p) sorted_[next[cell_of_[p]]++] = std::uint32_t(p);
-
-  layer_pairs_.clear();
-  for (std::size_t p = 0; p < x_.size(); ++p) {
-    const std::int64_t pi = std::int64_t(p % row_), pj = std::int64_t(p / row_);
-    const std::int64_t ci = lattice(x_[p].x), cj = lattice(x_[p].y), ck = lattice(x_[p].z);
-    std::uint32_t visited[27];
-    std::uint32_t* visited_end = visited;
-    for (std::int64_t k = ck - 1; k <= ck + 1; ++k)
-      for (std::int64_t j = cj - 1; j <= cj + 1; ++j)
-        for (std::int64_t i = ci - 1; i <= ci + 1; ++i) {
-          const std::uint32_t h = cell(i, j, k);
-          // Two of the 27 may share a hash: a pair must not be listed twice.
-          if (std::find(visited, visited_end, h) != visited_end) continue;
-          *visited_end++ = h;
-          for (std::uint32_t n = cell_start_[h]; n < cell_start_[h + 1]; ++n) {
-            const std::uint32_t q = sorted_[n];
-            if (q <= p) continue;
-            const std::int64_t di = std::int64_t(q % row_) - pi, dj = std::int64_t(q / row_) - pj;
-            if (di >= -1 && di <= 1 && dj <= 1) continue;  // of one square: held by its threads
-            const Vec d = x_[q] - x_[p];
-            if (dot(d, d) < reach * reach) layer_pairs_.emplace_back(std::uint32_t(p), q);
-          }
-        }
-  }
-  listed_at_ = x_;
-  listed_ = true;
-}
-
 void ClothSolver::solve_layers() {
-  // The list holds all pairs that can be in contact while no vertex has moved by more than half of its
-  // margin.
-  const double slack = 0.25 * layer_distance_;
-  bool stale = !listed_;
-  for (std::size_t p = 0; p < x_.size() && !stale; ++p) {
-    const Vec d = x_[p] - listed_at_[p];
-    stale = dot(d, d) > slack * slack;
-  }
-  if (stale) list_layers();
-  for (const auto& [a, b] : layer_pairs_) {
-    const Vec d = x_[b] - x_[a];
-    const double square = dot(d, d);
-    if (!(square < layer_distance_ * layer_distance_) || !(square > 0.0)) continue;
-    const double now = std::sqrt(square);
-    const Vec n = d * (1.0 / now);
-    const double push = 0.5 * (layer_distance_ - now);
-    x_[a] -= n * push;
-    x_[b] += n * push;
-    Vec slide = (x_[b] - previous_[b]) - (x_[a] - previous_[a]);
-    slide -= n * dot(slide, n);
-    const double amount = length(slide);
-    if (!(amount > 0.0)) continue;
-    const Vec hold = slide * (0.5 * std::min(1.0, config_.friction * 2.0 * push / amount));
-    x_[a] += hold;
-    x_[b] -= hold;
-  }
+  layers_.solve(x_, previous_, config_.friction, [this](std::uint32_t p, std::uint32_t q) {
+    const std::int64_t di = std::int64_t(q % row_) - std::int64_t(p % row_);
+    const std::int64_t dj = std::int64_t(q / row_) - std::int64_t(p / row_);
+    return di >= -1 && di <= 1 && dj <= 1;  // of one square: held by its threads
+  });
 }
 
 void ClothSolver::solve_table() {
@@ -366,20 +258,14 @@ void ClothSolver::solve_table() {
     const double d = table_.distance(x, n);
     if (!(d < 0.0)) continue;
     x -= n * d;
-    Vec slide = x - previous_[p];
-    slide -= n * dot(slide, n);
-    const double amount = length(slide);
-    if (amount > 0.0) x -= slide * std::min(1.0, config_.friction * -d / amount);
+    cloth::resist_sliding(x, x - previous_[p], n, -d, config_.friction);
   }
 }
 
-void check(double value, double lowest, double highest, const char* what) {
-  if (!(value >= lowest) || !(value <= highest))
-    throw io::InputError("tablecloth: " + std::string(what) + " is " + std::to_string(value) +
-                         ", must be from " + std::to_string(lowest) + " to " + std::to_string(highest));
-}
-
 void check(const TableclothConfig& c) {
+  const auto check = [](double value, double lowest, double highest, const char* what) {
+    cloth::check_range("tablecloth", value, lowest, highest, what);
+  };
   check(double(c.triangles), 2, 1 << 24, "the number of triangles");
   check(double(c.keyframes), 1, 1e6, "the number of keyframes");
   check(c.keyframes_per_second, 1, 1e6, "the number of keyframes per second");
@@ -422,15 +308,11 @@ std::vector<io::AnimatedMesh> simulate_tablecloth(const TableclothConfig& config
 }
 
 std::string cache_key(const TableclothConfig& c) {
-  // Doubles by their bits: two configs share a key only if they are the same.
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  const auto add = [&](std::uint64_t value) {
-    for (int byte = 0; byte < 8; ++byte) hash = (hash ^ (value >> (8 * byte) & 0xff)) * 0x100000001b3u;
-  };
+  cloth::ConfigHash hash;
   for (const std::uint64_t value :
        {std::uint64_t(solver_version), std::uint64_t(c.triangles), c.seed, std::uint64_t(c.keyframes),
         std::uint64_t(c.table_triangles), std::uint64_t(c.substeps_per_keyframe)})
-    add(value);
+    hash.add(value);
   for (const double value : {c.keyframes_per_second,
                              c.side,
                              c.drop_height,
@@ -452,11 +334,9 @@ std::string cache_key(const TableclothConfig& c) {
                              c.table.rim_radius,
                              c.table.pedestal_radius,
                              c.table.base_radius})
-    add(std::bit_cast<std::uint64_t>(value));
-  char digits[17];
-  std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
+    hash.add(value);
   return "tablecloth-v" + std::to_string(solver_version) + "-" + std::to_string(c.triangles) + "-seed" +
-         std::to_string(c.seed) + "-" + std::to_string(c.keyframes) + "kf-" + digits;
+         std::to_string(c.seed) + "-" + std::to_string(c.keyframes) + "kf-" + hash.digits();
 }
 
 }  // namespace kbvh::scenes

@@ -1,10 +1,10 @@
 #pragma once
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "experiments/io/animated_mesh.hpp"
+#include "experiments/scenes/cloth_parts.hpp"
 #include "experiments/scenes/shapes.hpp"
 
 namespace kbvh::scenes {
@@ -45,9 +45,6 @@ struct TableclothConfig {
   /// at most.
   std::uint32_t substeps_per_keyframe = 0;
 };
-
-/// Told the finished fraction (0 to 1) after every keyframe; may be empty.
-using Progress = std::function<void(double)>;
 
 /// Simulates the scene: {cloth (moving), table (static)}, the first keyframe at time 0.
 ///

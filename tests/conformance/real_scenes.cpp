@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "experiments/io/load.hpp"
+#include "experiments/scenes/garment.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/scenes/tablecloth.hpp"
 
@@ -75,7 +76,7 @@ fs::path data_folder() {
 }
 
 std::vector<RealScene> real_scenes() {
-  std::vector<RealScene> scenes{{"tablecloth", false}};
+  std::vector<RealScene> scenes{{"tablecloth", false}, {"shirt", false}, {"dress", false}};
   for (const std::string& name : sequences) scenes.push_back({name + "+sphere", true});
   scenes.push_back({"robot-Dance+MorphStressTest", true});
   for (const std::string& name : blender_scenes) scenes.push_back({"blender:" + name, true});
@@ -90,6 +91,12 @@ experiments::LoadedScene load_real_scene(const std::string& name, std::size_t ke
     scenes::TableclothConfig config;
     if (keyframes != 0) config.triangles = 512;
     scene.meshes = scenes::simulate_tablecloth(config);
+  } else if (name == "shirt" || name == "dress") {
+    scenes::GarmentConfig config;
+    config.kind = name == "shirt" ? scenes::GarmentKind::shirt : scenes::GarmentKind::dress;
+    config.triangles = keyframes != 0 ? 500 : 2000;
+    config.avatar_triangles = keyframes != 0 ? 300 : 1000;
+    scene.meshes = scenes::simulate_garment(config);
   } else if (name.rfind("blender:", 0) == 0) {
     scene.meshes = several_bodies(data_folder() / "blender" / name.substr(8));
   } else {

@@ -15,8 +15,8 @@ struct RealScene {
   std::string name;
   bool needs_data = false;
 };
-/// The tablecloth with its table; each sequence cut by a sphere; two sequences overlapping; the scenes of
-/// several bodies.
+/// The tablecloth with its table; garments on their figures; each sequence cut by a sphere; two sequences
+/// overlapping; the scenes of several bodies.
 std::vector<RealScene> real_scenes();
 
 /// Loads one. `keyframes` 0: all; otherwise that many from the middle of the clip. Large scenes are left out

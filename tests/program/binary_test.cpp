@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -47,7 +48,7 @@ class Binary : public testing::Test {
 const std::string tiny = "--scene waving_sheet --triangles 100 --keyframes 3 --l 2 --repetitions 2 ";
 
 TEST_F(Binary, HelpHasExamples) {
-  for (const char* command : {"list", "run", "bench", "report", "theory"}) {
+  for (const char* command : {"list", "run", "bench", "report", "scene", "theory"}) {
     const Outcome help = kbvh(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find("Example"), std::string::npos) << command;
@@ -111,6 +112,27 @@ TEST_F(Binary, ListsEveryStrategy) {
     EXPECT_NE(text.out.find(registry()[i].info.title), std::string::npos);
   }
   EXPECT_NE(text.out.find("tablecloth"), std::string::npos);
+}
+
+TEST_F(Binary, ShowsAndExportsAScene) {
+  const Outcome outcome = kbvh("scene passing_spheres --triangles 80 --keyframes 4 --json --out meshes");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const json scene = json::parse(outcome.out);
+  ASSERT_EQ(scene.at("bodies").size(), 2u);
+  for (const json& body : scene.at("bodies")) {
+    EXPECT_EQ(body.at("primitives"), 80u);
+    EXPECT_EQ(body.at("keyframes"), 4u);
+    EXPECT_EQ(body.at("nodes"), 159u);
+  }
+  for (const char* file :
+       {"0-icosphere-80.obj", "0-icosphere-80.pc2", "1-icosphere-80.obj", "1-icosphere-80.pc2"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "meshes" / file)) << file;
+  EXPECT_EQ(kbvh("scene passing_spheres --triangles 80 --keyframes 4 --frame 3 --out last.obj").code, 0);
+  const std::string text = text_of_file(folder_ / "last.obj");
+  std::size_t faces = 0;
+  for (std::size_t at = text.find("\nf "); at != std::string::npos; at = text.find("\nf ", at + 1)) ++faces;
+  EXPECT_EQ(faces, 160u);
+  EXPECT_EQ(kbvh("scene nowhere").code, 2);
 }
 
 TEST_F(Binary, RunsRecordsAndResumes) {

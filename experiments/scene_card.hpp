@@ -1,0 +1,32 @@
+#pragma once
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "experiments/scene_spec.hpp"
+
+namespace kbvh::experiments {
+
+/// What one body of a scene is and how violently it moves.
+struct BodyCard {
+  std::string name;
+  std::uint32_t vertices = 0, primitives = 0, keyframes = 0;
+  double seconds = 0;  ///< from the first keyframe to the last
+  /// Of the default binary tree over the first keyframe (median, one primitive per leaf): nodes, and the
+  /// share of their sides whose realising vertex is another one at the next keyframe, as mean over the
+  /// intervals and in the one where it is highest. A vertex that still realises the bound among equals
+  /// counts as the same. 0 for bodies at rest.
+  std::uint32_t nodes = 0;
+  double sides_changed = 0, most_sides_changed = 0;
+  /// Mean and largest way of a vertex in one keyframe interval, as multiples of the mean edge length at the
+  /// first keyframe.
+  double mean_step = 0, largest_step = 0;
+};
+
+/// One card per body. O(keyframes x (vertices + nodes)).
+std::vector<BodyCard> cards(const LoadedScene& scene);
+
+nlohmann::json as_json(const BodyCard& card);
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,162 @@
+#pragma once
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+/// What the cloth solvers (tablecloth, garments) share. Everything here is deterministic to the last bit on
+/// every machine with IEEE doubles and -ffp-contract=off.
+namespace kbvh::scenes {
+
+/// Told the finished fraction (0 to 1) after every keyframe; may be empty.
+using Progress = std::function<void(double)>;
+
+namespace cloth {
+
+inline constexpr double gravity = 9.81;  ///< m/s^2, along -z
+
+struct Vec {
+  double x = 0, y = 0, z = 0;
+  Vec operator+(const Vec& o) const { return {x + o.x, y + o.y, z + o.z}; }
+  Vec operator-(const Vec& o) const { return {x - o.x, y - o.y, z - o.z}; }
+  Vec operator*(double s) const { return {x * s, y * s, z * s}; }
+  Vec& operator+=(const Vec& o) { return *this = *this + o; }
+  Vec& operator-=(const Vec& o) { return *this = *this - o; }
+};
+inline double dot(const Vec& a, const Vec& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+inline Vec cross(const Vec& a, const Vec& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline double length(const Vec& a) {
+  return std::sqrt(dot(a, a));
+}
+
+/// One XPBD step of the distance between two vertices of equal mass; softness = mass / (stiffness dt^2).
+inline void solve_distance(Vec& a, Vec& b, double rest, double softness) {
+  const Vec d = b - a;
+  const double now = length(d);
+  if (!(now > 0.0)) return;
+  const Vec move = d * ((now - rest) / (now * (2.0 + softness)));
+  a += move;
+  b -= move;
+}
+
+/// One XPBD step of quadratic bending at b between its neighbours a and c along a thread; share = 1 / (6 +
+/// softness), softness = mass spacing^2 / (rigidity dt^2).
+inline void solve_bend(Vec& a, Vec& b, Vec& c, double share) {
+  const Vec bend = (a + c - b * 2.0) * share;
+  a -= bend;
+  b += bend * 2.0;
+  c -= bend;
+}
+
+/// How much of the velocity a step of quadratic drag along the unit normal takes away, as a speed along the
+/// normal. Implicit, so that drag can stop but never reverse it.
+inline double dragged_speed(double across, double air_drag, double dt) {
+  const double kept = 1.0 / (1.0 + dt * air_drag * std::fabs(across));
+  return (1.0 - kept) * across;
+}
+
+/// Coulomb's friction after a vertex was pushed out of a solid along n by `push`: takes from its way
+/// `slide` relative to the solid what friction holds.
+inline void resist_sliding(Vec& x, Vec slide, const Vec& n, double push, double friction) {
+  slide -= n * dot(slide, n);
+  const double amount = length(slide);
+  if (amount > 0.0) x -= slide * std::min(1.0, friction * push / amount);
+}
+
+/// Contact between layers of a cloth: vertices keep a distance from all that are not their neighbours in the
+/// cloth. It keeps layers apart nearly everywhere but is no guarantee: edges may still cut.
+class LayerContacts {
+ public:
+  /// `distance` is what is kept, in metres; 0: no contact.
+  explicit LayerContacts(double distance) : distance_(distance) {}
+
+  /// Pushes apart what is too near, with friction on the way since `previous`. `held(p, q)`, p < q, says
+  /// whether two vertices are neighbours in the cloth. O(vertices), and sorting them into cells when one has
+  /// moved by more than a quarter of the distance.
+  template <class Held>
+  void solve(std::vector<Vec>& x, const std::vector<Vec>& previous, double friction, Held held) {
+    if (!(distance_ > 0.0)) return;
+    if (stale(x)) {
+      sort_into_cells(x);
+      list(x, held);
+    }
+    push_apart(x, previous, friction);
+  }
+
+ private:
+  bool stale(const std::vector<Vec>& x) const;
+  void sort_into_cells(const std::vector<Vec>& x);
+  void push_apart(std::vector<Vec>& x, const std::vector<Vec>& previous, double friction) const;
+
+  std::uint32_t cell(std::int64_t i, std::int64_t j, std::int64_t k) const {
+    const std::uint64_t h =
+        std::uint64_t(i) * 73856093u ^ std::uint64_t(j) * 19349663u ^ std::uint64_t(k) * 83492791u;
+    return std::uint32_t(h) & (cells_ - 1);
+  }
+  double reach() const { return 1.5 * distance_; }
+  std::int64_t lattice(double x) const { return std::int64_t(std::floor(x * (1.0 / reach()))); }
+
+  template <class Held>
+  void list(const std::vector<Vec>& x, Held held) {
+    pairs_.clear();
+    for (std::size_t p = 0; p < x.size(); ++p) {
+      const std::int64_t ci = lattice(x[p].x), cj = lattice(x[p].y), ck = lattice(x[p].z);
+      std::uint32_t visited[27];
+      std::uint32_t* visited_end = visited;
+      for (std::int64_t k = ck - 1; k <= ck + 1; ++k)
+        for (std::int64_t j = cj - 1; j <= cj + 1; ++j)
+          for (std::int64_t i = ci - 1; i <= ci + 1; ++i) {
+            const std::uint32_t h = cell(i, j, k);
+            // Two of the 27 may share a hash: a pair must not be listed twice.
+            bool seen = false;
+            for (const std::uint32_t* v = visited; v != visited_end && !seen; ++v) seen = *v == h;
+            if (seen) continue;
+            *visited_end++ = h;
+            for (std::uint32_t n = cell_start_[h]; n < cell_start_[h + 1]; ++n) {
+              const std::uint32_t q = sorted_[n];
+              if (q <= p) continue;
+              const Vec d = x[q] - x[p];
+              if (!(dot(d, d) < reach() * reach()) || held(std::uint32_t(p), q)) continue;
+              pairs_.emplace_back(std::uint32_t(p), q);
+            }
+          }
+    }
+    listed_at_ = x;
+  }
+
+  double distance_;
+  // Candidates: pairs within the reach when they were listed.
+  std::vector<Vec> listed_at_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
+  std::uint32_t cells_ = 0;
+  std::vector<std::uint32_t> cell_start_, cell_of_, sorted_, next_;
+};
+
+/// A hash of a config's values for cache keys. Doubles count by their bits: two configs share a key only if
+/// they are the same.
+class ConfigHash {
+ public:
+  void add(std::uint64_t value) {
+    for (int byte = 0; byte < 8; ++byte) hash_ = (hash_ ^ (value >> (8 * byte) & 0xff)) * 0x100000001b3u;
+  }
+  void add(double value) { add(std::bit_cast<std::uint64_t>(value)); }
+  /// 16 hexadecimal digits.
+  std::string digits() const;
+
+ private:
+  std::uint64_t hash_ = 0xcbf29ce484222325u;
+};
+
+/// Throws io::InputError "scene: what is ..., must be from ... to ..." unless lowest <= value <= highest.
+void check_range(const char* scene, double value, double lowest, double highest, const char* what);
+
+}  // namespace cloth
+}  // namespace kbvh::scenes

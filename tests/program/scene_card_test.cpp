@@ -1,0 +1,85 @@
+// Scene cards: counts, and shares of realisers against a plain search over every node.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "core/hierarchy/builders.hpp"
+#include "experiments/scene_card.hpp"
+#include "experiments/scenes/shapes.hpp"
+
+namespace kbvh::experiments {
+namespace {
+
+LoadedScene scene_of(std::vector<io::AnimatedMesh> meshes) {
+  LoadedScene scene;
+  scene.name = "test";
+  for (const io::AnimatedMesh& mesh : meshes) scene.sources.push_back(mesh.name);
+  scene.meshes = std::move(meshes);
+  return scene;
+}
+
+TEST(SceneCard, NothingChangesInWhatIsMovedAsAWhole) {
+  // On a lattice, so that the motion is exact in float.
+  const io::AnimatedMesh ball = scenes::snapped(scenes::icosphere(80, {0, 0, 0}, 1.0), 12);
+  const auto list = cards(scene_of({scenes::translated(ball, {0.25, 0, 0}, 5), ball}));
+  ASSERT_EQ(list.size(), 2u);
+  EXPECT_EQ(list[0].name, "icosphere-80");
+  EXPECT_EQ(list[0].primitives, 80u);
+  EXPECT_EQ(list[0].vertices, 42u);
+  EXPECT_EQ(list[0].nodes, 159u);
+  EXPECT_EQ(list[0].keyframes, 5u);
+  EXPECT_NEAR(list[0].seconds, 4.0 / 30, 1e-12);
+  EXPECT_EQ(list[0].sides_changed, 0);
+  EXPECT_EQ(list[0].most_sides_changed, 0);
+  EXPECT_GT(list[0].mean_step, 0);
+  EXPECT_NEAR(list[0].mean_step, list[0].largest_step, 1e-9);
+  EXPECT_EQ(list[1].keyframes, 1u);
+  EXPECT_EQ(list[1].sides_changed, 0);
+  EXPECT_EQ(list[1].largest_step, 0);
+}
+
+TEST(SceneCard, SharesEqualAPlainSearch) {
+  const LoadedScene scene = scene_of({scenes::random_soup(60, 3, 6)});
+  const Body<float> body = assemble<float>(scene).bodies[0];
+  const Topology topology =
+      build_topology(body.primitives, body.plans.keyframe(0), {BuildMethod::median, 2, 1});
+  // In a soup in general position no two vertices of a node are equal: the realiser is the extreme one.
+  const auto realiser = [&](std::size_t k, std::uint32_t node, std::size_t side) {
+    std::uint32_t best = 0xffffffffu;
+    const std::function<void(std::uint32_t)> visit = [&](std::uint32_t n) {
+      const TopologyNode& at = topology.nodes[n];
+      for (std::uint32_t i = at.first(); i < at.first() + at.count(); ++i) {
+        if (!at.is_leaf()) {
+          visit(i);
+          continue;
+        }
+        for (const std::uint32_t v : body.primitives[topology.primitives[i]]) {
+          const float* x = body.plans.keyframe(k) + side / 2;
+          if (best == 0xffffffffu || (side % 2 == 0 ? x[3 * v] < x[3 * best] : x[3 * v] > x[3 * best]))
+            best = v;
+        }
+      }
+    };
+    visit(node);
+    return best;
+  };
+  double mean = 0, most = 0;
+  for (std::size_t k = 1; k < 6; ++k) {
+    std::size_t changed = 0;
+    for (std::uint32_t node = 0; node < topology.size(); ++node)
+      for (std::size_t side = 0; side < 6; ++side)
+        changed += realiser(k - 1, node, side) != realiser(k, node, side);
+    const double share = double(changed) / (6.0 * topology.size());
+    mean += share / 5;
+    most = std::max(most, share);
+  }
+  const BodyCard card = cards(scene)[0];
+  EXPECT_GT(card.sides_changed, 0);
+  EXPECT_DOUBLE_EQ(card.sides_changed, mean);
+  EXPECT_DOUBLE_EQ(card.most_sides_changed, most);
+}
+
+}  // namespace
+}  // namespace kbvh::experiments
