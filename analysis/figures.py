@@ -29,6 +29,7 @@ from axes import (
 )
 from colours import PHASE_NAMES, PHASES, Look
 from ratios import best_refit_line, crossings, fastest_configurations, pareto_front, without_oracles
+from text import memory as bytes_of
 from text import percent_tick, significant, size, tick
 
 WIDTH = 10.5  #: of every figure, in inches
@@ -373,4 +374,29 @@ def latency(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
     ]  # fmt: skip
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), ncol=3, frameon=False, borderaxespad=0.2)
     axes.set_xlabel("update and query of one frame (ms)")
+    return figure
+
+
+def memory(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
+    """Total time against the bytes that a strategy holds; contestants are numbered by speed."""
+    rows = thinned(group[(group["bytes"] > 0) & (group["total_motion"] > 0)])
+    rows = without_oracles(rows).sort_values("total_motion").reset_index(drop=True) if len(rows) else rows
+    if len(rows) < 2:
+        return None
+    names = [f"{number}  {label}: {bytes_of(held)}" for number, (label, held) in
+             enumerate(zip(rows["label"], rows["bytes"]), 1)]  # fmt: skip
+    side, tall = key_size(names)
+    figure = Figure(figsize=(WIDTH, max(3.6, tall)), layout="constrained")
+    grid = figure.add_gridspec(1, 2, width_ratios=[WIDTH - side, side])
+    axes = figure.add_subplot(grid[0, 0])
+    log_axis(axes, "x", list(rows["bytes"]), bytes_of)
+    log_axis(axes, "y", list(rows["total_motion"]))
+    points = list(zip(rows["bytes"].astype(float), rows["total_motion"].astype(float)))
+    for point, contestant in zip(points, rows["contestant"]):
+        mark(axes, *point, looks[contestant])
+    axes.set_xlabel("memory of the strategy's own structures")
+    axes.set_ylabel("total time per frame (ms)")
+    key(figure.add_subplot(grid[0, 1]), list(zip(names, (looks[c] for c in rows["contestant"]))), KeyLines.hidden)
+    settle(figure)
+    keep_labels_apart(axes, points, [str(number) for number in range(1, len(rows) + 1)])
     return figure

@@ -75,7 +75,7 @@ class TestPage(ReportCase):
         lines = [line for line in small() if line["strategy"]["id"] == "bottom_up" and line["scene"]["per_keyframe"] == 1]
         for line in lines:
             line["verified"].update(looseness=0.0, candidates=line["verified"]["pairs"])
-            del line["counters"]
+            del line["counters"], line["bytes"]
             for name in ("total_p50", "total_p99", "total_worst"):
                 del line["times"][name]
         self.page(lines, figures="main")
