@@ -91,31 +91,41 @@ def met(check: dict[str, Any], value: float) -> bool:
     raise ClaimError(f'the relation "{relation}" is none of {", ".join(RELATIONS)}')
 
 
+#: Size, l and runs of one table.
+Place = tuple[float, float, list[dict[str, Any]]]
+
+
 class Table:
     """The timed runs of a study as claims see them: one scalar, the last commit's, with sizes."""
 
     def __init__(self, study: Study, scalar: str) -> None:
-        self.study = study
         rows = study.timed
         rows = rows[rows["scalar"] == scalar]
         self.rows = rows.assign(size=rows["bodies"].map(largest_moving)).copy() if len(rows) else rows.assign(size=[])
         self.rows["size"] = self.rows["size"].where(self.rows["size"] > 0, self.rows["primitives"])
+        self._row: dict[int, dict[str, Any]] = {int(row["run"]): row for row in self.rows.to_dict("records")}
+        repetitions = study.repetitions.sort_values(["run", "repetition"])
+        self._times = {int(run): times for run, times in repetitions.groupby("run")}
+        self._places: dict[str, list[Place]] = {}
 
-    def places(self, scene: str) -> list[tuple[float, float, pd.DataFrame]]:
-        """Size, l and runs of every table of a scene; of tables for the same size and l, the one measured last."""
+    def places(self, scene: str) -> list[Place]:
+        """Every table of a scene; of tables for the same size and l, the one measured last."""
+        if scene in self._places:
+            return self._places[scene]
         found = self.rows[self.rows["scene"] == scene]
-        last: dict[tuple[float, float], pd.DataFrame] = {}
+        last: dict[tuple[float, float], list[dict[str, Any]]] = {}
         for _, group in sorted(found.groupby(["group", "commit", "dirty"]), key=lambda item: item[1]["run"].max()):
-            last[(float(group["size"].iloc[0]), float(group["l"].iloc[0]))] = group
-        return [(size, l, group) for (size, l), group in sorted(last.items(), key=lambda item: item[0])]
+            rows = [self._row[int(run)] for run in group["run"]]
+            last[(float(rows[0]["size"]), float(rows[0]["l"]))] = rows
+        self._places[scene] = [(size, l, rows) for (size, l), rows in sorted(last.items(), key=lambda item: item[0])]
+        return self._places[scene]
 
     def values(self, run: int, quantity: str) -> np.ndarray:
         """The quantity of each repetition of a run; a single number where it is counted; empty if unknown."""
-        row = self.rows[self.rows["run"] == run].iloc[0]
+        row = self._row[run]
         scale = row["l"] if quantity.endswith("per keyframe") else 1.0
         if quantity in TIMES:
-            times = self.study.repetitions[self.study.repetitions["run"] == run].sort_values("repetition")
-            return times[list(TIMES[quantity])].sum(axis=1).to_numpy(dtype=float) * scale
+            return self._times[run][list(TIMES[quantity])].to_numpy(dtype=float).sum(axis=1) * scale
         if quantity == "values per event":
             events = row["certificates_failed_per_frame"]
             known = [row["values_written_per_frame"] / events] if events > 0 else []
@@ -127,27 +137,32 @@ class Table:
             raise ClaimError(f'there is no quantity "{quantity}"')
         return np.array([value for value in known if math.isfinite(value)], dtype=float)
 
-    def chosen(self, rows: pd.DataFrame, term: dict[str, Any], quantity: str) -> Optional[int]:
+    def chosen(self, rows: list[dict[str, Any]], term: dict[str, Any], quantity: str) -> Optional[int]:
         """The run of a table that a term means: the fastest, or of counts the smallest, if several fit."""
-        for column, name in (("id", "strategy"), ("family", "family")):
-            if name in term:
-                rows = rows[rows[column] == term[name]]
-        rows = rows[~rows["id"].isin(term.get("not_for", {}).get(quantity, []))]
-        rows = rows[rows["guarantee"] != "approximate"]
         best: Optional[tuple[float, int]] = None
-        for row in rows.itertuples():
-            if any((row.builder or {}).get(name) != value for name, value in term.get("builder", {}).items()):
+        for row in rows:
+            if not _fits(row, term, quantity):
                 continue
-            if any(str(row.params.get(name, value)) != value for name, value in term.get("params", {}).items()):
-                continue
-            known = self.values(row.run, quantity)
+            known = self.values(row["run"], quantity)
             if len(known) and (best is None or float(np.median(known)) < best[0]):
-                best = (float(np.median(known)), int(row.run))
+                best = (float(np.median(known)), int(row["run"]))
         return None if best is None else best[1]
 
-    def row(self, run: int) -> pd.Series:
+    def row(self, run: int) -> dict[str, Any]:
         """One run."""
-        return self.rows[self.rows["run"] == run].iloc[0]
+        return self._row[run]
+
+
+def _fits(row: dict[str, Any], term: dict[str, Any], quantity: str) -> bool:
+    """Is a run one that the term means?"""
+    if any(row[column] != term[name] for column, name in (("id", "strategy"), ("family", "family")) if name in term):
+        return False
+    if row["guarantee"] == "approximate" or row["id"] in term.get("not_for", {}).get(quantity, []):
+        return False
+    builder = row["builder"] if isinstance(row["builder"], dict) else {}
+    if any(builder.get(name) != value for name, value in term.get("builder", {}).items()):
+        return False
+    return all(str(row["params"].get(name, value)) == value for name, value in term.get("params", {}).items())
 
 
 def largest_moving(bodies: Any) -> float:
@@ -222,7 +237,7 @@ class Looker:
         places = [place for place in everywhere if low / SLACK <= place[0] <= high * SLACK]
         wanted = f"{text.size(low)} to {text.size(high)}"
         if not places:
-            there = text.listing(sorted({text.size(place[0]) for place in everywhere}))
+            there = text.listing([text.size(size) for size in sorted({place[0] for place in everywhere})])
             return [], [f"{scene} of {wanted} polygons (measured: {there})"]
         made = {
             "ratio": self._ratio, "value": self._value, "exponent": self._exponent, "next_l": self._over_l,

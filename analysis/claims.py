@@ -79,7 +79,7 @@ def theory_rows(listed: list[dict[str, Any]], folder: Path) -> list[Row]:
     """The claims of theory.json as they are judged there; undecided where it is missing."""
     path = folder / "theory.json"
     known: dict[str, dict[str, Any]] = {}
-    missing = [f"{path.name} (`kbvh theory --out {folder}` writes it)"]
+    missing = [f"{path.name} in this folder, which kbvh theory --out writes"]
     if path.exists():
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
@@ -97,7 +97,7 @@ def theory_rows(listed: list[dict[str, Any]], folder: Path) -> list[Row]:
             continue
         rows.append(
             Row(
-                judged["id"], judged["claim"], judged["citation"], judged["bound"], {"": judged["measured"]},
+                judged["id"], judged["claim"][:1].upper() + judged["claim"][1:], judged["citation"], judged["bound"], {"": judged["measured"]},
                 judged["verdict"], judged["condition"], judged["why"], checks=judged["criteria"],
             )
         )  # fmt: skip
@@ -110,7 +110,7 @@ def experiment_row(claim: dict[str, Any], looker: Looker, baselines: list[dict[s
     looked = [looker.look(check) for check in claim["checks"]]
     missing = list(dict.fromkeys(gap for one in looked for gap in one.missing))
     verdict = verdict_of(looked)
-    sentences = [sentence(one, names, looker.table) for one in looked if one.points]
+    sentences = [sentence(one, names) for one in looked if one.points]
     if missing:
         so_far = "Measured so far: " if sentences else ""
         sentences = [f"Missing: {text.listing(missing)}.", so_far + " ".join(sentences)]
@@ -151,7 +151,8 @@ def ours(looked: list[Looked]) -> dict[str, str]:
                 values = [p.value.middle for p in one.points if (p.baseline, p.quantity) == (baseline, quantity)]
                 if values:
                     parts.append(_range(values) + (" (with motion)" if quantity.endswith("with motion") else ""))
-            result.setdefault(baseline, []).append(", ".join(parts))
+            name = one.check.get("short", "")
+            result.setdefault(baseline, []).append((f"{name}: " if name else "") + ", ".join(parts))
     return {baseline: "; ".join(parts) for baseline, parts in result.items()}
 
 
@@ -179,7 +180,7 @@ def _against(baseline: str, quantity: str, names: dict[str, str], several: bool)
     return told.strip()
 
 
-def sentence(one: Looked, names: dict[str, str], table: Table) -> str:
+def sentence(one: Looked, names: dict[str, str]) -> str:
     """What was measured for a check, where it is met, and what it wants."""
     parts = []
     several = any(quantity.endswith("with motion") for quantity in one.check["quantities"])
@@ -190,6 +191,8 @@ def sentence(one: Looked, names: dict[str, str], table: Table) -> str:
         told = f"{told} " if told else ""
         if len(mine) == 1:
             told += f"{text.factor(low.value.middle)} ({place(low)}): {where(mine)}"
+        elif text.factor(low.value.middle) == text.factor(high.value.middle):
+            told += f"{text.factor(low.value.middle)} at all {len(mine)} points: {where(mine)}"
         else:
             told += (
                 f"{text.factor(low.value.middle)} ({place(low)}) to {text.factor(high.value.middle)} ({place(high)}): "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Optional
 
@@ -115,13 +115,15 @@ def drawn(
     """Every figure with its picture (None without any panel) and sentences on the panels that are missing."""
     result = []
     for figure in FIGURES:
-        panels, missing = [], []
+        panels: list[tuple[Panel, list[Line], str]] = []
+        reasons: dict[str, list[str]] = {}
         for panel in figure.panels:
             lines, place = lines_of(table, panel, baselines, looks)
             if lines:
                 panels.append((panel, lines, place))
             else:
-                missing.append(f"{panel.place[0].upper()}{panel.place[1:]} is not drawn: {why_not(table, panel)}.")
+                reasons.setdefault(why_not(table, panel), []).append(panel.place)
+        missing = [f"Not drawn, {text.listing(places)}: {reason}." for reason, places in reasons.items()]
         title = f"Figure {figure.number} of the paper: {figure.title}"
         made = picture(folder, f"paper-{figure.number}", title, figure.reading, lambda: draw(panels)) if panels else None
         result.append((figure, made, missing))
@@ -196,6 +198,7 @@ def lines_of(
                     last = table.row(run)
             if last is not None:
                 look = Look(*FAMILIES["refit"], "-", True) if "family" in term else looks[last["contestant"]]
+                look = replace(look, filled=True)  # open markers are for the second quantity here
                 result.append(Line(name, look, quantity, x, y, number > 0))
     if panel.x == "l":
         result = [line for line in result if len(line.x) > 1]

@@ -47,7 +47,7 @@ class Section:
     errors: list[Picture] = field(default_factory=list)  #: time against error
     over_l: list[Picture] = field(default_factory=list)  #: time against frames per keyframe
     missing: str = ""  #: why a figure that one would expect is not there
-    break_even: list[tuple[str, str, str, str]] = field(default_factory=list)
+    break_even: list[tuple[str, ...]] = field(default_factory=list)
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
@@ -287,7 +287,7 @@ def _left_out(rows: pd.DataFrame) -> str:
 
 def _trends(
     timed: pd.DataFrame, head: str, all_looks: dict[str, Look], folder: Path, slug: str
-) -> tuple[list[Picture], list[tuple[str, str, str, str]]]:
+) -> tuple[list[Picture], list[tuple[str, ...]]]:
     """Lines over l and over n, through the headline group."""
     first = timed[timed["group"] == head].iloc[0]
     same = timed[(timed["scalar"] == first["scalar"]) & (timed["machine"] == first["machine"])]
@@ -301,8 +301,8 @@ def _trends(
         picture(
             folder, f"{slug}-l", f"Frames per keyframe: {where}, {text.size(first['primitives'])} primitives",
             "The number of events depends on the keyframes only, so strategies that work at events gain as more frames are "
-            "interpolated between two of them, while a refit (the broad blue band is the best one) pays for every frame. A "
-            "ring marks the break-even point, from which on the falling line wins."
+            "interpolated between two of them, while a refit (broad bands: blue is the best, grey the one of 2006) pays for every "
+            "frame. A ring marks a break-even point with either, from which on the falling line wins."
             + left_out,
             lambda: figures.over_frames_per_keyframe(depths, all_looks),
         ),
