@@ -244,8 +244,9 @@ def condition(looked: list[Looked], names: dict[str, str]) -> str:
         for baseline, quantity in _kinds(one.points):
             mine = [point for point in one.points if (point.baseline, point.quantity) == (baseline, quantity)]
             if any(point.met for point in mine):
-                parts.append(f"{_against(baseline, quantity, names, several)} {where(mine)}".strip())
-        clauses.append(f"{one.check['what']}: {'; '.join(parts)} only")
+                rule = "" if all(point.met for point in mine) else where(mine)
+                parts.append(f"{_against(baseline, quantity, names, several)} {rule}".strip())
+        clauses.append(f"{one.check['what']}: only {'; '.join(parts)}")
     return ". ".join(clauses)
 
 

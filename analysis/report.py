@@ -23,6 +23,7 @@ import ratios
 import tables
 import targets_table
 import text
+import theory_figures
 from canvas import Picture, picture
 from claim_points import ClaimError, Table
 from colours import Look, looks, symbol
@@ -105,6 +106,9 @@ def write(
     unique = study.runs.drop_duplicates("contestant")
     all_looks = looks(zip(unique["contestant"], unique["id"], unique["family"]))
     sections = _sections(study, groups, all_looks, folder / "figures", which)
+    theory = _theory(folder, which)
+    paper = _paper(study, claims, all_looks, folder / "figures", which)
+    drawn = {one.name for one in theory} | {paper_figures.anchor(figure.number) for figure, *_ in paper}
     page = render(
         title=title,
         study=study,
@@ -121,8 +125,9 @@ def write(
         size=text.size,
         claims=claims,
         tally=_tally(claims),
-        claim_links=_claim_links(claims, study, groups),
-        paper=_paper(study, claims, all_looks, folder / "figures", which),
+        claim_links=_claim_links(claims, study, groups, drawn),
+        theory=theory,
+        paper=paper,
         sections=[section for section in sections if not section.own],
         own_sections=[section for section in sections if section.own],
         every_section=sections,
@@ -141,8 +146,10 @@ def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:
     return [(verdict, sum(row.verdict == verdict for row in claims.rows)) for verdict in verdicts]
 
 
-def _claim_links(claims: paper_claims.Claims, study: Study, groups: list[tables.Group]) -> dict[str, list[tuple[str, str]]]:
-    """For each claim the fragments of the figures and tables that show it, with their texts."""
+def _claim_links(
+    claims: paper_claims.Claims, study: Study, groups: list[tables.Group], drawn: set[str]
+) -> dict[str, list[tuple[str, str]]]:
+    """For each claim the fragments of the figures (of those that are there) and tables that show it, with their texts."""
     names = {rows["group"].iloc[0]: (rows["scene"].iloc[0], group) for rows, group in zip(study.groups(), groups)}
     links: dict[str, list[tuple[str, str]]] = {}
     for row in claims.rows:
@@ -151,10 +158,23 @@ def _claim_links(claims: paper_claims.Claims, study: Study, groups: list[tables.
             number, _, place = panel.partition("-")
             of_figures.setdefault(number, []).append(place)
         mine = [(paper_figures.anchor(n), f"fig. {n} {text.listing(places)}") for n, places in of_figures.items()]
+        mine += [(name, "figure") for name, _, _, _, ids in theory_figures.FIGURES if row.id in ids]
+        mine = [one for one in mine if one[0] in drawn]
         known = [names[group] for group in row.groups if group in names]
         mine += [(group.anchor, f"{scene}, {group.title}") for scene, group in known]
         links[row.id] = mine
     return links
+
+
+def _theory(folder: Path, which: str) -> list[Picture]:
+    """What theory.json shows, if it is there."""
+    file = folder / "theory.json"
+    if which == "none" or not file.exists():
+        return []
+    try:
+        return theory_figures.pictures(theory_figures.load(file), folder / "figures")
+    except theory_figures.TheoryError as problem:
+        raise ClaimError(str(problem)) from None
 
 
 def _paper(
@@ -288,18 +308,20 @@ def _left_out(rows: pd.DataFrame) -> str:
 def _trends(
     timed: pd.DataFrame, head: str, all_looks: dict[str, Look], folder: Path, slug: str
 ) -> tuple[list[Picture], list[tuple[str, ...]]]:
-    """Lines over l and over n, through the headline group."""
+    """Lines over l and over n: at the size with most l and at the l with most sizes, or else those of the headline group."""
     first = timed[timed["group"] == head].iloc[0]
     same = timed[(timed["scalar"] == first["scalar"]) & (timed["machine"] == first["machine"])]
     same = same.drop_duplicates(["contestant", "primitives", "l"], keep="last")
     left_out = _left_out(same)
     same = ratios.without_oracles(same)
-    depths = ratios.fastest_configurations(same[same["primitives"] == first["primitives"]])
-    sizes = ratios.fastest_configurations(same[same["l"] == first["l"]])
+    primitives = _most(same, "primitives", "l", float(first["primitives"]))
+    depth = _most(same, "l", "primitives", float(first["l"]))
+    depths = ratios.fastest_configurations(same[same["primitives"] == primitives])
+    sizes = ratios.fastest_configurations(same[same["l"] == depth])
     where = f"{first['scene']}, {first['scalar']}"
     made = [
         picture(
-            folder, f"{slug}-l", f"Frames per keyframe: {where}, {text.size(first['primitives'])} primitives",
+            folder, f"{slug}-l", f"Frames per keyframe: {where}, {text.size(primitives)} primitives",
             "The number of events depends on the keyframes only, so strategies that work at events gain as more frames are "
             "interpolated between two of them, while a refit (broad bands: blue is the best, grey the one of 2006) pays for every "
             "frame. A ring marks a break-even point with either, from which on the falling line wins."
@@ -307,7 +329,7 @@ def _trends(
             lambda: figures.over_frames_per_keyframe(depths, all_looks),
         ),
         picture(
-            folder, f"{slug}-n", f"Size: {where}, l = {first['l']:g}",
+            folder, f"{slug}-n", f"Size: {where}, l = {depth:g}",
             "Both axes are logarithmic, so a cost proportional to n is a straight line as steep as the thin grey one. A "
             "steeper line grows faster than the scene; parallel lines differ by a constant factor at every size."
             + left_out,
@@ -315,6 +337,13 @@ def _trends(
         ),
     ]  # fmt: skip
     return [one for one in made if one is not None], tables.break_even(depths) if depths["l"].nunique() > 1 else []
+
+
+def _most(rows: pd.DataFrame, column: str, counted: str, usual: float) -> float:
+    """The value of a column at which most values of another were measured: the usual one if it has as many, else the largest."""
+    numbers = rows.groupby(column)[counted].nunique()
+    best = numbers[numbers == numbers.max()].index
+    return usual if usual in best else float(best.max())
 
 
 def _bodies(rows: pd.DataFrame) -> list[dict[str, str]]:

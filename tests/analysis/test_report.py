@@ -81,6 +81,13 @@ class TestPage(ReportCase):
         self.page(lines, figures="main")
         self.assertEqual({file.stem for file in (self.folder / "figures").iterdir()}, {"tablecloth-cost"})
 
+    def test_lines_over_l_are_drawn_at_the_size_with_most_l(self) -> None:
+        wanted = [c for c in synthetic.CONTESTANTS if c["id"] in ("bottom_up", "kinetic_aabb")]
+        lines = [synthetic.record(c, "tablecloth", n, "float", l) for c in wanted for n, l in ((2000, 1), (2000, 10), (9000, 10))]
+        page = self.page(lines, figures="main")
+        self.assertIn("Frames per keyframe: tablecloth, float, 2k primitives", page)
+        self.assertIn("Size: tablecloth, float, l = 10", page)
+
     def test_everything_from_results_is_escaped(self) -> None:
         lines = small()
         for line in lines:
