@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any, Optional
 
 import numpy as np
-import pandas as pd
 
 import text
 from load import Study
@@ -346,7 +345,13 @@ class Looker:
     def _one_clip(self, one: int, other: int) -> bool:
         """Are two runs of the same scene over the same keyframe intervals?"""
         a, b = self.table.row(one), self.table.row(other)
-        return bool(a["hash"] == b["hash"] and (a["frames"] - 1) * b["l"] == (b["frames"] - 1) * a["l"])
+        cut_alike = (a["frames"] - 1) * b["l"] == (b["frames"] - 1) * a["l"]
+        return bool(a["hash"] == b["hash"] and cut_alike and self._comparable(one, other))
+
+    def _comparable(self, one: int, other: int) -> bool:
+        """Are two runs of one machine and one commit?"""
+        a, b = self.table.row(one), self.table.row(other)
+        return all(a[name] == b[name] for name in ("machine", "commit", "dirty"))
 
     def _across(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
         """Each place over the largest of the other scene at the same l."""
@@ -358,7 +363,7 @@ class Looker:
         points: list[Point] = []
         for size, l, rows in places:
             run = self.table.chosen(rows, of, quantity)
-            if run is not None and l in others:
+            if run is not None and l in others and self._comparable(run, others[l]):
                 value = quotient(self.table, run, others[l], quantity)
                 points += self._point(check, quantity, baseline, scene, size, l, value, [run, others[l]])
         return points

@@ -93,7 +93,8 @@ def theory_rows(listed: list[dict[str, Any]], folder: Path) -> list[Row]:
     for one in listed:
         judged = known.get(one["id"])
         if judged is None:
-            rows.append(Row(one["id"], one["claim"], "", "", {}, OPEN, "", f"Missing: {missing[0]}.", list(missing)))
+            why = f"Missing: {missing[0]}."
+            rows.append(Row(one["id"], one["claim"], "", "", {}, OPEN, "", why, list(missing)))
             continue
         rows.append(
             Row(
@@ -230,7 +231,8 @@ def where(points: list[Point]) -> str:
     scenes = sorted({point.scene for point in good})
     if not any(point.scene in scenes for point in points if not point.met):
         return f"met on {text.listing(scenes)} only"
-    return f"met at {len(good)} of {len(points)} points ({'; '.join(place(p) for p in good[:3])}{'; …' if len(good) > 3 else ''})"
+    told = "; ".join(place(point) for point in good[:3]) + ("; …" if len(good) > 3 else "")
+    return f"met at {len(good)} of {len(points)} points ({told})"
 
 
 def condition(looked: list[Looked], names: dict[str, str]) -> str:

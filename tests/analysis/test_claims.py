@@ -190,6 +190,21 @@ class TestVerdicts(ClaimsCase):
             lines.append(one)
         self.assertEqual(self.rows(lines)["E3"].verdict, claims.HOLDS)
 
+    def test_commits_are_not_compared_with_one_another(self) -> None:
+        lines = world()
+        for one in lines:
+            if l_of(one) == 10:
+                one["commit"] = "fedcba9876543210"
+        rows = self.rows(lines)
+        self.assertEqual(rows["E3"].verdict, claims.HOLDS, "within each table all are of one commit")
+        self.assertEqual(rows["E15"].verdict, claims.OPEN, "ten times an l is in another table, of another commit")
+
+    def test_another_scalar_is_no_result(self) -> None:
+        lines = world()
+        for one in lines:
+            one["scene"]["scalar"] = "double"
+        self.assertEqual({row.verdict for row in self.rows(lines).values()}, {claims.OPEN})
+
     def test_disagreeing_repetitions_are_told(self) -> None:
         lines = world()
         for one in filter(of("kinetic_aabb", "tablecloth"), lines):
@@ -306,7 +321,9 @@ class TestPage(ClaimsCase):
         return (self.folder / "report.html").read_text(encoding="utf-8")
 
     def test_shows_verdicts_and_every_link_leads_somewhere(self) -> None:
-        lines = [one for one in world() if l_of(one) < 100]
+        few = ("bottom_up", "bottom_up_period", "kinetic_aabb", "kinetic_boxtree")
+        lines = [one for one in world() if l_of(one) < 100 and one["strategy"]["id"] in few]
+        lines = [one for one in lines if not one["scene"]["name"].startswith("dress")]
         for one in filter(of("kinetic_aabb"), lines):
             one["scene"]["origin"] = "files" if one["scene"]["name"].startswith("shirt") else "built_in"
         page = self.page(lines)

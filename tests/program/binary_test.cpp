@@ -285,8 +285,8 @@ TEST_F(Binary, StudiesOfAPlanCanBeRunOneByOne) {
   write_text(folder_ / "plan.json", R"({"name": "whole", "strategies": "bottom_up", "repetitions": 1, "l": 1,
       "scenes": [{"builtin": "waving_sheet", "triangles": 50, "keyframes": 2}],
       "studies": [{"name": "small"}, {"name": "large", "l": 2}, {"name": "large", "l": 3}, {"scenes": [
-        {"name": "mine", "bodies": [{"file": "ball.obj"}, {"shape": "waving_sheet", "triangles": 50, "keyframes": 2}]},
-        {"name": "shape", "bodies": ["box", {"shape": "waving_sheet", "triangles": 50, "keyframes": 2}]}]}],
+        {"name": "mine", "bodies": [{"file": "ball.obj"}, "waving_sheet:triangles=50,keyframes=2"]},
+        {"name": "shape", "bodies": ["box", "waving_sheet:triangles=50,keyframes=2"]}]}],
       "targets": [{"what": "t", "scenes": "mine", "scalar": "float", "l": 1, "at_least": 1, "aim": 2,
         "numerator": {"strategy": "bottom_up", "phase": "update"},
         "denominator": {"strategy": "bottom_up", "phase": "update"}}]})");
