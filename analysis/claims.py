@@ -243,12 +243,13 @@ def condition(looked: list[Looked], names: dict[str, str]) -> str:
             continue
         several = any(quantity.endswith("with motion") for quantity in one.check["quantities"])
         parts = []
-        for baseline, quantity in _kinds(one.points):
+        kinds = _kinds(one.points)
+        for baseline, quantity in kinds:
             mine = [point for point in one.points if (point.baseline, point.quantity) == (baseline, quantity)]
             if any(point.met for point in mine):
-                rule = "" if all(point.met for point in mine) else where(mine)
-                parts.append(f"{_against(baseline, quantity, names, several)} {rule}".strip())
-        clauses.append(f"{one.check['what']}: only {'; '.join(parts)}")
+                parts.append(f"{_against(baseline, quantity, names, several)} {where(mine)}".strip())
+        unmet = "; nothing else is met" if len(parts) < len(kinds) else ""
+        clauses.append(f"{one.check['what']}: {'; '.join(parts)}{unmet}")
     return ". ".join(clauses)
 
 
