@@ -28,8 +28,16 @@ from axes import (
     zero_log_axis,
 )
 from colours import PHASE_NAMES, PHASES, Look
-from ratios import best_refit_line, crossings, fastest_configurations, pareto_front, without_oracles
-from text import percent_tick, significant, size, tick
+from ratios import (
+    best_refit_line,
+    crossings,
+    fastest_configurations,
+    pareto_front,
+    period_line,
+    without_oracles,
+)
+from text import memory as bytes_of
+from text import memory_tick, percent_tick, significant, size, tick
 
 WIDTH = 10.5  #: of every figure, in inches
 #: Bars longer than this many times the fastest are torn off, or the others could not be read.
@@ -245,24 +253,29 @@ def _time_panels(rows: pd.DataFrame) -> list[tuple[str, str]]:
 
 
 def over_frames_per_keyframe(rows: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Update and total time against l; where a line crosses the best refit is marked."""
+    """Update and total time against l; where a line crosses the best refit or that of 2006 is marked."""
     panels = _time_panels(rows)
     if rows["l"].nunique() < 2 or not panels:
         return None
     figure, all_axes = _lines(rows, looks, "l", panels, "interpolated frames per keyframe, l")
     found: list[tuple[Axes, list[tuple[float, float]], list[str]]] = []
     for axes, (column, _) in zip(all_axes, panels):
-        best = best_refit_line(rows, column, "l")
-        if best is None:
-            continue
-        axes.plot(best.index, best, color="#0072B2", alpha=0.22, linewidth=7, solid_capstyle="round", zorder=1)
         points: list[tuple[float, float]] = []
-        for _, line in rows[rows["family"] != "refit"].groupby("contestant"):
-            own = line.set_index("l")[column].sort_index()
-            shared = own.index.intersection(best.index)
-            if (own.loc[shared] > 0).all():
-                x = np.asarray(shared, dtype=float)
-                points += [(c.x, c.y) for c in crossings(x, own.loc[shared].to_numpy(), best.loc[shared].to_numpy())]
+        for reference, colour, family in (
+            (best_refit_line(rows, column, "l"), "#0072B2", "refit"),
+            (period_line(rows, column, "l"), "#7A7A7A", "period"),
+        ):
+            if reference is None:
+                continue
+            axes.plot(reference.index, reference, color=colour, alpha=0.22, linewidth=7, solid_capstyle="round", zorder=1)
+            others = rows[~rows["family"].isin(REFITS)] if family == "period" else rows[rows["family"] != family]
+            for _, line in others.groupby("contestant"):
+                own = line.set_index("l")[column].sort_index()
+                shared = own.index.intersection(reference.index)
+                if (own.loc[shared] > 0).all():
+                    x = np.asarray(shared, dtype=float)
+                    level = reference.loc[shared].to_numpy()
+                    points += [(c.x, c.y) for c in crossings(x, own.loc[shared].to_numpy(), level)]
         for point in points:
             axes.plot(*point, marker="o", markersize=12, markerfacecolor="none", color="#222222", markeredgewidth=1.1)
         found.append((axes, points, [f"l≈{x:.0f}" for x, _ in points]))
@@ -373,4 +386,29 @@ def latency(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
     ]  # fmt: skip
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), ncol=3, frameon=False, borderaxespad=0.2)
     axes.set_xlabel("update and query of one frame (ms)")
+    return figure
+
+
+def memory(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
+    """Total time against the bytes that a strategy holds; contestants are numbered by speed."""
+    rows = thinned(group[(group["bytes"] > 0) & (group["total_motion"] > 0)])
+    rows = without_oracles(rows).sort_values("total_motion").reset_index(drop=True) if len(rows) else rows
+    if len(rows) < 2:
+        return None
+    names = [f"{number}  {label}: {bytes_of(held)}" for number, (label, held) in
+             enumerate(zip(rows["label"], rows["bytes"]), 1)]  # fmt: skip
+    side, tall = key_size(names)
+    figure = Figure(figsize=(WIDTH, max(3.6, tall)), layout="constrained")
+    grid = figure.add_gridspec(1, 2, width_ratios=[WIDTH - side, side])
+    axes = figure.add_subplot(grid[0, 0])
+    log_axis(axes, "x", list(rows["bytes"]), memory_tick)
+    log_axis(axes, "y", list(rows["total_motion"]))
+    points = list(zip(rows["bytes"].astype(float), rows["total_motion"].astype(float)))
+    for point, contestant in zip(points, rows["contestant"]):
+        mark(axes, *point, looks[contestant])
+    axes.set_xlabel("memory of the strategy's own structures")
+    axes.set_ylabel("total time per frame (ms)")
+    key(figure.add_subplot(grid[0, 1]), list(zip(names, (looks[c] for c in rows["contestant"]))), KeyLines.hidden)
+    settle(figure)
+    keep_labels_apart(axes, points, [str(number) for number in range(1, len(rows) + 1)])
     return figure

@@ -141,4 +141,5 @@ def _absent(study: Study) -> tuple[str, str]:
         words.append("No refit was timed: there is nothing to compare with.")
     if len(study.refused):
         words.append(f"{text.plural(len(study.refused), 'contestant run')} got no time; the reason stands below its table.")
+    words.append("Result files hold no quality over time and no events per level of a tree: only means over clips are shown.")
     return "Not measured", " ".join(words)

@@ -196,6 +196,8 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "seed": str(record.get("seed", "")),
         "scene": _family(record.text("scene.name"), bodies),
         "scene_name": record.text("scene.name"),
+        "origin": record.text("scene.origin", ""),
+        "changes": _changes(record),
         "hash": str(record.get("scene.hash", "")),
         "scalar": record.text("scene.scalar"),
         "l": record.number("scene.per_keyframe"),
@@ -241,6 +243,12 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         [row["scene_name"], row["hash"], row["primitives"], row["scalar"], row["l"], str(row["frames"]), row["machine"]]
     )
     return row
+
+
+def _changes(record: _Record) -> str:
+    """The script of plan changes in words; empty without one."""
+    steps, changes = record.number("scene.script.steps", 0), record.number("scene.script.changes", 0)
+    return f"{changes:.0f} of single vertices, in {steps:.0f} frames" if changes else ""
 
 
 def _moving(bodies: Any) -> float:

@@ -113,6 +113,13 @@ def best_refit_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Seri
     return best if len(best) else None
 
 
+def period_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Series]:
+    """The time of the refit as in 2006 at each x."""
+    period = rows[rows["family"] == "period"].groupby(x)[column].min()
+    period = period[period > 0]
+    return period if len(period) else None
+
+
 def without_oracles(rows: pd.DataFrame) -> pd.DataFrame:
     """Without brute force, which would squeeze all others together on a shared axis; unless nothing else is there."""
     others = rows[rows["family"] != "oracle"]

@@ -16,12 +16,16 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+import claims as paper_claims
 import figures
+import paper_figures
 import ratios
 import tables
 import targets_table
 import text
+import theory_figures
 from canvas import Picture, picture
+from claim_points import ClaimError, Table
 from colours import Look, looks, symbol
 from limits import limits
 from load import ResultError, Study, load
@@ -36,11 +40,15 @@ class Section:
     title: str
     anchor: str
     bodies: list[dict[str, str]]
+    card: list[tuple[str, str]]
+    own: bool  #: from files that the user brought
     sizes: str  #: of the smaller versions of the scene
     groups: list[tables.Group]
     pictures: list[Picture] = field(default_factory=list)
+    errors: list[Picture] = field(default_factory=list)  #: time against error
+    over_l: list[Picture] = field(default_factory=list)  #: time against frames per keyframe
     missing: str = ""  #: why a figure that one would expect is not there
-    break_even: list[tuple[str, str, str, str]] = field(default_factory=list)
+    break_even: list[tuple[str, ...]] = field(default_factory=list)
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
@@ -62,8 +70,10 @@ def main(arguments: Optional[list[str]] = None) -> int:
         study = load(options.folder)
         file = options.folder / targets_table.FILE_NAME
         targets = targets_table.load_targets(file) if file.exists() else []
-        page = write(study, options.folder, options.title, options.figures, targets)
-    except ResultError as error:
+        claims = paper_claims.evaluate(study, options.folder)
+        paper_claims.write(claims, options.folder)
+        page = write(study, options.folder, options.title, options.figures, targets, claims)
+    except (ResultError, ClaimError) as error:
         print(f"report: {error}", file=sys.stderr)
         return 2
     except OSError as error:
@@ -76,6 +86,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
             print(tables.plain(scene, group) + "\n")
         if targets:
             print(targets_table.markdown(targets))
+        print(paper_claims.plain(claims) + "\n")
     print(page)
     return 0
 
@@ -87,13 +98,17 @@ def plain_groups(study: Study) -> list[tuple[str, tables.Group]]:
 
 
 def write(
-    study: Study, folder: Path, title: str, which: str = "main", targets: Sequence[targets_table.Target] = ()
+    study: Study, folder: Path, title: str, which: str, targets: Sequence[targets_table.Target], claims: paper_claims.Claims
 ) -> Path:
     """Writes the report and its figures; returns the page's path."""
     all_ratios = tables.Ratios(study)
     groups = tables.groups(study, all_ratios)
     unique = study.runs.drop_duplicates("contestant")
     all_looks = looks(zip(unique["contestant"], unique["id"], unique["family"]))
+    sections = _sections(study, groups, all_looks, folder / "figures", which)
+    theory = _theory(folder, which)
+    paper = _paper(study, claims, all_looks, folder / "figures", which)
+    drawn = {one.name for one in theory} | {paper_figures.anchor(figure.number) for figure, *_ in paper}
     page = render(
         title=title,
         study=study,
@@ -108,7 +123,14 @@ def write(
         within=targets_table.within,
         milliseconds=text.milliseconds,
         size=text.size,
-        sections=_sections(study, groups, all_looks, folder / "figures", which),
+        claims=claims,
+        tally=_tally(claims),
+        claim_links=_claim_links(claims, study, groups, drawn),
+        theory=theory,
+        paper=paper,
+        sections=[section for section in sections if not section.own],
+        own_sections=[section for section in sections if section.own],
+        every_section=sections,
         strategies=_strategies(study),
         limits=limits(study),
         symbols={contestant: Markup(symbol(look)) for contestant, look in all_looks.items()},
@@ -116,6 +138,52 @@ def write(
     path = folder / "report.html"
     path.write_text(page, encoding="utf-8")
     return path
+
+
+def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:
+    """How many claims have which verdict."""
+    verdicts = (paper_claims.HOLDS, paper_claims.CONDITION, paper_claims.FAILS, paper_claims.OPEN)
+    return [(verdict, sum(row.verdict == verdict for row in claims.rows)) for verdict in verdicts]
+
+
+def _claim_links(
+    claims: paper_claims.Claims, study: Study, groups: list[tables.Group], drawn: set[str]
+) -> dict[str, list[tuple[str, str]]]:
+    """For each claim the fragments of the figures (of those that are there) and tables that show it, with their texts."""
+    names = {rows["group"].iloc[0]: (rows["scene"].iloc[0], group) for rows, group in zip(study.groups(), groups)}
+    links: dict[str, list[tuple[str, str]]] = {}
+    for row in claims.rows:
+        of_figures: dict[str, list[str]] = {}
+        for panel in row.figures:
+            number, _, place = panel.partition("-")
+            of_figures.setdefault(number, []).append(place)
+        mine = [(paper_figures.anchor(n), f"fig. {n} {text.listing(places)}") for n, places in of_figures.items()]
+        mine += [(name, "figure") for name, _, _, _, ids in theory_figures.FIGURES if row.id in ids]
+        mine = [one for one in mine if one[0] in drawn]
+        known = [names[group] for group in row.groups if group in names]
+        mine += [(group.anchor, f"{scene}, {group.title}") for scene, group in known]
+        links[row.id] = mine
+    return links
+
+
+def _theory(folder: Path, which: str) -> list[Picture]:
+    """What theory.json shows, if it is there."""
+    file = folder / "theory.json"
+    if which == "none" or not file.exists():
+        return []
+    try:
+        return theory_figures.pictures(theory_figures.load(file), folder / "figures")
+    except theory_figures.TheoryError as problem:
+        raise ClaimError(str(problem)) from None
+
+
+def _paper(
+    study: Study, claims: paper_claims.Claims, all_looks: dict[str, Look], folder: Path, which: str
+) -> list[tuple[paper_figures.PaperFigure, Optional[Picture], list[str]]]:
+    """The paper's own figures; without any of its panels, or if none are wanted, just what is missing."""
+    if which == "none":
+        return []
+    return paper_figures.drawn(Table(study, "float"), claims.baselines, all_looks, folder)
 
 
 def render(**values: object) -> str:
@@ -136,13 +204,16 @@ def _sections(
         mine = [of_group[group] for group in rows["group"].unique()]
         smaller = sorted(rows["primitives"].unique())[:-1]
         sizes = text.listing([text.size(value) for value in smaller])
-        section = Section(str(scene), f"scene-{number + 1}", _bodies(rows), sizes, mine)
+        own = bool((rows["origin"] == "files").any())
+        section = Section(str(scene), f"scene-{number + 1}", _bodies(rows), _card(rows), own, sizes, mine)
         timed = rows[rows["refused"] == ""]
         slug = re.sub(r"[^a-z0-9]+", "-", str(scene).lower()).strip("-") or f"scene-{number + 1}"
         if len(timed) and which != "none":
             head = headline(timed)
             section.pictures += _group_pictures(timed[timed["group"] == head], timed, all_looks, folder, slug)
-            if not any(one.name == f"{slug}-error" for one in section.pictures):
+            section.errors = [one for one in section.pictures if one.name == f"{slug}-error"]
+            section.pictures = [one for one in section.pictures if one.name != f"{slug}-error"]
+            if not section.errors:
                 section.missing = (
                     "Time against error is not drawn: all contestants have the same errors here (the table has them)."
                 )
@@ -154,7 +225,8 @@ def _sections(
                             timed[timed["group"] == other], timed[:0], all_looks, folder, name
                         )
             over, section.break_even = _trends(timed, head, all_looks, folder, slug)
-            section.pictures += over
+            section.over_l = [one for one in over if one.name == f"{slug}-l"]
+            section.pictures += [one for one in over if one.name != f"{slug}-l"]
         result.append(section)
     return result
 
@@ -217,6 +289,13 @@ def _group_pictures(
             + fastest_only,
             lambda: figures.latency(group, all_looks),
         ),
+        picture(
+            folder, f"{slug}-memory", f"Memory: {place}",
+            "What a strategy's own structures hold after the clip, beside the meshes and their motion, which all share. Left "
+            "and low is small and fast; a strategy that is right of another has to be below it to be worth its memory."
+            + fastest_only,
+            lambda: figures.memory(group, all_looks),
+        ),
     ]  # fmt: skip
     return [one for one in made if one is not None]
 
@@ -228,27 +307,29 @@ def _left_out(rows: pd.DataFrame) -> str:
 
 def _trends(
     timed: pd.DataFrame, head: str, all_looks: dict[str, Look], folder: Path, slug: str
-) -> tuple[list[Picture], list[tuple[str, str, str, str]]]:
-    """Lines over l and over n, through the headline group."""
+) -> tuple[list[Picture], list[tuple[str, ...]]]:
+    """Lines over l and over n: at the size with most l and at the l with most sizes, or else those of the headline group."""
     first = timed[timed["group"] == head].iloc[0]
     same = timed[(timed["scalar"] == first["scalar"]) & (timed["machine"] == first["machine"])]
     same = same.drop_duplicates(["contestant", "primitives", "l"], keep="last")
     left_out = _left_out(same)
     same = ratios.without_oracles(same)
-    depths = ratios.fastest_configurations(same[same["primitives"] == first["primitives"]])
-    sizes = ratios.fastest_configurations(same[same["l"] == first["l"]])
+    primitives = _most(same, "primitives", "l", float(first["primitives"]))
+    depth = _most(same, "l", "primitives", float(first["l"]))
+    depths = ratios.fastest_configurations(same[same["primitives"] == primitives])
+    sizes = ratios.fastest_configurations(same[same["l"] == depth])
     where = f"{first['scene']}, {first['scalar']}"
     made = [
         picture(
-            folder, f"{slug}-l", f"Frames per keyframe: {where}, {text.size(first['primitives'])} primitives",
+            folder, f"{slug}-l", f"Frames per keyframe: {where}, {text.size(primitives)} primitives",
             "The number of events depends on the keyframes only, so strategies that work at events gain as more frames are "
-            "interpolated between two of them, while a refit (the broad blue band is the best one) pays for every frame. A "
-            "ring marks the break-even point, from which on the falling line wins."
+            "interpolated between two of them, while a refit (broad bands: blue is the best, grey the one of 2006) pays for every "
+            "frame. A ring marks a break-even point with either, from which on the falling line wins."
             + left_out,
             lambda: figures.over_frames_per_keyframe(depths, all_looks),
         ),
         picture(
-            folder, f"{slug}-n", f"Size: {where}, l = {first['l']:g}",
+            folder, f"{slug}-n", f"Size: {where}, l = {depth:g}",
             "Both axes are logarithmic, so a cost proportional to n is a straight line as steep as the thin grey one. A "
             "steeper line grows faster than the scene; parallel lines differ by a constant factor at every size."
             + left_out,
@@ -256,6 +337,13 @@ def _trends(
         ),
     ]  # fmt: skip
     return [one for one in made if one is not None], tables.break_even(depths) if depths["l"].nunique() > 1 else []
+
+
+def _most(rows: pd.DataFrame, column: str, counted: str, usual: float) -> float:
+    """The value of a column at which most values of another were measured: the usual one if it has as many, else the largest."""
+    numbers = rows.groupby(column)[counted].nunique()
+    best = numbers[numbers == numbers.max()].index
+    return usual if usual in best else float(best.max())
 
 
 def _bodies(rows: pd.DataFrame) -> list[dict[str, str]]:
@@ -273,6 +361,30 @@ def _bodies(rows: pd.DataFrame) -> list[dict[str, str]]:
         for body in largest["bodies"]
         if isinstance(body, dict)
     ]
+
+
+def _card(rows: pd.DataFrame) -> list[tuple[str, str]]:
+    """Facts on a scene as it was measured: at its largest size, and over its sizes."""
+    largest = rows.loc[rows["primitives"].idxmax()]
+    mine = rows[rows["primitives"] == largest["primitives"]]
+    sampled = mine[mine["pairs"].notna() & (mine["verified_frames"] > 0)]
+    origins = {"built_in": "built into kbvh", "files": "read from files", "shapes": "made by formula"}
+    sizes = text.listing([text.size(value) for value in sorted(rows["moving"].unique())])
+    frames = text.listing([text.count(value) for value in sorted(mine["frames"].dropna().unique())])
+    facts = [
+        ("From", origins.get(str(largest["origin"]), "")),
+        ("Moving primitives", sizes),
+        ("Interpolated frames, l", text.listing([f"{value:g}" for value in sorted(rows["l"].unique())])),
+        ("Frames of a clip", frames),
+        ("Scalars", text.listing(sorted(rows["scalar"].unique()))),
+        ("Seeds", text.listing(sorted(seed for seed in rows["seed"].unique() if seed))),
+    ]
+    if len(sampled):
+        pairs = sampled["pairs"] / sampled["verified_frames"]
+        facts.append(("Pairs that meet", f"{text.significant(float(pairs.median()))} in a frame, on average"))
+    if len(largest["changes"]):
+        facts.append(("Changes at run time", largest["changes"]))
+    return [(name, value) for name, value in facts if value]
 
 
 def _values(column: pd.Series, shorten: Optional[int] = None) -> str:

@@ -89,6 +89,12 @@ def memory(value: Optional[float]) -> str:
     return f"{value:.0f}\u00a0B"
 
 
+def memory_tick(value: float) -> str:
+    """Bytes beside an axis: no zeros that say nothing."""
+    number, unit = memory(value).split("\u00a0")
+    return f"{float(number.replace(chr(0x202F), '')):g}\u00a0{unit}"
+
+
 def percent(value: Optional[float]) -> str:
     """A share (0.012) as 1.2 %."""
     if value is None or not known(value):

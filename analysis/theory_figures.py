@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from axes import KeyLines, fixed_log_axis, key, key_size, log_axis
-from canvas import picture
+from canvas import Picture, picture
 from colours import Look, looks
 from text import size, tick
 
@@ -241,20 +241,44 @@ def draw_steps(
 
 
 FIGURES = (
-    ("theory-events-n", "Events of a clip and n log n", events_over_n),
-    ("theory-events-l", "Values written and frames per keyframe", events_over_l),
-    ("theory-certificates", "Certificates per vertex", certificates_per_vertex),
-    ("theory-steps", "Cost of an event", steps_per_event),
-)
+    (
+        "theory-events-n", "Events of a clip and n log n", events_over_n,
+        "Left, points that follow the wide grey line grow as n log n; both axes are logarithmic. Right, a scene whose line "
+        "rises grows faster than that, one whose line falls grows more slowly.",
+        ("T6",),
+    ),
+    (
+        "theory-events-l", "Values written and frames per keyframe", events_over_l,
+        "The kinetic tree's lines are level, for its events come from the keyframes, however many frames are between them. "
+        "The refit writes every bound in every frame, so its dotted lines rise as l does.",
+        ("T7",),
+    ),
+    (
+        "theory-certificates", "Certificates per vertex", certificates_per_vertex,
+        "The axis of n is logarithmic, so O(log n) is at most a straight line. Filled marks are means, open ones the vertex "
+        "with the most.",
+        ("T4",),
+    ),
+    (
+        "theory-steps", "Cost of an event", steps_per_event,
+        "Filled marks are means over events, open ones the dearest event, grey lines the bounds. As long as open marks stay "
+        "below the grey lines, an event costs what the theory allows.",
+        ("T3",),
+    ),
+)  # fmt: skip
+
+
+def pictures(theory: Theory, folder: Path) -> list[Picture]:
+    """Every figure that has something to show, written as PNG and PDF."""
+    made = [
+        picture(folder, name, title, reading, lambda draw=draw: draw(theory)) for name, title, draw, reading, _ in FIGURES
+    ]
+    return [one for one in made if one is not None]
 
 
 def draw_all(theory: Theory, folder: Path) -> list[str]:
-    """Writes every figure that has something to show as PNG and PDF; their names."""
-    names = []
-    for name, title, draw in FIGURES:
-        if picture(folder, name, title, "", lambda draw=draw: draw(theory)) is not None:
-            names.append(name)
-    return names
+    """Writes every figure that has something to show; their names."""
+    return [one.name for one in pictures(theory, folder)]
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:

@@ -27,12 +27,17 @@ int run_and_wait(std::vector<std::string> words);
 /// the plan that a file would hold.
 struct StudyOptions {
   std::string plan_file, out, scene, builder, name, order, clip, script;
-  std::vector<std::string> bodies, strategies, scalars, params;
+  std::vector<std::string> bodies, strategies, scalars, params, studies;
   std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
   std::vector<std::string> builders;
   std::uint64_t obstacle = 0, keyframes = 0, repetitions = 0, frames_limit = 0, oracle_every = 0;
   bool print_plan = false;
 };
+
+/// Leaves only the studies of a plan file whose name is among `names` (a study without a name has the
+/// plan's), and takes its targets out, which are about all studies together. Throws io::InputError, beginning
+/// with `place`, for a name that no study has.
+void keep_studies(nlohmann::json& plan, const std::vector<std::string>& names, const std::string& place);
 
 /// The plan that the options say, as a plan file would (without `plan_file`, which is read by itself).
 /// Throws io::InputError.

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
@@ -99,6 +100,7 @@ int run_study(const StudyOptions& options, Harness harness) {
       if (said.contains("studies") && said["studies"].is_array())
         for (json& study : said["studies"])
           if (study.is_object()) set_common(study, options);
+      if (!options.studies.empty()) keep_studies(said, options.studies, options.plan_file);
     }
     if (options.print_plan) {
       std::printf("%s\n", said.dump(2).c_str());
@@ -157,6 +159,12 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
       ->check(CLI::PositiveNumber);
   command.add_option("--out", o->out, "folder to which results are appended (none: the table only)");
   CLI::Option* plan = command.add_option("--plan", o->plan_file, "a study as a file, see RESULTS.md");
+  command
+      .add_option("--study", o->studies,
+                  "only the studies of this name, without the plan's targets; repeatable")
+      ->take_all()
+      ->expected(1)
+      ->needs(plan);
   command.add_flag("--print-plan", o->print_plan, "print the plan file that says the same, and stop");
   for (CLI::Option* option : said_by_plan) plan->excludes(option);
 }
@@ -172,6 +180,27 @@ void add_command(CLI::App& program, Action& action, const char* name, const char
 }
 
 }  // namespace
+
+void keep_studies(json& plan, const std::vector<std::string>& names, const std::string& place) {
+  const auto name_of = [](const json& object, const std::string& otherwise) {
+    const auto found = object.is_object() ? object.find("name") : object.end();
+    return found != object.end() && found->is_string() ? found->get<std::string>() : otherwise;
+  };
+  const std::string plan_name = name_of(plan, "");
+  const bool several = plan.contains("studies") && plan["studies"].is_array();
+  std::vector<std::string> known;
+  json kept = json::array();
+  for (const json& study : several ? plan["studies"] : json::array({plan})) {
+    const std::string name = name_of(study, plan_name);
+    if (std::find(known.begin(), known.end(), name) == known.end()) known.push_back(name);
+    if (std::find(names.begin(), names.end(), name) != names.end()) kept.push_back(study);
+  }
+  for (const std::string& name : names)
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      throw io::InputError(place + ": there is no study '" + name + "'; known are " + joined(known));
+  if (several) plan["studies"] = kept;
+  plan.erase("targets");
+}
 
 json plan_of(const StudyOptions& options) {
   json plan = json::object();

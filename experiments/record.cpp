@@ -56,6 +56,18 @@ const char* word(PrimitiveKind kind) {
   return "polygons";
 }
 
+const char* word(SceneOrigin origin) {
+  switch (origin) {
+    case SceneOrigin::built_in:
+      return "built_in";
+    case SceneOrigin::files:
+      return "files";
+    case SceneOrigin::shapes:
+      break;
+  }
+  return "shapes";
+}
+
 const char* word(Harness harness) {
   return harness == Harness::rounds ? "run" : "bench";
 }
@@ -76,6 +88,7 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
   }
   return {{"name", scene.name},
           {"order", word(loaded.order)},
+          {"origin", word(loaded.origin)},
           {"hash", hexadecimal(hash(scene))},
           {"scalar", sizeof(S) == 4 ? "float" : "double"},
           {"per_keyframe", per_keyframe},

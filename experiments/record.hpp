@@ -18,6 +18,7 @@ const char* word(Guarantee guarantee);
 const char* word(Foresight foresight);
 const char* word(PrimitiveKind kind);
 const char* word(Harness harness);
+const char* word(SceneOrigin origin);
 
 /// The "scene" of a record.
 template <class S>

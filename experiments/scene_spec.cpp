@@ -313,6 +313,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
   loaded.seed = spec.options.seed;
   if (!spec.builtin.empty()) {
     const BuiltinScene& builtin = find_builtin_scene(spec.builtin);
+    loaded.origin = SceneOrigin::built_in;
     loaded.meshes = builtin.make(spec.options, progress);
     if (builtin.reversal != nullptr) loaded.reversal = builtin.reversal(spec.options);
     loaded.name = spec.builtin;
@@ -332,6 +333,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
       mesh = make_shape(keys);
     } else {
       if (progress) progress("reading " + body.file.string(), 0);
+      loaded.origin = SceneOrigin::files;
       mesh = io::load_animated_mesh({body.file, body.motion, body.clip, body.frames_per_second});
     }
     if (!body.name.empty()) mesh.name = body.name;

@@ -72,12 +72,20 @@ nlohmann::json body_from_text(const std::string& text);
 std::vector<SceneSpec> read_scenes(const nlohmann::json& scene, const std::string& place,
                                    const std::filesystem::path& folder);
 
+/// Where the bodies of a scene are from.
+enum class SceneOrigin : std::uint8_t {
+  built_in,  ///< a scene that the program knows by name
+  files,     ///< at least one body is read from a file
+  shapes,    ///< all bodies are made by formula
+};
+
 /// A scene before it is given a scalar.
 struct LoadedScene {
   std::string name;
   std::uint64_t seed = 1;
-  std::vector<io::AnimatedMesh> meshes;    ///< placed, in double
-  std::vector<std::string> sources;        ///< of each: its file, or how it was made
+  std::vector<io::AnimatedMesh> meshes;  ///< placed, in double
+  std::vector<std::string> sources;      ///< of each: its file, or how it was made
+  SceneOrigin origin = SceneOrigin::shapes;
   VertexOrder order = VertexOrder::given;  ///< `renumbered` is left to `assemble`
   std::optional<ReversalRule> reversal;    ///< of scenes that record their plan changes
   std::optional<ScriptSpec> script;        ///< plan changes of the user's own

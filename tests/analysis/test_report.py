@@ -75,11 +75,18 @@ class TestPage(ReportCase):
         lines = [line for line in small() if line["strategy"]["id"] == "bottom_up" and line["scene"]["per_keyframe"] == 1]
         for line in lines:
             line["verified"].update(looseness=0.0, candidates=line["verified"]["pairs"])
-            del line["counters"]
+            del line["counters"], line["bytes"]
             for name in ("total_p50", "total_p99", "total_worst"):
                 del line["times"][name]
         self.page(lines, figures="main")
         self.assertEqual({file.stem for file in (self.folder / "figures").iterdir()}, {"tablecloth-cost"})
+
+    def test_lines_over_l_are_drawn_at_the_size_with_most_l(self) -> None:
+        wanted = [c for c in synthetic.CONTESTANTS if c["id"] in ("bottom_up", "kinetic_aabb")]
+        lines = [synthetic.record(c, "tablecloth", n, "float", l) for c in wanted for n, l in ((2000, 1), (2000, 10), (9000, 10))]
+        page = self.page(lines, figures="main")
+        self.assertIn("Frames per keyframe: tablecloth, float, 2k primitives", page)
+        self.assertIn("Size: tablecloth, float, l = 10", page)
 
     def test_everything_from_results_is_escaped(self) -> None:
         lines = small()

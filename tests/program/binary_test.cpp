@@ -302,6 +302,41 @@ TEST_F(Binary, APlanSaysWhatTheCommandLineSays) {
   EXPECT_EQ(records()[0].at("scene").at("name"), "pair-shuffled");
 }
 
+TEST_F(Binary, StudiesOfAPlanCanBeRunOneByOne) {
+  write_text(folder_ / "ball.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  write_text(folder_ / "plan.json", R"({"name": "whole", "strategies": "bottom_up", "repetitions": 1, "l": 1,
+      "scenes": [{"builtin": "waving_sheet", "triangles": 50, "keyframes": 2}],
+      "studies": [{"name": "small"}, {"name": "large", "l": 2}, {"name": "large", "l": 3}, {"scenes": [
+        {"name": "mine", "bodies": [{"file": "ball.obj"}, "waving_sheet:triangles=50,keyframes=2"]},
+        {"name": "shape", "bodies": ["box", "waving_sheet:triangles=50,keyframes=2"]}]}],
+      "targets": [{"what": "t", "scenes": "mine", "scalar": "float", "l": 1, "at_least": 1, "aim": 2,
+        "numerator": {"strategy": "bottom_up", "phase": "update"},
+        "denominator": {"strategy": "bottom_up", "phase": "update"}}]})");
+  const Outcome large = kbvh("run --plan plan.json --study large --out out");
+  ASSERT_EQ(large.code, 0) << large.err;
+  auto list = records();
+  ASSERT_EQ(list.size(), 2u);
+  EXPECT_EQ(list[0].at("scene").at("per_keyframe"), 2);
+  EXPECT_EQ(list[1].at("scene").at("per_keyframe"), 3);
+  EXPECT_EQ(large.out.find("Targets"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/targets.json"));
+  // A study without a name has the plan's; what is there already is not measured again.
+  const Outcome two = kbvh("run --plan plan.json --study whole --study large --out out");
+  ASSERT_EQ(two.code, 0) << two.err;
+  EXPECT_NE(two.err.find("2 configurations measured, 2 were in"), std::string::npos) << two.err;
+  list = records();
+  ASSERT_EQ(list.size(), 4u);
+  EXPECT_EQ(list[0].at("scene").at("origin"), "built_in");
+  EXPECT_EQ(list[2].at("scene").at("origin"), "files");
+  EXPECT_EQ(list[3].at("scene").at("origin"), "shapes");
+  const Outcome wrong = kbvh("run --plan plan.json --study huge");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_NE(wrong.err.find("plan.json: there is no study 'huge'; known are small, large, whole"),
+            std::string::npos)
+      << wrong.err;
+  EXPECT_EQ(kbvh("run --study small").code, 2) << "--study is about a plan";
+}
+
 TEST_F(Binary, OrdersAreDifferentScenesOfTheSameGeometry) {
   const Outcome run =
       kbvh("run " + tiny + "--strategies bottom_up --order given,shuffled,renumbered --out out");

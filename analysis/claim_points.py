@@ -1,0 +1,369 @@
+"""Where a claim's check can be looked at in a study: values at scenes, sizes and l, beside what the check wants."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Optional
+
+import numpy as np
+
+import text
+from load import Study
+
+#: Phases that make up a time, in the names of claims.json.
+TIMES: dict[str, tuple[str, ...]] = {
+    "update": ("update", "plan_changes"),
+    "update with motion": ("motion", "update", "plan_changes"),
+    "update per keyframe": ("update", "plan_changes"),
+    "query": ("traversal", "triangle_tests"),
+    "total": ("update", "plan_changes", "traversal", "triangle_tests"),
+    "total with motion": ("motion", "update", "plan_changes", "traversal", "triangle_tests"),
+}
+#: Columns of what is counted.
+COUNTED: dict[str, str] = {
+    "events": "certificates_failed_per_frame",
+    "events per keyframe": "certificates_failed_per_frame",
+    "values": "values_written_per_frame",
+    "looseness": "looseness",
+    "false candidates": "false_candidates",
+}
+SLACK = 1.25  #: measured sizes reach a claimed one within this factor
+MEASURES = ("ratio", "value", "exponent", "next_l", "ten_l", "across")
+RELATIONS = ("<", "<=", ">", ">=", "within a factor of")
+
+
+class ClaimError(Exception):
+    """A claims.json that cannot be used; the text is one sentence."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number with the extremes that its repetitions allow (the same number where nothing is timed)."""
+
+    middle: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Point:
+    """A check's value at one place."""
+
+    baseline: str  #: id of the baseline, or "" where the check has none
+    quantity: str
+    scene: str
+    size: float
+    l: float
+    value: Value
+    met: bool
+    groups: tuple[str, ...]  #: tables that it is from
+    keys: tuple[str, ...]  #: records that it is from
+    of: str  #: the configurations, in words
+    close: bool  #: do repetitions disagree on whether the check is met?
+
+
+@dataclass
+class Looked:
+    """All points of one check, and what is missing to decide it."""
+
+    check: dict[str, Any]
+    points: list[Point] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+
+
+def met(check: dict[str, Any], value: float) -> bool:
+    """Does a value satisfy the check, its tolerance in the claim's favour?"""
+    bound, room = check["bound"], check["tolerance"] * abs(check["bound"])
+    relation = check["relation"]
+    if relation == "<":
+        return value < bound + room
+    if relation == "<=":
+        return value <= bound + room
+    if relation == ">":
+        return value > bound - room
+    if relation == ">=":
+        return value >= bound - room
+    if relation == "within a factor of":
+        factor = bound + room
+        return 1 / factor <= value <= factor
+    raise ClaimError(f'the relation "{relation}" is none of {", ".join(RELATIONS)}')
+
+
+#: Size, l and runs of one table.
+Place = tuple[float, float, list[dict[str, Any]]]
+
+
+class Table:
+    """The timed runs of a study as claims see them: one scalar, the last commit's, with sizes."""
+
+    def __init__(self, study: Study, scalar: str) -> None:
+        rows = study.timed
+        rows = rows[rows["scalar"] == scalar]
+        self.rows = rows.assign(size=rows["bodies"].map(largest_moving)).copy() if len(rows) else rows.assign(size=[])
+        self.rows["size"] = self.rows["size"].where(self.rows["size"] > 0, self.rows["primitives"])
+        self._row: dict[int, dict[str, Any]] = {int(row["run"]): row for row in self.rows.to_dict("records")}
+        repetitions = study.repetitions.sort_values(["run", "repetition"])
+        self._times = {int(run): times for run, times in repetitions.groupby("run")}
+        self._places: dict[str, list[Place]] = {}
+
+    def places(self, scene: str) -> list[Place]:
+        """Every table of a scene; of tables for the same size and l, the one measured last."""
+        if scene in self._places:
+            return self._places[scene]
+        found = self.rows[self.rows["scene"] == scene]
+        last: dict[tuple[float, float], list[dict[str, Any]]] = {}
+        for _, group in sorted(found.groupby(["group", "commit", "dirty"]), key=lambda item: item[1]["run"].max()):
+            rows = [self._row[int(run)] for run in group["run"]]
+            last[(float(rows[0]["size"]), float(rows[0]["l"]))] = rows
+        self._places[scene] = [(size, l, rows) for (size, l), rows in sorted(last.items(), key=lambda item: item[0])]
+        return self._places[scene]
+
+    def values(self, run: int, quantity: str) -> np.ndarray:
+        """The quantity of each repetition of a run; a single number where it is counted; empty if unknown."""
+        row = self._row[run]
+        scale = row["l"] if quantity.endswith("per keyframe") else 1.0
+        if quantity in TIMES:
+            return self._times[run][list(TIMES[quantity])].to_numpy(dtype=float).sum(axis=1) * scale
+        if quantity == "values per event":
+            events = row["certificates_failed_per_frame"]
+            known = [row["values_written_per_frame"] / events] if events > 0 else []
+        elif quantity in COUNTED:
+            steps = row["frames"] - 1  # the first frame belongs to no keyframe interval, and counts nothing
+            scale *= row["frames"] / steps if quantity.endswith("per keyframe") and steps > 0 else 1.0
+            known = [row[COUNTED[quantity]] * scale]
+        else:
+            raise ClaimError(f'there is no quantity "{quantity}"')
+        return np.array([value for value in known if math.isfinite(value)], dtype=float)
+
+    def chosen(self, rows: list[dict[str, Any]], term: dict[str, Any], quantity: str) -> Optional[int]:
+        """The run of a table that a term means: the fastest, or of counts the smallest, if several fit."""
+        best: Optional[tuple[float, int]] = None
+        for row in rows:
+            if not _fits(row, term, quantity):
+                continue
+            known = self.values(row["run"], quantity)
+            if len(known) and (best is None or float(np.median(known)) < best[0]):
+                best = (float(np.median(known)), int(row["run"]))
+        return None if best is None else best[1]
+
+    def row(self, run: int) -> dict[str, Any]:
+        """One run."""
+        return self._row[run]
+
+
+def _fits(row: dict[str, Any], term: dict[str, Any], quantity: str) -> bool:
+    """Is a run one that the term means?"""
+    if any(row[column] != term[name] for column, name in (("id", "strategy"), ("family", "family")) if name in term):
+        return False
+    if row["guarantee"] == "approximate" or row["id"] in term.get("not_for", {}).get(quantity, []):
+        return False
+    builder = row["builder"] if isinstance(row["builder"], dict) else {}
+    if any(builder.get(name) != value for name, value in term.get("builder", {}).items()):
+        return False
+    return all(str(row["params"].get(name, value)) == value for name, value in term.get("params", {}).items())
+
+
+def largest_moving(bodies: Any) -> float:
+    """Primitives of the largest body that moves; 0 if unknown."""
+    counts = [body.get("primitives") for body in bodies if isinstance(body, dict) and body.get("moving") is True]
+    return float(max((count for count in counts if isinstance(count, (int, float))), default=0))
+
+
+def quotient(table: Table, above: int, below: int, quantity: str) -> Optional[Value]:
+    """One run's quantity over another's: repetition by repetition within a session, else of medians."""
+    a, b = table.values(above, quantity), table.values(below, quantity)
+    if not len(a) or not len(b) or b.min() <= 0:
+        return None
+    together = table.row(above)["session"] == table.row(below)["session"]
+    if together and len(a) == len(b):
+        each = a / b
+        return Value(float(np.median(each)), float(each.min()), float(each.max()))
+    return Value(float(np.median(a) / np.median(b)), float(a.min() / b.max()), float(a.max() / b.min()))
+
+
+def words_of(term: dict[str, Any]) -> str:
+    """A term in words, for what is missing."""
+    settings = {**term.get("builder", {}), **term.get("params", {})}
+    told = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in settings.items())
+    who = term["strategy"] if "strategy" in term else f"any {term['family']}"
+    return f"{who} ({told})" if told else who
+
+
+class Looker:
+    """Looks at checks in one study."""
+
+    def __init__(self, table: Table, baselines: list[dict[str, Any]]) -> None:
+        self.table = table
+        self.baselines = baselines
+
+    def look(self, check: dict[str, Any]) -> Looked:
+        """All points of the check, and what is missing. Raises ClaimError for a check that makes no sense."""
+        if check["measure"] not in MEASURES:
+            raise ClaimError(f'the measure "{check["measure"]}" is none of {", ".join(MEASURES)}')
+        looked = Looked(check)
+        for quantity in check["quantities"]:
+            for baseline, above, below in self._sides(check):
+                for scene in check["scenes"]:
+                    points, missing = self._scene(check, quantity, baseline, above, below, scene)
+                    looked.points += points
+                    looked.missing += [one for one in missing if one not in looked.missing]
+                for scene in check.get("optional_scenes", []):
+                    looked.points += self._scene(check, quantity, baseline, above, below, scene)[0]
+        return looked
+
+    def _sides(self, check: dict[str, Any]) -> list[tuple[str, dict[str, Any], Optional[dict[str, Any]]]]:
+        """Baseline, the term above and the one below (None where there is but one), for each baseline that counts."""
+        above, below = check.get("numerator", check.get("of")), check.get("denominator")
+        if above is None or (check["measure"] == "ratio") != (below is not None):
+            raise ClaimError(f'the check "{check["what"]}" does not say what it is of')
+        if "baselines" not in (above, below):
+            return [("", above, below)]
+        return [
+            (one["id"], one if above == "baselines" else above, one if below == "baselines" else below)
+            for one in self.baselines
+        ]
+
+    def _scene(
+        self, check: dict[str, Any], quantity: str, baseline: str, above: dict[str, Any],
+        below: Optional[dict[str, Any]], scene: str,
+    ) -> tuple[list[Point], list[str]]:  # fmt: skip
+        """Points of one scene, and why they do not suffice."""
+        low, high = check["size"]
+        everywhere = self.table.places(scene)
+        if not everywhere:
+            return [], [f"results of the scene {scene}"]
+        places = [place for place in everywhere if low / SLACK <= place[0] <= high * SLACK]
+        wanted = f"{text.size(low)} to {text.size(high)}"
+        if not places:
+            there = text.listing([text.size(size) for size in sorted({place[0] for place in everywhere})])
+            return [], [f"{scene} of {wanted} polygons (measured: {there})"]
+        made = {
+            "ratio": self._ratio, "value": self._value, "exponent": self._exponent, "next_l": self._over_l,
+            "ten_l": self._over_l, "across": self._across,
+        }[check["measure"]](check, quantity, baseline, above, below, scene, places)  # fmt: skip
+        if not made:
+            terms = text.listing([words_of(term) for term in (above, below) if term is not None])
+            return [], [self._why_nothing(check, terms, scene, places)]
+        return made, self._gaps(check, scene, made)
+
+    @staticmethod
+    def _why_nothing(check: dict[str, Any], terms: str, scene: str, places: list[Any]) -> str:
+        depths = text.listing([f"{l:g}" for l in sorted({l for _, l, _ in places})])
+        sizes = len({size for size, _, _ in places})
+        if check["measure"] == "exponent":
+            return f"{check['least_sizes']} sizes of {scene} with events of {terms} ({sizes} measured)"
+        if check["measure"] in ("next_l", "ten_l"):
+            factor = "ten times apart " if check["measure"] == "ten_l" else ""
+            return f"timed runs of {terms} on {scene} at two l {factor}of one clip (measured: l = {depths})"
+        beside = f" and of {check['other_scene']}" if check["measure"] == "across" else ""
+        return f"timed runs of {terms} on {scene}{beside} in one table"
+
+    @staticmethod
+    def _gaps(check: dict[str, Any], scene: str, points: list[Point]) -> list[str]:
+        """What points do not cover of the claimed sizes and of l."""
+        low, high = check["size"]
+        sizes, deepest = sorted({one.size for one in points}), max(one.l for one in points)
+        gaps = []
+        if check["measure"] != "exponent" and not check.get("any_size"):
+            if sizes[0] > low * SLACK or sizes[-1] < high / SLACK:
+                there = text.listing([text.size(size) for size in sizes])
+                gaps.append(f"{scene} of {text.size(low)} to {text.size(high)} polygons (measured: {there})")
+        if deepest < check["l_reaches"]:
+            depths = text.listing([f"{l:g}" for l in sorted({one.l for one in points})])
+            gaps.append(f"{scene} at l = {check['l_reaches']:g} or more (measured: {depths})")
+        return gaps
+
+    def _point(self, check: dict[str, Any], quantity: str, baseline: str, scene: str, size: float, l: float,
+               value: Optional[Value], runs: list[int]) -> list[Point]:  # fmt: skip
+        if value is None or not math.isfinite(value.middle):
+            return []
+        rows = [self.table.row(run) for run in runs]
+        ends = {met(check, value.low), met(check, value.high)}
+        return [
+            Point(
+                baseline, quantity, scene, size, l, value, met(check, value.middle),
+                tuple(dict.fromkeys(str(row["group"]) for row in rows)), tuple(str(row["key"]) for row in rows),
+                " / ".join(dict.fromkeys(str(row["label"]) for row in rows)), len(ends) > 1,
+            )
+        ]  # fmt: skip
+
+    def _ratio(self, check, quantity, baseline, above, below, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+        points: list[Point] = []
+        for size, l, rows in places:
+            a, b = self.table.chosen(rows, above, quantity), self.table.chosen(rows, below, quantity)
+            if a is not None and b is not None:
+                value = quotient(self.table, a, b, quantity)
+                points += self._point(check, quantity, baseline, scene, size, l, value, [a, b])
+        return points
+
+    def _value(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+        points: list[Point] = []
+        for size, l, rows in places:
+            run = self.table.chosen(rows, of, quantity)
+            if run is not None:
+                known = self.table.values(run, quantity)
+                value = Value(float(np.median(known)), float(known.min()), float(known.max()))
+                points += self._point(check, quantity, baseline, scene, size, l, value, [run])
+        return points
+
+    def _exponent(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+        """The slope through logarithms at each l that has enough sizes; its extremes come from leaving one size out."""
+        points: list[Point] = []
+        for depth in sorted({l for _, l, _ in places}):
+            found = []
+            for size, l, rows in places:
+                run = self.table.chosen(rows, of, quantity) if l == depth else None
+                if run is not None and (known := float(np.median(self.table.values(run, quantity)))) > 0:
+                    found.append((size, known, run))
+            if len(found) < max(check["least_sizes"], 2):
+                continue
+            x, y = np.log([one[0] for one in found]), np.log([one[1] for one in found])
+            slope = lambda keep: float(np.polyfit(x[keep], y[keep], 1)[0])  # noqa: E731
+            every = np.ones(len(x), dtype=bool)
+            without = [slope(np.arange(len(x)) != i) for i in range(len(x))] if len(x) > 2 else [slope(every)]
+            value = Value(slope(every), min(without), max(without))
+            points += self._point(check, quantity, baseline, scene, found[-1][0], depth, value, [one[2] for one in found])
+        return points
+
+    def _over_l(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+        """At each size the next l over the one before it, or ten times an l over it; only within one clip."""
+        points: list[Point] = []
+        for size in sorted({size for size, _, _ in places}):
+            depths = [(l, rows) for at, l, rows in places if at == size]
+            pairs = list(zip(depths[:-1], depths[1:]))
+            if check["measure"] == "ten_l":
+                pairs = [(one, other) for one in depths for other in depths if other[0] == 10 * one[0]]
+            for (_, fewer), (l, more) in pairs:
+                a, b = self.table.chosen(more, of, quantity), self.table.chosen(fewer, of, quantity)
+                if a is None or b is None or not self._one_clip(a, b):
+                    continue
+                value = quotient(self.table, a, b, quantity)
+                points += self._point(check, quantity, baseline, scene, size, l, value, [a, b])
+        return points
+
+    def _one_clip(self, one: int, other: int) -> bool:
+        """Are two runs of the same scene over the same keyframe intervals?"""
+        a, b = self.table.row(one), self.table.row(other)
+        cut_alike = (a["frames"] - 1) * b["l"] == (b["frames"] - 1) * a["l"]
+        return bool(a["hash"] == b["hash"] and cut_alike and self._comparable(one, other))
+
+    def _comparable(self, one: int, other: int) -> bool:
+        """Are two runs of one machine and one commit?"""
+        a, b = self.table.row(one), self.table.row(other)
+        return all(a[name] == b[name] for name in ("machine", "commit", "dirty"))
+
+    def _across(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+        """Each place over the largest of the other scene at the same l."""
+        low, high = check["other_size"]
+        others: dict[float, int] = {}
+        for size, l, rows in self.table.places(check["other_scene"]):
+            if low / SLACK <= size <= high * SLACK and (run := self.table.chosen(rows, of, quantity)) is not None:
+                others[l] = run
+        points: list[Point] = []
+        for size, l, rows in places:
+            run = self.table.chosen(rows, of, quantity)
+            if run is not None and l in others and self._comparable(run, others[l]):
+                value = quotient(self.table, run, others[l], quantity)
+                points += self._point(check, quantity, baseline, scene, size, l, value, [run, others[l]])
+        return points
