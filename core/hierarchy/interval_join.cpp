@@ -90,9 +90,7 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
 
 template <class S>
 void IntervalJoin<S>::sort_by_begin() {
-  const auto bucket = [](const JoinedPair& pair) {
-    return std::min(buckets - 1, std::uint32_t(pair.begin * float(buckets)));
-  };
+  const auto bucket = [](const JoinedPair& pair) { return bucket_of(pair.begin); };
   std::uint32_t place[buckets] = {};
   for (const JoinedPair& pair : found_) ++place[bucket(pair)];
   std::uint32_t sum = 0;
@@ -106,30 +104,67 @@ void IntervalJoin<S>::sort_by_begin() {
   for (const JoinedPair& pair : found_) sorted_[place[bucket(pair)]++] = pair;
   next_ = 0;
   waiting_.clear();
+  alive_.clear();
+  alive_places_.clear();
+  next_ending_.resize(sorted_.size());
+  place_.resize(sorted_.size());
+  std::fill(std::begin(ending_), std::end(ending_), none);
+  present_ = 0;
+}
+
+template <class S>
+void IntervalJoin<S>::begin_pair(std::uint32_t index) {
+  const JoinedPair& pair = sorted_[index];
+  const std::uint32_t bucket = bucket_of(pair.end);
+  next_ending_[index] = ending_[bucket];
+  ending_[bucket] = index;
+  place_[index] = std::uint32_t(alive_.size());
+  alive_.push_back({body_a_, pair.primitive_a, body_b_, pair.primitive_b});
+  alive_places_.push_back(index);
+}
+
+template <class S>
+void IntervalJoin<S>::end_pair(std::uint32_t index) {
+  const std::uint32_t place = place_[index], last = alive_places_.back();
+  alive_[place] = alive_.back();
+  alive_places_[place] = last;
+  place_[last] = place;
+  alive_.pop_back();
+  alive_places_.pop_back();
 }
 
 template <class S>
 void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
-  const std::uint32_t open = bucket_end_[std::min(buckets - 1, std::uint32_t(fraction * float(buckets)))];
-  const std::size_t before = out.size(), old = waiting_.size();
-  const std::size_t room = old + (open - next_);
-  waiting_.resize(room);
-  for (std::uint32_t i = next_; i < open; ++i) waiting_[old + (i - next_)] = i;
-  next_ = open;
-  out.resize(before + room);
-  std::size_t found = 0, kept = 0;
-  PrimitivePair* const pairs = out.data() + before;
-  for (std::size_t i = 0; i < room; ++i) {
-    const std::uint32_t index = waiting_[i];
-    const JoinedPair pair = sorted_[index];
-    pairs[found] = {body_a_, pair.primitive_a, body_b_, pair.primitive_b};
-    waiting_[kept] = index;
-    const bool ended = pair.end < fraction;
-    found += !ended && pair.begin <= fraction ? 1 : 0;
-    kept += ended ? 0 : 1;
-  }
+  const std::uint32_t bucket = bucket_of(fraction);
+  // What begins: all of earlier buckets, some of the present one.
+  std::size_t kept = 0;
+  const auto begin_or_wait = [&](std::uint32_t index) {
+    const JoinedPair& pair = sorted_[index];
+    if (pair.begin > fraction)
+      waiting_[kept++] = index;
+    else if (pair.end >= fraction)
+      begin_pair(index);
+  };
+  const std::size_t before = waiting_.size();
+  waiting_.resize(before + (bucket_end_[bucket] - next_));
+  for (std::size_t i = 0; i < before; ++i) begin_or_wait(waiting_[i]);
+  for (; next_ < bucket_end_[bucket]; ++next_) begin_or_wait(next_);
   waiting_.resize(kept);
-  out.resize(before + found);
+  // What ends: the lists of earlier buckets as a whole.
+  for (; present_ < bucket; ++present_) {
+    for (std::uint32_t index = ending_[present_]; index != none; index = next_ending_[index]) end_pair(index);
+    ending_[present_] = none;
+  }
+  for (std::uint32_t* link = &ending_[bucket]; *link != none;) {
+    const std::uint32_t index = *link;
+    if (sorted_[index].end < fraction) {
+      *link = next_ending_[index];
+      end_pair(index);
+    } else {
+      link = &next_ending_[index];
+    }
+  }
+  out.insert(out.end(), alive_.begin(), alive_.end());
 }
 
 template <class S>
@@ -140,7 +175,9 @@ std::size_t IntervalJoin<S>::bytes() const {
         (own.rows[0].size() + own.rows[1].size()) * sizeof(S) + own.stamps.size() * sizeof(std::uint32_t);
   return total + stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
          (chunk_.size() + found_.capacity() + sorted_.capacity()) * sizeof(JoinedPair) +
-         waiting_.capacity() * sizeof(std::uint32_t);
+         alive_.capacity() * sizeof(PrimitivePair) +
+         (waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() + place_.capacity()) *
+             sizeof(std::uint32_t);
 }
 
 template class IntervalJoin<float>;

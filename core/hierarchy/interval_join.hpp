@@ -15,7 +15,7 @@ class IntervalJoin {
   void join(LinearBounds<S>& bounds, std::uint32_t body_a, std::uint32_t body_b, std::uint64_t& tests);
 
   /// Appends the pairs whose boxes overlap at a fraction of the segment, which never decreases within one.
-  /// O(pairs that overlap then or did at the last call).
+  /// O(pairs that begin or end since the last call), and one copy of those that overlap.
   void read(float fraction, PairBuffer& out);
   /// All pairs of the segment, in the order in which they begin, roughly.
   std::span<const JoinedPair> pairs() const { return {sorted_.data(), sorted_.size()}; }
@@ -25,8 +25,14 @@ class IntervalJoin {
   std::size_t bytes() const;
 
  private:
-  static constexpr std::uint32_t buckets = 64;
+  static constexpr std::uint32_t buckets = 256, none = ~std::uint32_t(0);
+  static std::uint32_t bucket_of(float fraction) {
+    const auto bucket = std::uint32_t(fraction * float(buckets));
+    return bucket < buckets ? bucket : buckets - 1;
+  }
   void sort_by_begin();
+  void begin_pair(std::uint32_t index);
+  void end_pair(std::uint32_t index);
   WideLinearLeaves<S> leaves(typename LinearBounds<S>::Side& side, std::uint32_t which);
 
   /// Rows of one body's primitives at both ends, made where the join comes.
@@ -42,9 +48,14 @@ class IntervalJoin {
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
   std::vector<JoinedPair> chunk_, found_, sorted_;
-  std::uint32_t bucket_end_[buckets] = {};
-  std::uint32_t next_ = 0;  ///< in sorted_: those before it have begun, or are in `waiting_`
-  std::vector<std::uint32_t> waiting_;
+  std::uint32_t bucket_end_[buckets] = {};  ///< in sorted_
+  std::uint32_t next_ = 0;                  ///< in sorted_: those before it have begun, or are in `waiting_`
+  std::vector<std::uint32_t> waiting_;      ///< of the present bucket
+  PairBuffer alive_;                        ///< at the last `read`
+  std::vector<std::uint32_t> alive_places_, place_;  ///< their places in sorted_, and back
+  /// Pairs that are alive, in lists by the bucket in which they end.
+  std::uint32_t ending_[buckets] = {}, present_ = 0;
+  std::vector<std::uint32_t> next_ending_;
 };
 
 extern template class IntervalJoin<float>;
