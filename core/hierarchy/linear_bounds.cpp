@@ -45,10 +45,10 @@ void LinearBounds<S>::choose_segment(double t) {
     rest = rest && motion_.at_rest(body);
   }
   if (rest || begin == -std::numeric_limits<double>::infinity()) begin = t;
-  // Plans without an end: some frames ahead, as far as can be told.
+  // Plans without an end: as many frames ahead as they have lasted lately, as far as can be told.
   if (!rest && end == std::numeric_limits<double>::infinity()) {
     begin = std::max(begin, t);
-    end = t + (t > last_ ? 16 * (t - last_) : 1.0 / 16);
+    end = t + 1.01 * foreseen_ * (step_ > 0 ? step_ : 1.0 / 64);
     begin_ = begin;
     end_ = end;
     return;
@@ -92,12 +92,20 @@ void LinearBounds<S>::make_margin(Side& side) const {
 template <class S>
 void LinearBounds<S>::start() {
   last_ = motion_.time();
+  step_ = 0;
+  foreseen_ = 1;
   std::fill(refits_.begin(), refits_.end(), 0);
-  plans_changed();
+  restart();
 }
 
 template <class S>
 void LinearBounds<S>::plans_changed() {
+  foreseen_ = std::max(1.0, foreseen_ / 2);
+  restart();
+}
+
+template <class S>
+void LinearBounds<S>::restart() {
   for (Side& side : sides_) side.current = false;
   end_ = none;
   advance();
@@ -107,12 +115,11 @@ template <class S>
 bool LinearBounds<S>::advance() {
   const double t = motion_.time(), before = end_;
   const bool anew = end_ == none;
-  if (!anew && t <= end_) {
-    last_ = t;
-    return false;
-  }
-  choose_segment(t);
+  if (t > last_) step_ = t - last_;
   last_ = t;
+  if (!anew && t <= end_) return false;
+  if (!anew) foreseen_ = std::min(16.0, 2 * foreseen_);
+  choose_segment(t);
   const bool goes_on = !anew && begin_ == before;
   for (std::uint32_t body = 0; body < body_count(); ++body) {
     Side& side = sides_[body];

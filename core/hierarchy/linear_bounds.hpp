@@ -68,6 +68,7 @@ class LinearBounds {
   std::size_t bytes() const;
 
  private:
+  void restart();
   void choose_segment(double t);
   bool make_end(std::uint32_t body, std::uint32_t end, double t);
   void make_margin(Side& side) const;
@@ -75,7 +76,9 @@ class LinearBounds {
   SceneView<S> scene_;
   SegmentMotion<S> motion_;
   std::uint32_t pieces_;
-  double begin_ = 0, end_ = 0, last_ = 0;
+  double begin_ = 0, end_ = 0;
+  double last_ = 0, step_ = 0;  ///< time of the last frame, and from the one before
+  double foreseen_ = 1;         ///< frames that a segment without an end is made for
   std::vector<Side> sides_;
   std::vector<std::uint64_t> refits_;
 };

@@ -1,6 +1,8 @@
 // Targets of plans: what is refused before anything is measured, and what the rows say of given records.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include <functional>
 
 #include "experiments/contestants.hpp"
@@ -80,15 +82,15 @@ TEST(Targets, ErrorsNameFileTargetAndKey) {
     EXPECT_EQ(without(key), std::string("p.json: targets[0]: ") + key + ": is missing");
   EXPECT_EQ(with("/extra", 1),
             "p.json: targets[0]: there is no key 'extra'; known are aim, at_least, denominator, l, note, "
-            "numerator, "
-            "scalar, scenes, what");
+            "numerator, over, scalar, scenes, what");
   EXPECT_EQ(
       with("/numerator/extra", 1),
       "p.json: targets[0]: numerator: there is no key 'extra'; known are builder, params, phase, strategy");
   EXPECT_EQ(
       with("/denominator/phase", "lunch"),
       "p.json: targets[0]: denominator: phase: expected one of motion, update, traversal, triangle_tests, "
-      "query, total, got 'lunch'");
+      "query, candidates, total, got 'lunch'");
+  EXPECT_EQ(with("/over", "all"), "p.json: targets[0]: over: expected worst or geometric_mean, got 'all'");
   EXPECT_EQ(with("/numerator", "bottom_up"),
             "p.json: targets[0]: numerator: expected an object with named members, got \"bottom_up\"");
   EXPECT_EQ(with("/scalar", "half"), "p.json: targets[0]: scalar: expected float or double, got 'half'");
@@ -213,6 +215,31 @@ TEST(Targets, TheWorstSceneAndTheFastestConfigurationCount) {
   EXPECT_EQ(scenes[0].at("counts"), true);
   EXPECT_EQ(scenes[2].at("ratio"), 0.5);
   EXPECT_EQ(scenes[2].at("counts"), false);
+}
+
+TEST(Targets, GeometricMeansAreOverAllScenesThatCount) {
+  json plan = example_plan();
+  plan["targets"][0]["over"] = "geometric_mean";
+  const json row = row_of(plan, example_groups());
+  EXPECT_EQ(row.at("over"), "geometric_mean");
+  EXPECT_DOUBLE_EQ(row.at("measured").get<double>(), std::sqrt(3.0 * 2.5));
+  const json &sheet = row.at("per_scene")[0].at("confidence_interval"),
+             &soup = row.at("per_scene")[1].at("confidence_interval");
+  for (const std::size_t end : {0u, 1u})
+    EXPECT_DOUBLE_EQ(row.at("confidence_interval")[end].get<double>(),
+                     std::sqrt(sheet[end].get<double>() * soup[end].get<double>()));
+  EXPECT_NE(targets_table(json::array({row})).find("mean of 2"), std::string::npos);
+  auto groups = example_groups();
+  groups.erase(groups.begin() + 1);
+  EXPECT_EQ(row_of(plan, groups).at("verdict"), "unmeasured") << "a scene that counts is missing";
+}
+
+TEST(Targets, CandidatesAreUpdateTraversalAndPlanChanges) {
+  json plan = example_plan();
+  plan["targets"][0]["scenes"] = "sheet";
+  plan["targets"][0]["numerator"]["phase"] = "candidates";
+  plan["targets"][0]["denominator"]["phase"] = "query";
+  EXPECT_EQ(row_of(plan, example_groups()).at("measured"), 14.0 / 3.0);
 }
 
 TEST(Targets, Verdicts) {
