@@ -8,6 +8,7 @@ namespace {
 /// Leaf pairs that are collected before they are turned into pairs of primitives: few enough to stay in the
 /// cache.
 constexpr std::size_t leaf_pair_room = 2048;
+/// Room for pairs of primitives that is made at least.
 constexpr std::size_t chunk_room = 2048;
 }  // namespace
 
@@ -40,14 +41,13 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
                            std::uint64_t& tests) {
   body_a_ = body_a;
   body_b_ = body_b;
-  found_.clear();
+  std::size_t found = 0;
   auto &a = bounds.side(body_a), &b = bounds.side(body_b);
   if (!a.hierarchy.empty() && !b.hierarchy.empty()) {
     const std::uint32_t width = a.hierarchy.topology().width;
     const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(a.hierarchy.kernels());
     stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
     leaf_pairs_.resize(2 * leaf_pair_room);
-    chunk_.resize(chunk_room);
     const auto no_limit = Budget{}.box_tests;
     WideTraversal state{stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pair_room, 1, no_limit};
     // A root that is a leaf lies in a node's only lane, so that the roots are compared with each other there.
@@ -61,9 +61,9 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
                               leaf_pairs_.data(),
                               0,
                               0,
-                              chunk_.data(),
+                              nullptr,
                               0,
-                              chunk_room,
+                              0,
                               0};
     const auto pairs_of_leaves = kernels.leaf_join(
         width, std::max(4u, std::max(a.hierarchy.padded_leaf_size(), b.hierarchy.padded_leaf_size())));
@@ -72,9 +72,10 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
       leaf_join.next = 0;
       leaf_join.count = state.found;
       while (leaf_join.next < leaf_join.count) {
+        if (found_.size() < leaf_join.found + chunk_room) found_.resize(2 * leaf_join.found + chunk_room);
+        leaf_join.out = found_.data();
+        leaf_join.out_room = found_.size();
         pairs_of_leaves(leaf_join);
-        found_.insert(found_.end(), chunk_.begin(), chunk_.begin() + std::ptrdiff_t(leaf_join.found));
-        leaf_join.found = 0;
       }
       state.found = 0;
       if (state.depth + wide_step >= state.stack_room) {
@@ -84,15 +85,16 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
       }
     }
     tests += state.tests + leaf_join.tests;
+    found = leaf_join.found;
   }
-  sort_by_begin();
+  sort_by_begin({found_.data(), found});
 }
 
 template <class S>
-void IntervalJoin<S>::sort_by_begin() {
+void IntervalJoin<S>::sort_by_begin(std::span<const JoinedPair> found) {
   const auto bucket = [](const JoinedPair& pair) { return bucket_of(pair.begin); };
   std::uint32_t place[buckets] = {};
-  for (const JoinedPair& pair : found_) ++place[bucket(pair)];
+  for (const JoinedPair& pair : found) ++place[bucket(pair)];
   std::uint32_t sum = 0;
   for (std::uint32_t k = 0; k < buckets; ++k) {
     const std::uint32_t count = place[k];
@@ -100,12 +102,15 @@ void IntervalJoin<S>::sort_by_begin() {
     sum += count;
     bucket_end_[k] = sum;
   }
-  sorted_.resize(found_.size());
-  for (const JoinedPair& pair : found_) sorted_[place[bucket(pair)]++] = pair;
+  sorted_.resize(found.size());
+  for (const JoinedPair& pair : found) sorted_[place[bucket(pair)]++] = pair;
   next_ = 0;
   waiting_.clear();
-  alive_.clear();
-  alive_places_.clear();
+  alive_count_ = 0;
+  if (alive_.size() < sorted_.size()) {
+    alive_.resize(sorted_.size());
+    alive_places_.resize(sorted_.size());
+  }
   next_ending_.resize(sorted_.size());
   place_.resize(sorted_.size());
   std::fill(std::begin(ending_), std::end(ending_), none);
@@ -114,23 +119,21 @@ void IntervalJoin<S>::sort_by_begin() {
 
 template <class S>
 void IntervalJoin<S>::begin_pair(std::uint32_t index) {
-  const JoinedPair& pair = sorted_[index];
-  const std::uint32_t bucket = bucket_of(pair.end);
+  const JoinedPair pair = sorted_[index];
+  const std::uint32_t bucket = bucket_of(pair.end), place = alive_count_++;
   next_ending_[index] = ending_[bucket];
   ending_[bucket] = index;
-  place_[index] = std::uint32_t(alive_.size());
-  alive_.push_back({body_a_, pair.primitive_a, body_b_, pair.primitive_b});
-  alive_places_.push_back(index);
+  place_[index] = place;
+  alive_[place] = {body_a_, pair.primitive_a, body_b_, pair.primitive_b};
+  alive_places_[place] = index;
 }
 
 template <class S>
 void IntervalJoin<S>::end_pair(std::uint32_t index) {
-  const std::uint32_t place = place_[index], last = alive_places_.back();
-  alive_[place] = alive_.back();
-  alive_places_[place] = last;
-  place_[last] = place;
-  alive_.pop_back();
-  alive_places_.pop_back();
+  const std::uint32_t place = place_[index], last = --alive_count_;
+  alive_[place] = alive_[last];
+  alive_places_[place] = alive_places_[last];
+  place_[alive_places_[place]] = place;
 }
 
 template <class S>
@@ -164,7 +167,7 @@ void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
       link = &next_ending_[index];
     }
   }
-  out.insert(out.end(), alive_.begin(), alive_.end());
+  out.insert(out.end(), alive_.begin(), alive_.begin() + std::ptrdiff_t(alive_count_));
 }
 
 template <class S>
@@ -174,7 +177,7 @@ std::size_t IntervalJoin<S>::bytes() const {
     total +=
         (own.rows[0].size() + own.rows[1].size()) * sizeof(S) + own.stamps.size() * sizeof(std::uint32_t);
   return total + stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
-         (chunk_.size() + found_.capacity() + sorted_.capacity()) * sizeof(JoinedPair) +
+         (found_.capacity() + sorted_.capacity()) * sizeof(JoinedPair) +
          alive_.capacity() * sizeof(PrimitivePair) +
          (waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() + place_.capacity()) *
              sizeof(std::uint32_t);

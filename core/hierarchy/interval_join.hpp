@@ -30,7 +30,7 @@ class IntervalJoin {
     const auto bucket = std::uint32_t(fraction * float(buckets));
     return bucket < buckets ? bucket : buckets - 1;
   }
-  void sort_by_begin();
+  void sort_by_begin(std::span<const JoinedPair> found);
   void begin_pair(std::uint32_t index);
   void end_pair(std::uint32_t index);
   WideLinearLeaves<S> leaves(typename LinearBounds<S>::Side& side, std::uint32_t which);
@@ -47,11 +47,12 @@ class IntervalJoin {
   Leaves leaves_[2];
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
-  std::vector<JoinedPair> chunk_, found_, sorted_;
+  std::vector<JoinedPair> found_, sorted_;
   std::uint32_t bucket_end_[buckets] = {};  ///< in sorted_
   std::uint32_t next_ = 0;                  ///< in sorted_: those before it have begun, or are in `waiting_`
   std::vector<std::uint32_t> waiting_;      ///< of the present bucket
-  PairBuffer alive_;                        ///< at the last `read`
+  PairBuffer alive_;                        ///< the first `alive_count_` of them, at the last `read`
+  std::uint32_t alive_count_ = 0;
   std::vector<std::uint32_t> alive_places_, place_;  ///< their places in sorted_, and back
   /// Pairs that are alive, in lists by the bucket in which they end.
   std::uint32_t ending_[buckets] = {}, present_ = 0;

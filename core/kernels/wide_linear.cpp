@@ -92,6 +92,18 @@ template <class S, class V>
 /// More than all rounding of a fraction, of `together` and of frames alike.
 constexpr float fraction_slack = 0x1p-20f;
 
+/// Bits of the lanes that no side keeps apart at the begin, or none at the end.
+template <class S, class V>
+[[gnu::always_inline]] inline unsigned together_at_an_end(const Gaps<S, V>& gaps) {
+  V first = gaps.first[0], last = gaps.last[0];
+  for (std::size_t k = 1; k < 6; ++k) {
+    first = larger(first, gaps.first[k]);
+    last = larger(last, gaps.last[k]);
+  }
+  const V zero = V{} + S(0);
+  return mask_bits(first <= zero) | mask_bits(last <= zero);
+}
+
 /// Bit i: lane i of the rows overlaps the box at some time. With `times`, their fractions go to begin and
 /// end.
 template <class S, std::size_t width, bool times>
@@ -103,33 +115,20 @@ template <class S, std::size_t width, bool times>
   unsigned bits = 0;
   for (std::size_t i = 0; i < width; i += lanes) {
     Gaps<S, V> gaps;
-    V apart, at_first, at_last;
+    V apart;
     for (std::size_t k = 0; k < 6; ++k) {
       const V d0 = load_lanes<V>(first + k * width + i) - reach.bound[0][k];
       const V d1 = load_lanes<V>(last + k * width + i) - reach.bound[1][k];
       gaps.first[k] = d0;
       gaps.last[k] = d1;
       apart = k == 0 ? smaller(d0, d1) : larger(apart, smaller(d0, d1));
-      at_first = k == 0 ? d0 : larger(at_first, d0);
-      at_last = k == 0 ? d1 : larger(at_last, d1);
     }
     const V zero = V{} + S(0);
-    unsigned hit = 0, open = 0;
-    if constexpr (lanes == 1) {
-      hit = apart <= zero ? 1U : 0U;
-      open = hit != 0 && at_first > zero && at_last > zero ? 1U : 0U;
-    } else {
-      const auto maybe = apart <= zero;
-      hit = mask_bits(maybe);
-      open = mask_bits(maybe & (at_first > zero) & (at_last > zero));
-    }
-    if (times ? hit != 0 : open != 0) {
+    unsigned hit = mask_bits(apart <= zero);
+    if (times ? hit != 0 : (hit & ~together_at_an_end(gaps)) != 0) {
       V from, to;
       together<S, V>(gaps, from, to);
-      if constexpr (lanes == 1)
-        hit = from > to + 2 * S(fraction_slack) ? 0U : hit;
-      else
-        hit &= ~(mask_bits(from > to + 2 * S(fraction_slack)) & open);
+      hit &= ~mask_bits(from > to + 2 * S(fraction_slack));
       if constexpr (times) {
         store_lanes(begin + i, from);
         store_lanes(end + i, to);
