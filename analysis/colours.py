@@ -22,11 +22,11 @@ FAMILIES: dict[str, tuple[str, str]] = {
     "bullet": ("#E69F00", "v"),
     "embree": ("#CC79A7", "P"),
     "lazy": ("#8C7A00", "<"),
+    "linear": ("#882255", "h"),
 }
 
 #: What families that are not known choose from.
 FREE: tuple[tuple[str, str], ...] = (
-    ("#882255", "h"),
     ("#44AA99", "p"),
     ("#5D4A9C", ">"),
     ("#AA4499", "8"),
