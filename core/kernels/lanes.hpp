@@ -4,6 +4,11 @@
 // "portable" has vectors of one lane, which are plain numbers: the same source, without any extension.
 #include <cstddef>
 #include <cstdint>
+// A header that is compiled by itself, for no instruction set, is portable.
+#if !defined(KBVH_KERNELS_avx512) && !defined(KBVH_KERNELS_avx2) && !defined(KBVH_KERNELS_sse) && \
+    !defined(KBVH_KERNELS_portable)
+#define KBVH_KERNELS_portable
+#endif
 #if !defined(KBVH_KERNELS_portable)
 #include <immintrin.h>
 #endif
