@@ -1,6 +1,6 @@
-// Bullet 3.24 (Coumans) as contestants: its quantised triangle-mesh hierarchy, and its dynamic tree.
+// Bullet's quantised triangle-mesh hierarchy (Coumans, Bullet 3.24) as a contestant: btOptimizedBvh, kept up
+// to date by refit().
 //
-// bullet_bvh: btOptimizedBvh with quantisation, kept up to date by refit().
 // - Without quantisation refit() silently does nothing, so it is always quantised.
 // - refit() enlarges the bounds in which it quantises by 1.0, whatever the unit: a mesh of a few centimetres
 // is
@@ -16,108 +16,20 @@
 //   primitive of the smaller body. Its walk of two trees is not open to users, so the default `query=trees`
 //   descends both of Bullet's node arrays here, which is faster; the overlap test is Bullet's.
 // - A primitive index has 21 bits.
-//
-// bullet_dbvt: btDbvt with one leaf per primitive, tree by optimizeTopDown(), queries by collideTT.
-// - Bullet updates it leaf by leaf (`update=leaves`): each leaf is removed and inserted again, which also
-// changes
-//   the tree. The default `update=refit` recomputes the volumes of all nodes instead, children first, by
-//   Bullet's Merge; that loop is not in Bullet, but an order of magnitude faster. Boxes are tight either way.
-// - The tree is first built by insertion: identical boxes make a list of it before it is optimised.
-//
-// Both are float, as Debian's Bullet, and take float scenes only; both know triangles only or boxes. A
-// primitive of more than 3 vertices is given to btOptimizedBvh as the triangle (lower, upper, first vertex),
-// which has the polygon's box.
-#include <BulletCollision/BroadphaseCollision/btDbvt.h>
+// - A primitive of more than 3 vertices is given to it as the triangle (lower, upper, first vertex), which
+// has
+//   the polygon's box.
+#include "bullet.hpp"
+
 #include <BulletCollision/CollisionShapes/btOptimizedBvh.h>
 #include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
 #include <LinearMath/btAabbUtil2.h>
 
-#include <algorithm>
 #include <cmath>
 #include <type_traits>
 
-#include "core/registry.hpp"
-
-#ifdef BT_USE_DOUBLE_PRECISION
-#error "this adapter is for Bullet in float"
-#endif
-
-namespace kbvh {
+namespace kbvh::bullet {
 namespace {
-
-btVector3 vector(const float* p) {
-  return btVector3(p[0], p[1], p[2]);
-}
-
-/// Lays a binary tree out as an audit wants it: siblings next to each other and after their parent.
-/// `children(node)` is a pair of handles, `primitive(node)` a primitive id or -1 for inner nodes.
-template <class Handle, class Primitive, class Children, class BoxOf>
-AuditView breadth_first(Handle root, const Primitive& primitive, const Children& children, const BoxOf& box) {
-  AuditView view;
-  std::vector<Handle> handles{root};
-  view.topology.parents.push_back(0);
-  view.topology.depths.push_back(0);
-  for (std::uint32_t i = 0; i < handles.size(); ++i) {
-    const Handle node = handles[i];
-    view.boxes.push_back(box(node));
-    if (const int id = primitive(node); id >= 0) {
-      view.topology.nodes.push_back(TopologyNode::leaf(std::uint32_t(view.topology.primitives.size()), 1));
-      view.topology.primitives.push_back(std::uint32_t(id));
-      continue;
-    }
-    view.topology.nodes.push_back(TopologyNode::inner(std::uint32_t(handles.size()), 2));
-    const auto [left, right] = children(node);
-    for (const Handle child : {left, right}) {
-      handles.push_back(child);
-      view.topology.parents.push_back(i);
-      view.topology.depths.push_back(std::uint8_t(std::min(255, view.topology.depths[i] + 1)));
-    }
-  }
-  return view;
-}
-
-/// What both have in common: which bodies move, and that time does not run backwards.
-template <class Count>
-class Bullet : public Strategy<float> {
- public:
-  static constexpr Foresight foresight = Foresight::none;
-
-  Bullet(const SceneView<float>& scene, const SampledMotion<float>& motion)
-      : Strategy<float>(scene, motion), moves_(scene.body_count()) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
-      moves_[body] = scene.moving(body);
-      for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
-    }
-  }
-
-  void reset(double t) final {
-    this->start_at(t);
-    update_all();
-    count_.table = {};
-  }
-
-  void advance(double t) final {
-    this->move_to(t);
-    update_moving();
-  }
-
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<float>> changes) final {
-    for (const auto& change : changes) moves_[change.body] = true;
-  }
-
- protected:
-  virtual void update_all() = 0;
-  virtual void update_moving() = 0;
-  Counters counted() const final { return count_.table; }
-  void count_refit(std::uint64_t primitives) {
-    count_.add(Counter::nodes_visited, 2 * primitives - 1);
-    count_.add(Counter::values_written, 6 * (2 * primitives - 1));
-    count_.add(Counter::vertex_reads, 3 * primitives);
-  }
-
-  std::vector<std::uint8_t> moves_;
-  Count count_;
-};
 
 /// Collects what one box overlaps in a quantised tree.
 class BoxHits final : public btNodeOverlapCallback {
@@ -133,13 +45,13 @@ class BoxHits final : public btNodeOverlapCallback {
 };
 
 template <class S, class Count>
-class BulletBvh final : public Bullet<Count> {
+class BulletBvh final : public Contestant<Count> {
   static_assert(std::is_same_v<S, float>);
 
  public:
   BulletBvh(const SceneView<float>& scene, const SampledMotion<float>& motion, Topologies /*none*/,
             const Params& params)
-      : Bullet<Count>(scene, motion),
+      : Contestant<Count>(scene, motion),
         scaled_(params.word("scale") == "fit"),
         trees_(params.word("query") == "trees"),
         bodies_(scene.body_count()) {
@@ -416,215 +328,22 @@ class BulletBvh final : public Bullet<Count> {
   BoxHits hits_;
 };
 
-/// Collects overlapping leaves of two dynamic trees.
-class LeafHits final : public btDbvt::ICollide {
- public:
-  BodyPair bodies{};
-  PairBuffer* out = nullptr;
-
-  using btDbvt::ICollide::Process;
-  void Process(const btDbvtNode* a, const btDbvtNode* b) override {
-    out->push_back({bodies.first, std::uint32_t(a->dataAsInt), bodies.second, std::uint32_t(b->dataAsInt)});
-  }
-};
-
-template <class S, class Count>
-class BulletDbvt final : public Bullet<Count> {
-  static_assert(std::is_same_v<S, float>);
-
- public:
-  BulletDbvt(const SceneView<float>& scene, const SampledMotion<float>& motion, Topologies /*none*/,
-             const Params& params)
-      : Bullet<Count>(scene, motion), refits_(params.word("update") == "refit"), bodies_(scene.body_count()) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) build(body);
-  }
-
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
-    hits_.out = &out;
-    for (const BodyPair& pair : this->scene_.pairs()) {
-      hits_.bodies = pair;
-      // As collideTT, with a stack that stays allocated.
-      bodies_[pair.first].tree.collideTTpersistentStack(bodies_[pair.first].tree.m_root,
-                                                        bodies_[pair.second].tree.m_root, hits_);
-    }
-    return {};
-  }
-
-  std::optional<AuditView> audit_view(std::uint32_t body) const override {
-    const btDbvtNode* root = bodies_[body].tree.m_root;
-    if (root == nullptr) return AuditView{};
-    return breadth_first(
-        root, [](const btDbvtNode* node) { return node->isleaf() ? node->dataAsInt : -1; },
-        [](const btDbvtNode* node) {
-          return std::pair<const btDbvtNode*, const btDbvtNode*>(node->childs[0], node->childs[1]);
-        },
-        [](const btDbvtNode* node) {
-          Box<double> box;
-          for (int axis = 0; axis < 3; ++axis) {
-            box.lower[axis] = double(node->volume.Mins()[axis]);
-            box.upper[axis] = double(node->volume.Maxs()[axis]);
-          }
-          return box;
-        });
-  }
-
-  std::size_t bytes() const override {
-    std::size_t total = 0;
-    for (const BodyState& state : bodies_) {
-      const auto leaves = std::size_t(state.tree.m_leaves);
-      total += sizeof(btDbvt) + (leaves == 0 ? 0 : 2 * leaves - 1) * sizeof(btDbvtNode) +
-               state.nodes.size() * sizeof(btDbvtNode*);
-    }
-    return total;
-  }
-
- private:
-  struct BodyState {
-    btDbvt tree;
-    std::vector<btDbvtNode*> nodes;  // refit: all, children before parents; else leaves by primitive
-  };
-
-  btDbvtVolume volume(std::uint32_t body, int primitive) const {
-    const Box<float> box = primitive_box(this->scene_.primitives(body)[std::uint32_t(primitive)],
-                                         this->sampled_.positions(body));
-    return btDbvtVolume::FromMM(vector(box.lower), vector(box.upper));
-  }
-
-  void build(std::uint32_t body) {
-    BodyState& state = bodies_[body];
-    const std::uint32_t count = this->scene_.primitives(body).count();
-    if (count == 0) return;
-    {
-      // Insertion and optimizeTopDown() multiply extents: far from 1 they overflow, and the latter then
-      // writes out of bounds. The shape of the tree is decided at a sane size; true volumes follow below.
-      const float scale = sane_scale(body);
-      btDbvt grown;
-      for (int p = 0; p < int(count); ++p) {
-        const btDbvtVolume real = volume(body, p);
-        grown.insert(btDbvtVolume::FromMM(real.Mins() * scale, real.Maxs() * scale), nullptr)->dataAsInt = p;
-      }
-      grown.optimizeTopDown();
-      // The copy has its nodes in memory as a descent meets them: both refits and queries profit.
-      btDbvt::IClone nothing_more;
-      grown.clone(state.tree, &nothing_more);
-      state.tree.m_leaves = grown.m_leaves;  // which clone() forgets
-    }
-    state.nodes.resize(refits_ ? 0 : count);
-    std::vector<btDbvtNode*> stack{state.tree.m_root};
-    while (!stack.empty()) {
-      btDbvtNode* node = stack.back();
-      stack.pop_back();
-      if (refits_) state.nodes.push_back(node);
-      if (node->isleaf()) {
-        if (!refits_) state.nodes[std::size_t(node->dataAsInt)] = node;
-        continue;
-      }
-      // clone() puts the node at place i of its stack into childs[i & 1]; so this order is that of the
-      // memory.
-      const std::size_t place = stack.size();
-      stack.push_back(node->childs[place & 1]);
-      stack.push_back(node->childs[(place + 1) & 1]);
-    }
-    // Children before parents, and true volumes in place of the scaled ones.
-    std::vector<btDbvtNode*> order;
-    stack = {state.tree.m_root};
-    while (!stack.empty()) {
-      btDbvtNode* node = stack.back();
-      stack.pop_back();
-      order.push_back(node);
-      if (node->isleaf()) continue;
-      stack.push_back(node->childs[0]);
-      stack.push_back(node->childs[1]);
-    }
-    std::reverse(order.begin(), order.end());
-    for (btDbvtNode* node : order) set_volume(body, *node);
-    if (refits_) std::reverse(state.nodes.begin(), state.nodes.end());
-  }
-
-  /// A power of two that brings the body's coordinates to about 1000.
-  float sane_scale(std::uint32_t body) const {
-    float largest = 0;
-    for (std::uint32_t p = 0; p < this->scene_.primitives(body).count(); ++p) {
-      const btDbvtVolume v = volume(body, int(p));
-      for (int axis = 0; axis < 3; ++axis)
-        largest = std::max({largest, std::abs(v.Mins()[axis]), std::abs(v.Maxs()[axis])});
-    }
-    if (largest == 0) return 1;
-    return std::ldexp(1.0F, std::clamp(10 - std::ilogb(largest), -126, 126));
-  }
-
-  void set_volume(std::uint32_t body, btDbvtNode& node) const {
-    if (node.isleaf())
-      node.volume = volume(body, node.dataAsInt);
-    else
-      Merge(node.childs[0]->volume, node.childs[1]->volume, node.volume);
-  }
-
-  void update(std::uint32_t body) {
-    BodyState& state = bodies_[body];
-    if (state.nodes.empty()) return;
-    if (refits_) {
-      for (btDbvtNode* node : state.nodes) set_volume(body, *node);
-      this->count_refit(this->scene_.primitives(body).count());
-      return;
-    }
-    for (std::size_t p = 0; p < state.nodes.size(); ++p) {
-      btDbvtVolume box = volume(body, int(p));
-      state.tree.update(state.nodes[p], box);
-    }
-    this->count_.add(Counter::vertex_reads, 3 * state.nodes.size());
-  }
-  void update_all() override {
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
-  }
-  void update_moving() override {
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
-      if (this->moves_[body]) update(body);
-  }
-
-  bool refits_;
-  std::vector<BodyState> bodies_;
-  LeafHits hits_;
-};
-
-Info bullet_info(const char* id, const char* title) {
-  Info info;
-  info.id = id;
-  info.title = title;
-  info.family = "bullet";
-  info.citation = "Coumans, Bullet 3.24";
-  info.guarantee = Guarantee::candidate_superset;
-  info.positions = PositionUse::all;
-  info.can.plan_changes = true;
-  info.topology.own = true;
-  info.own_scalar = "float";
-  return info;
-}
-
 }  // namespace
-}  // namespace kbvh
+}  // namespace kbvh::bullet
 
-KBVH_STRATEGY(bullet) {
+KBVH_STRATEGY(bullet_bvh) {
   using namespace kbvh;
-  Info bvh = bullet_info("bullet_bvh", "Bullet quantised BVH, refit");
-  bvh.tightness = Tightness::conservative;
-  bvh.parameters.push_back({"query",
-                            "trees",
-                            {"trees", "primitives"},
-                            "descend both trees, or ask Bullet for each primitive of the smaller body",
-                            0});
-  bvh.parameters.push_back({"scale",
-                            "fit",
-                            {"fit", "none"},
-                            "scale the scene so that Bullet's margin of 1.0 is small, or leave it",
-                            0});
-  Info dbvt = bullet_info("bullet_dbvt", "Bullet dynamic tree");
-  dbvt.tightness = Tightness::tight;
-  dbvt.can.restructures = true;  // with update=leaves
-  dbvt.parameters.push_back(
-      {"update", "refit", {"refit", "leaves"}, "recompute all nodes, or btDbvt::update leaf by leaf", 0});
-  std::vector<StrategyEntry> entries;
-  entries.push_back(make_entry<BulletBvh, Scalars::float_only>(std::move(bvh)));
-  entries.push_back(make_entry<BulletDbvt, Scalars::float_only>(std::move(dbvt)));
-  return entries;
+  Info info = bullet::info("bullet_bvh", "Bullet quantised BVH, refit");
+  info.tightness = Tightness::conservative;
+  info.parameters.push_back({"query",
+                             "trees",
+                             {"trees", "primitives"},
+                             "descend both trees, or ask Bullet for each primitive of the smaller body",
+                             0});
+  info.parameters.push_back({"scale",
+                             "fit",
+                             {"fit", "none"},
+                             "scale the scene so that Bullet's margin of 1.0 is small, or leave it",
+                             0});
+  return {make_entry<bullet::BulletBvh, Scalars::float_only>(std::move(info))};
 }

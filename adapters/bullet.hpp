@@ -1,0 +1,106 @@
+#pragma once
+// What both contestants of Bullet 3.24 (Coumans) have in common. Both are float, as Debian's Bullet, and take
+// float scenes only; both know triangles only or boxes.
+#include <LinearMath/btVector3.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "core/registry.hpp"
+
+#ifdef BT_USE_DOUBLE_PRECISION
+#error "these adapters are for Bullet in float"
+#endif
+
+namespace kbvh::bullet {
+
+inline btVector3 vector(const float* p) {
+  return btVector3(p[0], p[1], p[2]);
+}
+
+/// Lays a binary tree out as an audit wants it: siblings next to each other and after their parent.
+/// `children(node)` is a pair of handles, `primitive(node)` a primitive id or -1 for inner nodes.
+template <class Handle, class Primitive, class Children, class BoxOf>
+AuditView breadth_first(Handle root, const Primitive& primitive, const Children& children, const BoxOf& box) {
+  AuditView view;
+  std::vector<Handle> handles{root};
+  view.topology.parents.push_back(0);
+  view.topology.depths.push_back(0);
+  for (std::uint32_t i = 0; i < handles.size(); ++i) {
+    const Handle node = handles[i];
+    view.boxes.push_back(box(node));
+    if (const int id = primitive(node); id >= 0) {
+      view.topology.nodes.push_back(TopologyNode::leaf(std::uint32_t(view.topology.primitives.size()), 1));
+      view.topology.primitives.push_back(std::uint32_t(id));
+      continue;
+    }
+    view.topology.nodes.push_back(TopologyNode::inner(std::uint32_t(handles.size()), 2));
+    const auto [left, right] = children(node);
+    for (const Handle child : {left, right}) {
+      handles.push_back(child);
+      view.topology.parents.push_back(i);
+      view.topology.depths.push_back(std::uint8_t(std::min(255, view.topology.depths[i] + 1)));
+    }
+  }
+  return view;
+}
+
+/// What both have in common: which bodies move, and that time does not run backwards.
+template <class Count>
+class Contestant : public Strategy<float> {
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+
+  Contestant(const SceneView<float>& scene, const SampledMotion<float>& motion)
+      : Strategy<float>(scene, motion), moves_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+      moves_[body] = scene.moving(body);
+      for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
+    }
+  }
+
+  void reset(double t) final {
+    this->start_at(t);
+    update_all();
+    count_.table = {};
+  }
+
+  void advance(double t) final {
+    this->move_to(t);
+    update_moving();
+  }
+
+  void flight_plans_changed(double /*t*/, std::span<const PlanChange<float>> changes) final {
+    for (const auto& change : changes) moves_[change.body] = true;
+  }
+
+ protected:
+  virtual void update_all() = 0;
+  virtual void update_moving() = 0;
+  Counters counted() const final { return count_.table; }
+  void count_refit(std::uint64_t primitives) {
+    count_.add(Counter::nodes_visited, 2 * primitives - 1);
+    count_.add(Counter::values_written, 6 * (2 * primitives - 1));
+    count_.add(Counter::vertex_reads, 3 * primitives);
+  }
+
+  std::vector<std::uint8_t> moves_;
+  Count count_;
+};
+
+/// What the registration of both says.
+inline Info info(const char* id, const char* title) {
+  Info made;
+  made.id = id;
+  made.title = title;
+  made.family = "bullet";
+  made.citation = "Coumans, Bullet 3.24";
+  made.guarantee = Guarantee::candidate_superset;
+  made.positions = PositionUse::all;
+  made.can.plan_changes = true;
+  made.topology.own = true;
+  made.own_scalar = "float";
+  return made;
+}
+
+}  // namespace kbvh::bullet

@@ -1,0 +1,203 @@
+// Bullet's dynamic tree (Coumans, Bullet 3.24) as a contestant: btDbvt with one leaf per primitive, tree by
+// optimizeTopDown(), queries by collideTT.
+//
+// - Bullet updates it leaf by leaf (`update=leaves`): each leaf is removed and inserted again, which also
+//   changes the tree. The default `update=refit` recomputes the volumes of all nodes instead, children first,
+//   by Bullet's Merge; that loop is not in Bullet, but an order of magnitude faster. Boxes are tight either
+//   way.
+// - The tree is first built by insertion: identical boxes make a list of it before it is optimised.
+#include "bullet.hpp"
+
+#include <BulletCollision/BroadphaseCollision/btDbvt.h>
+
+#include <cmath>
+#include <type_traits>
+
+namespace kbvh::bullet {
+namespace {
+
+/// Collects overlapping leaves of two dynamic trees.
+class LeafHits final : public btDbvt::ICollide {
+ public:
+  BodyPair bodies{};
+  PairBuffer* out = nullptr;
+
+  using btDbvt::ICollide::Process;
+  void Process(const btDbvtNode* a, const btDbvtNode* b) override {
+    out->push_back({bodies.first, std::uint32_t(a->dataAsInt), bodies.second, std::uint32_t(b->dataAsInt)});
+  }
+};
+
+template <class S, class Count>
+class BulletDbvt final : public Contestant<Count> {
+  static_assert(std::is_same_v<S, float>);
+
+ public:
+  BulletDbvt(const SceneView<float>& scene, const SampledMotion<float>& motion, Topologies /*none*/,
+             const Params& params)
+      : Contestant<Count>(scene, motion),
+        refits_(params.word("update") == "refit"),
+        bodies_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) build(body);
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+    hits_.out = &out;
+    for (const BodyPair& pair : this->scene_.pairs()) {
+      hits_.bodies = pair;
+      // As collideTT, with a stack that stays allocated.
+      bodies_[pair.first].tree.collideTTpersistentStack(bodies_[pair.first].tree.m_root,
+                                                        bodies_[pair.second].tree.m_root, hits_);
+    }
+    return {};
+  }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    const btDbvtNode* root = bodies_[body].tree.m_root;
+    if (root == nullptr) return AuditView{};
+    return breadth_first(
+        root, [](const btDbvtNode* node) { return node->isleaf() ? node->dataAsInt : -1; },
+        [](const btDbvtNode* node) {
+          return std::pair<const btDbvtNode*, const btDbvtNode*>(node->childs[0], node->childs[1]);
+        },
+        [](const btDbvtNode* node) {
+          Box<double> box;
+          for (int axis = 0; axis < 3; ++axis) {
+            box.lower[axis] = double(node->volume.Mins()[axis]);
+            box.upper[axis] = double(node->volume.Maxs()[axis]);
+          }
+          return box;
+        });
+  }
+
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const BodyState& state : bodies_) {
+      const auto leaves = std::size_t(state.tree.m_leaves);
+      total += sizeof(btDbvt) + (leaves == 0 ? 0 : 2 * leaves - 1) * sizeof(btDbvtNode) +
+               state.nodes.size() * sizeof(btDbvtNode*);
+    }
+    return total;
+  }
+
+ private:
+  struct BodyState {
+    btDbvt tree;
+    std::vector<btDbvtNode*> nodes;  // refit: all, children before parents; else leaves by primitive
+  };
+
+  btDbvtVolume volume(std::uint32_t body, int primitive) const {
+    const Box<float> box = primitive_box(this->scene_.primitives(body)[std::uint32_t(primitive)],
+                                         this->sampled_.positions(body));
+    return btDbvtVolume::FromMM(vector(box.lower), vector(box.upper));
+  }
+
+  void build(std::uint32_t body) {
+    BodyState& state = bodies_[body];
+    const std::uint32_t count = this->scene_.primitives(body).count();
+    if (count == 0) return;
+    {
+      // Insertion and optimizeTopDown() multiply extents: far from 1 they overflow, and the latter then
+      // writes out of bounds. The shape of the tree is decided at a sane size; true volumes follow below.
+      const float scale = sane_scale(body);
+      btDbvt grown;
+      for (int p = 0; p < int(count); ++p) {
+        const btDbvtVolume real = volume(body, p);
+        grown.insert(btDbvtVolume::FromMM(real.Mins() * scale, real.Maxs() * scale), nullptr)->dataAsInt = p;
+      }
+      grown.optimizeTopDown();
+      // The copy has its nodes in memory as a descent meets them: both refits and queries profit.
+      btDbvt::IClone nothing_more;
+      grown.clone(state.tree, &nothing_more);
+      state.tree.m_leaves = grown.m_leaves;  // which clone() forgets
+    }
+    state.nodes.resize(refits_ ? 0 : count);
+    std::vector<btDbvtNode*> stack{state.tree.m_root};
+    while (!stack.empty()) {
+      btDbvtNode* node = stack.back();
+      stack.pop_back();
+      if (refits_) state.nodes.push_back(node);
+      if (node->isleaf()) {
+        if (!refits_) state.nodes[std::size_t(node->dataAsInt)] = node;
+        continue;
+      }
+      // clone() puts the node at place i of its stack into childs[i & 1]; so this order is that of the
+      // memory.
+      const std::size_t place = stack.size();
+      stack.push_back(node->childs[place & 1]);
+      stack.push_back(node->childs[(place + 1) & 1]);
+    }
+    // Children before parents, and true volumes in place of the scaled ones.
+    std::vector<btDbvtNode*> order;
+    stack = {state.tree.m_root};
+    while (!stack.empty()) {
+      btDbvtNode* node = stack.back();
+      stack.pop_back();
+      order.push_back(node);
+      if (node->isleaf()) continue;
+      stack.push_back(node->childs[0]);
+      stack.push_back(node->childs[1]);
+    }
+    std::reverse(order.begin(), order.end());
+    for (btDbvtNode* node : order) set_volume(body, *node);
+    if (refits_) std::reverse(state.nodes.begin(), state.nodes.end());
+  }
+
+  /// A power of two that brings the body's coordinates to about 1000.
+  float sane_scale(std::uint32_t body) const {
+    float largest = 0;
+    for (std::uint32_t p = 0; p < this->scene_.primitives(body).count(); ++p) {
+      const btDbvtVolume v = volume(body, int(p));
+      for (int axis = 0; axis < 3; ++axis)
+        largest = std::max({largest, std::abs(v.Mins()[axis]), std::abs(v.Maxs()[axis])});
+    }
+    if (largest == 0) return 1;
+    return std::ldexp(1.0F, std::clamp(10 - std::ilogb(largest), -126, 126));
+  }
+
+  void set_volume(std::uint32_t body, btDbvtNode& node) const {
+    if (node.isleaf())
+      node.volume = volume(body, node.dataAsInt);
+    else
+      Merge(node.childs[0]->volume, node.childs[1]->volume, node.volume);
+  }
+
+  void update(std::uint32_t body) {
+    BodyState& state = bodies_[body];
+    if (state.nodes.empty()) return;
+    if (refits_) {
+      for (btDbvtNode* node : state.nodes) set_volume(body, *node);
+      this->count_refit(this->scene_.primitives(body).count());
+      return;
+    }
+    for (std::size_t p = 0; p < state.nodes.size(); ++p) {
+      btDbvtVolume box = volume(body, int(p));
+      state.tree.update(state.nodes[p], box);
+    }
+    this->count_.add(Counter::vertex_reads, 3 * state.nodes.size());
+  }
+  void update_all() override {
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
+  }
+  void update_moving() override {
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
+      if (this->moves_[body]) update(body);
+  }
+
+  bool refits_;
+  std::vector<BodyState> bodies_;
+  LeafHits hits_;
+};
+
+}  // namespace
+}  // namespace kbvh::bullet
+
+KBVH_STRATEGY(bullet_dbvt) {
+  using namespace kbvh;
+  Info info = bullet::info("bullet_dbvt", "Bullet dynamic tree");
+  info.tightness = Tightness::tight;
+  info.can.restructures = true;  // with update=leaves
+  info.parameters.push_back(
+      {"update", "refit", {"refit", "leaves"}, "recompute all nodes, or btDbvt::update leaf by leaf", 0});
+  return {make_entry<bullet::BulletDbvt, Scalars::float_only>(std::move(info))};
+}
