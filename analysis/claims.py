@@ -17,7 +17,7 @@ from typing import Any, Optional
 
 import text
 from claim_points import ClaimError, Looked, Looker, Point, Table
-from load import ResultError, Study, load
+from load import ResultError, Study, load, read_json
 
 SCHEMA = "kbvh-claims-1"
 THEORY_SCHEMA = "kbvh-theory-1"
@@ -54,13 +54,7 @@ class Claims:
 
 def read_claims(file: Path = FILE) -> dict[str, Any]:
     """Reads claims.json. Raises ClaimError."""
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as problem:
-        raise ClaimError(f"{file}: {problem}") from None
-    if not isinstance(found, dict) or found.get("schema") != SCHEMA:
-        raise ClaimError(f"{file}: the schema is not {SCHEMA}")
-    return found
+    return read_json(file, SCHEMA, ClaimError)
 
 
 def evaluate(study: Study, folder: Path, file: Path = FILE) -> Claims:
@@ -81,12 +75,7 @@ def theory_rows(listed: list[dict[str, Any]], folder: Path) -> list[Row]:
     known: dict[str, dict[str, Any]] = {}
     missing = [f"{path.name} in this folder, which kbvh theory --out writes"]
     if path.exists():
-        try:
-            found = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as problem:
-            raise ClaimError(f"{path}: {problem}") from None
-        if not isinstance(found, dict) or found.get("schema") != THEORY_SCHEMA:
-            raise ClaimError(f"{path}: the schema is not {THEORY_SCHEMA}")
+        found = read_json(path, THEORY_SCHEMA, ClaimError)
         known = {claim["id"]: claim for claim in found["claims"]}
         missing = [f"the claim in {path.name}"]
     rows = []

@@ -22,7 +22,7 @@ COUNTERS = (
     "nodes_visited", "values_written", "vertex_reads", "positions_fetched", "certificates_made",
     "certificates_failed", "certificates_discarded", "internal_events", "overlap_events",
     "fathers_apart_events", "leaves_apart_events", "bound_change_events", "list_peak", "queue_operations", "queue_steps",
-    "queue_peak", "box_tests", "triangle_tests", "triangle_tests_exact",
+    "queue_peak", "box_tests", "triangle_tests", "triangle_tests_exact", "span_tests", "span_verdicts",
 )  # fmt: skip
 #: Counters that are a level, not a sum over the clip.
 LEVELS = ("queue_peak", "list_peak")
@@ -31,6 +31,17 @@ GUARANTEES = ("exact", "candidate_superset", "approximate")
 
 class ResultError(Exception):
     """A result file that cannot be used; the text is one sentence for the user."""
+
+
+def read_json(file: Path, schema: str, error: type[Exception]) -> dict[str, Any]:
+    """The object in a JSON file of this schema; raises `error`, with one sentence, if there is none."""
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as problem:
+        raise error(f"{file}: {problem}") from problem
+    if not isinstance(found, dict) or found.get("schema") != schema:
+        raise error(f"{file}: the schema is not {schema}")
+    return found
 
 
 @dataclass

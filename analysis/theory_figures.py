@@ -6,7 +6,6 @@ usage: theory_figures.py FOLDER
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from matplotlib.lines import Line2D
 from axes import KeyLines, fixed_log_axis, key, key_size, log_axis
 from canvas import Picture, picture
 from colours import Look, looks
+from load import read_json
 from text import size, tick
 
 SCHEMA = "kbvh-theory-1"
@@ -45,12 +45,7 @@ class Theory:
 
 def load(file: Path) -> Theory:
     """Reads theory.json. Raises TheoryError if it is missing or of another schema."""
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as problem:
-        raise TheoryError(f"{file}: {problem}") from problem
-    if not isinstance(found, dict) or found.get("schema") != SCHEMA:
-        raise TheoryError(f"{file}: the schema is not {SCHEMA}")
+    found = read_json(file, SCHEMA, TheoryError)
     counts = pd.DataFrame(found["counts"])
     frames = pd.DataFrame(found["frames"])
     scenes = sorted({*counts.get("scene", []), *frames.get("scene", [])})

@@ -110,12 +110,6 @@ class IntervalJoinStrategy final : public Strategy<S> {
   }
 
  private:
-  static bool all_triangles(const Primitives& primitives) {
-    if (primitives.kind != PrimitiveKind::polygons) return false;
-    for (std::uint32_t p = 0; p < primitives.count(); ++p)
-      if (primitives.offsets[p] != 3 * p || primitives.offsets[p + 1] != 3 * p + 3) return false;
-    return true;
-  }
   void new_segment() {
     if constexpr (Count::enabled) count_linear_update(bounds_, count_);
     joined_ = false;

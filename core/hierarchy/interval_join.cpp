@@ -92,11 +92,11 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
 
 template <class S>
 void IntervalJoin<S>::sort_by_begin(std::span<const JoinedPair> found) {
-  const auto bucket = [](const JoinedPair& pair) { return bucket_of(pair.begin); };
-  std::uint32_t place[buckets] = {};
+  const auto bucket = [](const JoinedPair& pair) { return FractionBuckets::of(pair.begin); };
+  std::uint32_t place[FractionBuckets::count] = {};
   for (const JoinedPair& pair : found) ++place[bucket(pair)];
   std::uint32_t sum = 0;
-  for (std::uint32_t k = 0; k < buckets; ++k) {
+  for (std::uint32_t k = 0; k < FractionBuckets::count; ++k) {
     const std::uint32_t count = place[k];
     place[k] = sum;
     sum += count;
@@ -120,7 +120,7 @@ void IntervalJoin<S>::sort_by_begin(std::span<const JoinedPair> found) {
 template <class S>
 void IntervalJoin<S>::begin_pair(std::uint32_t index) {
   const JoinedPair pair = sorted_[index];
-  const std::uint32_t bucket = bucket_of(pair.end), place = alive_count_++;
+  const std::uint32_t bucket = FractionBuckets::of(pair.end), place = alive_count_++;
   next_ending_[index] = ending_[bucket];
   ending_[bucket] = index;
   place_[index] = place;
@@ -138,7 +138,7 @@ void IntervalJoin<S>::end_pair(std::uint32_t index) {
 
 template <class S>
 void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
-  const std::uint32_t bucket = bucket_of(fraction);
+  const std::uint32_t bucket = FractionBuckets::of(fraction);
   // What begins: all of earlier buckets, some of the present one.
   std::size_t kept = 0;
   const auto begin_or_wait = [&](std::uint32_t index) {

@@ -1,9 +1,21 @@
 #pragma once
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/hierarchy/linear_bounds.hpp"
 
 namespace kbvh {
+
+/// Times of a segment, as fractions, in buckets of one length: what happens in a bucket can be left in any
+/// order until a frame lies in it. Powers of two, so that no bucket's limits are rounded.
+struct FractionBuckets {
+  static constexpr std::uint32_t count = 256;
+  static std::uint32_t of(float fraction) {
+    const auto bucket = std::uint32_t(fraction * float(count));
+    return bucket < count ? bucket : count - 1;
+  }
+};
 
 /// The pairs of primitives of two bodies whose linear boxes overlap within a segment, with the fractions at
 /// which they begin and cease to: one traversal for a whole segment, from which frames are read.
@@ -17,6 +29,7 @@ class IntervalJoin {
   /// Appends the pairs whose boxes overlap at a fraction of the segment, which never decreases within one.
   /// O(pairs that begin or end since the last call), and one copy of those that overlap.
   void read(float fraction, PairBuffer& out);
+
   /// All pairs of the segment, in the order in which they begin, roughly.
   std::span<const JoinedPair> pairs() const { return {sorted_.data(), sorted_.size()}; }
   std::uint32_t body_a() const { return body_a_; }
@@ -25,11 +38,7 @@ class IntervalJoin {
   std::size_t bytes() const;
 
  private:
-  static constexpr std::uint32_t buckets = 256, none = ~std::uint32_t(0);
-  static std::uint32_t bucket_of(float fraction) {
-    const auto bucket = std::uint32_t(fraction * float(buckets));
-    return bucket < buckets ? bucket : buckets - 1;
-  }
+  static constexpr std::uint32_t none = ~std::uint32_t(0);
   void sort_by_begin(std::span<const JoinedPair> found);
   void begin_pair(std::uint32_t index);
   void end_pair(std::uint32_t index);
@@ -48,14 +57,14 @@ class IntervalJoin {
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
   std::vector<JoinedPair> found_, sorted_;
-  std::uint32_t bucket_end_[buckets] = {};  ///< in sorted_
-  std::uint32_t next_ = 0;                  ///< in sorted_: those before it have begun, or are in `waiting_`
-  std::vector<std::uint32_t> waiting_;      ///< of the present bucket
-  PairBuffer alive_;                        ///< the first `alive_count_` of them, at the last `read`
+  std::uint32_t bucket_end_[FractionBuckets::count] = {};  ///< in sorted_
+  std::uint32_t next_ = 0;              ///< in sorted_: those before it have begun, or are in `waiting_`
+  std::vector<std::uint32_t> waiting_;  ///< of the present bucket
+  PairBuffer alive_;                    ///< the first `alive_count_` of them, at the last `read`
   std::uint32_t alive_count_ = 0;
   std::vector<std::uint32_t> alive_places_, place_;  ///< their places in sorted_, and back
   /// Pairs that are alive, in lists by the bucket in which they end.
-  std::uint32_t ending_[buckets] = {}, present_ = 0;
+  std::uint32_t ending_[FractionBuckets::count] = {}, present_ = 0;
   std::vector<std::uint32_t> next_ending_;
 };
 

@@ -24,8 +24,7 @@ void SpanAnswers<S>::start(const IntervalJoin<S>& join) {
 
 template <class S>
 void SpanAnswers<S>::wait(std::uint32_t pair, float until) {
-  const std::uint32_t bucket =
-      std::clamp(std::uint32_t(std::max(until, 0.0F) * float(buckets)), bucket_, buckets - 1);
+  const std::uint32_t bucket = std::max(FractionBuckets::of(std::max(until, 0.0F)), bucket_);
   time_[pair] = until;
   next_[pair] = head_[bucket];
   head_[bucket] = pair;
@@ -34,7 +33,7 @@ void SpanAnswers<S>::wait(std::uint32_t pair, float until) {
 template <class S>
 void SpanAnswers<S>::collect_due(const IntervalJoin<S>& join, float fraction) {
   due_.clear();
-  const std::uint32_t present = std::min(buckets - 1, std::uint32_t(fraction * float(buckets)));
+  const std::uint32_t present = FractionBuckets::of(fraction);
   const auto pairs = join.pairs();
   for (std::uint32_t bucket = bucket_; bucket <= present; ++bucket) {
     std::uint32_t pair = head_[bucket];
@@ -139,6 +138,13 @@ std::size_t SpanAnswers<S>::bytes() const {
   return (intersecting_.capacity() + open_.capacity()) * sizeof(Item) +
          (next_.capacity() + due_.capacity()) * sizeof(std::uint32_t) + time_.capacity() * sizeof(float) +
          tries_.capacity() * sizeof(SpanPair<S>) + verdicts_.capacity();
+}
+
+bool all_triangles(const Primitives& primitives) {
+  if (primitives.kind != PrimitiveKind::polygons) return false;
+  for (std::uint32_t p = 0; p < primitives.count(); ++p)
+    if (primitives.offsets[p] != 3 * p || primitives.offsets[p + 1] != 3 * p + 3) return false;
+  return true;
 }
 
 template class SpanAnswers<float>;

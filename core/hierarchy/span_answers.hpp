@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <vector>
 
 #include "core/geometry/span_pair.hpp"
@@ -11,6 +12,9 @@ namespace kbvh {
 /// a pair begins, or what was proved of it ends, the rest of its span is asked about, then a quarter of that.
 /// What is apart is not looked at again before its span is over, what intersects is only read out, and the
 /// rest is a candidate at each frame for as long as a quarter would have lasted.
+///
+/// Both bodies must consist of triangles only, the corners of primitive p at 3 p, 3 p + 1 and 3 p + 2 of
+/// `Primitives::vertices` (`all_triangles`).
 template <class S>
 class SpanAnswers {
  public:
@@ -29,7 +33,7 @@ class SpanAnswers {
   std::size_t bytes() const;
 
  private:
-  static constexpr std::uint32_t buckets = 256, none = ~std::uint32_t(0);
+  static constexpr std::uint32_t none = ~std::uint32_t(0);
   /// A pair by its place in the join, and until when it stays where it is.
   struct Item {
     std::uint32_t pair;
@@ -44,13 +48,16 @@ class SpanAnswers {
   /// Pairs that wait for their time: lists by bucket of it.
   std::vector<std::uint32_t> next_;
   std::vector<float> time_;
-  std::uint32_t head_[buckets] = {}, bucket_ = 0;
+  std::uint32_t head_[FractionBuckets::count] = {}, bucket_ = 0;
   float last_ = -1, step_ = 0;
   std::vector<std::uint32_t> due_;
   std::vector<SpanPair<S>> tries_;
   std::vector<SpanVerdict> verdicts_;
   std::uint64_t attempts_ = 0, decided_ = 0;
 };
+
+/// Whether SpanAnswers can take the primitives. O(primitives).
+bool all_triangles(const Primitives& primitives);
 
 extern template class SpanAnswers<float>;
 extern template class SpanAnswers<double>;

@@ -239,9 +239,18 @@ QueryStatus WideQuery<S>::run(WideHierarchy<S>& a, std::uint32_t body_a, WideHie
   WideTraversal state = fresh_traversal(budget);
   if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
   const auto traverse = overlap_kernels<S>(a.kernels()).traverse(a.topology().width);
+  return complete(
+      state, [&] { traverse(a.arrays(), b.arrays(), state); },
+      [&] { leaves_to_pairs(a, body_a, b, body_b, scene, motion, state.found, out, tests); }, tests);
+}
+
+template <class S>
+template <class Traverse, class Take>
+QueryStatus WideQuery<S>::complete(WideTraversal& state, const Traverse& traverse, const Take& take,
+                                   std::uint64_t& tests) {
   while (state.depth > 0 && state.tests < state.test_limit) {
-    traverse(a.arrays(), b.arrays(), state);
-    leaves_to_pairs(a, body_a, b, body_b, scene, motion, state.found, out, tests);
+    traverse();
+    take();
     state.found = 0;
     grow(state);
   }
@@ -264,14 +273,9 @@ QueryStatus WideQuery<S>::run_at(WideHierarchy<S>& a, const WideMoment<S>& momen
       moment->stale[0] = 0;
     }
   if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
-  while (state.depth > 0 && state.tests < state.test_limit) {
-    kernels.at(width)(moment_a, moment_b, state);
-    leaves_to_pairs(a, body_a, b, body_b, scene, motion, state.found, out, tests);
-    state.found = 0;
-    grow(state);
-  }
-  tests += state.tests;
-  return {state.depth};
+  return complete(
+      state, [&] { kernels.at(width)(moment_a, moment_b, state); },
+      [&] { leaves_to_pairs(a, body_a, b, body_b, scene, motion, state.found, out, tests); }, tests);
 }
 
 template <class S>

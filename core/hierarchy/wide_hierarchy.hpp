@@ -187,6 +187,10 @@ class WideQuery {
   /// An empty traversal in this query's buffers.
   WideTraversal fresh_traversal(const Budget& budget);
   void grow(WideTraversal& state);
+  /// Traverses, and takes what was found, until nothing is left or the budget is used up.
+  template <class Traverse, class Take>
+  QueryStatus complete(WideTraversal& state, const Traverse& traverse, const Take& take,
+                       std::uint64_t& tests);
   void leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
                        const SceneView<S>& scene, const SampledMotion<S>& motion, std::size_t count,
                        PairBuffer& out, std::uint64_t& tests);

@@ -158,5 +158,19 @@ class ConfigHash {
 /// Throws io::InputError "scene: what is ..., must be from ... to ..." unless lowest <= value <= highest.
 void check_range(const char* scene, double value, double lowest, double highest, const char* what);
 
+/// Checks what every cloth has, by these names in its config: density, stiffness, drag, viscosity, friction
+/// and distance of layers. `check(value, lowest, highest, what)` is a `check_range` for the scene.
+template <class Config, class Check>
+void check_cloth(const Config& c, const Check& check) {
+  check(c.area_density, 1e-3, 1e3, "the area density");
+  check(c.stretch_stiffness, 1e-3, 1e12, "the stretch stiffness");
+  check(c.shear_stiffness, 1e-3, 1e12, "the shear stiffness");
+  check(c.bending_rigidity, 0.0, 1e6, "the bending rigidity");
+  check(c.air_drag, 0.0, 1e6, "the air drag");
+  check(c.viscosity, 0.0, 1e3, "the viscosity");
+  check(c.friction, 0.0, 1e3, "the friction");
+  check(c.layer_distance, 0.0, 0.95, "the layer distance");
+}
+
 }  // namespace cloth
 }  // namespace kbvh::scenes

@@ -31,14 +31,7 @@ void check(const GarmentConfig& c) {
   check(c.keyframes_per_second, 1, 1e6, "the number of keyframes per second");
   check(double(c.full_triangles), 1, 1 << 22, "the number of triangles simulated in full");
   check(double(c.fine_steps), 1, 1e6, "the number of steps per keyframe of the second level");
-  check(c.area_density, 1e-3, 1e3, "the area density");
-  check(c.stretch_stiffness, 1e-3, 1e12, "the stretch stiffness");
-  check(c.shear_stiffness, 1e-3, 1e12, "the shear stiffness");
-  check(c.bending_rigidity, 0.0, 1e6, "the bending rigidity");
-  check(c.air_drag, 0.0, 1e6, "the air drag");
-  check(c.viscosity, 0.0, 1e3, "the viscosity");
-  check(c.friction, 0.0, 1e3, "the friction");
-  check(c.layer_distance, 0.0, 0.95, "the layer distance");
+  cloth::check_cloth(c, check);
   check(c.skin_bite, -0.01, 0.01, "the skin's bite");
 }
 

@@ -271,14 +271,7 @@ void check(const TableclothConfig& c) {
   check(c.keyframes_per_second, 1, 1e6, "the number of keyframes per second");
   check(c.side, 1e-3, 1e3, "the side");
   check(c.drop_height, 0.0, 1e3, "the drop height");
-  check(c.area_density, 1e-3, 1e3, "the area density");
-  check(c.stretch_stiffness, 1e-3, 1e12, "the stretch stiffness");
-  check(c.shear_stiffness, 1e-3, 1e12, "the shear stiffness");
-  check(c.bending_rigidity, 0.0, 1e6, "the bending rigidity");
-  check(c.air_drag, 0.0, 1e6, "the air drag");
-  check(c.viscosity, 0.0, 1e3, "the viscosity");
-  check(c.friction, 0.0, 1e3, "the friction");
-  check(c.layer_distance, 0.0, 0.95, "the layer distance");
+  cloth::check_cloth(c, check);
   check(c.rest_gap, -0.01, 0.01, "the rest gap");
   check(c.rim_bite, -0.01, 0.01, "the rim bite");
 }
