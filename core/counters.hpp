@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -38,6 +39,9 @@ const char* name(Counter counter);
 /// The counter table of one strategy instance; cleared by `reset`.
 struct Counters {
   std::array<std::uint64_t, std::size_t(Counter::count)> values{};
+  /// Events of bounds by the depth of the node where they begin (0: root); the last entry has all deeper
+  /// ones.
+  std::array<std::uint64_t, 64> events_at_depth{};
   std::uint64_t& operator[](Counter c) { return values[std::size_t(c)]; }
   std::uint64_t operator[](Counter c) const { return values[std::size_t(c)]; }
 };
@@ -49,12 +53,16 @@ struct Counting {
   void peak(Counter c, std::uint64_t n) {
     if (n > table[c]) table[c] = n;
   }
+  void event_at(std::size_t depth) {
+    ++table.events_at_depth[std::min(depth, table.events_at_depth.size() - 1)];
+  }
   static constexpr bool enabled = true;
 };
 struct Silent {
   Counters table;
   void add(Counter, std::uint64_t = 1) {}
   void peak(Counter, std::uint64_t) {}
+  void event_at(std::size_t) {}
   static constexpr bool enabled = false;
 };
 

@@ -70,14 +70,19 @@ class FrameChecker {
     if (!extra.empty()) violate("pair " + text(extra[0]) + " is reported but does not intersect");
   }
 
-  void check_bounds() {
+  /// `judged`: keep the quality of this frame's boxes, too.
+  void check_bounds(bool judged) {
     const Info& info = session_.info();
+    Quality quality{.t = session_.playback().time()};
+    Audit frame;
     for (std::uint32_t body = 0; body < session_.scene().bodies.size(); ++body) {
       auto view = session_.strategy().audit_view(body);
       if (!view) continue;
       result_.audited = true;
       const Audit found = audit(*view, session_.scene().bodies[body].primitives,
                                 session_.playback().positions(body), &sound_[body]);
+      frame.add(found);
+      if (judged && found.topology_error.empty()) judge(body, *view, quality);
       if (found.topology_error.empty()) sound_[body] = std::move(view->topology);
       result_.audit.add(found);
       const std::string where = "body " + std::to_string(body) + ": ";
@@ -86,12 +91,26 @@ class FrameChecker {
       if (info.tightness == Tightness::tight && found.not_tight)
         violate(where + std::to_string(found.not_tight) + " boxes are not tight");
     }
+    quality.looseness = frame.looseness();
+    if (quality.sah_rebuilt > 0) result_.over_time.push_back(quality);
   }
 
   /// What was sound need not be any more.
   void geometry_changed() { std::fill(sound_.begin(), sound_.end(), Topology{}); }
 
  private:
+  void judge(std::uint32_t body, const AuditView& view, Quality& quality) const {
+    const Primitives& primitives = session_.scene().bodies[body].primitives;
+    const S* positions = session_.playback().positions(body);
+    std::vector<Box<double>> boxes = tight_boxes(view.topology, primitives, positions);
+    for (std::size_t node = 0; node < boxes.size(); ++node)
+      if (view.stale.empty() || !view.stale[node]) boxes[node] = view.boxes[node];
+    quality.sah += sah_cost(view.topology, boxes);
+    const Topology rebuilt = build_topology(
+        primitives, positions,
+        {.method = BuildMethod::sah, .width = view.topology.width, .leaf_size = view.topology.leaf_size});
+    quality.sah_rebuilt += sah_cost(rebuilt, tight_boxes(rebuilt, primitives, positions));
+  }
   void violate(const std::string& what) {
     if (result_.first_violation.empty())
       result_.first_violation = "t = " + std::to_string(session_.playback().time()) + ": " + what;
@@ -114,6 +133,13 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
   // The oracle knows one truth for each time, of the scene that it was made for.
   const bool known_truth =
       oracle.script() == (script ? hash(*script) : 0) && !(script && script->changes_geometry());
+  // Every so many of the frames that are compared, so that there are no more samples than asked for.
+  const std::uint64_t compared_frames =
+      (frames.size() + options.every_nth_frame - 1) / options.every_nth_frame + 1;
+  const std::uint64_t judged_every =
+      options.quality_samples > 0 ? (compared_frames + options.quality_samples - 1) / options.quality_samples
+                                  : 0;
+  std::uint64_t compared_before = 0;
   const auto query = [&](bool compared) {
     const double t = session.playback().time();
     pairs.clear();
@@ -126,7 +152,7 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
     checker.check_pairs(
         candidates, pairs,
         known_truth ? oracle.pairs(session.playback()) : sweep_pairs(session.scene(), session.playback()));
-    checker.check_bounds();
+    checker.check_bounds(judged_every > 0 && compared_before++ % judged_every == 0);
   };
   for (std::size_t f = 0; f < frames.size(); ++f) {
     if (f == 0)

@@ -4,6 +4,14 @@
 
 namespace kbvh {
 
+/// A contestant's boxes at one time, summed over the bodies whose hierarchy can be seen.
+struct Quality {
+  double t = 0;
+  double looseness = 0;    ///< of the boxes that are up to date
+  double sah = 0;          ///< `sah_cost`; boxes that no query has brought up to date count as tight
+  double sah_rebuilt = 0;  ///< the same of SAH trees built at t, of the same width and leaf size
+};
+
 /// What a verified run of one contestant over a clip showed. Recorded with every measurement.
 struct Verification {
   std::uint64_t frames = 0;             ///< frames compared with the oracle
@@ -15,6 +23,7 @@ struct Verification {
   std::uint64_t malformed = 0;          ///< ids out of range or not canonical
   Audit audit;                          ///< summed over frames and bodies
   bool audited = false;                 ///< false for hierarchies that cannot be seen
+  std::vector<Quality> over_time;       ///< of a sample of the audited frames
   std::string first_violation;  ///< of the declared guarantee or tightness: frame, what, value; or empty
 
   /// The declared guarantee and tightness held in every frame.
@@ -23,6 +32,7 @@ struct Verification {
 
 struct VerifyOptions {
   std::uint64_t every_nth_frame = 1;  ///< compare and audit only these (and the last); the strategy sees all
+  std::uint64_t quality_samples = 0;  ///< most entries of `over_time`; each costs a build with SAH
 };
 
 /// Runs a contestant over the frames and compares each with the oracle: candidates contain the truth,

@@ -14,6 +14,9 @@ namespace {
 /// A contestant is warm when its buffers have grown; so long, or one clip, is enough for that.
 constexpr double warm_up_seconds = 0.05;
 
+/// Frames at which the quality of a contestant's boxes is recorded.
+constexpr std::uint64_t quality_samples = 16;
+
 double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
@@ -98,7 +101,7 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
   try {
     {
       Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
-      measured.verification = verify<S>(session, frames_, *oracle_, script_, {oracle_every});
+      measured.verification = verify<S>(session, frames_, *oracle_, script_, {oracle_every, quality_samples});
       measured.counters = session.strategy().counters();
     }
     if (!measured.verification.holds()) {
@@ -167,6 +170,10 @@ json times_record(const Measured& measured) {
 
 json verified_record(const Measured& measured) {
   const Verification& v = measured.verification;
+  json over_time = json::array();
+  for (const Quality& q : v.over_time)
+    over_time.push_back(
+        {{"t", q.t}, {"looseness", q.looseness}, {"sah", q.sah}, {"sah_rebuilt", q.sah_rebuilt}});
   return {{"holds", v.holds()},
           {"first_violation", v.first_violation},
           {"frames", v.frames},
@@ -182,7 +189,8 @@ json verified_record(const Measured& measured) {
           {"looseness", v.audit.looseness()},
           {"invalid", v.audit.invalid},
           {"not_tight", v.audit.not_tight},
-          {"sampled_every", measured.sampled_every}};
+          {"sampled_every", measured.sampled_every},
+          {"over_time", over_time}};
 }
 
 json counters_record(const Counters& counters) {
@@ -190,6 +198,13 @@ json counters_record(const Counters& counters) {
   for (std::size_t c = 0; c < std::size_t(Counter::count); ++c)
     record[name(Counter(c))] = counters[Counter(c)];
   return record;
+}
+
+json depths_record(const Counters& counters) {
+  const auto& events = counters.events_at_depth;
+  std::size_t used = events.size();
+  while (used > 0 && events[used - 1] == 0) --used;
+  return json(std::vector<std::uint64_t>(events.begin(), events.begin() + std::ptrdiff_t(used)));
 }
 
 }  // namespace kbvh::experiments

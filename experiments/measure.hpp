@@ -79,5 +79,7 @@ nlohmann::json times_record(const Measured& measured);
 /// Verification as result records hold it.
 nlohmann::json verified_record(const Measured& measured);
 nlohmann::json counters_record(const Counters& counters);
+/// Events of bounds by depth, from the root to the deepest that had any.
+nlohmann::json depths_record(const Counters& counters);
 
 }  // namespace kbvh::experiments

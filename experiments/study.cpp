@@ -185,6 +185,7 @@ class Runner {
     record["when"] = now_utc();
     record["verified"] = verified_record(measured);
     record["counters"] = counters_record(measured.counters);
+    record["events_at_depth"] = depths_record(measured.counters);
     record["bytes"] = measured.counters[Counter::bytes];
     record["times"] = nullptr;
     if (measured.refused.empty())

@@ -119,6 +119,7 @@ class KineticAabbTree {
     std::uint32_t node = node_of(event.slot);
     KBVH_ASSERT(realiser(node, side) == event.winner);
     count_->add(Counter::certificates_failed);
+    count_->event_at(topology_.depths[node]);
     for (;;) {
       replace(node, side, event.loser, now);
       certify(node, side, now);
