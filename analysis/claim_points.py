@@ -128,6 +128,8 @@ class Table:
         if quantity == "values per event":
             events = row["certificates_failed_per_frame"]
             known = [row["values_written_per_frame"] / events] if events > 0 else []
+        elif quantity == "ageing":
+            known = [ageing(row["over_time"])]
         elif quantity in COUNTED:
             steps = row["frames"] - 1  # the first frame belongs to no keyframe interval, and counts nothing
             scale *= row["frames"] / steps if quantity.endswith("per keyframe") and steps > 0 else 1.0
@@ -162,6 +164,14 @@ def _fits(row: dict[str, Any], term: dict[str, Any], quantity: str) -> bool:
     if any(builder.get(name) != value for name, value in term.get("builder", {}).items()):
         return False
     return all(str(row["params"].get(name, value)) == value for name, value in term.get("params", {}).items())
+
+
+def ageing(samples: list[dict[str, float]]) -> float:
+    """SAH cost over that of a rebuilt tree, of the last sample over the first; NaN with fewer than two."""
+    if len(samples) < 2:
+        return math.nan
+    first, last = (one["sah"] / one["sah_rebuilt"] for one in (samples[0], samples[-1]))
+    return last / first
 
 
 def largest_moving(bodies: Any) -> float:

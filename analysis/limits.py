@@ -141,5 +141,6 @@ def _absent(study: Study) -> tuple[str, str]:
         words.append("No refit was timed: there is nothing to compare with.")
     if len(study.refused):
         words.append(f"{text.plural(len(study.refused), 'contestant run')} got no time; the reason stands below its table.")
-    words.append("Result files hold no quality over time and no events per level of a tree: only means over clips are shown.")
+    if len(timed) and not (timed["over_time"].map(len) > 0).any():
+        words.append("These results hold no quality of boxes over time: they are from an older program.")
     return "Not measured", " ".join(words)

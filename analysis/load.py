@@ -227,6 +227,8 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "own_scalar": record.text("strategy.own_scalar", ""),
         "params": params,
         "builder": builder,
+        "over_time": _over_time(record),
+        "events_at_depth": _list(record, "events_at_depth"),
         "holds": holds,
         "violation": violation,
         "audited": record.flag("verified.audited", False),
@@ -254,6 +256,24 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         [row["scene_name"], row["hash"], row["primitives"], row["scalar"], row["l"], str(row["frames"]), row["machine"]]
     )
     return row
+
+
+def _list(record: _Record, path: str) -> list[Any]:
+    listed = record.get(path, [])
+    if not isinstance(listed, list):
+        raise ResultError(f"{record.place}: {path} should be a list.")
+    return listed
+
+
+def _over_time(record: _Record) -> list[dict[str, float]]:
+    """Quality of the boxes at some times of the clip, those that can be compared with a rebuilt tree."""
+    samples = []
+    for entry in _list(record, "verified.over_time"):
+        one = _Record(entry if isinstance(entry, dict) else {}, f"{record.place}, verified.over_time")
+        sample = {name: one.number(name) for name in ("t", "looseness", "sah", "sah_rebuilt")}
+        if sample["sah"] > 0 and sample["sah_rebuilt"] > 0:
+            samples.append(sample)
+    return samples
 
 
 def _changes(record: _Record) -> str:

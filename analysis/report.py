@@ -24,6 +24,7 @@ import tables
 import targets_table
 import text
 import theory_figures
+import tree_figures
 from canvas import Picture, picture
 from claim_points import ClaimError, Table
 from colours import Look, looks, symbol
@@ -280,6 +281,21 @@ def _group_pictures(
             "An event-driven strategy writes a bound only when an event changes it, while a refit writes all of them in every "
             "frame: that is the work it saves. What it pays are the events, each of which costs more time than writing a value.",
             lambda: figures.counters(group, sizes, all_looks),
+        ),
+        picture(
+            folder, f"{slug}-depth", f"Where in the tree events happen: {place}",
+            "Each mark counts the events per frame that begin at nodes of one depth. A line that rises to the right says that "
+            "most events are near the leaves, where one changes few boxes above it: that is why an event is cheap."
+            + fastest_only,
+            lambda: tree_figures.events_by_depth(group, all_looks),
+        ),
+        picture(
+            folder, f"{slug}-quality", f"Does the tree age? {place}",
+            "A level line is a tree that suits the last frame of the clip as well as its first; a rising one is of a structure "
+            "that the motion has spoilt. The cost is that of a random query by the surface-area heuristic, over that of a "
+            "tree built with this heuristic at that time (1), so a line that starts above 1 has fuller leaves, or was split "
+            "at medians, from the start." + fastest_only,
+            lambda: tree_figures.over_time(group, all_looks),
         ),
         picture(
             folder, f"{slug}-latency", f"Even or jerky: {place}",

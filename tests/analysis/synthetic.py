@@ -104,6 +104,10 @@ def record(
             "missed_candidates": missed, "missed": missed, "extra": extra, "repeated": 0, "malformed": 0,
             "audited": not contestant.get("hidden", False), "protrusion": contestant.get("protrusion", 0.0),
             "looseness": loose, "invalid": 0, "not_tight": 0, "sampled_every": 1 if l <= 10 else 3,
+            "over_time": [] if contestant.get("hidden", False) else [
+                {"t": float(t), "looseness": loose, "sah": 60.0 + t * contestant["query"], "sah_rebuilt": 50.0}
+                for t in range(0, keyframes, 4)
+            ],
         },
         "times": {
             "unit": "ms", "repetitions": rows, "total_p50": total * 0.97, "total_p99": total * (2.6 if event else 1.15),
@@ -117,6 +121,7 @@ def record(
             "queue_operations": int(events * 4), "queue_steps": int(events * 40), "queue_peak": primitives if event else 0,
             "box_tests": 40 * candidates, "triangle_tests": candidates, "triangle_tests_exact": pairs // 50, "bytes": 0,
         },
+        "events_at_depth": [int(events * 2.0 ** (depth - 12)) for depth in range(12)] if event else [],
         "bytes": primitives * (200 if event else 48),
     }  # fmt: skip
 

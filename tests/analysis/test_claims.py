@@ -48,6 +48,8 @@ def line(scene: str, size: int, l: int, strategy: str) -> Line:
     ms = size * 1e-6
     result["key"] = f"{strategy} {scene} {size} {l}"
     result["verified"]["looseness"] = loose
+    for sample in result["verified"]["over_time"]:
+        sample["sah"] = 60.0 + (sample["t"] if loose else 0.0)
     phases = {"motion": motion * ms, "update": (each + interval / l) * ms, "traversal": query * ms,
               "triangle_tests": 0.0, "plan_changes": 0.0}  # fmt: skip
     result["times"]["repetitions"] = [dict(phases) for _ in range(3)]
@@ -151,6 +153,15 @@ class TestVerdicts(ClaimsCase):
                 row = self.rows(lines)[id]
                 self.assertEqual(row.verdict, claims.FAILS, row.why)
                 self.assertIn("met nowhere", row.why)
+
+    def test_a_boxtree_that_does_not_age_more_than_others_flips_the_claim(self) -> None:
+        lines = world()
+        for one in filter(of("kinetic_boxtree", "tablecloth"), lines):
+            for sample in one["verified"]["over_time"]:
+                sample["sah"] = 60.0 - sample["t"]
+        row = self.rows(lines)["E4"]
+        self.assertEqual(row.verdict, claims.FAILS, row.why)
+        self.assertIn("Ageing", row.why)
 
     def test_against_one_baseline_only_is_a_condition(self) -> None:
         lines = world()

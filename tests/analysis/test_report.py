@@ -66,7 +66,7 @@ class TestPage(ReportCase):
     def test_figures_come_as_png_and_pdf(self) -> None:
         self.page(small(), figures="main")
         names = {file.name for file in (self.folder / "figures").iterdir()}
-        for figure in ("cost", "error", "counters", "latency", "l"):
+        for figure in ("cost", "error", "counters", "depth", "quality", "latency", "l"):
             self.assertIn(f"tablecloth-{figure}.png", names)
             self.assertIn(f"tablecloth-{figure}.pdf", names)
         self.assertNotIn("tablecloth-n.png", names, "one size only: no figure over sizes")
@@ -75,11 +75,16 @@ class TestPage(ReportCase):
         lines = [line for line in small() if line["strategy"]["id"] == "bottom_up" and line["scene"]["per_keyframe"] == 1]
         for line in lines:
             line["verified"].update(looseness=0.0, candidates=line["verified"]["pairs"])
-            del line["counters"], line["bytes"]
+            del line["counters"], line["bytes"], line["events_at_depth"], line["verified"]["over_time"]
             for name in ("total_p50", "total_p99", "total_worst"):
                 del line["times"][name]
         self.page(lines, figures="main")
         self.assertEqual({file.stem for file in (self.folder / "figures").iterdir()}, {"tablecloth-cost"})
+
+    def test_qualities_that_make_no_sense_are_one_sentence(self) -> None:
+        line = small()[0]
+        line["verified"]["over_time"][1]["sah"] = "large"
+        self.assertIn("verified.over_time: sah should be a number", self.refusal(json.dumps(line) + "\n"))
 
     def test_lines_over_l_are_drawn_at_the_size_with_most_l(self) -> None:
         wanted = [c for c in synthetic.CONTESTANTS if c["id"] in ("bottom_up", "kinetic_aabb")]
