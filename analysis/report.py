@@ -6,6 +6,7 @@ usage: report.py RESULTS_DIR [--title TEXT] [--figures main|all|none] [--print]
 from __future__ import annotations
 
 import argparse
+import base64
 import re
 import sys
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ import claims as paper_claims
 import figures
 import paper_figures
 import ratios
+import scene_pictures
 import tables
 import targets_table
 import text
@@ -42,6 +44,7 @@ class Section:
     anchor: str
     bodies: list[dict[str, str]]
     card: list[tuple[str, str]]
+    view: Optional[Picture]  #: of the scene itself
     own: bool  #: from files that the user brought
     sizes: str  #: of the smaller versions of the scene
     groups: list[tables.Group]
@@ -206,7 +209,11 @@ def _sections(
         smaller = sorted(rows["primitives"].unique())[:-1]
         sizes = text.listing([text.size(value) for value in smaller])
         own = bool((rows["origin"] == "files").any())
-        section = Section(str(scene), f"scene-{number + 1}", _bodies(rows), _card(rows), own, sizes, mine)
+        card, view = _card(rows), None
+        if (shown := scene_pictures.exported(folder.parent, list(rows.sort_values("primitives")["scene_name"]))) is not None:
+            card += _violence(shown)
+            view = _view(shown, folder, str(scene)) if which != "none" else None
+        section = Section(str(scene), f"scene-{number + 1}", _bodies(rows), card, view, own, sizes, mine)
         timed = rows[rows["refused"] == ""]
         slug = re.sub(r"[^a-z0-9]+", "-", str(scene).lower()).strip("-") or f"scene-{number + 1}"
         if len(timed) and which != "none":
@@ -401,6 +408,33 @@ def _card(rows: pd.DataFrame) -> list[tuple[str, str]]:
     if len(largest["changes"]):
         facts.append(("Changes at run time", largest["changes"]))
     return [(name, value) for name, value in facts if value]
+
+
+def _violence(folder: Path) -> list[tuple[str, str]]:
+    """How much the moving bodies of a scene that was written out move, from its card."""
+    facts = []
+    for body in scene_pictures.card(folder):
+        if body["keyframes"] > 1:
+            facts.append((
+                f"How violent: {body['name']}",
+                f"{100 * body['sides_changed_per_keyframe']:.2g} % of the sides of its {text.size(body['nodes'])} nodes have "
+                f"another realising vertex at the next keyframe (at most {100 * body['sides_changed_at_most']:.2g} %); a vertex "
+                f"moves by {body['mean_step_in_edges']:.2g} edges (at most {body['largest_step_in_edges']:.2g})",
+            ))  # fmt: skip
+    return facts
+
+
+def _view(folder: Path, figures_folder: Path, scene: str) -> Picture:
+    """The scene at a few keyframes."""
+    slug = re.sub(r"[^a-z0-9]+", "-", scene.lower()).strip("-") or "scene"
+    file = figures_folder / f"{slug}-scene.png"
+    width, height = scene_pictures.write(folder, file)
+    uri = "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode("ascii")
+    reading = (
+        "Some keyframes from the first to the last, seen with z upwards; each body has its colour. "
+        f"Drawn from the meshes in scenes/{folder.name}, which other programs can open, too."
+    )
+    return Picture(file.stem, f"What it looks like: {scene}", reading, uri, width // 2, height // 2)
 
 
 def _values(column: pd.Series, shorten: Optional[int] = None) -> str:

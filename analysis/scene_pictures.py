@@ -8,14 +8,17 @@ NAME --out FOLDER` writes (every body as OBJ, and PC2 if it moves).
 from __future__ import annotations
 
 import argparse
+import json
 import struct
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Optional
 
 import matplotlib.image
 import numpy as np
 
 PALETTE = ((0.62, 0.30, 0.28), (0.86, 0.72, 0.60), (0.45, 0.55, 0.68))  # bodies, in the order of their files
+WIDEST = 1.7  # of a panel, in heights
 LIGHT = np.array((-0.45, 0.5, 0.75)) / 1.007  # as the viewer sees it: from the upper left, in front
 
 
@@ -103,22 +106,48 @@ def draw(image: np.ndarray, depth: np.ndarray, points: np.ndarray, triangles: np
 
 
 def picture(meshes: list[Mesh], keyframes: list[int], azimuth: float, height: int) -> np.ndarray:
-    """The keyframes side by side, [height, width, 3]."""
+    """The keyframes side by side, all at one scale and around one point, [height, width, 3]."""
     view = camera(azimuth)
     panels = []
-    for keyframe in keyframes:
-        at = [m.positions[min(keyframe, len(m.positions) - 1)] for m in meshes]
-        everything = np.concatenate(at)
-        middle = 0.5 * (everything.min(axis=0) + everything.max(axis=0))
-        spans = np.ptp((everything - middle) @ view.T, axis=0)
-        scale = 0.95 * height / spans[1]
-        width = int(height * max(0.55, 1.05 * spans[0] / spans[1]))
+    moments = [[m.positions[min(keyframe, len(m.positions) - 1)] for m in meshes] for keyframe in keyframes]
+    seen = np.concatenate([points @ view.T for at in moments for points in at])
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    middle = 0.5 * (low + high) @ view
+    spans = np.maximum(high - low, 1e-30)
+    width = int(height * min(max(0.55, 1.05 * spans[0] / spans[1]), WIDEST))
+    scale = 0.95 * min(height / spans[1], width / spans[0])
+    for at in moments:
         image = np.ones((height, width, 3))
         depth = np.full((height, width), -np.inf)
         for i, (mesh, points) in enumerate(zip(meshes, at)):
             draw(image, depth, points, mesh.triangles, PALETTE[i % len(PALETTE)], view, scale, middle)
         panels.append(image)
     return np.concatenate(panels, axis=1)
+
+
+def exported(results: Path, names: list[str]) -> Optional[Path]:
+    """The folder of the last of these scenes that `kbvh run --out RESULTS` has written out; None if there is none."""
+    for name in reversed(names):
+        folder = results / "scenes" / name.replace("/", "-")
+        if (folder / "card.json").exists():
+            return folder
+    return None
+
+
+def card(folder: Path) -> list[dict[str, Any]]:
+    """The bodies as card.json has them."""
+    return list(json.loads((folder / "card.json").read_text(encoding="utf-8"))["bodies"])
+
+
+def write(folder: Path, file: Path, height: int = 420) -> tuple[int, int]:
+    """Draws all keyframes that a folder has, unless the file is newer; returns width and height in pixels."""
+    if not (file.exists() and file.stat().st_mtime > (folder / "card.json").stat().st_mtime):
+        meshes = [mesh for mesh in read_scene(folder) if len(mesh.triangles)]
+        keyframes = list(range(max((len(mesh.positions) for mesh in meshes), default=0)))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        image = picture(meshes, keyframes, 50.0, height) if keyframes else np.ones((height, height, 3))
+        matplotlib.image.imsave(file, np.clip(image, 0, 1))
+    return int(matplotlib.image.imread(file).shape[1]), int(matplotlib.image.imread(file).shape[0])
 
 
 def main() -> None:

@@ -6,15 +6,12 @@
 
 #include "experiments/cli.hpp"
 #include "experiments/io/obj.hpp"
-#include "experiments/io/pc2.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
 #include "experiments/scene_card.hpp"
 #include "experiments/text.hpp"
 
 namespace kbvh::experiments {
-
-using nlohmann::json;
 
 namespace {
 
@@ -24,7 +21,7 @@ constexpr const char* examples = R"(Examples:
   kbvh scene dress --triangles 8000 --out folder
 Prints counts and how violently the bodies move: the share of the sides of a binary tree (a triangle per leaf)
 whose realising vertex changes from one keyframe to the next. A folder gets every body as OBJ, with PC2 if it
-moves; a file ending in .obj holds all bodies at one keyframe, one after the other.)";
+moves, and these numbers as card.json; a file ending in .obj holds all bodies at one keyframe, one after the other.)";
 
 struct SceneOptions {
   std::string name, out;
@@ -52,19 +49,12 @@ io::AnimatedMesh snapshot(const std::vector<io::AnimatedMesh>& bodies, std::size
   return all;
 }
 
-void write(const std::vector<io::AnimatedMesh>& bodies, const SceneOptions& options) {
+void write(const LoadedScene& scene, const SceneOptions& options) {
   const std::filesystem::path out = options.out;
-  if (out.extension() == ".obj") {
-    io::save_obj(snapshot(bodies, options.frame), out);
-    return;
-  }
-  std::error_code error;
-  std::filesystem::create_directories(out, error);
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const std::string file = std::to_string(i) + "-" + bodies[i].name;
-    io::save_obj(bodies[i], out / (file + ".obj"));
-    if (bodies[i].moving()) io::save_pc2(bodies[i], out / (file + ".pc2"));
-  }
+  if (out.extension() == ".obj")
+    io::save_obj(snapshot(scene.meshes, options.frame), out);
+  else
+    export_scene(scene, out, 0);
 }
 
 void print(const std::vector<BodyCard>& list) {
@@ -91,15 +81,13 @@ int show(const SceneOptions& options) {
     line.show(what + ": " + std::to_string(int(100 * fraction)) + " %");
   });
   line.clear();
-  if (!options.out.empty()) write(scene.meshes, options);
+  if (!options.out.empty()) write(scene, options);
   const std::vector<BodyCard> list = cards(scene);
   if (!options.as_json) {
     print(list);
     return success;
   }
-  json bodies = json::array();
-  for (const BodyCard& card : list) bodies.push_back(as_json(card));
-  std::printf("%s\n", json{{"scene", options.name}, {"bodies", bodies}}.dump(2).c_str());
+  std::printf("%s\n", as_json(options.name, list).dump(2).c_str());
   return success;
 }
 

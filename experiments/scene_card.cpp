@@ -4,6 +4,9 @@
 #include <cmath>
 
 #include "core/hierarchy/builders.hpp"
+#include "experiments/io/bytes.hpp"
+#include "experiments/io/obj.hpp"
+#include "experiments/io/pc2.hpp"
 
 namespace kbvh::experiments {
 
@@ -125,6 +128,51 @@ nlohmann::json as_json(const BodyCard& c) {
           {"sides_changed_at_most", c.most_sides_changed},
           {"mean_step_in_edges", c.mean_step},
           {"largest_step_in_edges", c.largest_step}};
+}
+
+nlohmann::json as_json(const std::string& scene, const std::vector<BodyCard>& list) {
+  nlohmann::json bodies = nlohmann::json::array();
+  for (const BodyCard& card : list) bodies.push_back(as_json(card));
+  return {{"scene", scene}, {"bodies", bodies}};
+}
+
+namespace {
+
+/// Some of the keyframes, a second apart: pictures need no times.
+io::AnimatedMesh thinned(const io::AnimatedMesh& mesh, std::size_t most_keyframes) {
+  const std::size_t all = mesh.keyframe_times.size();
+  if (most_keyframes == 0 || all <= 1) return mesh;
+  io::AnimatedMesh few = mesh;
+  few.keyframe_times.clear();
+  few.positions.clear();
+  const std::size_t kept = std::min(most_keyframes, all), size = std::size_t(3) * mesh.vertex_count;
+  for (std::size_t i = 0; i < kept; ++i) {
+    const std::size_t k = kept == 1 ? 0 : i * (all - 1) / (kept - 1);
+    few.keyframe_times.push_back(double(i));
+    few.positions.insert(few.positions.end(), mesh.positions.begin() + std::ptrdiff_t(k * size),
+                         mesh.positions.begin() + std::ptrdiff_t((k + 1) * size));
+  }
+  return few;
+}
+
+}  // namespace
+
+std::string file_name(std::string name) {
+  for (char& c : name)
+    if (c == '/' || c == '\0') c = '-';
+  return name;
+}
+
+void export_scene(const LoadedScene& scene, const std::filesystem::path& folder, std::size_t most_keyframes) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    const io::AnimatedMesh mesh = thinned(scene.meshes[i], most_keyframes);
+    const std::string file = std::to_string(i) + "-" + file_name(mesh.name);
+    io::save_obj(mesh, folder / (file + ".obj"));
+    if (mesh.moving()) io::save_pc2(mesh, folder / (file + ".pc2"), 1);
+  }
+  io::write_file_atomically(folder / "card.json", as_json(scene.name, cards(scene)).dump(2) + "\n");
 }
 
 }  // namespace kbvh::experiments

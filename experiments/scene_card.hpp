@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -28,5 +29,16 @@ struct BodyCard {
 std::vector<BodyCard> cards(const LoadedScene& scene);
 
 nlohmann::json as_json(const BodyCard& card);
+
+/// {"scene": name, "bodies": [cards]}.
+nlohmann::json as_json(const std::string& scene, const std::vector<BodyCard>& list);
+
+/// A scene's or body's name as the name of a file or folder.
+std::string file_name(std::string name);
+
+/// Writes a scene for people and pictures: every body as OBJ, with PC2 if it moves, its number before its
+/// name, and the cards as card.json. `most_keyframes`: of long clips only so many, the first, the last and
+/// some between; 0: all. Throws io::InputError.
+void export_scene(const LoadedScene& scene, const std::filesystem::path& folder, std::size_t most_keyframes);
 
 }  // namespace kbvh::experiments

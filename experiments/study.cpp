@@ -13,6 +13,7 @@
 #include "experiments/progress.hpp"
 #include "experiments/record.hpp"
 #include "experiments/results.hpp"
+#include "experiments/scene_card.hpp"
 #include "experiments/table.hpp"
 #include "experiments/targets.hpp"
 #include "experiments/text.hpp"
@@ -22,6 +23,10 @@ namespace kbvh::experiments {
 using nlohmann::json;
 
 namespace {
+
+/// Primitives up to which a scene's keyframes are written for its picture, and how many keyframes.
+constexpr std::uint64_t largest_shown = 150'000;
+constexpr std::size_t keyframes_shown = 4;
 
 /// One run of a plan: what all its groups share.
 class Runner {
@@ -45,6 +50,7 @@ class Runner {
       }
       const LoadedScene loaded = load(spec, making_);
       for (const std::string& text : loaded.notes) note("note: " + text);
+      if (store_) show_scene(loaded);
       for (const std::string& scalar : study.scalars) {
         if (scalar == "float")
           scene<float>(study, contestants, loaded);
@@ -69,6 +75,17 @@ class Runner {
   void note(const std::string& text) {
     progress_.clear();
     if (said_.insert(text).second) say(text);
+  }
+
+  /// What the report shows of a scene: its card, and a few keyframes where it is not too large for a picture.
+  void show_scene(const LoadedScene& loaded) {
+    std::uint64_t primitives = 0;
+    for (const io::AnimatedMesh& mesh : loaded.meshes) primitives += mesh.primitive_count();
+    const std::filesystem::path folder = store_->folder() / "scenes" / file_name(loaded.name);
+    if (primitives > largest_shown || std::filesystem::exists(folder / "card.json")) return;
+    making_("looking at " + loaded.name, 0);
+    export_scene(loaded, folder, keyframes_shown);
+    progress_.clear();
   }
 
   template <class S>

@@ -67,28 +67,28 @@ template <class V>
   return lane ? 1U : 0U;
 }
 #if !defined(KBVH_KERNELS_portable)
-[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int32_t, 4> m) {
-  return unsigned(_mm_movemask_ps((__m128)m));
-}
-[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int64_t, 2> m) {
-  return unsigned(_mm_movemask_pd((__m128d)m));
-}
-#endif
+// By size, not by type: compilers differ in what the lanes of a comparison are called.
+template <class V>
+[[gnu::always_inline]] inline unsigned mask_bits(V m) {
+  constexpr std::size_t lane = sizeof(m[0]);
+  static_assert(lane == 4 || lane == 8);
+  if constexpr (sizeof(V) == 16) {
+    return lane == 4 ? unsigned(_mm_movemask_ps((__m128)m)) : unsigned(_mm_movemask_pd((__m128d)m));
+  }
 #if defined(KBVH_KERNELS_avx2) || defined(KBVH_KERNELS_avx512)
-[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int32_t, 8> m) {
-  return unsigned(_mm256_movemask_ps((__m256)m));
-}
-[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int64_t, 4> m) {
-  return unsigned(_mm256_movemask_pd((__m256d)m));
-}
+  if constexpr (sizeof(V) == 32) {
+    return lane == 4 ? unsigned(_mm256_movemask_ps((__m256)m)) : unsigned(_mm256_movemask_pd((__m256d)m));
+  }
 #endif
 #if defined(KBVH_KERNELS_avx512)
-// Through 32 bits: GCC 12 can spill a 16-bit mask and reload more than it wrote.
-[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int32_t, 16> m) {
-  return unsigned(_mm512_movepi32_mask((__m512i)m)) & 0xffffU;
-}
-[[gnu::always_inline]] inline unsigned mask_bits(Vector<std::int64_t, 8> m) {
-  return unsigned(_mm512_movepi64_mask((__m512i)m)) & 0xffU;
+  // Through 32 bits: GCC 12 can spill a 16-bit mask and reload more than it wrote.
+  if constexpr (sizeof(V) == 64) {
+    if constexpr (lane == 4)
+      return unsigned(_mm512_movepi32_mask((__m512i)m)) & 0xffffU;
+    else
+      return unsigned(_mm512_movepi64_mask((__m512i)m)) & 0xffU;
+  }
+#endif
 }
 #endif
 

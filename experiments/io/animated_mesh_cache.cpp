@@ -13,18 +13,6 @@ namespace {
 constexpr std::string_view magic = "KBVHMESH";
 constexpr std::size_t header_bytes = 32;
 
-std::uint64_t checksum_of(std::string_view bytes) {
-  std::uint64_t sum = bytes.size();
-  const auto add = [&](std::uint64_t word) {
-    sum = (sum ^ word) * 0x9E3779B97F4A7C15u;
-    sum ^= sum >> 32;
-  };
-  std::size_t at = 0;
-  for (; at + 8 <= bytes.size(); at += 8) add(load_little_endian<std::uint64_t>(bytes.data() + at));
-  for (; at < bytes.size(); ++at) add(static_cast<unsigned char>(bytes[at]));
-  return sum;
-}
-
 bool all_floats(const std::vector<double>& numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](double x) {
     return std::abs(x) <= largest_coordinate && static_cast<float>(x) == x;
@@ -116,6 +104,18 @@ AnimatedMesh read_mesh(PayloadReader& in, const std::filesystem::path& file) {
 
 }  // namespace
 
+std::uint64_t cache_checksum(std::string_view bytes) {
+  std::uint64_t sum = bytes.size();
+  const auto add = [&](std::uint64_t word) {
+    sum = (sum ^ word) * 0x9E3779B97F4A7C15u;
+    sum ^= sum >> 32;
+  };
+  std::size_t at = 0;
+  for (; at + 8 <= bytes.size(); at += 8) add(load_little_endian<std::uint64_t>(bytes.data() + at));
+  for (; at < bytes.size(); ++at) add(static_cast<unsigned char>(bytes[at]));
+  return sum;
+}
+
 void save_cache(const std::vector<AnimatedMesh>& meshes, const std::filesystem::path& file) {
   std::string payload;
   append_little_endian(payload, std::uint64_t{meshes.size()});
@@ -127,7 +127,7 @@ void save_cache(const std::vector<AnimatedMesh>& meshes, const std::filesystem::
   append_little_endian(out, cache_version);
   append_little_endian(out, std::uint32_t{0});
   append_little_endian(out, std::uint64_t{payload.size()});
-  append_little_endian(out, checksum_of(payload));
+  append_little_endian(out, cache_checksum(payload));
   out += payload;
   write_file_atomically(file, out);
 }
@@ -154,7 +154,7 @@ std::vector<AnimatedMesh> load_cache(const std::filesystem::path& file) {
              std::to_string(bytes.size() - header_bytes) + " are there");
   }
   const std::string_view payload = std::string_view(bytes).substr(header_bytes);
-  if (checksum_of(payload) != load_little_endian<std::uint64_t>(&bytes[24])) {
+  if (cache_checksum(payload) != load_little_endian<std::uint64_t>(&bytes[24])) {
     fail(file, "payload",
          "the checksum of its " + std::to_string(size) + " bytes is wrong: the file is damaged");
   }

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <string_view>
 #include <vector>
 
 #include "experiments/io/animated_mesh.hpp"
@@ -9,6 +10,9 @@ namespace kbvh::io {
 
 /// Raised whenever the layout below changes; files of another version are refused, never guessed at.
 inline constexpr std::uint32_t cache_version = 1;
+
+/// Of a payload, as the header holds it: finds damage, not malice.
+std::uint64_t cache_checksum(std::string_view payload);
 
 /// Writes meshes to one binary file: "KBVHMESH", u32 version, u32 0, u64 payload bytes, u64 checksum,
 /// payload; all little-endian. Positions take float32 each if all of a mesh are exactly floats, else float64:

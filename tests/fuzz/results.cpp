@@ -1,0 +1,23 @@
+#include "experiments/results.hpp"
+
+#include "tests/fuzz/input_file.hpp"
+
+// A result file of whatever bytes, and a record added to it: the new record is found again, and what could be
+// read before still can.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using kbvh::experiments::ResultStore;
+  static const kbvh::fuzz::InputFolder folder;
+  folder.write("results.jsonl", data, size);
+  std::size_t before = 0, unreadable = 0;
+  {
+    ResultStore store(folder.path());
+    before = store.records();
+    unreadable = store.unreadable_lines();
+    store.append({{"key", "fuzz"}, {"value", 1}});
+  }
+  const ResultStore again(folder.path());
+  const nlohmann::json* found = again.find("fuzz");
+  if (found == nullptr || found->at("value") != 1) std::abort();
+  if (again.records() != before + 1 || again.unreadable_lines() != unreadable) std::abort();
+  return 0;
+}
