@@ -42,13 +42,13 @@ struct Points {
   [[gnu::always_inline]] static void store_largest(S* to, Pack p) { store_smallest(to, p); }
 };
 
-#if defined(__AVX__)
+#if defined(KBVH_KERNELS_avx2) || defined(KBVH_KERNELS_avx512)
 // GCC 12 makes a load and a shuffle of __builtin_shufflevector; this is one instruction that reads memory.
 [[gnu::always_inline]] inline Vector<float, 8> joined(Vector<float, 4> a, Vector<float, 4> b) {
   return (Vector<float, 8>)_mm256_insertf128_ps(_mm256_castps128_ps256((__m128)a), (__m128)b, 1);
 }
 #endif
-#if defined(__AVX512F__)
+#if defined(KBVH_KERNELS_avx512)
 [[gnu::always_inline]] inline Vector<double, 8> joined(Vector<double, 4> a, Vector<double, 4> b) {
   return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
 }
