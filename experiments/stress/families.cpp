@@ -195,7 +195,7 @@ StressScene signed_zeros(const FamilySetting& setting) {
   StressScene scene;
   for (int b = 0; b < 2; ++b)
     scene.bodies.push_back(
-        soup_of(20 + random.below(20), keyframes_for(setting), [&](std::uint32_t, std::uint32_t, int) {
+        soup_of(8 + random.below(8), keyframes_for(setting), [&](std::uint32_t, std::uint32_t, int) {
           return random.among(
               {0.0, -0.0, 0.0, -0.0, 1.0, -1.0, setting.limits.smallest, -setting.limits.smallest});
         }));

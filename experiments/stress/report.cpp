@@ -56,7 +56,7 @@ std::vector<StressRow> over_families(const std::vector<StressRow>& rows) {
     sum->crashes += row.crashes;
     sum->hangs += row.hangs;
     sum->protrusion = std::max(sum->protrusion, row.protrusion);
-    sum->looseness_sum += row.looseness_sum;
+    sum->log_looseness += row.log_looseness;
     sum->audited += row.audited;
   }
   return sums;

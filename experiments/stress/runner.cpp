@@ -195,7 +195,7 @@ void StressRow::add(const CaseResult& result) {
     relative_protrusion = std::max(relative_protrusion, result.protrusion / result.extent);
   if (!result.audited) return;
   ++audited;
-  looseness_sum += result.looseness;
+  log_looseness += std::log1p(result.looseness);
   looseness_worst = std::max(looseness_worst, result.looseness);
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -57,13 +58,15 @@ struct StressRow {
   std::uint64_t broken = 0, threw = 0, crashes = 0, hangs = 0;
   double protrusion = 0;           ///< largest, in units of the scene
   double relative_protrusion = 0;  ///< largest, over the scene's largest coordinate
-  double looseness_sum = 0, looseness_worst = 0;
+  double log_looseness = 0;        ///< sum over audited scenes of log(1 + looseness)
+  double looseness_worst = 0;
   std::uint64_t audited = 0;
   double seconds = 0;  ///< processor time
 
   void add(const CaseResult& result);
   std::uint64_t failures() const { return broken + threw + crashes + hangs; }
-  double looseness() const { return audited > 0 ? looseness_sum / double(audited) : 0; }
+  /// Geometric mean over scenes, of the factor that it stands for: scales differ too much for any other.
+  double looseness() const { return audited > 0 ? std::expm1(log_looseness / double(audited)) : 0; }
 };
 
 /// A failure, shrunk or not.
