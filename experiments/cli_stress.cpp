@@ -29,7 +29,7 @@ struct StressArguments {
   std::vector<std::uint32_t> l{1, 7, 100};
   std::uint64_t scenes = 100, seed = 1;
   std::uint32_t many_keyframes = 100000;
-  double seconds = 20;
+  double seconds = 100;
   bool plain = false, no_shrink = false, list = false;
 };
 
@@ -161,7 +161,7 @@ void add_stress(CLI::App& program, Action& action) {
   command->add_option("--param", a->params, "key=value or strategy.key=value; a list of values sweeps");
   command->add_option("--many-keyframes", a->many_keyframes, "of the longest scene (100000)")
       ->check(CLI::Range(100u, 10000000u));
-  command->add_option("--seconds", a->seconds, "processor time of a strategy on a scene; more hangs (20)")
+  command->add_option("--seconds", a->seconds, "processor time of a strategy on a scene; more hangs (100)")
       ->check(CLI::PositiveNumber);
   command->add_flag("--plain", a->plain, "every strategy in its usual configuration only");
   command->add_flag("--no-shrink", a->no_shrink, "leave failures as large as they are");

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "core/kinetic/event.hpp"
@@ -46,10 +47,12 @@ class RoundedClock {
     const auto times = plan.keyframe_times();
     const auto axis = std::size_t(axis_of(event.side));
     const std::size_t w = std::size_t(3) * event.winner + axis, l = std::size_t(3) * event.loser + axis;
+    // Differences of coordinates come first, so that float times do not mean float coordinates.
+    using Wide = std::conditional_t<sizeof(T) < sizeof(S), S, T>;
     const T sign = is_upper(event.side) ? T(1) : T(-1);
     for (std::size_t k = plan.segment_at(now.begin); k + 1 < times.size() && times[k] < until; ++k) {
       const T begin = T(times[k]), length = T(times[k + 1]) - begin;
-      const T behind = sign * (T(plan.keyframe(k)[w]) - T(plan.keyframe(k)[l]));
+      const T behind = sign * T(Wide(plan.keyframe(k)[w]) - Wide(plan.keyframe(k)[l]));
       T time = 0;
       if constexpr (rule == FailureRule::end_point_rule) {
         const double ahead = double(plan.keyframe(k + 1)[l]) - double(plan.keyframe(k + 1)[w]);
@@ -60,7 +63,7 @@ class RoundedClock {
         time = std::min(time, T(times[k + 1]));
         if (!(double(time) >= now.begin)) time = T(now.begin);
       } else {
-        const T ahead = sign * (T(plan.keyframe(k + 1)[l]) - T(plan.keyframe(k + 1)[w]));
+        const T ahead = sign * T(Wide(plan.keyframe(k + 1)[l]) - Wide(plan.keyframe(k + 1)[w]));
         const T closing = (behind + ahead) / length;  // of the loser, relative to the winner
         if (!(closing > 0)) continue;
         time = begin + behind / closing;

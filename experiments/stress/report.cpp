@@ -21,6 +21,7 @@ std::vector<std::string> cells(const StressRow& row) {
           row.strategy,
           std::to_string(row.scenes),
           short_number(row.protrusion),
+          short_number(row.relative_protrusion),
           row.audited > 0 ? short_number(row.looseness()) : "-",
           std::to_string(row.missed),
           std::to_string(row.extra),
@@ -31,8 +32,9 @@ std::vector<std::string> cells(const StressRow& row) {
           std::to_string(row.refused)};
 }
 
-const std::vector<std::string> head{"family", "strategy", "scenes", "protrusion", "looseness", "missed",
-                                    "extra",  "events",   "hangs",  "crashes",    "broken",    "refused"};
+const std::vector<std::string> head{"family",    "strategy", "scenes", "protrusion", "relative",
+                                    "looseness", "missed",   "extra",  "events",     "hangs",
+                                    "crashes",   "broken",   "refused"};
 
 /// One line for each strategy over all families.
 std::vector<StressRow> over_families(const std::vector<StressRow>& rows) {
@@ -56,6 +58,7 @@ std::vector<StressRow> over_families(const std::vector<StressRow>& rows) {
     sum->crashes += row.crashes;
     sum->hangs += row.hangs;
     sum->protrusion = std::max(sum->protrusion, row.protrusion);
+    sum->relative_protrusion = std::max(sum->relative_protrusion, row.relative_protrusion);
     sum->log_looseness += row.log_looseness;
     sum->audited += row.audited;
   }

@@ -195,7 +195,8 @@ void StressRow::add(const CaseResult& result) {
     relative_protrusion = std::max(relative_protrusion, result.protrusion / result.extent);
   if (!result.audited) return;
   ++audited;
-  log_looseness += std::log1p(result.looseness);
+  // Boxes that hold nothing have an area of zero, and a looseness of minus one.
+  log_looseness += std::log1p(std::max(result.looseness, -0.999999));
   looseness_worst = std::max(looseness_worst, result.looseness);
 }
 

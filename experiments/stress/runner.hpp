@@ -40,7 +40,7 @@ struct CaseResult {
 };
 
 struct RunLimits {
-  double seconds = 20;  ///< processor time of one contestant on one scene; more is a hang
+  double seconds = 100;  ///< processor time of one contestant on one scene; more is a hang
   bool silent = false;  ///< drop what child processes print
 };
 

@@ -5,10 +5,12 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 
 #include "core/hierarchy/stored_hierarchy.hpp"
 #include "core/kinetic/kinetic_aabb_strategy.hpp"
 #include "experiments/io/animated_mesh.hpp"
+#include "experiments/io/bytes.hpp"
 #include "experiments/stress/isolate.hpp"
 #include "experiments/stress/runner.hpp"
 #include "experiments/stress/shrink.hpp"
@@ -248,6 +250,22 @@ TEST(Shrinking, LeavesWhatIsNeededAndNothingElse) {
   for (const double x : small.bodies[0].positions) others += x != 0;
   EXPECT_EQ(others, 1u);
   EXPECT_LT(asked, 3000u);
+}
+
+// Scenes that the suite has found, each with the contestant that failed on it.
+TEST(Repro, WhatFailedOnceHolds) {
+  std::size_t played = 0;
+  for (const auto& file : std::filesystem::directory_iterator(KBVH_SOURCE_DIR "/tests/repro/stress")) {
+    const Repro repro = repro_of(io::read_file(file.path()), file.path().string());
+    const StrategyEntry* known = known_strategy(repro.strategy);
+    if (known == nullptr) continue;  // a peer that is not installed here
+    ContestantSpec spec = contestant(*known, repro.params);
+    if (!repro.builder.empty()) spec.builder = builder_of(repro.builder);
+    const CaseResult result = run_scene(repro.scene, repro.scalar, {spec}, {})[0];
+    EXPECT_EQ(result.outcome, Outcome::held) << file.path() << ": " << result.what;
+    ++played;
+  }
+  RecordProperty("played", int(played));
 }
 
 // --- what exactness buys --------------------------------------------------------------------------------
