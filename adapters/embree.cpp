@@ -308,6 +308,8 @@ class EmbreeRefit final : public Strategy<S> {
     return box;
   }
 
+  static constexpr float largest = 1.8e18f;  // of a bound that is handed over
+
   template <auto bounds_of>
   static void fit(const RTCBoundsFunctionArguments* args) {
     hand_over(bounds_of(*static_cast<const BodyState*>(args->geometryUserPtr), args->primID),
@@ -315,20 +317,22 @@ class EmbreeRefit final : public Strategy<S> {
   }
   /// Half of a refit's time is spent here and above: whole registers are stored, with Embree's own padding.
   static void hand_over(const Bounds& tight, RTCBounds& box) {
-    constexpr float twice_smallest = 2 * std::numeric_limits<float>::min(), largest = 1.8e18f;
+    constexpr float twice_smallest = 2 * std::numeric_limits<float>::min();
     const Lanes sides[2] = {(tight.lower - twice_smallest).max(-largest).min(largest),
                             (tight.upper + twice_smallest).max(-largest).min(largest)};
     static_assert(sizeof(RTCBounds) == sizeof(sides));
     std::memcpy(&box, sides, sizeof(box));
   }
 
-  /// The root of the triangles, which nothing else reads, lies within that of the boxes.
+  /// The root of the triangles, which nothing else reads, lies within that of the boxes, as far as these
+  /// reach.
   static bool bounds_triangles(const BodyState& state) {
     RTCBounds boxes, triangles;
     rtcGetSceneBounds(state.boxes.scene.get(), &boxes);
     rtcGetSceneBounds(state.triangles.scene.get(), &triangles);
     const auto within = [](float lower, float inner_lower, float inner_upper, float upper) {
-      return lower <= std::min(inner_lower, 1.8e18f) && std::max(inner_upper, -1.8e18f) <= upper;
+      return lower <= std::clamp(inner_lower, -largest, largest) &&
+             std::clamp(inner_upper, -largest, largest) <= upper;
     };
     return within(boxes.lower_x, triangles.lower_x, triangles.upper_x, boxes.upper_x) &&
            within(boxes.lower_y, triangles.lower_y, triangles.upper_y, boxes.upper_y) &&

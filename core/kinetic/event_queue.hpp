@@ -17,6 +17,7 @@ namespace kbvh {
 ///   top(), pop(), empty(), size(), clear(), bytes()
 ///   grow(slots)       makes room for slots below this number, amortised O(1) each; events stay scheduled
 ///   slots()           how many there is room for
+///   ClockType         the clock: EventClock in all but contestants that round times
 /// `steps()` counts comparisons. Events and their order come from a clock: Clock::Event has a `slot`, and
 /// clock.earlier(a, b) orders by exact time first (EventClock, OverlapClock).
 
@@ -39,6 +40,7 @@ class AvlEventQueue {
   using Tree = boost::intrusive::avl_set<Node, boost::intrusive::compare<Less>>;
 
  public:
+  using ClockType = Clock;
   static constexpr const char* name = "avl";
   AvlEventQueue(const Clock& clock, std::uint32_t slots)
       : steps_(std::make_unique<std::uint64_t>(0)), nodes_(slots), tree_(Less{&clock, steps_.get()}) {}
@@ -101,6 +103,7 @@ class BinaryHeapEventQueue {
   using Event = typename Clock::Event;
 
  public:
+  using ClockType = Clock;
   static constexpr const char* name = "binary_heap";
   BinaryHeapEventQueue(const Clock& clock, std::uint32_t slots)
       : clock_(&clock), events_(slots), place_(slots, none) {

@@ -57,7 +57,7 @@ template <class S, class Queue, class Count, class Observer = NoObserver>
 class KineticAabbTree {
  public:
   KineticAabbTree(Topology topology, const Primitives& primitives, std::uint16_t body,
-                  std::uint32_t first_slot, EventClock<S>& clock, Queue& queue, Count& count,
+                  std::uint32_t first_slot, typename Queue::ClockType& clock, Queue& queue, Count& count,
                   Observer observer = {})
       : topology_(std::move(topology)),
         leaf_vertices_(packed_leaf_vertices(topology_, primitives)),
@@ -407,7 +407,7 @@ class KineticAabbTree {
   ListPool leaf_vertices_;
   std::uint16_t body_;
   CertificateSlots slots_;
-  EventClock<S>* clock_;
+  typename Queue::ClockType* clock_;
   Queue* queue_;
   Count* count_;
   Observer observer_;

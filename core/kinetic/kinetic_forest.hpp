@@ -15,6 +15,7 @@ template <class S, class Queue, class Count, class Observer = NoObserver,
 class KineticForest {
  public:
   using Tree = KineticTree<S, Queue, Count, Observer>;
+  using Clock = typename Queue::ClockType;
 
   KineticForest(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, Count& count,
                 Observer observer = {})
@@ -78,8 +79,8 @@ class KineticForest {
 
   Tree& tree(std::uint32_t body) { return trees_[body]; }
   const Tree& tree(std::uint32_t body) const { return trees_[body]; }
-  EventClock<S>& clock() { return clock_; }
-  const EventClock<S>& clock() const { return clock_; }
+  Clock& clock() { return clock_; }
+  const Clock& clock() const { return clock_; }
   Queue& queue() { return queue_; }
   const Queue& queue() const { return queue_; }
   std::size_t bytes() const {
@@ -102,7 +103,7 @@ class KineticForest {
     return std::uint32_t(slots);
   }
 
-  EventClock<S> clock_;
+  Clock clock_;
   Queue queue_;
   Count* count_;
   std::vector<Tree> trees_;

@@ -1,0 +1,177 @@
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <set>
+
+#include "experiments/cli.hpp"
+#include "experiments/io/bytes.hpp"
+#include "experiments/program.hpp"
+#include "experiments/progress.hpp"
+#include "experiments/stress/runner.hpp"
+#include "experiments/text.hpp"
+
+namespace kbvh::experiments {
+
+namespace {
+
+constexpr const char* examples = R"(Examples:
+  kbvh stress --scenes 1000 --out results/stress
+  kbvh stress --families near_tangent,spikes --strategies kinetic_aabb,bottom_up --l 7
+  kbvh stress --strategies family:approximate --out results/error
+  kbvh stress --repro results/stress/repro-spikes-kinetic_aabb-float.json
+Scenes made to break what they are played to, from seeds; each contestant in a process of its own, held against the
+oracle. DIR/stress.json has the table, DIR/repro-*.json what failed, made as small as it could be.
+Exit codes: 0 nothing failed, 1 something did, 2 wrong use. Errors of approximate contestants are results.)";
+
+struct StressArguments {
+  std::string out, repro;
+  std::vector<std::string> strategies{"default"}, families, scalars{"float", "double"}, params;
+  std::vector<std::uint32_t> l{1, 7, 100};
+  std::uint64_t scenes = 100, seed = 1;
+  std::uint32_t many_keyframes = 100000;
+  double seconds = 100;
+  bool plain = false, no_shrink = false, list = false;
+};
+
+std::vector<ContestantSpec> contestants_of(const StressArguments& arguments) {
+  std::vector<StrategyRequest> requests;
+  for (const std::string& id : arguments.strategies) {
+    StrategyRequest request;
+    request.id = id;
+    requests.push_back(std::move(request));
+  }
+  Sweep sweep;
+  for (const std::string& text : arguments.params) {
+    const auto assignment = parse_assignment(text);
+    if (!assignment) throw io::InputError("--param: expected key=value, got '" + text + "'");
+    sweep[assignment->first] = split(assignment->second, ',');
+  }
+  std::vector<std::string> notes;
+  auto list = expand(requests, sweep, {}, notes);
+  for (const std::string& note : notes) say(note);
+  return list;
+}
+
+int run_repro(const StressArguments& arguments, bool others) {
+  const stress::Repro repro = stress::repro_of(io::read_file(arguments.repro), arguments.repro);
+  std::vector<ContestantSpec> specs;
+  if (others) {
+    specs = contestants_of(arguments);
+  } else {
+    ContestantSpec spec;
+    spec.entry = &find_strategy(repro.strategy);
+    const Info& info = spec.entry->info;
+    spec.given = repro.params;
+    spec.params = Params(info.id, info.parameters, repro.params).values();
+    spec.builder = repro.builder.empty() ? info.topology.preferred : stress::builder_of(repro.builder);
+    spec.label = repro.strategy;
+    specs = {spec};
+  }
+  stress::RunLimits limits;
+  limits.seconds = arguments.seconds;
+  const auto results = stress::run_scene(repro.scene, repro.scalar, specs, limits);
+  bool failed = false;
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    failed |= results[i].failed();
+    std::printf("%s, %s: %s%s%s\n", specs[i].label.c_str(), repro.scalar.c_str(), name(results[i].outcome),
+                results[i].what.empty() ? "" : ": ", results[i].what.c_str());
+  }
+  return failed ? guarantee_broken : success;
+}
+
+std::string file_name(const stress::Repro& repro, std::set<std::string>& taken) {
+  const std::string base = "repro-" + repro.scene.family + "-" + repro.strategy + "-" + repro.scalar;
+  std::string name = base + ".json";
+  for (int i = 2; !taken.insert(name).second; ++i) name = base + "-" + std::to_string(i) + ".json";
+  return name;
+}
+
+int run(const StressArguments& arguments, bool strategies_named) {
+  if (arguments.list) {
+    for (const stress::Family& family : stress::families())
+      std::printf("%-22s %s\n", family.name.c_str(), family.meaning.c_str());
+    return success;
+  }
+  if (!arguments.repro.empty()) return run_repro(arguments, strategies_named);
+  stress::StressOptions options;
+  for (const std::string& name : arguments.families) options.families.push_back(&stress::find_family(name));
+  if (options.families.empty())
+    for (const stress::Family& family : stress::families()) options.families.push_back(&family);
+  options.contestants = contestants_of(arguments);
+  options.scenes = arguments.scenes;
+  options.seed = arguments.seed;
+  options.scalars = arguments.scalars;
+  options.l = arguments.l;
+  options.many_keyframes = arguments.many_keyframes;
+  options.limits.seconds = arguments.seconds;
+  options.vary = !arguments.plain;
+  options.shrink = !arguments.no_shrink;
+  const std::filesystem::path folder = arguments.out;
+  if (!arguments.out.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) throw io::InputError("cannot make " + folder.string() + ": " + error.message());
+  }
+  Progress progress;
+  stress::StressReport report =
+      stress::run_stress(options, [&](const std::string& what) { progress.show(what); });
+  progress.clear();
+  std::fputs(stress_table(report).c_str(), stdout);
+  std::set<std::string> taken;
+  for (stress::StressFailure& failure : report.failures) {
+    const stress::Repro& repro = failure.repro;
+    say(repro.strategy + " on " + repro.scene.family + ", " + repro.scalar +
+        ", l = " + std::to_string(failure.l) + ": " + repro.failure + " (made smaller from " +
+        counted(failure.triangles_before, "triangle") + " to " + std::to_string(repro.scene.triangles()) +
+        ")");
+    if (arguments.out.empty()) continue;
+    failure.file = file_name(repro, taken);
+    io::write_file_atomically(folder / failure.file, stress::to_text(repro));
+    say("kbvh stress --repro " + (folder / failure.file).string() + " shows it");
+  }
+  if (!arguments.out.empty()) {
+    const std::filesystem::path file = folder / "stress.json";
+    io::write_file_atomically(file, to_json(report, options).dump(1) + "\n");
+    say("all numbers are in " + file.string());
+  }
+  for (const stress::StressRow& row : report.rows)
+    if (row.failures() > 0) return guarantee_broken;
+  return success;
+}
+
+}  // namespace
+
+void add_stress(CLI::App& program, Action& action) {
+  CLI::App* command = program.add_subcommand("stress", "play scenes that are made to break things");
+  command->footer(examples);
+  auto a = std::make_shared<StressArguments>();
+  CLI::Option* strategies =
+      command->add_option("--strategies", a->strategies, "as for run: ids, family:NAME, default, all, !ID")
+          ->delimiter(',');
+  command->add_option("--families", a->families, "of scenes (all)")->delimiter(',');
+  command->add_option("--scenes", a->scenes, "to be made, in turn of the families (100)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--seed", a->seed, "another one, other scenes (1)");
+  command->add_option("--scalars", a->scalars, "float, double (both)")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"float", "double"}));
+  command->add_option("--l", a->l, "frames for each keyframe interval (1,7,100)")
+      ->delimiter(',')
+      ->check(CLI::Range(1u, 100000u));
+  command->add_option("--param", a->params, "key=value or strategy.key=value; a list of values sweeps");
+  command->add_option("--many-keyframes", a->many_keyframes, "of the longest scene (100000)")
+      ->check(CLI::Range(100u, 10000000u));
+  command->add_option("--seconds", a->seconds, "processor time of a strategy on a scene; more hangs (100)")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--plain", a->plain, "every strategy in its usual configuration only");
+  command->add_flag("--no-shrink", a->no_shrink, "leave failures as large as they are");
+  command->add_flag("--list", a->list, "show the families");
+  command->add_option("--repro", a->repro, "play the scene of this file, by whom it names or --strategies");
+  command->add_option("--out", a->out, "folder for stress.json and repro files (none: the table only)");
+  command->callback([&action, a, strategies] {
+    const bool named = strategies->count() > 0;
+    action = [a, named] { return run(*a, named); };
+  });
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,595 @@
+#include "experiments/stress/families.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "core/geometry/predicates.hpp"
+#include "experiments/io/animated_mesh.hpp"
+#include "experiments/scenes/shapes.hpp"
+
+namespace kbvh::experiments::stress {
+
+template <class S>
+ScalarLimits scalar_limits() {
+  using Limits = std::numeric_limits<S>;
+  return {double(admissible_magnitude<S>), double(Limits::denorm_min()), double(Limits::min()),
+          double(Limits::epsilon())};
+}
+template ScalarLimits scalar_limits<float>();
+template ScalarLimits scalar_limits<double>();
+
+namespace {
+
+/// A seeded stream that is the same on every platform.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : noise_(seed) {}
+  std::uint32_t below(std::uint32_t n) { return std::uint32_t((noise_.bits(next_++) >> 11) % n); }
+  double unit() { return noise_.signed_unit(next_++); }
+  bool one_in(std::uint32_t n) { return below(n) == 0; }
+  template <class T>
+  T among(std::initializer_list<T> values) {
+    return values.begin()[below(std::uint32_t(values.size()))];
+  }
+
+ private:
+  scenes::SeededNoise noise_;
+  std::uint64_t next_ = 0;
+};
+
+/// Fewer keyframes where each segment has many frames: all l cost about the same.
+std::uint32_t keyframes_for(const FamilySetting& setting) {
+  return setting.l >= 50 ? 2 : setting.l >= 5 ? 4 : 8;
+}
+
+StressBody unmoved(std::uint32_t vertices) {
+  StressBody body;
+  body.vertex_count = vertices;
+  body.positions.assign(std::size_t(3) * vertices, 0.0);
+  return body;
+}
+
+/// A body of `triangles` triangles without common vertices whose points are what `at` says.
+using Point = std::function<double(std::uint32_t keyframe, std::uint32_t vertex, int axis)>;
+StressBody soup_of(std::uint32_t triangles, std::uint32_t keyframes, const Point& at) {
+  StressBody body;
+  body.vertex_count = 3 * triangles;
+  for (std::uint32_t p = 0; p < triangles; ++p) body.primitives.push_back({3 * p, 3 * p + 1, 3 * p + 2});
+  body.times.clear();
+  for (std::uint32_t k = 0; k < keyframes; ++k) {
+    body.times.push_back(0.25 * k);
+    for (std::uint32_t v = 0; v < body.vertex_count; ++v)
+      for (int axis = 0; axis < 3; ++axis) body.positions.push_back(at(k, v, axis));
+  }
+  return body;
+}
+
+/// Triangles of a size scattered in [-1, 1]^3, every vertex on a random walk.
+StressBody soup(Random& random, std::uint32_t triangles, std::uint32_t keyframes, double size = 0.4,
+                double travel = 0.3) {
+  std::vector<double> last(std::size_t(9) * triangles);
+  double centre[3] = {0, 0, 0};
+  for (std::size_t i = 0; i < last.size(); ++i) {
+    if (i % 9 == 0)
+      for (double& c : centre) c = 0.6 * random.unit();
+    last[i] = centre[i % 3] + size * random.unit();
+  }
+  return soup_of(triangles, keyframes, [&](std::uint32_t k, std::uint32_t v, int axis) {
+    double& x = last[std::size_t(3) * v + std::size_t(axis)];
+    if (k > 0) x += travel * random.unit();
+    return x;
+  });
+}
+
+/// A connected sheet of 2 (n - 1)^2 triangles.
+using SheetPoint = std::function<double(std::uint32_t x, std::uint32_t y, std::uint32_t k, int axis)>;
+StressBody sheet(std::uint32_t n, std::uint32_t keyframes, const SheetPoint& at) {
+  StressBody body;
+  body.vertex_count = n * n;
+  for (std::uint32_t y = 0; y + 1 < n; ++y)
+    for (std::uint32_t x = 0; x + 1 < n; ++x) {
+      const std::uint32_t v = y * n + x;
+      body.primitives.push_back({v, v + 1, v + n});
+      body.primitives.push_back({v + 1, v + n + 1, v + n});
+    }
+  body.times.clear();
+  for (std::uint32_t k = 0; k < keyframes; ++k) {
+    body.times.push_back(k);
+    for (std::uint32_t y = 0; y < n; ++y)
+      for (std::uint32_t x = 0; x < n; ++x)
+        for (int axis = 0; axis < 3; ++axis) body.positions.push_back(at(x, y, k, axis));
+  }
+  return body;
+}
+
+StressScene two_soups(Random& random, std::uint32_t triangles, std::uint32_t keyframes) {
+  StressScene scene;
+  for (int b = 0; b < 2; ++b)
+    scene.bodies.push_back(soup(random, triangles / 2 + random.below(triangles), keyframes));
+  return scene;
+}
+
+void for_coordinates(StressScene& scene, const std::function<void(double&)>& change) {
+  for (StressBody& body : scene.bodies)
+    for (double& x : body.positions) change(x);
+}
+
+/// Scales so that the largest coordinate is `largest`.
+void scale_to(StressScene& scene, double largest) {
+  double most = 0;
+  for_coordinates(scene, [&](double& x) { most = std::max(most, std::abs(x)); });
+  if (most > 0) for_coordinates(scene, [&](double& x) { x = x / most * largest; });
+}
+
+// --- sizes of numbers -----------------------------------------------------------------------------------
+
+StressScene soups_scaled_to(const FamilySetting& setting, double largest) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 30, keyframes_for(setting));
+  scale_to(scene, largest);
+  return scene;
+}
+StressScene tiny(const FamilySetting& s) {
+  return soups_scaled_to(s, 1e-30);
+}
+StressScene unit(const FamilySetting& s) {
+  return soups_scaled_to(s, 1);
+}
+StressScene million(const FamilySetting& s) {
+  return soups_scaled_to(s, 1e6);
+}
+StressScene huge(const FamilySetting& s) {
+  return soups_scaled_to(s, 1e30);
+}
+
+StressScene mixed(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 12, keyframes_for(setting));
+  // A scale for each triangle, or for each vertex.
+  const std::uint32_t together = random.among({1u, 3u});
+  for (StressBody& body : scene.bodies)
+    for (std::uint32_t v = 0; v < body.vertex_count; v += together) {
+      const double scale = random.among({1e-30, 1e-10, 1.0, 1.0, 1e6, 1e20, 4e29});
+      for (std::uint32_t i = v; i < std::min(v + together, body.vertex_count); ++i)
+        for (std::size_t k = 0; k < body.times.size(); ++k)
+          for (int axis = 0; axis < 3; ++axis) body.position(k, i)[axis] *= scale;
+    }
+  return scene;
+}
+
+/// Steps of the coordinates' own last place, far from the origin.
+StressScene far_away(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene;
+  const double offset = std::ldexp(1.0, int(10 + random.below(30)));
+  const double step = offset * setting.limits.epsilon * random.among({1.0, 1.0, 8.0});
+  double shift[3];
+  for (double& s : shift) s = offset * random.among({1.0, -1.5, 1.25});
+  for (int b = 0; b < 2; ++b)
+    scene.bodies.push_back(
+        soup_of(20 + random.below(20), keyframes_for(setting), [&](std::uint32_t, std::uint32_t, int axis) {
+          return shift[axis] + step * double(random.below(24));
+        }));
+  return scene;
+}
+
+StressScene denormals(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene;
+  const double most = random.among({3.0, 40.0});
+  for (int b = 0; b < 2; ++b)
+    scene.bodies.push_back(
+        soup_of(12 + random.below(12), keyframes_for(setting), [&](std::uint32_t, std::uint32_t v, int) {
+          const double steps = std::floor(most * random.unit());
+          // Some vertices on the border between denormal and normal numbers.
+          return v % 7 == 3 ? setting.limits.normal + steps * setting.limits.smallest
+                            : steps * setting.limits.smallest;
+        }));
+  return scene;
+}
+
+StressScene signed_zeros(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene;
+  for (int b = 0; b < 2; ++b)
+    scene.bodies.push_back(
+        soup_of(8 + random.below(8), keyframes_for(setting), [&](std::uint32_t, std::uint32_t, int) {
+          return random.among(
+              {0.0, -0.0, 0.0, -0.0, 1.0, -1.0, setting.limits.smallest, -setting.limits.smallest});
+        }));
+  return scene;
+}
+
+/// Across the whole admissible range from keyframe to keyframe, or by the smallest step there is.
+StressScene largest(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 10, keyframes_for(setting));
+  for (StressBody& body : scene.bodies)
+    for (std::uint32_t p = 0; p < body.primitives.size(); ++p) {
+      const std::uint32_t kind = random.below(3);
+      for (std::size_t k = 0; kind != 2 && k < body.times.size(); ++k)
+        for (std::uint32_t i = 0; i < 3; ++i)
+          for (int axis = 0; axis < 3; ++axis)
+            body.position(k, 3 * p + i)[axis] = kind == 0 ? random.among({1.0, -1.0}) * setting.limits.largest
+                                                          : double(random.below(5)) * setting.limits.smallest;
+    }
+  return scene;
+}
+
+/// Coordinates on both sides of the limit: such a scene may be refused, never misjudged.
+StressScene beyond_range(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 8, keyframes_for(setting));
+  scale_to(scene, setting.limits.largest * random.among({0.999999, 1.0, 1.0000002, 1.5, 1e9}));
+  return scene;
+}
+
+// --- trajectories ---------------------------------------------------------------------------------------
+
+/// Vertices that fly side by side with slopes that differ in the last places only.
+StressScene near_parallel(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene;
+  const double ulp = setting.limits.epsilon;
+  for (int b = 0; b < 2; ++b) {
+    double base[3] = {0, 0, 0};
+    scene.bodies.push_back(soup_of(
+        20 + random.below(16), keyframes_for(setting), [&](std::uint32_t k, std::uint32_t v, int axis) {
+          if (v % 6 == 0 && axis == 0 && k == 0)
+            for (double& x : base) x = 1 + 0.5 * random.unit();
+          // In the same places at every keyframe but for some ulps, and much further on each time.
+          const double place = 1 + 0.0625 * double((v * 7 + std::uint32_t(axis) * 3) % 5);
+          return place + 0.25 * k + ulp * 4 * double(random.below(7)) - ulp * 12;
+        }));
+  }
+  return scene;
+}
+
+/// Vertices that come back at every other keyframe to the same height, give or take one ulp: their paths
+/// touch the highest, or nearly.
+StressScene near_tangent(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene;
+  const double ulp = setting.limits.epsilon;
+  for (int b = 0; b < 2; ++b)
+    scene.bodies.push_back(
+        soup_of(20 + random.below(16), keyframes_for(setting), [&](std::uint32_t k, std::uint32_t v, int) {
+          const double side = v % 2 == 0 ? 1.0 : -1.0;
+          if (v % 5 == 0) return side;
+          if (k % 2 == 1) return side * (1 + ulp * double(int(random.below(3)) - 1));
+          return side * (0.5 + 0.4 * random.unit());
+        }));
+  return scene;
+}
+
+/// Mirrored in a point or a plane between two keyframes: all vertices meet at one instant.
+StressScene all_cross_at_once(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene;
+  const bool in_a_point = random.one_in(2);
+  scene.bodies.push_back(
+      sheet(6, keyframes_for(setting), [&](std::uint32_t x, std::uint32_t y, std::uint32_t k, int axis) {
+        const double at[3] = {0.25 * x, 0.25 * y, 0.125 * ((x + y) % 3)};
+        const bool mirrored = k % 2 == 1 && (in_a_point || axis == 0);
+        return mirrored ? 2.0 - at[axis] : at[axis];
+      }));
+  scene.bodies.push_back(soup(random, 30, keyframes_for(setting)));
+  for (double& t : scene.bodies[1].times) t *= 4;
+  return scene;
+}
+
+/// Every triangle has a twin that flies with it, apart only in some of the segments.
+StressScene coincident(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 30, std::max(3u, keyframes_for(setting)));
+  for (StressBody& body : scene.bodies)
+    for (std::size_t k = 0; k < body.times.size(); ++k)
+      for (std::size_t p = 0; p + 1 < body.primitives.size(); p += 2) {
+        if (random.one_in(3)) continue;
+        std::copy_n(body.position(k, 3 * p), 9, body.position(k, 3 * p + 3));
+      }
+  return scene;
+}
+
+/// Whole numbers, so that ties are exact; later every vertex goes its own way.
+StressScene ties_that_separate(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene;
+  const std::uint32_t keyframes = std::max(3u, keyframes_for(setting));
+  for (int b = 0; b < 2; ++b) {
+    const std::uint32_t until = 1 + random.below(keyframes);
+    scene.bodies.push_back(
+        soup_of(20 + random.below(20), keyframes, [&](std::uint32_t k, std::uint32_t, int) {
+          return k < until ? double(random.below(3)) : random.among({0.0, 1.0, 2.0}) + 0.5 * random.unit();
+        }));
+  }
+  return scene;
+}
+
+/// One vertex flies far out and comes back.
+StressScene spikes(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 30, std::max(3u, keyframes_for(setting)));
+  for (StressBody& body : scene.bodies) {
+    const std::uint32_t count = 1 + random.below(3);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const std::size_t k = random.below(std::uint32_t(body.times.size()));
+      const double height = random.among({1e3, 1e6, 1e15, 1e29, setting.limits.largest});
+      body.position(k, random.below(body.vertex_count))[random.below(3)] = height * random.among({1, -1});
+    }
+  }
+  return scene;
+}
+
+// --- time -----------------------------------------------------------------------------------------------
+
+StressScene uneven_keyframes(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 30, std::max(3u, keyframes_for(setting)));
+  for (StressBody& body : scene.bodies) {
+    double t = random.among({0.0, -0.5, 5e-7});
+    for (double& time : body.times) {
+      time = t;
+      t += random.among({1e-6, 1e-6, 5e-7, 1.0, 3.0, 1000.0, std::nextafter(t, 1e9) - t});
+      if (!(t > time)) t = std::nextafter(time, 1e9);
+    }
+  }
+  return scene;
+}
+
+/// So many keyframes that whatever drifts has drifted; few triangles.
+StressScene many_keyframes(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene;
+  for (int b = 0; b < 2; ++b) {
+    StressBody body = soup(random, 2 + random.below(3), 1);
+    const std::vector<double> start = body.positions;
+    body.times.clear();
+    body.positions.clear();
+    const double rate = random.among({1.0 / 30, 0.1, 1e-3});
+    for (std::uint32_t k = 0; k < setting.many_keyframes; ++k) {
+      body.times.push_back(rate * k);
+      for (const double x : start) body.positions.push_back(x + 0.3 * random.unit());
+    }
+    scene.bodies.push_back(std::move(body));
+  }
+  const auto& times = scene.bodies[random.below(2)].times;
+  // l frames in a few of the segments, else one in each.
+  for (std::size_t k = 0; k + 1 < times.size(); ++k) {
+    const std::uint32_t here = setting.l > 1 && k % 500 == 0 ? setting.l : 1;
+    for (std::uint32_t j = 0; j < here; ++j)
+      scene.frames.push_back(times[k] + (times[k + 1] - times[k]) * double(j) / double(here));
+  }
+  scene.compare_every = std::max<std::uint64_t>(1, scene.frames.size() / 150);
+  return scene;
+}
+
+/// The same scene forward in steps of every size: within an ulp, over many keyframes, from before the first
+/// to behind the last, and twice to the same time.
+StressScene odd_steps(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 30, 10);
+  double t = random.among({0.0, -1.0, 0.1});
+  const std::uint32_t frames = 20 + setting.l;
+  for (std::uint32_t f = 0; f < frames; ++f) {
+    scene.frames.push_back(t);
+    switch (random.below(6)) {
+      case 0:
+        break;  // the same time again
+      case 1:
+        t = std::nextafter(t, 1e9);
+        break;
+      case 2:
+        t = 0.25 * std::floor(4 * t + 1);  // the next keyframe
+        break;
+      case 3:
+        t += 0.25 * random.below(4);
+        break;
+      default:
+        t += std::abs(random.unit()) * random.among({1e-9, 0.01, 0.1, 1.5});
+    }
+  }
+  return scene;
+}
+
+// --- changes of plans -----------------------------------------------------------------------------------
+
+PlanChange<double> random_change(Random& random, const StressScene& scene, double t) {
+  PlanChange<double> change;
+  change.body = random.below(std::uint32_t(scene.bodies.size()));
+  change.vertex = random.below(scene.bodies[change.body].vertex_count);
+  const std::uint32_t kind = random.below(4);
+  if (kind != 0)
+    for (double& v : change.velocity) v = random.among({0.5 * random.unit(), 0.0, 0.25});
+  if (kind >= 2)
+    for (std::uint32_t k = 1; k <= 2; ++k) {
+      change.times.push_back(t + 0.25 * k);
+      for (int axis = 0; axis < 3; ++axis)
+        change.positions.push_back(kind == 2 ? random.unit() : double(random.below(3)));
+    }
+  return change;
+}
+
+StressScene::Step changes_at(Random& random, const StressScene& scene, double t, std::uint32_t count) {
+  StressScene::Step step{t, {}};
+  for (std::uint32_t i = 0; i < count; ++i) step.changes.push_back(random_change(random, scene, t));
+  return step;
+}
+
+/// Many of them of the same vertices: the last one counts.
+StressScene changes_at_once(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 40, keyframes_for(setting));
+  const double end = scene.bodies[0].times.back();
+  scene.steps.push_back(changes_at(random, scene, end * random.among({0.0, 0.25, 1.0 / 3}), 2000));
+  return scene;
+}
+
+/// At the instants at which many certificates fail: halfway between keyframes between which the scene is
+/// mirrored, so that times are exact.
+StressScene changes_at_events(const FamilySetting& setting) {
+  StressScene scene = all_cross_at_once(setting);
+  Random random(setting.seed + 1);
+  const auto& times = scene.bodies[0].times;
+  for (std::size_t k = 0; k + 1 < times.size(); ++k)
+    scene.steps.push_back(changes_at(random, scene, 0.5 * (times[k] + times[k + 1]), 1 + random.below(40)));
+  return scene;
+}
+
+StressScene changes_at_keyframes(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 30, keyframes_for(setting));
+  const auto& times = scene.bodies[0].times;
+  for (std::size_t k = 0; k < times.size(); ++k)
+    scene.steps.push_back(changes_at(random, scene, times[k], 1 + random.below(30)));
+  // Nobody can know that a body with one keyframe will move.
+  if (random.one_in(3)) {
+    StressBody& still = scene.bodies[1];
+    still.times.resize(1);
+    still.positions.resize(std::size_t(3) * still.vertex_count);
+  }
+  return scene;
+}
+
+// --- shapes ---------------------------------------------------------------------------------------------
+
+StressScene with_triangles(const FamilySetting& setting,
+                           const std::function<void(Random&, double* corners)>& change) {
+  Random random(setting.seed);
+  StressScene scene = two_soups(random, 40, keyframes_for(setting));
+  for (StressBody& body : scene.bodies)
+    for (std::size_t k = 0; k < body.times.size(); ++k)
+      for (std::size_t p = 0; p < body.primitives.size(); ++p) change(random, body.position(k, 3 * p));
+  return scene;
+}
+
+StressScene slivers(const FamilySetting& setting) {
+  return with_triangles(setting, [&](Random& random, double* corners) {
+    // The third corner lies beside the line through the others, or beside one of them.
+    const double u = random.among({0.0, 0.5, 1.0, std::abs(random.unit())});
+    const double width = random.among({0.0, setting.limits.epsilon, 1e-7, 1e-3});
+    for (int i = 0; i < 3; ++i)
+      corners[6 + i] = corners[i] + u * (corners[3 + i] - corners[i]) + width * random.unit();
+  });
+}
+
+StressScene zero_area(const FamilySetting& setting) {
+  return with_triangles(setting, [](Random& random, double* corners) {
+    const std::uint32_t kind = random.below(4);
+    if (kind == 0) return;
+    if (kind >= 1) std::copy_n(corners, 3, corners + 6);  // a segment
+    if (kind >= 2) std::copy_n(corners, 3, corners + 3);  // a point
+    if (kind >= 3)
+      for (int i = 0; i < 9; ++i) corners[i] = std::round(corners[i]);
+  });
+}
+
+/// The same triangles many times over: copies of vertices, of lists of vertices, and across the bodies.
+StressScene duplicates(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene;
+  const StressBody one = soup(random, 4, keyframes_for(setting), 0.8);
+  const std::uint32_t copies = 4 + random.below(6);
+  for (int b = 0; b < 2; ++b) {
+    StressBody body = unmoved(one.vertex_count * copies);
+    body.times = one.times;
+    body.positions.clear();
+    for (std::size_t k = 0; k < one.times.size(); ++k)
+      for (std::uint32_t c = 0; c < copies; ++c)
+        body.positions.insert(body.positions.end(), one.position(k, 0),
+                              one.position(k, 0) + std::size_t(3) * one.vertex_count);
+    for (std::uint32_t c = 0; c < copies; ++c)
+      for (const auto& primitive : one.primitives) {
+        auto ids = primitive;
+        for (std::uint32_t& v : ids) v += c % 2 == 0 ? c * one.vertex_count : 0;
+        body.primitives.push_back(ids);
+        // A corner that comes twice.
+        if (random.one_in(4)) body.primitives.push_back({ids[0], ids[1], ids[1]});
+      }
+    scene.bodies.push_back(std::move(body));
+  }
+  return scene;
+}
+
+StressScene one_or_none(const FamilySetting& setting) {
+  Random random(setting.seed);
+  StressScene scene;
+  const std::uint32_t bodies = 2 + random.below(2);
+  for (std::uint32_t b = 0; b < bodies; ++b) {
+    const std::uint32_t kind = random.below(4);
+    if (kind == 0)
+      scene.bodies.push_back(unmoved(random.below(3)));  // vertices at most
+    else
+      scene.bodies.push_back(soup(random, kind == 3 ? 20 : 1, random.among({1u, keyframes_for(setting)})));
+  }
+  return scene;
+}
+
+}  // namespace
+
+const std::vector<Family>& families() {
+  static const std::vector<Family> all{
+      {"tiny", "coordinates of 1e-30", tiny},
+      {"unit", "coordinates of 1", unit},
+      {"million", "coordinates of 1e6", million},
+      {"huge", "coordinates of 1e30", huge},
+      {"mixed", "coordinates from 1e-30 to 1e30 in one scene", mixed},
+      {"largest", "across the whole admissible range from keyframe to keyframe", largest},
+      {"beyond_range", "on both sides of the admissible range", beyond_range},
+      {"far_away", "far offset, motion in the last places", far_away},
+      {"denormals", "coordinates between zero and the smallest normal number", denormals},
+      {"signed_zeros", "zeros of both signs", signed_zeros},
+      {"near_parallel", "trajectories whose slopes differ in the last places", near_parallel},
+      {"near_tangent", "trajectories that touch the highest, give or take an ulp", near_tangent},
+      {"all_cross_at_once", "all vertices cross at one instant", all_cross_at_once},
+      {"coincident", "vertices that coincide for whole segments", coincident},
+      {"ties_that_separate", "exact ties that part later", ties_that_separate},
+      {"spikes", "single vertices fly far out and back", spikes},
+      {"uneven_keyframes", "keyframes a millionth apart beside long ones", uneven_keyframes},
+      {"many_keyframes", "up to 1e5 keyframes of a few triangles", many_keyframes},
+      {"odd_steps", "a clip played forward in odd steps", odd_steps},
+      {"changes_at_once", "thousands of changes of plans at one instant", changes_at_once},
+      {"changes_at_events", "changes of plans at times of events", changes_at_events},
+      {"changes_at_keyframes", "changes of plans at keyframes", changes_at_keyframes},
+      {"slivers", "needles and caps", slivers},
+      {"zero_area", "triangles that are segments or points", zero_area},
+      {"duplicates", "the same triangles many times", duplicates},
+      {"one_or_none", "bodies of one triangle, or of none", one_or_none},
+  };
+  return all;
+}
+
+const Family& find_family(const std::string& name) {
+  std::string known;
+  for (const Family& family : families()) {
+    if (family.name == name) return family;
+    known += (known.empty() ? "" : ", ") + family.name;
+  }
+  throw io::InputError("there is no family '" + name + "'; families are " + known);
+}
+
+StressScene make_scene(const Family& family, const FamilySetting& setting) {
+  StressScene scene = family.make(setting);
+  scene.family = family.name;
+  if (!scene.frames.empty()) return scene;
+  std::vector<double> knots;
+  for (const StressBody& body : scene.bodies)
+    if (body.times.size() > 1) knots.insert(knots.end(), body.times.begin(), body.times.end());
+  if (knots.empty()) knots = {0.0, 0.5};
+  std::sort(knots.begin(), knots.end());
+  knots.erase(std::unique(knots.begin(), knots.end()), knots.end());
+  for (std::size_t k = 0; k + 1 < knots.size(); ++k)
+    for (std::uint32_t j = 0; j < setting.l; ++j)
+      scene.frames.push_back(knots[k] + (knots[k + 1] - knots[k]) * double(j) / double(setting.l));
+  scene.frames.push_back(knots.back());
+  for (const StressScene::Step& step : scene.steps) scene.frames.push_back(step.time);
+  std::sort(scene.frames.begin(), scene.frames.end());
+  scene.frames.erase(std::unique(scene.frames.begin(), scene.frames.end()), scene.frames.end());
+  // At the uneven ends of keyframes of several bodies there are more segments than l was meant for.
+  if (scene.frames.size() > 200) scene.compare_every = scene.frames.size() / 100;
+  return scene;
+}
+
+}  // namespace kbvh::experiments::stress

@@ -1,0 +1,116 @@
+#pragma once
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "experiments/contestants.hpp"
+#include "experiments/stress/families.hpp"
+
+namespace kbvh::experiments::stress {
+
+/// How one contestant fared on one scene.
+enum class Outcome : std::uint8_t {
+  held,        ///< its guarantee, tightness and boxes; an approximate one: it came to the end
+  broken,      ///< a guarantee that it declares, or a box that does not hold its vertices
+  threw,       ///< an exception that the contract does not know
+  crashed,     ///< the process ended
+  hung,        ///< had to be stopped
+  unsuitable,  ///< does not take part: no such scalar, cannot take changes of plans, too large
+  refused,     ///< the scene is none, by contract
+};
+const char* name(Outcome outcome);
+
+/// One contestant on one scene in one scalar.
+struct CaseResult {
+  Outcome outcome = Outcome::held;
+  std::string what;  ///< of a failure, a refusal or an unsuitable contestant: in one sentence
+  std::uint64_t frames = 0, pairs = 0, missed = 0, extra = 0;
+  std::uint64_t events = 0;  ///< certificates that failed, and events of separation lists
+  double protrusion = 0;     ///< furthest out of a box, in units of the scene
+  double extent = 0;         ///< largest coordinate of the scene, to hold it against
+  double looseness = 0;      ///< of all audited frames
+  bool audited = false;
+  double seconds = 0;  ///< processor time; 0 if it did not come to the end
+
+  /// Held, unsuitable and refused are none.
+  bool failed() const;
+};
+
+struct RunLimits {
+  double seconds = 100;  ///< processor time of one contestant on one scene; more is a hang
+  bool silent = false;  ///< drop what child processes print
+};
+
+/// All contestants on one scene, each in a process that may crash or hang; `scalar` is "float" or "double".
+std::vector<CaseResult> run_scene(const StressScene& scene, const std::string& scalar,
+                                  const std::vector<ContestantSpec>& contestants, const RunLimits& limits);
+
+/// One row of the table: one contestant on the scenes of one family.
+struct StressRow {
+  std::string family, strategy, strategy_family;  ///< the strategy's label, and its own family
+  bool approximate = false;
+  std::uint64_t scenes = 0;  ///< played to the end or failed: scenes of the family in a scalar, with one l
+  std::uint64_t refused = 0, unsuitable = 0;
+  std::uint64_t frames = 0, pairs = 0, missed = 0, extra = 0, events = 0;
+  std::uint64_t broken = 0, threw = 0, crashes = 0, hangs = 0;
+  double protrusion = 0;           ///< largest, in units of the scene
+  double relative_protrusion = 0;  ///< largest, over the scene's largest coordinate
+  double log_looseness = 0;        ///< sum over audited scenes of log(1 + looseness)
+  double looseness_worst = 0;
+  std::uint64_t audited = 0;
+  double seconds = 0;  ///< processor time
+
+  void add(const CaseResult& result);
+  std::uint64_t failures() const { return broken + threw + crashes + hangs; }
+  /// Geometric mean over scenes, of the factor that it stands for: scales differ too much for any other.
+  double looseness() const { return audited > 0 ? std::expm1(log_looseness / double(audited)) : 0; }
+};
+
+/// A failure, shrunk or not.
+struct StressFailure {
+  Repro repro;
+  std::uint64_t seed = 0;
+  std::uint32_t l = 0;
+  std::string file;  ///< where the repro was written, or empty
+  std::size_t triangles_before = 0, size_before = 0;
+};
+
+struct StressOptions {
+  std::vector<const Family*> families;
+  std::vector<ContestantSpec> contestants;
+  std::uint64_t scenes = 100;  ///< in turn of the families
+  std::uint64_t seed = 1;
+  std::vector<std::string> scalars{"float", "double"};
+  std::vector<std::uint32_t> l{1, 7, 100};
+  bool vary = true;  ///< draw builder and parameters for all but the first scene of a family
+  bool shrink = true;
+  std::size_t most_repros = 20;  ///< failures of one family and strategy beyond the first are only counted
+  std::uint32_t many_keyframes = 100000;  ///< of the first such scene; of others a fiftieth
+  RunLimits limits{};
+};
+
+struct StressReport {
+  std::vector<StressRow> rows;  ///< by family, then by strategy
+  std::vector<StressFailure> failures;
+  std::uint64_t scenes = 0;
+};
+
+/// Runs the suite. `told` hears what is being done. Same options, same scenes.
+StressReport run_stress(const StressOptions& options, const std::function<void(const std::string&)>& told);
+
+/// The contestant in another configuration that it declares, drawn at random from the seed: builder, and
+/// every parameter that is a choice of words.
+ContestantSpec varied(const ContestantSpec& spec, std::uint64_t seed);
+
+/// "median/2/1", and back; throws io::InputError.
+std::string builder_text(const BuilderConfig& builder);
+BuilderConfig builder_of(const std::string& text);
+
+/// The table that the program prints, and what is written as stress.json (RESULTS.md).
+std::string stress_table(const StressReport& report);
+nlohmann::json to_json(const StressReport& report, const StressOptions& options);
+
+}  // namespace kbvh::experiments::stress

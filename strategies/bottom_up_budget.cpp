@@ -1,0 +1,61 @@
+// Bottom-up refit with a query that stops when it has used up its work for the frame: what it has found by
+// then is the answer (the idea of time-critical collision detection; Klein & Zachmann 2003).
+
+#include "core/hierarchy/stored_hierarchy.hpp"
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class Count>
+class BottomUpBudget final : public StoredHierarchyStrategy<S, Count> {
+  using Base = StoredHierarchyStrategy<S, Count>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  BottomUpBudget(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
+                 const Params& params)
+      : Base(scene, motion, std::move(topologies), params),
+        box_tests_(std::uint64_t(params.number("box_tests"))) {}
+
+  /// The budget is for the frame, so body pairs share it; what it leaves undone is counted in the status.
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+    QueryStatus status;
+    std::uint64_t tests = 0;
+    const std::uint64_t most = std::min(box_tests_, budget.box_tests);
+    for (const BodyPair& pair : this->scene_.pairs()) {
+      if (tests >= most) {
+        ++status.pending;
+        continue;
+      }
+      auto &a = this->hierarchies_[pair.first], &b = this->hierarchies_[pair.second];
+      status.pending += this->query_
+                            .run(a, pair.first, b, pair.second, this->scene_, this->sampled_,
+                                 Budget{most - tests}, out, tests)
+                            .pending;
+    }
+    this->count_.add(Counter::box_tests, tests);
+    return status;
+  }
+
+ private:
+  void update(std::uint32_t body) override { this->refit(body); }
+  std::uint64_t box_tests_;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(bottom_up_budget) {
+  using namespace kbvh;
+  return {make_entry<BottomUpBudget>({
+      .id = "bottom_up_budget",
+      .title = "bottom-up refit, query on a budget",
+      .family = "approximate",
+      .citation = "after Klein & Zachmann 2003",
+      .guarantee = Guarantee::approximate,
+      .can = {.plan_changes = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+      .parameters = {{"box_tests", "1000", {}, "box tests that the query of a frame may take", 1}},
+  })};
+}

@@ -1,0 +1,63 @@
+// The kinetic AABB tree as one would write it without exact arithmetic: times of events are floats or
+// doubles, and a certificate's failure is where two lines meet. Shows what the exact decisions of
+// kinetic_aabb buy.
+
+#include "core/kinetic/kinetic_aabb_strategy.hpp"
+#include "core/kinetic/rounded_clock.hpp"
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class T, FailureRule rule>
+using RoundedQueue = AvlEventQueue<RoundedClock<S, T, rule>>;
+
+template <class S, class Count>
+using Approximate = KineticAabbStrategy<S, Count, RoundedQueue<S, double, FailureRule::end_point_rule>,
+                                        RoundedQueue<S, double, FailureRule::textbook>,
+                                        RoundedQueue<S, float, FailureRule::end_point_rule>,
+                                        RoundedQueue<S, float, FailureRule::textbook>>;
+
+template <class S, class Count>
+class KineticAabbApproximate final : public Approximate<S, Count> {
+ public:
+  KineticAabbApproximate(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+                         const Params& params)
+      : Approximate<S, Count>(scene, motion, std::move(topologies),
+                              (params.word("event_times") == "float" ? 2u : 0u) +
+                                  (params.word("formula") == "textbook" ? 1u : 0u)) {}
+
+  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+    this->unsupported("flight-plan changes");
+  }
+  void geometry_changed(double /*t*/, const GeometryChange<S>& /*change*/) override {
+    this->unsupported("geometry changes");
+  }
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(kinetic_aabb_approximate) {
+  using namespace kbvh;
+  return {make_entry<KineticAabbApproximate>({
+      .id = "kinetic_aabb_approximate",
+      .title = "kinetic AABB tree, rounded times",
+      .family = "approximate",
+      .citation = "Zachmann & Weller 2006, s.4, Algorithm 3",
+      .tightness = Tightness::none,
+      .guarantee = Guarantee::approximate,
+      .positions = PositionUse::fetched,
+      .can = {.event_driven = true, .continuous = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+      .parameters = {{"event_times",
+                      "double",
+                      {"double", "float"},
+                      "in what times of events are computed and compared (kinetic_aabb: exactly)"},
+                     {"formula",
+                      "textbook",
+                      {"textbook", "end_point_rule"},
+                      "a failure is where two lines meet, or where the end of the segment says (as in "
+                      "kinetic_aabb)"}},
+  })};
+}
