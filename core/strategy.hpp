@@ -16,6 +16,8 @@
 
 namespace kbvh {
 
+struct MovingPoints;
+
 /// Does a strategy keep every box as small as it can be, or only large enough?
 enum class Tightness : std::uint8_t { tight, conservative, none };
 
@@ -70,6 +72,9 @@ struct Info {
   std::string own_scalar{};
   /// Largest scene it is offered, in primitive pairs of one body pair (quadratic contestants); 0: any.
   std::uint64_t max_primitive_pairs = 0;
+  /// A peer library's own, uncertified test of two features in motion (core/continuous/impact.hpp): does it
+  /// say that they touch? `kbvh ccd` shows it beside the exact one. Null: it has none.
+  bool (*own_impact)(Contact::Kind kind, const MovingPoints& points) = nullptr;
   // Filled in by the registration from the class itself:
   Foresight foresight = Foresight::none;
   bool has_float = false, has_double = false;

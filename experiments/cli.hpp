@@ -19,6 +19,7 @@ void add_bench(CLI::App& program, Action& action);
 void add_report(CLI::App& program, Action& action);
 void add_scene(CLI::App& program, Action& action);
 void add_theory(CLI::App& program, Action& action);
+void add_ccd(CLI::App& program, Action& action);
 
 /// Runs a program of PATH and waits for it; its exit code. Throws io::InputError if it cannot be started.
 int run_and_wait(std::vector<std::string> words);
