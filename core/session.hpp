@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/hierarchy/oracle.hpp"
+#include "core/hierarchy/self_pairs.hpp"
 #include "core/plan_script.hpp"
 #include "core/registry.hpp"
 
@@ -110,6 +111,8 @@ class Session {
 
  private:
   void make_strategy() {
+    if (has_self_pairs(view_.pairs()) && !info_->can.self_pairs)
+      throw ConfigError("'" + info_->id + "' does not declare self pairs, which the scene asks for");
     const Params params(info_->id, info_->parameters, contestant_.params);
     Topologies topologies;
     if (!info_->topology.own) topologies = build_topologies(view_, playback_, contestant_.builder);

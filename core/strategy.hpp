@@ -43,7 +43,7 @@ struct Capabilities {
   bool plan_changes = false;      ///< flight_plans_changed
   bool geometry_changes = false;  ///< geometry_changed
   bool spans = false;             ///< answers intervals without looking at frames
-  bool self_pairs = false;        ///< body pairs of a body with itself
+  bool self_pairs = false;        ///< pairs within a body; scenes that ask for them are refused else
   bool time_budget = false;       ///< honours a query budget
 };
 

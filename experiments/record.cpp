@@ -84,6 +84,7 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
                       {"keyframes", body.plans.keyframe_count()},
                       {"moving", body.plans.moving()},
                       {"kind", word(body.primitives.kind)},
+                      {"self", i < loaded.self.size() && loaded.self[i]},
                       {"degenerate", loaded.meshes[i].degenerate_primitives}});
   }
   return {{"name", scene.name},

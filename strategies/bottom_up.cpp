@@ -105,7 +105,7 @@ KBVH_STRATEGY(bottom_up) {
       .title = "bottom-up refit",
       .family = "refit",
       .citation = "van den Bergen 1997; Z&W 2006, s.2; wide nodes after Wald et al. 2008",
-      .can = {.plan_changes = true, .geometry_changes = true, .time_budget = true},
+      .can = {.plan_changes = true, .geometry_changes = true, .self_pairs = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"kernels", "auto", kernel_words(),
                       "instruction set of refit and query; auto: the widest of this machine"},

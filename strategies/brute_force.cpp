@@ -37,9 +37,11 @@ class BruteForce final : public Strategy<S> {
           status.pending += a.size() - i;
           break;
         }
-        for (std::uint32_t j = 0; j < b.size(); ++j)
-          if (overlap(a[i], b[j])) out.push_back({pair.first, i, pair.second, j});
-        tests += b.size();
+        const std::uint32_t first = pair.first == pair.second ? i + 1 : 0;
+        for (std::uint32_t j = first; j < b.size(); ++j)
+          if (overlap(a[i], b[j]) && !(first != 0 && neighbours(pair.first, i, j)))
+            out.push_back({pair.first, i, pair.second, j});
+        tests += b.size() - first;
       }
       count_.add(Counter::box_tests, tests);
     }
@@ -60,6 +62,11 @@ class BruteForce final : public Strategy<S> {
   Counters counted() const override { return count_.table; }
 
  private:
+  bool neighbours(std::uint32_t body, std::uint32_t i, std::uint32_t j) const {
+    const Primitives& primitives = this->scene_.primitives(body);
+    return share_vertex(primitives[i], primitives[j]);
+  }
+
   void update() {
     for (std::uint32_t body = 0; body < boxes_.size(); ++body) {
       const Primitives& primitives = this->scene_.primitives(body);
@@ -88,7 +95,7 @@ KBVH_STRATEGY(brute_force) {
       .family = "oracle",
       .citation = "all pairs",
       .tightness = Tightness::none,
-      .can = {.plan_changes = true, .geometry_changes = true, .time_budget = true},
+      .can = {.plan_changes = true, .geometry_changes = true, .self_pairs = true, .time_budget = true},
       .topology = {.own = true},
       .max_primitive_pairs = 100'000'000,
   })};

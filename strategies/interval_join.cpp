@@ -151,7 +151,7 @@ KBVH_STRATEGY(interval_join) {
       .citation = "kbvh",
       .tightness = Tightness::conservative,
       .positions = PositionUse::fetched,
-      .can = {.continuous = true, .plan_changes = true},
+      .can = {.continuous = true, .plan_changes = true, .self_pairs = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters =
           {segment_pieces_parameter(),

@@ -51,6 +51,7 @@ class KineticSeparationList final : public Strategy<S> {
                                    collision.forest().tree(pair.first).topology(), pair.second,
                                    collision.forest().tree(pair.second).topology(), count_, out);
         for (const auto& leaf : collision.list().leaf_pairs(i)) leaves(leaf.a, leaf.b);
+        for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) { leaves(leaf, leaf); });
       }
     });
     return {};
@@ -65,8 +66,13 @@ class KineticSeparationList final : public Strategy<S> {
       collision.advance(t1);
       for (const auto& ended : list.stop_spans())
         append_spans(collision, ended.bodies, ended.leaf, t0, std::min(ended.until, t1), out);
-      for (std::size_t i = 0; i < this->scene_.pairs().size(); ++i)
+      for (std::size_t i = 0; i < this->scene_.pairs().size(); ++i) {
+        using Leaf = std::remove_cvref_t<decltype(list.leaf_pairs(i)[0])>;
         for (const auto& leaf : list.leaf_pairs(i)) append_spans(collision, i, leaf, t0, t1, out);
+        for_leaves_with_themselves(collision, this->scene_.pairs()[i], [&](std::uint32_t leaf) {
+          append_spans(collision, i, Leaf{leaf, leaf, 0, t0}, t0, t1, out);
+        });
+      }
     });
   }
 
@@ -113,6 +119,23 @@ class KineticSeparationList final : public Strategy<S> {
     return std::visit([&](const auto& collision) -> decltype(auto) { return work(*collision); }, collision_);
   }
 
+  /// Within one body the list has no leaf with itself.
+  template <class System, class Work>
+  void for_leaves_with_themselves(const System& collision, const BodyPair& pair, const Work& work) const {
+    if (pair.first != pair.second) return;
+    const Topology& topology = collision.forest().tree(pair.first).topology();
+    if (topology.empty() || topology.leaf_size == 1) return;
+    std::vector<std::uint32_t> nodes{0};  // by way of the root: changes of geometry leave gaps
+    while (!nodes.empty()) {
+      const std::uint32_t node = nodes.back();
+      nodes.pop_back();
+      const TopologyNode own = topology.nodes[node];
+      if (own.is_leaf()) work(node);
+      for (std::uint32_t child = own.first(); !own.is_leaf() && child < own.first() + own.count(); ++child)
+        nodes.push_back(child);
+    }
+  }
+
   /// Every primitive pair of two leaves for as long as the leaves overlap.
   template <class System, class LeafPair>
   void append_spans(const System& collision, std::size_t body_pair, const LeafPair& leaf, double t0,
@@ -122,9 +145,14 @@ class KineticSeparationList final : public Strategy<S> {
     const Topology& b = collision.forest().tree(pair.second).topology();
     const TopologyNode na = a.nodes[leaf.a], nb = b.nodes[leaf.b];
     for (std::uint32_t i = na.first(); i < na.first() + na.count(); ++i)
-      for (std::uint32_t j = nb.first(); j < nb.first() + nb.count(); ++j)
-        out.push_back(
-            {{pair.first, a.primitives[i], pair.second, b.primitives[j]}, std::max(leaf.since, t0), end});
+      for (std::uint32_t j = nb.first(); j < nb.first() + nb.count(); ++j) {
+        PrimitivePair found{pair.first, a.primitives[i], pair.second, b.primitives[j]};
+        const LeavesOf leaves = leaf.a == leaf.b ? LeavesOf::one : LeavesOf::two;
+        if (pair.first == pair.second &&
+            keep_self_pairs(&this->scene_.primitives(pair.first), leaves, &found, 1) == 0)
+          continue;
+        out.push_back({found, std::max(leaf.since, t0), end});
+      }
   }
 
   Count count_;
@@ -148,7 +176,8 @@ KBVH_STRATEGY(kinetic_separation_list) {
               .continuous = true,
               .plan_changes = true,
               .geometry_changes = true,
-              .spans = true},
+              .spans = true,
+              .self_pairs = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"queue",
                       "avl",

@@ -54,6 +54,7 @@ class LinearBounds {
   /// Where the segment a time lies in it, from 0 to 1.
   S fraction(double t) const;
 
+  const SceneView<S>& scene() const { return scene_; }
   std::uint32_t body_count() const { return std::uint32_t(sides_.size()); }
   Side& side(std::uint32_t body) { return sides_[body]; }
   const Side& side(std::uint32_t body) const { return sides_[body]; }
