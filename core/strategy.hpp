@@ -45,6 +45,7 @@ struct Capabilities {
   bool spans = false;             ///< answers intervals without looking at frames
   bool self_pairs = false;        ///< pairs within a body; scenes that ask for them are refused else
   bool time_budget = false;       ///< honours a query budget
+  bool contacts = false;          ///< swept_pairs: the broad phase of continuous collision detection
 };
 
 /// Which topologies a strategy can be given. One that builds its own hierarchy (a peer library) accepts none.
@@ -130,6 +131,19 @@ class Strategy {
   /// every frame; a pair may have several. Stands at t0 when it is called, and at t1 after, as by `advance`.
   /// Spans are of candidates: at a frame, `confirm` keeps the pairs that intersect then.
   virtual void spans(double /*t0*/, double /*t1*/, SpanBuffer& /*out*/) { unsupported("spans"); }
+
+  /// Announces `swept_pairs` for the motion that begins at t, where the strategy and the motion view stand.
+  virtual void start_sweep(double t) { stand_at(t); }
+  /// Appends the primitive pairs that may touch while every vertex moves on a straight line from its position
+  /// at t0 to that at t1, each once, canonical; within one body those that share a vertex, too, for their
+  /// other features may touch. `start_sweep` came before; the motion view stands at t1, with all positions,
+  /// and `before` are those at t0 ([body], then [vertex][3]). No knot of any plan lies strictly between.
+  /// Afterwards the next sweep may be announced from t1, or all begins again with `reset`; frames are not
+  /// answered between.
+  virtual void swept_pairs(double /*t0*/, double /*t1*/, std::span<const S* const> /*before*/,
+                           PairBuffer& /*out*/) {
+    unsupported("contacts");
+  }
 
   /// The plans of some vertices have changed at t; the motion view shows the new ones. Each starts from the
   /// stored position at t. The strategy has been advanced to t before.

@@ -32,7 +32,7 @@ struct StudyOptions {
   std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
   std::vector<std::string> builders;
   std::uint64_t obstacle = 0, keyframes = 0, repetitions = 0, frames_limit = 0, oracle_every = 0;
-  bool print_plan = false, self = false;
+  bool print_plan = false, self = false, continuous = false;
 };
 
 /// Leaves only the studies of a plan file whose name is among `names` (a study without a name has the

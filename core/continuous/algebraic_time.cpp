@@ -1,6 +1,7 @@
 #include "core/continuous/algebraic_time.hpp"
 
 #include <algorithm>
+#include <optional>
 
 #include "core/assert.hpp"
 
@@ -61,9 +62,7 @@ void Polynomial::drop_powers_of_two() {
   for (int i = 0; i <= degree_; ++i)
     if (!coefficient_[i].is_zero()) shift = std::min(shift, unsigned(lsb(abs(coefficient_[i]))));
   if (shift == 0) return;
-  // Exact, whatever a shift to the right would do with the sign.
-  const Integer power = Integer(1) << shift;
-  for (int i = 0; i <= degree_; ++i) coefficient_[i] /= power;
+  for (int i = 0; i <= degree_; ++i) coefficient_[i] >>= shift;  // nothing is lost
 }
 
 Polynomial Polynomial::remainder(const Polynomial& divisor) const {
@@ -145,9 +144,22 @@ double AlgebraicTime::rounded(const DyadicTime& t, unsigned up) {
   return std::ldexp(Integer(below + up).convert_to<double>(), -int(bits));
 }
 
+int AlgebraicTime::sign_throughout(const Polynomial& q) const {
+  KBVH_ASSERT(q.degree() <= 2);
+  const Integer& n = begin_.numerator;
+  const unsigned e = begin_.exponent;
+  const int first = q.sign_at(n, e), last = q.sign_at(end_.numerator, e);
+  if (first == 0 || first != last) return 0;
+  if (q.degree() < 2) return first;
+  // Twice the coefficient in the middle, times 2^(2 e).
+  const Integer middle = (q[0] << (2 * e + 1)) + ((q[1] * (2 * n + 1)) << e) + 2 * q[2] * n * (n + 1);
+  return middle.sign() == first ? first : 0;
+}
+
 int AlgebraicTime::sign(const Polynomial& q) const {
   if (q.is_zero()) return 0;
   if (dyadic_) return q.sign_at(begin_.numerator, begin_.exponent);
+  if (const int sign = sign_throughout(q)) return sign;
   // A Tarski query; p' q may be reduced modulo p, which leaves the Cauchy index as it is.
   const Polynomial h = (p_.derivative() * q).remainder(p_);
   return SturmSequence(p_, h).index(begin_, end_);
@@ -155,15 +167,20 @@ int AlgebraicTime::sign(const Polynomial& q) const {
 
 void AlgebraicTime::refine(unsigned bits) {
   if (dyadic_ || begin_.exponent >= bits) return;
-  const SturmSequence roots(p_, p_.derivative());
+  // A root of odd multiplicity is where the sign changes; of others only the number of roots tells.
+  const int before = p_.sign_at(begin_.numerator, begin_.exponent);
+  const bool crossing = before != p_.sign_at(end_.numerator, end_.exponent);
+  std::optional<SturmSequence> roots;
+  if (!crossing) roots.emplace(p_, p_.derivative());
   while (begin_.exponent < bits) {
     const DyadicTime centre = middle(begin_);
-    if (p_.sign_at(centre.numerator, centre.exponent) == 0) {
+    const int sign = p_.sign_at(centre.numerator, centre.exponent);
+    if (sign == 0) {
       begin_ = end_ = centre;
       dyadic_ = true;
       return;
     }
-    if (roots.index(doubled(begin_), centre) != 0) {
+    if (crossing ? sign != before : roots->index(doubled(begin_), centre) != 0) {
       begin_ = doubled(begin_);
       end_ = centre;
     } else {

@@ -71,7 +71,8 @@ class SturmSequence {
   std::vector<Polynomial> sequence_;
 };
 
-/// An algebraic number in [0, 1]: a dyadic one, or the only root of a polynomial between two dyadic ones.
+/// An algebraic number in [0, 1]: a dyadic one, or the only root of a polynomial between two dyadic ones,
+/// which are neighbours with one exponent.
 class AlgebraicTime {
  public:
   explicit AlgebraicTime(DyadicTime t) : begin_(t), end_(t), dyadic_(true) {}
@@ -87,6 +88,8 @@ class AlgebraicTime {
   double end() const { return rounded(end_, dyadic_ && begin_.exponent <= 50 ? 0 : 1); }
 
  private:
+  /// The sign of q everywhere between the ends, by its Bernstein coefficients there; 0 if they do not tell.
+  int sign_throughout(const Polynomial& q) const;
   static double rounded(const DyadicTime& t, unsigned up);
   Polynomial p_;
   DyadicTime begin_, end_;

@@ -77,36 +77,29 @@ class ExactQuery {
     }
     normal_ = cross(a, b);
     coplanar_ = dot(normal_, r);
+    const bool at_ends[2] = {coplanar_.sign_at(0, 0) == 0, coplanar_.sign_at(1, 0) == 0};
+    for (const int end : {0, 1})
+      if (at_ends[end]) times_.emplace_back(DyadicTime{end, 0});
+    if (!coplanar_.is_zero()) {
+      append_inner_roots(coplanar_, times_);
+      if (times_.empty()) return;
+    }
     const MovingVector x = kind == Contact::Kind::vertex_face ? cross(a, r) : cross(r, a);
     const MovingVector y = cross(r, b);
     if (kind == Contact::Kind::vertex_face)
       shares_ = {x, y, normal_ - x - y};
     else
       shares_ = {x, y, normal_ - x, normal_ - y};
+    if (coplanar_.is_zero() && !touch_at(times_[0])) add_times_in_plane();
   }
 
-  Impact impact() const {
-    std::vector<AlgebraicTime> times;
-    for (const int end : {0, 1})
-      if (coplanar_.sign_at(end, 0) == 0) times.emplace_back(DyadicTime{end, 0});
-    if (!coplanar_.is_zero()) {
-      append_inner_roots(coplanar_, times);
-    } else {
-      // The set of times of contact is closed, and nothing changes between roots of what `touch_at` looks at:
-      // if there is any contact, there is one at such a root or at an end.
-      const auto add = [&](const MovingVector& vector) {
-        for (const Polynomial& q : vector.axis)
-          if (q.degree() >= 1) append_inner_roots(q, times);
-      };
-      add(normal_);
-      for (const MovingVector& share : shares_) add(share);
-      for (const auto& [i, j] : differences()) add(p_[i] - p_[j]);
-    }
+  Impact impact() {
     Impact result;
     constexpr unsigned bits = 20;
     static_assert(impact_width == 1.0 / (1U << bits));
-    for (AlgebraicTime& t : times) {
+    for (AlgebraicTime& t : times_) {
       if (!touch_at(t)) continue;
+      if (t.end() == 0) return {true, 0, 0};
       t.refine(bits);
       if (!result.touches) result = {true, t.begin(), t.end()};
       result.begin = std::min(result.begin, t.begin());
@@ -116,6 +109,18 @@ class ExactQuery {
   }
 
  private:
+  /// If all is in one plane for all time. The set of times of contact is closed, and nothing changes between
+  /// roots of what `touch_at` looks at: if there is any contact, there is one at such a root or at an end.
+  void add_times_in_plane() {
+    const auto add = [&](const MovingVector& vector) {
+      for (const Polynomial& q : vector.axis)
+        if (q.degree() >= 1) append_inner_roots(q, times_);
+    };
+    add(normal_);
+    for (const MovingVector& share : shares_) add(share);
+    for (const auto& [i, j] : differences()) add(p_[i] - p_[j]);
+  }
+
   struct Two {
     int i, j;
   };
@@ -156,6 +161,7 @@ class ExactQuery {
   MovingVector p_[4], normal_;
   Polynomial coplanar_;
   std::vector<MovingVector> shares_;
+  std::vector<AlgebraicTime> times_;  ///< at which there may be contact
 };
 
 }  // namespace

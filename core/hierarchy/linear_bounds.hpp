@@ -45,6 +45,9 @@ class LinearBounds {
   void start();
   /// The same if the present time is not in the segment any more. Returns whether it began a new one.
   bool advance();
+  /// The bounds of the segment that the motion's present time is in and not the last of: where `advance`
+  /// would stay at the end of one, this goes on to the next.
+  void enter();
   /// Plans have changed at the motion's present time: the rest of the segment is another one.
   void plans_changed();
 
@@ -70,6 +73,8 @@ class LinearBounds {
 
  private:
   void restart();
+  void note_time();
+  void go_on();
   void choose_segment(double t);
   bool make_end(std::uint32_t body, std::uint32_t end, double t);
   void make_margin(Side& side) const;

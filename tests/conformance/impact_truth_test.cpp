@@ -3,7 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <set>
+#include <tuple>
 
+#include "core/continuous/contacts.hpp"
+#include "core/session.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/impact_queries.hpp"
 #include "experiments/io/animated_mesh.hpp"
@@ -44,6 +48,64 @@ TEST(ImpactTruth, ExactArithmeticAloneIsRight) {
     for (const ImpactQuery& query : file.queries)
       ASSERT_EQ(find_impact_exact(query.kind, query.moving()).touches, *query.truth) << file.name;
 }
+
+// Both pairs of frames as scenes of one body: broad and narrow phase of every strategy together.
+class FramePairs : public testing::TestWithParam<std::string> {};
+
+TEST_P(FramePairs, ListedPairsAreFoundOrFree) {
+  const std::filesystem::path folder = data_folder() / "ccd" / "frames" / GetParam();
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no frames at " << folder << " (set KBVH_DATA)";
+  const FramePair pair = read_frame_pair(folder);
+  Scene<double> scene;
+  Body<double> body;
+  body.name = pair.name;
+  for (const auto& face : pair.faces) body.primitives.add(face);
+  std::vector<double> positions = pair.positions[0];
+  positions.insert(positions.end(), pair.positions[1].begin(), pair.positions[1].end());
+  const std::vector<double> times{0, 1};
+  body.plans = FlightPlans<double>(std::uint32_t(pair.positions[0].size() / 3), times, std::move(positions));
+  scene.bodies.push_back(std::move(body));
+  scene.pairs = {{0, 0}};
+  const Features features(scene.bodies[0].primitives);
+  ASSERT_EQ(features.edges().size(), pair.edges.size());
+  for (std::size_t i = 0; i < pair.edges.size(); ++i) {
+    ASSERT_EQ(features.edges()[i].vertices[0], pair.edges[i][0]);
+    ASSERT_EQ(features.edges()[i].vertices[1], pair.edges[i][1]);
+  }
+  int strategies = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (!entry.info.can.contacts || !entry.info.can.self_pairs || entry.info.max_primitive_pairs != 0)
+      continue;
+    ++strategies;
+    Session<double> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    session.reset(0);
+    ContactBuffer contacts;
+    PhaseTimes times_taken;
+    session.contacts(1, contacts, times_taken);
+    using Key = std::tuple<Contact::Kind, std::uint32_t, std::uint32_t>;
+    std::set<Key> found;
+    for (const Contact& contact : contacts)
+      EXPECT_TRUE(found.insert({contact.kind, contact.feature_a, contact.feature_b}).second) << "twice";
+    std::uint64_t missed = 0, extra = 0, touching = 0;
+    for (const FramePair::Listed& listed : pair.listed) {
+      std::uint32_t a = listed.first, b = listed.second;
+      if (listed.kind == Contact::Kind::edge_edge && a > b) std::swap(a, b);
+      const bool reported = found.contains({listed.kind, a, b});
+      touching += listed.touches ? 1 : 0;
+      missed += listed.touches && !reported ? 1 : 0;
+      extra += !listed.touches && reported ? 1 : 0;
+    }
+    EXPECT_EQ(missed, 0u) << entry.info.id;
+    EXPECT_EQ(extra, 0u) << entry.info.id;
+    EXPECT_GT(touching, 4000u);
+    EXPECT_GE(contacts.size(), touching);
+  }
+  EXPECT_GE(strategies, 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Data, FramePairs, testing::Values("cloth-ball", "rod-twist"), [](const auto& test) {
+  return test.param == "rod-twist" ? "rod_twist" : "cloth_ball";
+});
 
 TEST(ImpactQueries, ComplainWithTheLine) {
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "impact_queries";
