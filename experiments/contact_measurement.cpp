@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include "experiments/io/animated_mesh.hpp"
+
 namespace kbvh::experiments {
 
 namespace {
