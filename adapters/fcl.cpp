@@ -28,6 +28,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/continuous/impact.hpp"
 #include "core/registry.hpp"
 
 namespace kbvh {
@@ -282,6 +283,25 @@ struct Bind {
   using Type = Fcl<Own, mode, verdict, S, Count>;
 };
 
+/// FCL's own test of a vertex and a face, or of two edges, in linear motion: the cubic's roots in floating
+/// point, by bisection or Newton's method, and tolerances for what is inside.
+bool fcl_impact(Contact::Kind kind, const MovingPoints& points) {
+  fcl::Vector3d p[2][4];
+  for (int end = 0; end < 2; ++end)
+    for (int i = 0; i < 4; ++i) {
+      const double* x = (end == 0 ? points.begin : points.end)[i];
+      p[end][i] = fcl::Vector3d(x[0], x[1], x[2]);
+    }
+  double time = 0;
+  fcl::Vector3d place;
+  using Test = fcl::detail::Intersect<double>;
+  // FCL names the face first.
+  return kind == Contact::Kind::vertex_face ? Test::intersect_VF(p[0][1], p[0][2], p[0][3], p[0][0], p[1][1],
+                                                                 p[1][2], p[1][3], p[1][0], &time, &place)
+                                            : Test::intersect_EE(p[0][0], p[0][1], p[0][2], p[0][3], p[1][0],
+                                                                 p[1][1], p[1][2], p[1][3], &time, &place);
+}
+
 template <class Own, Mode mode, Verdict verdict = Verdict::kbvh>
 StrategyEntry entry(const std::string& name, const std::string& title) {
   constexpr bool single = std::is_same_v<Own, float>;
@@ -298,6 +318,7 @@ StrategyEntry entry(const std::string& name, const std::string& title) {
   info.can.restructures = mode == Mode::rebuild;
   info.can.plan_changes = true;
   info.topology.own = true;
+  if (verdict == Verdict::own && !single) info.own_impact = fcl_impact;
   return make_entry<Bind<Own, mode, verdict>::template Type, scalars>(std::move(info));
 }
 

@@ -6,6 +6,7 @@
 
 #include "core/counters.hpp"
 #include "core/geometry/triangle_triangle.hpp"
+#include "core/hierarchy/self_pairs.hpp"
 #include "core/hierarchy/topology.hpp"
 #include "core/motion/motion_view.hpp"
 
@@ -109,7 +110,8 @@ Box<S> primitive_box(std::span<const std::uint32_t> vertices, const S* positions
 }
 
 /// Turns overlapping leaves into candidate pairs: appends the primitive pairs of two leaves whose own boxes
-/// overlap. One such object serves one pair of bodies; it fetches the positions it reads.
+/// overlap. One such object serves one pair of bodies; it fetches the positions it reads. Within one body,
+/// each two leaves are to be given once, and a leaf of several primitives with itself, too.
 template <class S, class Count>
 class LeafPairs {
  public:
@@ -126,6 +128,16 @@ class LeafPairs {
         out_(&out) {}
 
   void operator()(std::uint32_t leaf_a, std::uint32_t leaf_b) {
+    const std::size_t before = out_->size();
+    append(leaf_a, leaf_b);
+    if (body_a_ != body_b_) return;
+    const LeavesOf leaves = leaf_a == leaf_b ? LeavesOf::one : LeavesOf::two;
+    out_->resize(before +
+                 keep_self_pairs(primitives_a_, leaves, out_->data() + before, out_->size() - before));
+  }
+
+ private:
+  void append(std::uint32_t leaf_a, std::uint32_t leaf_b) {
     const TopologyNode na = a_->nodes[leaf_a], nb = b_->nodes[leaf_b];
     if (na.count() == 1 && nb.count() == 1) {
       out_->push_back({body_a_, a_->primitives[na.first()], body_b_, b_->primitives[nb.first()]});
@@ -149,8 +161,6 @@ class LeafPairs {
     }
     count_->add(Counter::box_tests, tests);
   }
-
- private:
   LaneBox<S> box(std::uint32_t body, const Primitives& primitives, std::uint32_t primitive) const {
     const auto vertices = primitives[primitive];
     motion_->fetch(body, vertices);

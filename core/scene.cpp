@@ -26,7 +26,7 @@ void validate(const Scene<S>& scene) {
     }
   }
   for (const BodyPair& pair : scene.pairs)
-    if (pair.first >= pair.second || pair.second >= scene.bodies.size())
+    if (pair.first > pair.second || pair.second >= scene.bodies.size())
       throw std::invalid_argument("body pair (" + std::to_string(pair.first) + ", " +
                                   std::to_string(pair.second) + ") in a scene of " +
                                   std::to_string(scene.bodies.size()) + " bodies");

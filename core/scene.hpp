@@ -54,7 +54,7 @@ struct Body {
   FlightPlans<S> plans;
 };
 
-/// Which bodies are tested against each other; first < second.
+/// Which bodies are tested against each other; first < second, or both the same: pairs within one body.
 struct BodyPair {
   std::uint32_t first, second;
 };

@@ -5,7 +5,9 @@
 #include <optional>
 #include <vector>
 
+#include "core/continuous/contacts.hpp"
 #include "core/hierarchy/oracle.hpp"
+#include "core/hierarchy/self_pairs.hpp"
 #include "core/plan_script.hpp"
 #include "core/registry.hpp"
 
@@ -48,11 +50,12 @@ class Session {
   /// instance is made anew, and references to it are not valid any more.
   void reset(double t) {
     playback_.restore_plans();
+    changed_ = geometry_changed_;  // of what the constructor's scene says
     if (geometry_changed_) {
       changing_.emplace(*original_);
       playback_.seek(overlaid_keyframes(*original_).front());
       make_strategy();
-      geometry_changed_ = false;
+      geometry_changed_ = changed_ = false;
     }
     playback_.seek(t);
     playback_.evaluate_all();
@@ -78,11 +81,40 @@ class Session {
     playback_.seek(t);
     strategy_->spans(from, t, out);
   }
+  /// Moves to t and appends the contacts of features on the way, for strategies that declare contacts: every
+  /// vertex moves on a straight line from its present position to that at t. To be called from one time of
+  /// `overlaid_keyframes` to the next, beginning after `reset`, without frames between. The narrow phase
+  /// counts as triangle tests. Throws std::invalid_argument unless all bodies consist of triangles, and
+  /// std::logic_error after changes of plans or geometry, of which it knows nothing. Returns the pairs of
+  /// primitives that came to the narrow phase.
+  std::size_t contacts(double t, ContactBuffer& out, PhaseTimes& times) {
+    if (!finder_) finder_.emplace(*scene_);
+    if (changed_) throw std::logic_error("contacts are not found after changes of plans or geometry");
+    playback_.evaluate_all();
+    finder_->start(playback_);
+    const double from = playback_.time();
+    timed(times.update, [&] { strategy_->start_sweep(from); });
+    playback_.seek(t);
+    timed(times.motion, [&] { playback_.evaluate_all(); });
+    before_.clear();
+    for (std::uint32_t body = 0; body < playback_.body_count(); ++body)
+      before_.push_back(finder_->before(body));
+    swept_.clear();
+    timed(times.traversal, [&] { strategy_->swept_pairs(from, t, before_, swept_); });
+    timed(times.triangle_tests, [&] { finder_->find(playback_, swept_, out); });
+    return swept_.size();
+  }
+  /// How contacts were decided; after the first call of `contacts`.
+  ImpactStats impact_stats() const { return finder_ ? finder_->stats() : ImpactStats{}; }
+  /// The pairs of the last call of `contacts`.
+  const PairBuffer& swept_pairs() const { return swept_; }
+
   /// Makes the changes at the current time, all of them or, if one is not valid, none
   /// (Playback::change_plans).
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
     if (changing_) changing_->check_plans(changes);
     playback_.change_plans(playback_.time(), changes);
+    changed_ = true;
     timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });
   }
   /// Inserts and deletes at the current time; the scene given to the constructor stays as it is. Throws
@@ -91,7 +123,7 @@ class Session {
   void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
     if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
     changing_->apply(change, playback_);
-    geometry_changed_ = true;
+    geometry_changed_ = changed_ = true;
     timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
   }
 
@@ -110,6 +142,8 @@ class Session {
 
  private:
   void make_strategy() {
+    if (has_self_pairs(view_.pairs()) && !info_->can.self_pairs)
+      throw ConfigError("'" + info_->id + "' does not declare self pairs, which the scene asks for");
     const Params params(info_->id, info_->parameters, contestant_.params);
     Topologies topologies;
     if (!info_->topology.own) topologies = build_topologies(view_, playback_, contestant_.builder);
@@ -130,7 +164,10 @@ class Session {
   SceneView<S> view_;
   Playback<S> playback_;
   std::unique_ptr<Strategy<S>> strategy_;
-  bool geometry_changed_ = false;
+  bool geometry_changed_ = false, changed_ = false;
+  std::optional<ContactFinder<S>> finder_;
+  std::vector<const S*> before_;
+  PairBuffer swept_;
 };
 
 }  // namespace kbvh

@@ -16,6 +16,8 @@
 
 namespace kbvh {
 
+struct MovingPoints;
+
 /// Does a strategy keep every box as small as it can be, or only large enough?
 enum class Tightness : std::uint8_t { tight, conservative, none };
 
@@ -41,8 +43,9 @@ struct Capabilities {
   bool plan_changes = false;      ///< flight_plans_changed
   bool geometry_changes = false;  ///< geometry_changed
   bool spans = false;             ///< answers intervals without looking at frames
-  bool self_pairs = false;        ///< body pairs of a body with itself
+  bool self_pairs = false;        ///< pairs within a body; scenes that ask for them are refused else
   bool time_budget = false;       ///< honours a query budget
+  bool contacts = false;          ///< swept_pairs: the broad phase of continuous collision detection
 };
 
 /// Which topologies a strategy can be given. One that builds its own hierarchy (a peer library) accepts none.
@@ -70,6 +73,9 @@ struct Info {
   std::string own_scalar{};
   /// Largest scene it is offered, in primitive pairs of one body pair (quadratic contestants); 0: any.
   std::uint64_t max_primitive_pairs = 0;
+  /// A peer library's own, uncertified test of two features in motion (core/continuous/impact.hpp): does it
+  /// say that they touch? `kbvh ccd` shows it beside the exact one. Null: it has none.
+  bool (*own_impact)(Contact::Kind kind, const MovingPoints& points) = nullptr;
   // Filled in by the registration from the class itself:
   Foresight foresight = Foresight::none;
   bool has_float = false, has_double = false;
@@ -125,6 +131,19 @@ class Strategy {
   /// every frame; a pair may have several. Stands at t0 when it is called, and at t1 after, as by `advance`.
   /// Spans are of candidates: at a frame, `confirm` keeps the pairs that intersect then.
   virtual void spans(double /*t0*/, double /*t1*/, SpanBuffer& /*out*/) { unsupported("spans"); }
+
+  /// Announces `swept_pairs` for the motion that begins at t, where the strategy and the motion view stand.
+  virtual void start_sweep(double t) { stand_at(t); }
+  /// Appends the primitive pairs that may touch while every vertex moves on a straight line from its position
+  /// at t0 to that at t1, each once, canonical; within one body those that share a vertex, too, for their
+  /// other features may touch. `start_sweep` came before; the motion view stands at t1, with all positions,
+  /// and `before` are those at t0 ([body], then [vertex][3]). No knot of any plan lies strictly between.
+  /// Afterwards the next sweep may be announced from t1, or all begins again with `reset`; frames are not
+  /// answered between.
+  virtual void swept_pairs(double /*t0*/, double /*t1*/, std::span<const S* const> /*before*/,
+                           PairBuffer& /*out*/) {
+    unsupported("contacts");
+  }
 
   /// The plans of some vertices have changed at t; the motion view shows the new ones. Each starts from the
   /// stored position at t. The strategy has been advanced to t before.

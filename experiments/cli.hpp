@@ -20,6 +20,7 @@ void add_report(CLI::App& program, Action& action);
 void add_scene(CLI::App& program, Action& action);
 void add_theory(CLI::App& program, Action& action);
 void add_stress(CLI::App& program, Action& action);
+void add_ccd(CLI::App& program, Action& action);
 
 /// Runs a program of PATH and waits for it; its exit code. Throws io::InputError if it cannot be started.
 int run_and_wait(std::vector<std::string> words);
@@ -32,7 +33,7 @@ struct StudyOptions {
   std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
   std::vector<std::string> builders;
   std::uint64_t obstacle = 0, keyframes = 0, repetitions = 0, frames_limit = 0, oracle_every = 0;
-  bool print_plan = false;
+  bool print_plan = false, self = false, continuous = false;
 };
 
 /// Leaves only the studies of a plan file whose name is among `names` (a study without a name has the

@@ -35,7 +35,8 @@ std::vector<std::string> capabilities_of(const Info& info) {
                                               {info.can.geometry_changes, "geometry_changes"},
                                               {info.can.spans, "spans"},
                                               {info.can.self_pairs, "self_pairs"},
-                                              {info.can.time_budget, "time_budget"}};
+                                              {info.can.time_budget, "time_budget"},
+                                              {info.can.contacts, "contacts"}};
   std::vector<std::string> words;
   for (const auto& [can, word] : all)
     if (can) words.push_back(word);

@@ -72,6 +72,7 @@ json scene_of(const StudyOptions& options) {
   if (options.obstacle > 0) scene["obstacle"] = options.obstacle;
   if (!options.name.empty()) scene["name"] = options.name;
   if (!options.script.empty()) scene["script"] = options.script;
+  if (options.self) scene["self"] = true;
   if (!options.order.empty()) scene["order"] = split(options.order, ',');
   return scene;
 }
@@ -134,6 +135,11 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
       command.add_option("--seed", o->seeds, "of what chance decides (1); a list sweeps")->delimiter(','),
       command.add_option("--script", o->script,
                          "changes of plans while the scene runs: a file, see RESULTS.md"),
+      command.add_flag(
+          "--continuous", o->continuous,
+          "contacts of vertices and faces, and of edges, between keyframes: exact, l does not apply"),
+      command.add_flag("--self", o->self,
+                       "pairs within every body, too, of primitives that share no vertex; of one: self=true"),
       command.add_option("--order", o->order, "vertex order: given, shuffled, renumbered; a list sweeps"),
       command
           .add_option("--strategies", o->strategies,
@@ -212,6 +218,7 @@ json plan_of(const StudyOptions& options) {
   if (!options.leaf_sizes.empty()) plan["builder"]["leaf_size"] = options.leaf_sizes;
   if (!options.l.empty()) plan["l"] = options.l;
   if (!options.scalars.empty()) plan["scalars"] = options.scalars;
+  if (options.continuous) plan["continuous"] = true;
   set_common(plan, options);
   return plan;
 }

@@ -98,6 +98,7 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
   }
   if (const auto count = keys.whole("repetitions", 1, 10000)) study.repetitions = std::uint32_t(*count);
   if (const auto limit = keys.whole("frames_limit", 0, ~std::uint64_t(0))) study.frames_limit = *limit;
+  if (const auto continuous = keys.truth("continuous")) study.continuous = *continuous;
   if (const auto every = keys.whole("oracle_every", 1, ~std::uint64_t(0))) study.oracle_every = *every;
 }
 

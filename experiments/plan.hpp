@@ -23,6 +23,7 @@ struct Study {
   std::uint32_t repetitions = 3;
   std::uint64_t frames_limit = 0;  ///< only so many first frames; 0: all
   std::uint64_t oracle_every = 1;  ///< verify every n-th frame (and the last)
+  bool continuous = false;         ///< contacts between keyframes instead of pairs at frames
 };
 
 /// A plan is one or more studies, done one after the other into the same results.

@@ -84,6 +84,7 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
                       {"keyframes", body.plans.keyframe_count()},
                       {"moving", body.plans.moving()},
                       {"kind", word(body.primitives.kind)},
+                      {"self", i < loaded.self.size() && loaded.self[i]},
                       {"degenerate", loaded.meshes[i].degenerate_primitives}});
   }
   return {{"name", scene.name},
@@ -151,6 +152,7 @@ std::string configuration_key(Harness harness, const std::string& program, const
            {"machine",
             {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
              machine.at("kernels")}}};
+  if (study.continuous) all["continuous"] = true;
   if (scene.contains("script")) all["script"] = scene.at("script").at("hash");
   return hexadecimal(hash_of(all.dump()));
 }

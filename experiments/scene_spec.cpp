@@ -72,13 +72,15 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
   if (const auto move = keys.numbers("translate", 3))
     std::copy(move->begin(), move->end(), body.placement.translate);
   body.as = take_as_of(keys);
+  body.self = keys.truth("self").value_or(false);
   if (keys.has("file") == keys.has("shape"))
     throw io::InputError(place + ": a body has either a file or a shape");
   if (keys.has("shape")) {
     if (const json* triangles = keys.find("triangles"); triangles != nullptr && triangles->is_array())
       keys.fail("triangles", "a sweep belongs to the scene, a body has one number");
     body.shape = object;
-    for (const char* common : {"name", "scale", "rotate", "translate", "as"}) body.shape.erase(common);
+    for (const char* common : {"name", "scale", "rotate", "translate", "as", "self"})
+      body.shape.erase(common);
     // Made once for its complaints where the sizes are small, so that a wrong key shows before hours of work.
     json probe = body.shape;
     const auto& name = probe["shape"];
@@ -160,7 +162,11 @@ json body_from_text(const std::string& text) {
       continue;
     }
     if (body.contains(key)) throw io::InputError(at + ": is given twice");
-    if (words.contains(key)) {
+    if (key == "self") {
+      if (value != "true" && value != "false")
+        throw io::InputError(at + ": expected true or false, got '" + value + "'");
+      body[key] = value == "true";
+    } else if (words.contains(key)) {
       body[key] = value;
     } else if (wholes.contains(key)) {
       const auto number = parse_whole(value);
@@ -186,6 +192,7 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
   SceneSpec base;
   base.name = keys.word("name").value_or("");
   base.optional = keys.truth("optional").value_or(false);
+  base.self = keys.truth("self").value_or(false);
   base.builtin = keys.word("builtin").value_or("");
   if (keys.has("bodies") != base.builtin.empty())
     throw io::InputError(place + ": a scene is either builtin or has bodies");
@@ -353,8 +360,10 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     place(mesh, body.placement);
     loaded.sources.push_back(source);
     names.push_back(mesh.name);
+    loaded.self.push_back(body.self);
     loaded.meshes.push_back(std::move(mesh));
   }
+  if (spec.self) loaded.self.assign(loaded.meshes.size(), true);
   if (loaded.name.empty()) loaded.name = joined(names, "+");
   if (!spec.name.empty()) loaded.name = spec.name;
   loaded.order = spec.order;
@@ -402,6 +411,8 @@ Scene<S> assemble(const LoadedScene& loaded) {
     scene.bodies.push_back(std::move(body));
   }
   scene.pairs = all_pairs(scene.bodies);
+  for (std::uint32_t i = 0; i < loaded.self.size(); ++i)
+    if (loaded.self[i]) scene.pairs.push_back({i, i});
   validate(scene);
   if (loaded.order == VertexOrder::renumbered)
     scene = std::move(renumber_in_leaf_order(scene, BuilderConfig{}).scene);

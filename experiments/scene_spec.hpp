@@ -33,6 +33,7 @@ struct BodySpec {
   nlohmann::json shape;  ///< for make_shape; null for files
   io::TakeAs as = io::TakeAs::given;
   Placement placement;
+  bool self = false;  ///< pairs within it are asked for, too
   std::string place;  ///< for messages
 };
 
@@ -51,6 +52,7 @@ struct SceneSpec {
   std::vector<BodySpec> bodies;
   std::optional<ScriptSpec> script;  ///< plan changes of the user's own
   VertexOrder order = VertexOrder::given;
+  bool self = false;      ///< pairs within every body are asked for, too
   bool optional = false;  ///< skipped with a note if a file does not exist
   std::string said;       ///< all that decides what it is, as text: equal texts are equal scenes
 };
@@ -85,6 +87,7 @@ struct LoadedScene {
   std::uint64_t seed = 1;
   std::vector<io::AnimatedMesh> meshes;  ///< placed, in double
   std::vector<std::string> sources;      ///< of each: its file, or how it was made
+  std::vector<bool> self;                ///< of each: are pairs within it asked for? Empty: of none
   SceneOrigin origin = SceneOrigin::shapes;
   VertexOrder order = VertexOrder::given;  ///< `renumbered` is left to `assemble`
   std::optional<ReversalRule> reversal;    ///< of scenes that record their plan changes
@@ -104,7 +107,8 @@ void place(io::AnimatedMesh& mesh, const Placement& placement);
 /// Gives the vertices another order, drawn from the seed; the geometry is the same.
 void shuffle_vertices(io::AnimatedMesh& mesh, std::uint64_t seed);
 
-/// The scene in one scalar: every coordinate rounded once. Body pairs: all with at least one that moves.
+/// The scene in one scalar: every coordinate rounded once. Body pairs: all with at least one that moves, then
+/// those of bodies with themselves that are asked for.
 /// Throws io::InputError that names the body, e.g. if a coordinate does not fit the scalar.
 template <class S>
 Scene<S> assemble(const LoadedScene& loaded);

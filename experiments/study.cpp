@@ -8,6 +8,7 @@
 #include <set>
 
 #include "experiments/bench_harness.hpp"
+#include "experiments/contact_measurement.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/machine.hpp"
 #include "experiments/progress.hpp"
@@ -92,6 +93,10 @@ class Runner {
   void scene(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded) {
     const Scene<S> scene = assemble<S>(loaded);
     const PlanScript<S> script = script_of(scene, loaded, making_);
+    if (study.continuous) {
+      contact_group(study, contestants, loaded, scene, script);
+      return;
+    }
     Oracle<S> oracle(scene, cache_folder(), hash(script));
     std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
     if (has_own_frames(loaded)) {
@@ -119,13 +124,51 @@ class Runner {
            " and l = " + std::to_string(l) +
            " only keyframes are compared with the truth; take a number without common factors");
     Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script);
+    measure_all(study, contestants, loaded, about_scene, title, measurement,
+                [&](const Info& info) { return unsuitable(info, scene, script); });
+  }
+
+  /// The same for contacts from each keyframe to the next.
+  template <class S>
+  void contact_group(const Study& study, const std::vector<ContestantSpec>& contestants,
+                     const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script) {
+    if (!script.empty()) {
+      note("note: " + scene.name +
+           " is left out: contacts between keyframes know nothing of changes of plans");
+      return;
+    }
+    std::vector<double> knots = overlaid_keyframes(scene);
+    if (study.frames_limit > 0 && knots.size() > study.frames_limit + 1) knots.resize(study.frames_limit + 1);
+    if (knots.size() < 2) {
+      note("note: " + scene.name + " is left out: nothing moves, so there are no contacts between keyframes");
+      return;
+    }
+    progress_.show(scene.name + ": finding the true contacts");
+    ContactMeasurement<S> measurement(scene, knots);
+    json about_scene = scene_record(scene, loaded, 1, knots.size() - 1);
+    about_scene["name"] = scene.name + " (contacts)";
+    about_scene["continuous"] = true;
+    measure_all(study, contestants, loaded, about_scene, scene.name + ", contacts", measurement,
+                [&](const Info& info) -> std::string {
+                  if (!info.can.contacts) return "finds no contacts between keyframes";
+                  return unsuitable(info, scene, script);
+                });
+  }
+
+  /// Verifies and times the contestants of one table. `M` is a Measurement, or one of contacts.
+  template <class M, class Unsuitable>
+  void measure_all(const Study& study, const std::vector<ContestantSpec>& contestants,
+                   const LoadedScene& loaded, const json& about_scene, const std::string& title,
+                   M& measurement, const Unsuitable& why_not) {
+    const std::string scalar = about_scene.at("scalar");
     std::vector<json> records;           // in the order of the contestants
     std::vector<std::size_t> record_of;  // of each one that is measured
     std::size_t skipped = 0;
     for (std::size_t c = 0; c < contestants.size(); ++c) {
       const ContestantSpec& spec = contestants[c];
-      if (const std::string why = unsuitable(spec.entry->info, scene, script); !why.empty()) {
-        note("note: " + spec.entry->info.id + " is left out of " + scene.name + ": it " + why);
+      if (const std::string why = why_not(spec.entry->info); !why.empty()) {
+        note("note: " + spec.entry->info.id + " is left out of " + about_scene.at("name").get<std::string>() +
+             ": it " + why);
         continue;
       }
       json record{{"schema", results_schema},
@@ -152,12 +195,13 @@ class Runner {
       records.push_back(std::move(record));
     }
     if (skipped > 0)
-      note(title + ", " + (sizeof(S) == 4 ? "float" : "double") + ": " + std::to_string(skipped) + " of " +
-           std::to_string(records.size()) + " configurations are in the results already, not measured again");
-    play_all(measurement, study.repetitions, title);
+      note(title + ", " + scalar + ": " + std::to_string(skipped) + " of " + std::to_string(records.size()) +
+           " configurations are in the results already, not measured again");
+    play_all(measurement, study.repetitions, title, scalar);
     for (std::size_t i = 0; i < measurement.size(); ++i) {
       json& record = records[record_of[i]];
       complete(record, measurement[i]);
+      record.update(measurement.extras(i));
       ++outcome_.measured;
       if (!measurement[i].refused.empty()) ++outcome_.refused;
       if (store_) store_->append(record);
@@ -169,8 +213,9 @@ class Runner {
     std::fflush(stdout);
   }
 
-  template <class S>
-  void play_all(Measurement<S>& measurement, std::uint32_t repetitions, const std::string& title) {
+  template <class M>
+  void play_all(M& measurement, std::uint32_t repetitions, const std::string& title,
+                const std::string& scalar) {
     std::vector<std::size_t> timed;
     for (std::size_t i = 0; i < measurement.size(); ++i)
       if (measurement.timed(i)) timed.push_back(i);
@@ -188,9 +233,8 @@ class Runner {
     }
     std::vector<BenchItem> items;
     for (const std::size_t i : timed)
-      items.push_back(
-          {title + ", " + (sizeof(S) == 4 ? "float" : "double") + "/" + measurement[i].spec->label,
-           [&play, i]() -> const ClipTimes& { return play(i); }});
+      items.push_back({title + ", " + scalar + "/" + measurement[i].spec->label,
+                       [&play, i]() -> const ClipTimes& { return play(i); }});
     json runs = run_benchmarks(items, repetitions);
     runs["context"]["commit"] = commit();
     runs["context"]["dirty"] = dirty();

@@ -60,6 +60,10 @@ class BottomUp final : public StoredHierarchyStrategy<S, Count> {
     this->edit_geometry(change);
   }
 
+  void swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) override {
+    this->sweep(t0, t1, before, out);
+  }
+
  private:
   void update(std::uint32_t body) override {
     auto& hierarchy = this->hierarchies_[body];
@@ -105,7 +109,11 @@ KBVH_STRATEGY(bottom_up) {
       .title = "bottom-up refit",
       .family = "refit",
       .citation = "van den Bergen 1997; Z&W 2006, s.2; wide nodes after Wald et al. 2008",
-      .can = {.plan_changes = true, .geometry_changes = true, .time_budget = true},
+      .can = {.plan_changes = true,
+              .geometry_changes = true,
+              .self_pairs = true,
+              .time_budget = true,
+              .contacts = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"kernels", "auto", kernel_words(),
                       "instruction set of refit and query; auto: the widest of this machine"},

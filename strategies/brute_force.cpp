@@ -37,13 +37,34 @@ class BruteForce final : public Strategy<S> {
           status.pending += a.size() - i;
           break;
         }
-        for (std::uint32_t j = 0; j < b.size(); ++j)
-          if (overlap(a[i], b[j])) out.push_back({pair.first, i, pair.second, j});
-        tests += b.size();
+        const std::uint32_t first = pair.first == pair.second ? i + 1 : 0;
+        for (std::uint32_t j = first; j < b.size(); ++j)
+          if (overlap(a[i], b[j]) && !(first != 0 && neighbours(pair.first, i, j)))
+            out.push_back({pair.first, i, pair.second, j});
+        tests += b.size() - first;
       }
       count_.add(Counter::box_tests, tests);
     }
     return status;
+  }
+
+  void swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) override {
+    this->stand_at(t0);
+    this->move_to(t1);
+    std::vector<std::vector<Box<S>>> swept(boxes_.size());
+    for (std::uint32_t body = 0; body < boxes_.size(); ++body) {
+      const Primitives& primitives = this->scene_.primitives(body);
+      for (std::uint32_t p = 0; p < primitives.count(); ++p) {
+        Box<S> box = primitive_box(primitives[p], before[body]);
+        box.extend(primitive_box(primitives[p], this->sampled_.positions(body)));
+        swept[body].push_back(primitives.alive(p) ? box : Box<S>{});
+      }
+    }
+    for (const BodyPair& pair : this->scene_.pairs())
+      for (std::uint32_t i = 0; i < swept[pair.first].size(); ++i)
+        for (std::uint32_t j = pair.first == pair.second ? i + 1 : 0; j < swept[pair.second].size(); ++j)
+          if (overlap(swept[pair.first][i], swept[pair.second][j]))
+            out.push_back({pair.first, i, pair.second, j});
   }
 
   void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}
@@ -60,6 +81,11 @@ class BruteForce final : public Strategy<S> {
   Counters counted() const override { return count_.table; }
 
  private:
+  bool neighbours(std::uint32_t body, std::uint32_t i, std::uint32_t j) const {
+    const Primitives& primitives = this->scene_.primitives(body);
+    return share_vertex(primitives[i], primitives[j]);
+  }
+
   void update() {
     for (std::uint32_t body = 0; body < boxes_.size(); ++body) {
       const Primitives& primitives = this->scene_.primitives(body);
@@ -88,7 +114,11 @@ KBVH_STRATEGY(brute_force) {
       .family = "oracle",
       .citation = "all pairs",
       .tightness = Tightness::none,
-      .can = {.plan_changes = true, .geometry_changes = true, .time_budget = true},
+      .can = {.plan_changes = true,
+              .geometry_changes = true,
+              .self_pairs = true,
+              .time_budget = true,
+              .contacts = true},
       .topology = {.own = true},
       .max_primitive_pairs = 100'000'000,
   })};

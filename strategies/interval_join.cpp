@@ -81,6 +81,31 @@ class IntervalJoinStrategy final : public Strategy<S> {
     pairs.insert(pairs.end(), to_test_.begin(), to_test_.end());
   }
 
+  void start_sweep(double t) override {
+    this->stand_at(t);
+    bounds_.enter();
+    joined_ = false;
+    if (!sweeps_.empty()) return;
+    sweeps_.resize(joins_.size());
+    for (auto& sweep : sweeps_) sweep.keep_neighbours();
+  }
+
+  /// All pairs of the segment, whenever their boxes overlap in it.
+  void swept_pairs(double t0, double t1, std::span<const S* const> /*before*/, PairBuffer& out) override {
+    this->stand_at(t0);
+    this->move_to(t1);
+    if (!(bounds_.begin() <= t0 && t1 <= bounds_.end()))
+      throw std::invalid_argument("contacts are asked for across a knot of a plan, or with pieces > 1");
+    std::uint64_t tests = 0;
+    for (std::size_t i = 0; i < sweeps_.size(); ++i) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      sweeps_[i].join(bounds_, pair.first, pair.second, tests);
+      for (const JoinedPair& found : sweeps_[i].pairs())
+        out.push_back({pair.first, found.primitive_a, pair.second, found.primitive_b});
+    }
+    count_.add(Counter::box_tests, tests);
+  }
+
   void flight_plans_changed(double t, std::span<const PlanChange<S>> /*changes*/) override {
     this->stand_at(t);
     bounds_.plans_changed();
@@ -95,6 +120,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
     std::size_t total = bounds_.bytes();
     for (const auto& join : joins_) total += join.bytes();
     for (const auto& answers : answers_) total += answers.bytes();
+    for (const auto& sweep : sweeps_) total += sweep.bytes();
     return total;
   }
 
@@ -127,6 +153,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
   LinearBounds<S> bounds_;
   std::vector<IntervalJoin<S>> joins_;  ///< one for each pair of bodies
   std::vector<SpanAnswers<S>> answers_;
+  std::vector<IntervalJoin<S>> sweeps_;  ///< the same for contacts, once they are asked for
   std::vector<bool> by_spans_;
   bool any_by_spans_ = false, joined_ = false;
   /// What was read for one pair of bodies.
@@ -151,7 +178,7 @@ KBVH_STRATEGY(interval_join) {
       .citation = "kbvh",
       .tightness = Tightness::conservative,
       .positions = PositionUse::fetched,
-      .can = {.continuous = true, .plan_changes = true},
+      .can = {.continuous = true, .plan_changes = true, .self_pairs = true, .contacts = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters =
           {segment_pieces_parameter(),

@@ -1,6 +1,7 @@
 // Kinetic incremental collision detection (Z&W 2006, s.7): two kinetic AABB trees and the separation list of
 // their pairs, all kept at events; a query reads the overlapping leaves and traverses nothing.
 
+#include <algorithm>
 #include <variant>
 
 #include "core/hierarchy/realiser_boxes.hpp"
@@ -51,6 +52,7 @@ class KineticSeparationList final : public Strategy<S> {
                                    collision.forest().tree(pair.first).topology(), pair.second,
                                    collision.forest().tree(pair.second).topology(), count_, out);
         for (const auto& leaf : collision.list().leaf_pairs(i)) leaves(leaf.a, leaf.b);
+        for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) { leaves(leaf, leaf); });
       }
     });
     return {};
@@ -65,8 +67,37 @@ class KineticSeparationList final : public Strategy<S> {
       collision.advance(t1);
       for (const auto& ended : list.stop_spans())
         append_spans(collision, ended.bodies, ended.leaf, t0, std::min(ended.until, t1), out);
-      for (std::size_t i = 0; i < this->scene_.pairs().size(); ++i)
+      for (std::size_t i = 0; i < this->scene_.pairs().size(); ++i) {
+        using Leaf = std::remove_cvref_t<decltype(list.leaf_pairs(i)[0])>;
         for (const auto& leaf : list.leaf_pairs(i)) append_spans(collision, i, leaf, t0, t1, out);
+        for_leaves_with_themselves(collision, this->scene_.pairs()[i], [&](std::uint32_t leaf) {
+          append_spans(collision, i, Leaf{leaf, leaf, 0, t0}, t0, t1, out);
+        });
+      }
+    });
+  }
+
+  /// All leaves that overlap at some time between. What overlaps twice is found twice.
+  void swept_pairs(double t0, double t1, std::span<const S* const> /*before*/, PairBuffer& out) override {
+    this->stand_at(t0);
+    this->move_to(t1);
+    on_collision([&](auto& collision) {
+      auto& list = collision.list();
+      list.start_spans(t0);
+      collision.advance(t1);
+      const auto ended = list.stop_spans();
+      for (std::size_t i = 0; i < this->scene_.pairs().size(); ++i) {
+        const BodyPair& pair = this->scene_.pairs()[i];
+        swept_leaves_.clear();
+        for (const auto& leaf : list.leaf_pairs(i)) swept_leaves_.emplace_back(leaf.a, leaf.b);
+        for (const auto& leaf : ended)
+          if (leaf.bodies == i) swept_leaves_.emplace_back(leaf.leaf.a, leaf.leaf.b);
+        for_leaves_with_themselves(collision, pair,
+                                   [&](std::uint32_t leaf) { swept_leaves_.emplace_back(leaf, leaf); });
+        std::sort(swept_leaves_.begin(), swept_leaves_.end());
+        swept_leaves_.erase(std::unique(swept_leaves_.begin(), swept_leaves_.end()), swept_leaves_.end());
+        for (const auto& [a, b] : swept_leaves_) append_leaves(collision, pair, a, b, out);
+      }
     });
   }
 
@@ -113,6 +144,39 @@ class KineticSeparationList final : public Strategy<S> {
     return std::visit([&](const auto& collision) -> decltype(auto) { return work(*collision); }, collision_);
   }
 
+  /// Within one body the list has no leaf with itself.
+  template <class System, class Work>
+  void for_leaves_with_themselves(const System& collision, const BodyPair& pair, const Work& work) const {
+    if (pair.first != pair.second) return;
+    const Topology& topology = collision.forest().tree(pair.first).topology();
+    if (topology.empty() || topology.leaf_size == 1) return;
+    std::vector<std::uint32_t> nodes{0};  // by way of the root: changes of geometry leave gaps
+    while (!nodes.empty()) {
+      const std::uint32_t node = nodes.back();
+      nodes.pop_back();
+      const TopologyNode own = topology.nodes[node];
+      if (own.is_leaf()) work(node);
+      for (std::uint32_t child = own.first(); !own.is_leaf() && child < own.first() + own.count(); ++child)
+        nodes.push_back(child);
+    }
+  }
+
+  /// Every primitive pair of two leaves, those that share a vertex included.
+  template <class System>
+  void append_leaves(const System& collision, const BodyPair& pair, std::uint32_t leaf_a,
+                     std::uint32_t leaf_b, PairBuffer& out) const {
+    const Topology& a = collision.forest().tree(pair.first).topology();
+    const Topology& b = collision.forest().tree(pair.second).topology();
+    const TopologyNode na = a.nodes[leaf_a], nb = b.nodes[leaf_b];
+    const std::size_t before = out.size();
+    for (std::uint32_t i = na.first(); i < na.first() + na.count(); ++i)
+      for (std::uint32_t j = nb.first(); j < nb.first() + nb.count(); ++j)
+        out.push_back({pair.first, a.primitives[i], pair.second, b.primitives[j]});
+    if (pair.first != pair.second) return;
+    const LeavesOf leaves = leaf_a == leaf_b ? LeavesOf::one : LeavesOf::two;
+    out.resize(before + keep_self_pairs(nullptr, leaves, out.data() + before, out.size() - before));
+  }
+
   /// Every primitive pair of two leaves for as long as the leaves overlap.
   template <class System, class LeafPair>
   void append_spans(const System& collision, std::size_t body_pair, const LeafPair& leaf, double t0,
@@ -122,12 +186,18 @@ class KineticSeparationList final : public Strategy<S> {
     const Topology& b = collision.forest().tree(pair.second).topology();
     const TopologyNode na = a.nodes[leaf.a], nb = b.nodes[leaf.b];
     for (std::uint32_t i = na.first(); i < na.first() + na.count(); ++i)
-      for (std::uint32_t j = nb.first(); j < nb.first() + nb.count(); ++j)
-        out.push_back(
-            {{pair.first, a.primitives[i], pair.second, b.primitives[j]}, std::max(leaf.since, t0), end});
+      for (std::uint32_t j = nb.first(); j < nb.first() + nb.count(); ++j) {
+        PrimitivePair found{pair.first, a.primitives[i], pair.second, b.primitives[j]};
+        const LeavesOf leaves = leaf.a == leaf.b ? LeavesOf::one : LeavesOf::two;
+        if (pair.first == pair.second &&
+            keep_self_pairs(&this->scene_.primitives(pair.first), leaves, &found, 1) == 0)
+          continue;
+        out.push_back({found, std::max(leaf.since, t0), end});
+      }
   }
 
   Count count_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> swept_leaves_;
   std::variant<std::unique_ptr<Collision<AvlEventQueue>>, std::unique_ptr<Collision<BinaryHeapEventQueue>>>
       collision_;
   std::uint64_t first_step_ = 0, first_fetch_ = 0;
@@ -148,7 +218,9 @@ KBVH_STRATEGY(kinetic_separation_list) {
               .continuous = true,
               .plan_changes = true,
               .geometry_changes = true,
-              .spans = true},
+              .spans = true,
+              .self_pairs = true,
+              .contacts = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"queue",
                       "avl",

@@ -54,7 +54,11 @@ KBVH_STRATEGY(rebuild) {
       .title = "rebuild",
       .family = "rebuild",
       .citation = "van den Bergen 1997 (as the alternative to refitting)",
-      .can = {.restructures = true, .plan_changes = true, .geometry_changes = true, .time_budget = true},
+      .can = {.restructures = true,
+              .plan_changes = true,
+              .geometry_changes = true,
+              .self_pairs = true,
+              .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"method", "median", {"median", "sah", "morton"}, "how the new topology is built"}},
   })};

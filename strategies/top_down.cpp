@@ -81,7 +81,7 @@ KBVH_STRATEGY(top_down) {
       .title = "top-down refit",
       .family = "refit",
       .citation = "van den Bergen 1998; Larsson & Akenine-Möller 2001",
-      .can = {.plan_changes = true, .geometry_changes = true, .time_budget = true},
+      .can = {.plan_changes = true, .geometry_changes = true, .self_pairs = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
   })};
 }

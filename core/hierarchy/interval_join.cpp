@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/hierarchy/self_pairs.hpp"
+
 namespace kbvh {
 
 namespace {
@@ -41,6 +43,7 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
                            std::uint64_t& tests) {
   body_a_ = body_a;
   body_b_ = body_b;
+  const bool self = body_a == body_b;
   std::size_t found = 0;
   auto &a = bounds.side(body_a), &b = bounds.side(body_b);
   if (!a.hierarchy.empty() && !b.hierarchy.empty()) {
@@ -67,15 +70,31 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
                               0};
     const auto pairs_of_leaves = kernels.leaf_join(
         width, std::max(4u, std::max(a.hierarchy.padded_leaf_size(), b.hierarchy.padded_leaf_size())));
-    while (state.depth > 0) {
-      kernels.join(width)(leaf_join.a, leaf_join.ends_a, leaf_join.b, leaf_join.ends_b, state);
-      leaf_join.next = 0;
-      leaf_join.count = state.found;
+    const auto take_leaves = [&](std::size_t end) {
+      leaf_join.count = end;
       while (leaf_join.next < leaf_join.count) {
         if (found_.size() < leaf_join.found + chunk_room) found_.resize(2 * leaf_join.found + chunk_room);
         leaf_join.out = found_.data();
         leaf_join.out_room = found_.size();
         pairs_of_leaves(leaf_join);
+      }
+    };
+    const auto take_self_leaves = [&](std::size_t end, LeavesOf leaves) {
+      const std::size_t before = leaf_join.found;
+      take_leaves(end);
+      const Primitives* neighbours = with_neighbours_ ? nullptr : &bounds.scene().primitives(body_a);
+      leaf_join.found =
+          before + keep_self_pairs(neighbours, leaves, found_.data() + before, leaf_join.found - before);
+    };
+    const auto traverse = self ? kernels.self(width) : kernels.join(width);
+    while (state.depth > 0) {
+      traverse(leaf_join.a, leaf_join.ends_a, leaf_join.b, leaf_join.ends_b, state);
+      leaf_join.next = 0;
+      if (self) {
+        take_self_leaves(different_leaves_first(leaf_pairs_.data(), state.found), LeavesOf::two);
+        take_self_leaves(state.found, LeavesOf::one);
+      } else {
+        take_leaves(state.found);
       }
       state.found = 0;
       if (state.depth + wide_step >= state.stack_room) {

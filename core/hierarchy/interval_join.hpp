@@ -22,9 +22,13 @@ struct FractionBuckets {
 template <class S>
 class IntervalJoin {
  public:
-  /// Joins anew for the bounds' present segment. Adds the box tests made to `tests`. Allocates only where
-  /// there are more pairs than ever before.
+  /// Joins anew for the bounds' present segment; within one body if both are the same, and then without pairs
+  /// that share a vertex, unless `keep_neighbours` was called. Adds the box tests made to `tests`. Allocates
+  /// only where there are more pairs than ever before.
   void join(LinearBounds<S>& bounds, std::uint32_t body_a, std::uint32_t body_b, std::uint64_t& tests);
+
+  /// From now on pairs within one body that share a vertex are kept.
+  void keep_neighbours() { with_neighbours_ = true; }
 
   /// Appends the pairs whose boxes overlap at a fraction of the segment, which never decreases within one.
   /// O(pairs that begin or end since the last call), and one copy of those that overlap.
@@ -53,6 +57,7 @@ class IntervalJoin {
     bool at_rest = false;
   };
   std::uint32_t body_a_ = 0, body_b_ = 0;
+  bool with_neighbours_ = false;
   Leaves leaves_[2];
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;

@@ -112,12 +112,29 @@ void LinearBounds<S>::restart() {
 }
 
 template <class S>
+void LinearBounds<S>::note_time() {
+  if (motion_.time() > last_) step_ = motion_.time() - last_;
+  last_ = motion_.time();
+}
+
+template <class S>
 bool LinearBounds<S>::advance() {
+  note_time();
+  if (end_ != none && motion_.time() <= end_) return false;
+  go_on();
+  return true;
+}
+
+template <class S>
+void LinearBounds<S>::enter() {
+  note_time();
+  if (end_ == none || motion_.time() >= end_) go_on();
+}
+
+template <class S>
+void LinearBounds<S>::go_on() {
   const double t = motion_.time(), before = end_;
   const bool anew = end_ == none;
-  if (t > last_) step_ = t - last_;
-  last_ = t;
-  if (!anew && t <= end_) return false;
   if (!anew) foreseen_ = std::min(16.0, 2 * foreseen_);
   choose_segment(t);
   const bool goes_on = !anew && begin_ == before;
@@ -146,7 +163,6 @@ bool LinearBounds<S>::advance() {
     }
   }
   for (Side& side : sides_) make_margin(side);
-  return true;
 }
 
 template <class S>

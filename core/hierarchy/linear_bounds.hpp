@@ -45,6 +45,9 @@ class LinearBounds {
   void start();
   /// The same if the present time is not in the segment any more. Returns whether it began a new one.
   bool advance();
+  /// The bounds of the segment that the motion's present time is in and not the last of: where `advance`
+  /// would stay at the end of one, this goes on to the next.
+  void enter();
   /// Plans have changed at the motion's present time: the rest of the segment is another one.
   void plans_changed();
 
@@ -54,6 +57,7 @@ class LinearBounds {
   /// Where the segment a time lies in it, from 0 to 1.
   S fraction(double t) const;
 
+  const SceneView<S>& scene() const { return scene_; }
   std::uint32_t body_count() const { return std::uint32_t(sides_.size()); }
   Side& side(std::uint32_t body) { return sides_[body]; }
   const Side& side(std::uint32_t body) const { return sides_[body]; }
@@ -69,6 +73,8 @@ class LinearBounds {
 
  private:
   void restart();
+  void note_time();
+  void go_on();
   void choose_segment(double t);
   bool make_end(std::uint32_t body, std::uint32_t end, double t);
   void make_margin(Side& side) const;

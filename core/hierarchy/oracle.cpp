@@ -1,6 +1,7 @@
 #include "core/hierarchy/oracle.hpp"
 
 #include "core/hierarchy/builders.hpp"
+#include "core/hierarchy/self_pairs.hpp"
 
 #include <unistd.h>
 
@@ -32,9 +33,11 @@ std::vector<PrimitivePair> brute_force_pairs(const Scene<S>& scene, Playback<S>&
   std::vector<PrimitivePair> result;
   for (const BodyPair& pair : scene.pairs) {
     const Body<S>&a = scene.bodies[pair.first], &b = scene.bodies[pair.second];
+    const bool within = pair.first == pair.second;
     for (std::uint32_t i = 0; i < a.primitives.count(); ++i)
-      for (std::uint32_t j = 0; j < b.primitives.count(); ++j)
+      for (std::uint32_t j = within ? i + 1 : 0; j < b.primitives.count(); ++j)
         if (a.primitives.alive(i) && b.primitives.alive(j) &&
+            !(within && share_vertex(a.primitives[i], a.primitives[j])) &&
             truly_meet(a, i, playback.positions(pair.first), b, j, playback.positions(pair.second)))
           result.push_back({pair.first, i, pair.second, j});
   }
@@ -75,6 +78,9 @@ std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playb
     const auto items_a = sorted_items(pair.first, axis, whole_b),
                items_b = sorted_items(pair.second, axis, whole_a);
     const auto report = [&](const Item& x, const Item& y) {
+      if (pair.first == pair.second &&
+          (x.primitive >= y.primitive || share_vertex(a.primitives[x.primitive], a.primitives[y.primitive])))
+        return;  // each of these pairs is seen twice: of both lists
       if (overlap(x.box, y.box) && truly_meet(a, x.primitive, positions_a, b, y.primitive, positions_b))
         result.push_back({pair.first, x.primitive, pair.second, y.primitive});
     };

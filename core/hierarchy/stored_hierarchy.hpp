@@ -1,4 +1,7 @@
 #pragma once
+#include <optional>
+
+#include "core/hierarchy/swept_hierarchies.hpp"
 #include "core/hierarchy/topology_edit.hpp"
 #include "core/hierarchy/wide_hierarchy.hpp"
 #include "core/strategy.hpp"
@@ -74,7 +77,7 @@ class StoredHierarchyStrategy : public Strategy<S> {
   std::size_t bytes() const override {
     std::size_t total = 0;
     for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
-    return total;
+    return total + (swept_ ? swept_->bytes() : 0);
   }
 
  protected:
@@ -98,6 +101,17 @@ class StoredHierarchyStrategy : public Strategy<S> {
   }
   /// Called when a body's hierarchy has another topology than before, for what is kept beside it.
   virtual void topology_changed(std::uint32_t /*body*/) {}
+  /// The broad phase of contacts by one refit to both ends of the motion, on the topologies as they are at
+  /// its first call: what a strategy that declares contacts can do in `swept_pairs`.
+  void sweep(double t0, double t1, std::span<const S* const> before, PairBuffer& out) {
+    this->stand_at(t0);
+    this->move_to(t1);
+    if (!swept_) swept_.emplace(this->scene_, hierarchies_);
+    swept_->refit(before, this->sampled_);
+    std::uint64_t tests = 0;
+    swept_->pairs(query_, out, tests);
+    count_.add(Counter::box_tests, tests);
+  }
   void refit(std::uint32_t body) { hierarchies_[body].refit(this->sampled_.positions(body)); }
   Counters counted() const override { return count_.table; }
 
@@ -105,6 +119,7 @@ class StoredHierarchyStrategy : public Strategy<S> {
   WideQuery<S> query_;
   Count count_;
   bool plans_changed_ = false;
+  std::optional<SweptHierarchies<S>> swept_;  ///< made when contacts are first asked for
 };
 
 }  // namespace kbvh

@@ -238,10 +238,31 @@ QueryStatus WideQuery<S>::run(WideHierarchy<S>& a, std::uint32_t body_a, WideHie
   if (!a.suits(b)) throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
   WideTraversal state = fresh_traversal(budget);
   if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
-  const auto traverse = overlap_kernels<S>(a.kernels()).traverse(a.topology().width);
+  const auto& kernels = overlap_kernels<S>(a.kernels());
+  const std::uint32_t width = a.topology().width;
+  const auto traverse = body_a == body_b ? kernels.self(width) : kernels.traverse(width);
   return complete(
       state, [&] { traverse(a.arrays(), b.arrays(), state); },
       [&] { leaves_to_pairs(a, body_a, b, body_b, scene, motion, state.found, out, tests); }, tests);
+}
+
+template <class S>
+void WideQuery<S>::run_over(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a,
+                            WideHierarchy<S>& b, std::uint32_t body_b, const S* positions_b, PairBuffer& out,
+                            std::uint64_t& tests) {
+  if (a.empty() || b.empty()) return;
+  if (!a.suits(b)) throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
+  WideTraversal state = fresh_traversal(Budget{});
+  if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
+  const auto& kernels = overlap_kernels<S>(a.kernels());
+  const std::uint32_t width = a.topology().width;
+  const auto traverse = body_a == body_b ? kernels.self(width) : kernels.traverse(width);
+  complete(
+      state, [&] { traverse(a.arrays(), b.arrays(), state); },
+      [&] {
+        leaves_to_pairs(a, body_a, positions_a, b, body_b, positions_b, nullptr, state.found, out, tests);
+      },
+      tests);
 }
 
 template <class S>
@@ -333,41 +354,72 @@ typename WideQuery<S>::Wanted WideQuery<S>::proceed(const LazySide& a, const Laz
 }
 
 template <class S>
+void WideQuery<S>::fetch_leaves(WideHierarchy<S>& h, std::uint32_t body, std::size_t side, std::size_t count,
+                                const SceneView<S>& scene, const SampledMotion<S>& motion) {
+  // Positions that are not there yet, all at once: calls with a few vertices each cost more than the
+  // vertices.
+  if (h.padded_leaf_size() == 1 || motion.all_current(body)) return;
+  to_fetch_.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t leaf = h.leaf_number(leaf_pairs_[2 * i + side]);
+    if (!h.to_be_fetched(leaf)) continue;
+    for (const std::uint32_t primitive : h.leaf_primitives(leaf)) {
+      const auto vertices = scene.primitives(body)[primitive];
+      to_fetch_.insert(to_fetch_.end(), vertices.begin(), vertices.end());
+    }
+  }
+  motion.fetch(body, to_fetch_);
+}
+
+template <class S>
 void WideQuery<S>::leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b,
                                    std::uint32_t body_b, const SceneView<S>& scene,
                                    const SampledMotion<S>& motion, std::size_t count, PairBuffer& out,
                                    std::uint64_t& tests) {
+  fetch_leaves(a, body_a, 0, count, scene, motion);
+  fetch_leaves(b, body_b, 1, count, scene, motion);
+  const Primitives* neighbours = body_a == body_b ? &scene.primitives(body_a) : nullptr;
+  leaves_to_pairs(a, body_a, motion.positions(body_a), b, body_b, motion.positions(body_b), neighbours, count,
+                  out, tests);
+}
+
+template <class S>
+void WideQuery<S>::leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a,
+                                   WideHierarchy<S>& b, std::uint32_t body_b, const S* positions_b,
+                                   const Primitives* neighbours, std::size_t count, PairBuffer& out,
+                                   std::uint64_t& tests) {
+  if (body_a != body_b) {
+    append_pairs(a, body_a, positions_a, b, body_b, positions_b, 0, count, out, tests);
+    return;
+  }
+  const std::size_t different = different_leaves_first(leaf_pairs_.data(), count);
+  const auto append = [&](LeavesOf leaves, std::size_t begin, std::size_t end) {
+    const std::size_t before = out.size();
+    append_pairs(a, body_a, positions_a, b, body_b, positions_b, begin, end, out, tests);
+    out.resize(before + keep_self_pairs(neighbours, leaves, out.data() + before, out.size() - before));
+  };
+  append(LeavesOf::two, 0, different);
+  append(LeavesOf::one, different, count);
+}
+
+template <class S>
+void WideQuery<S>::append_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a,
+                                WideHierarchy<S>& b, std::uint32_t body_b, const S* positions_b,
+                                std::size_t begin, std::size_t end, PairBuffer& out, std::uint64_t& tests) {
   if (a.padded_leaf_size() == 1) {
-    for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t i = begin; i < end; ++i)
       out.push_back({body_a, a.leaf_primitives(a.leaf_number(leaf_pairs_[2 * i]))[0], body_b,
                      b.leaf_primitives(b.leaf_number(leaf_pairs_[2 * i + 1]))[0]});
     return;
   }
-  // Positions that are not there yet, all at once: calls with a few vertices each cost more than the
-  // vertices.
-  const auto fetch = [&](WideHierarchy<S>& h, std::uint32_t body, std::size_t side) {
-    if (motion.all_current(body)) return;
-    to_fetch_.clear();
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t leaf = h.leaf_number(leaf_pairs_[2 * i + side]);
-      if (!h.to_be_fetched(leaf)) continue;
-      for (const std::uint32_t primitive : h.leaf_primitives(leaf)) {
-        const auto vertices = scene.primitives(body)[primitive];
-        to_fetch_.insert(to_fetch_.end(), vertices.begin(), vertices.end());
-      }
-    }
-    motion.fetch(body, to_fetch_);
-  };
-  fetch(a, body_a, 0);
-  fetch(b, body_b, 1);
   chunk_.resize(chunk_room);
   WideLeafPairs<S> state{a.arrays(),
                          b.arrays(),
-                         a.leaves(motion.positions(body_a)),
-                         b.leaves(motion.positions(body_b)),
+                         a.leaves(positions_a),
+                         b.leaves(positions_b),
                          leaf_pairs_.data(),
-                         0,
-                         count,
+                         begin,
+                         end,
                          body_a,
                          body_b,
                          chunk_.data(),

@@ -145,11 +145,17 @@ template <class S>
 class WideQuery {
  public:
   /// Appends the pairs of primitives whose boxes, and those of all nodes above them, overlap. Both
-  /// hierarchies need the same width and leaf size. Returns what the budget left undone; adds the box tests
-  /// made to `tests`.
+  /// hierarchies need the same width and leaf size. If both bodies are the same, so must be the hierarchies:
+  /// these are the pairs within it, without those that share a vertex. Returns what the budget left undone;
+  /// adds the box tests made to `tests`.
   QueryStatus run(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
                   const SceneView<S>& scene, const SampledMotion<S>& motion, const Budget& budget,
                   PairBuffer& out, std::uint64_t& tests);
+
+  /// The same for hierarchies over primitives and positions that are not a scene's, and with the pairs that
+  /// share a vertex.
+  void run_over(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a, WideHierarchy<S>& b,
+                std::uint32_t body_b, const S* positions_b, PairBuffer& out, std::uint64_t& tests);
 
   /// The same for the boxes of one moment of a segment in which they are linear in time: those that are read
   /// are made from the moments' ends, into the hierarchies. All nodes are marked as stale before.
@@ -194,6 +200,15 @@ class WideQuery {
   void leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
                        const SceneView<S>& scene, const SampledMotion<S>& motion, std::size_t count,
                        PairBuffer& out, std::uint64_t& tests);
+  void fetch_leaves(WideHierarchy<S>& h, std::uint32_t body, std::size_t side, std::size_t count,
+                    const SceneView<S>& scene, const SampledMotion<S>& motion);
+  /// Within one body pairs that share a vertex are left out; not so if `neighbours` is null.
+  void leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a, WideHierarchy<S>& b,
+                       std::uint32_t body_b, const S* positions_b, const Primitives* neighbours,
+                       std::size_t count, PairBuffer& out, std::uint64_t& tests);
+  void append_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a, WideHierarchy<S>& b,
+                    std::uint32_t body_b, const S* positions_b, std::size_t begin, std::size_t end,
+                    PairBuffer& out, std::uint64_t& tests);
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
   std::vector<FoundPair> chunk_;

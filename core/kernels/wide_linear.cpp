@@ -140,8 +140,9 @@ template <class S, std::size_t width, bool times>
 }
 
 /// Boxes that are linear in time.
-template <class S, std::uint32_t width>
+template <class S, std::uint32_t width, bool self>
 struct SegmentView {
+  static constexpr bool within_one = self;
   WideEnds<S> a, b;
   S margin;
   static constexpr std::size_t row_scalars = 6 * width;
@@ -178,9 +179,9 @@ struct SegmentView {
   }
 };
 
-template <class S, std::uint32_t width>
+template <class S, std::uint32_t width, bool self>
 void join(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b, WideTraversal& state) {
-  SegmentView<S, width> view(ends_a, ends_b);
+  SegmentView<S, width, self> view(ends_a, ends_b);
   traverse_pairs(a, b, view, state);
 }
 
@@ -237,11 +238,12 @@ void leaf_join(WideLeafJoin<S>& shared) {
 
 template <class S>
 constexpr WideLinearKernels<S> table{{&at<S, 2>, &at<S, 4>, &at<S, 8>},
-                                     {&join<S, 2>, &join<S, 4>, &join<S, 8>},
+                                     {&join<S, 2, false>, &join<S, 4, false>, &join<S, 8, false>},
                                      {{&leaf_join<S, 2, 4>, &leaf_join<S, 2, 8>, &leaf_join<S, 2, 16>},
                                       {&leaf_join<S, 4, 4>, &leaf_join<S, 4, 8>, &leaf_join<S, 4, 16>},
                                       {&leaf_join<S, 8, 4>, &leaf_join<S, 8, 8>, &leaf_join<S, 8, 16>}},
-                                     {&make<S, 2>, &make<S, 4>, &make<S, 8>}};
+                                     {&make<S, 2>, &make<S, 4>, &make<S, 8>},
+                                     {&join<S, 2, true>, &join<S, 4, true>, &join<S, 8, true>}};
 
 }  // namespace
 

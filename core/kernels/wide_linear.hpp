@@ -72,10 +72,12 @@ struct WideLinearKernels {
   Join join_width[3];               ///< [log2(width) - 1]
   LeafJoin leaf_join_padded[3][3];  ///< [log2(width) - 1][padded leaf size 4, 8, 16]
   Make make_width[3];               ///< [log2(width) - 1]
+  Join self_width[3];               ///< [log2(width) - 1]; of a hierarchy with itself
 
   static constexpr std::size_t index(std::uint32_t width) { return width == 2 ? 0 : width == 4 ? 1 : 2; }
   At at(std::uint32_t width) const { return at_width[index(width)]; }
   Join join(std::uint32_t width) const { return join_width[index(width)]; }
+  Join self(std::uint32_t width) const { return self_width[index(width)]; }
   LeafJoin leaf_join(std::uint32_t width, std::uint32_t padded) const {
     return leaf_join_padded[index(width)][index(padded / 2)];
   }

@@ -15,6 +15,13 @@ struct LazyView : StoredView<S, width> {
   }
 };
 
+/// Of a hierarchy with itself.
+template <class S, std::uint32_t width>
+struct SelfView : StoredView<S, width> {
+  using StoredView<S, width>::StoredView;
+  static constexpr bool within_one = true;
+};
+
 template <template <class, std::uint32_t> class View, class S, std::uint32_t width>
 void traverse(WideArrays<S> a, WideArrays<S> b, WideTraversal& state) {
   View<S, width> view(a, b);
@@ -64,15 +71,17 @@ void leaf_pairs(WideLeafPairs<S>& shared) {
 }
 
 template <class S>
-constexpr WideOverlapKernels<S> table{&traverse<StoredView, S, 2>,
-                                      &traverse<StoredView, S, 4>,
-                                      &traverse<StoredView, S, 8>,
-                                      {{&leaf_pairs<S, 2, 4>, &leaf_pairs<S, 2, 8>, &leaf_pairs<S, 2, 16>},
-                                       {&leaf_pairs<S, 4, 4>, &leaf_pairs<S, 4, 8>, &leaf_pairs<S, 4, 16>},
-                                       {&leaf_pairs<S, 8, 4>, &leaf_pairs<S, 8, 8>, &leaf_pairs<S, 8, 16>}},
-                                      &traverse<LazyView, S, 2>,
-                                      &traverse<LazyView, S, 4>,
-                                      &traverse<LazyView, S, 8>};
+constexpr WideOverlapKernels<S> table{
+    &traverse<StoredView, S, 2>,
+    &traverse<StoredView, S, 4>,
+    &traverse<StoredView, S, 8>,
+    {{&leaf_pairs<S, 2, 4>, &leaf_pairs<S, 2, 8>, &leaf_pairs<S, 2, 16>},
+     {&leaf_pairs<S, 4, 4>, &leaf_pairs<S, 4, 8>, &leaf_pairs<S, 4, 16>},
+     {&leaf_pairs<S, 8, 4>, &leaf_pairs<S, 8, 8>, &leaf_pairs<S, 8, 16>}},
+    &traverse<LazyView, S, 2>,
+    &traverse<LazyView, S, 4>,
+    &traverse<LazyView, S, 8>,
+    {&traverse<SelfView, S, 2>, &traverse<SelfView, S, 4>, &traverse<SelfView, S, 8>}};
 
 }  // namespace
 

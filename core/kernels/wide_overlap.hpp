@@ -77,6 +77,9 @@ struct WideOverlapKernels {
   LeafPairs leaf_pairs[3][3];
   /// As `traverse`, but leaves off, too, when the pair on top of the stack waits for boxes.
   Traverse lazy2, lazy4, lazy8;
+  /// As `traverse`, of a hierarchy with itself: two different leaves once, and each leaf with itself.
+  Traverse self_width[3];
+  Traverse self(std::uint32_t width) const { return self_width[width == 2 ? 0 : width == 4 ? 1 : 2]; }
   Traverse lazy(std::uint32_t width) const { return width == 2 ? lazy2 : width == 4 ? lazy4 : lazy8; }
   Traverse traverse(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
   LeafPairs pairs(std::uint32_t width, std::uint32_t padded_leaf) const {

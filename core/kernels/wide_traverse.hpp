@@ -75,6 +75,8 @@ template <class S, std::size_t width>
 ///   void enter(std::uint32_t a, std::uint32_t b)   their children will be read; a leaf has bit 31 set
 ///   Box own_b(node), lane_a(node, lane), lane_b(node, lane)
 ///   unsigned meeting_a(node, Box), meeting_b(node, Box)   bit i: lane i of the node meets the box
+///   bool within_one   both hierarchies are the same: each two different leaves are found once, and each leaf
+///     with itself
 template <class S, class View>
 [[gnu::always_inline]] inline void traverse_pairs(const WideArrays<S>& a, const WideArrays<S>& b, View& view,
                                                   WideTraversal& shared) {
@@ -91,6 +93,8 @@ template <class S, class View>
       for (; first != 0; first &= first - 1) {
         const std::uint32_t i = lowest(first), child_a = child(node_a, pair.first, i);
         unsigned second = view.meeting_b(pair.second, view.lane_a(pair.first, i));
+        // Below a node with itself, the other half mirrors this one.
+        if (View::within_one && pair.first == pair.second) second &= ~0U << i;
         for (; second != 0; second &= second - 1)
           emit(state, child_a, child(node_b, pair.second, lowest(second)));
       }
@@ -114,6 +118,7 @@ template <class S, class View>
 /// Boxes as they lie in the rows.
 template <class S, std::uint32_t width>
 struct StoredView {
+  static constexpr bool within_one = false;
   const S *lanes_a, *lanes_b, *all_own_b;
   static constexpr std::size_t row_scalars = 6 * width;
 

@@ -66,6 +66,10 @@ struct ListEdit {
 /// them goes, and they are decided anew on the trees as they are then; a pair of a node that is gone lies
 /// below a pair of its former parent, which counts as changed. Nothing else is looked at.
 ///
+/// Within one body, a node with itself always overlaps and needs no event: below it stand the pairs of two of
+/// its children, one for each two, which are roots of the tree of pairs; they keep the list at least as long
+/// as the tree has inner nodes. A leaf with itself is in no list.
+///
 /// Boxes are compared on the flight plans with the margin of OverlapClock: the list may hold a pair of boxes
 /// that are apart by some ulps, and misses none whose rounded boxes touch.
 template <class S, template <class> class Queue, class Count>
@@ -111,6 +115,7 @@ class SeparationList {
     read_trees(forest);
     for (const BodyPair& pair : scene.pairs()) body_pairs_.push_back(pair);
     roots_.resize(body_pairs_.size(), none);
+    self_roots_.resize(body_pairs_.size());
   }
   SeparationList(const SeparationList&) = delete;
   SeparationList& operator=(const SeparationList&) = delete;
@@ -126,6 +131,7 @@ class SeparationList {
     for (auto& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
     for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) {
       roots_[i] = none;
+      self_roots_[i].clear();
       if (both_have_nodes(i)) start_pair(i, Instant<S>::at(t));
     }
   }
@@ -155,13 +161,13 @@ class SeparationList {
     for (const auto& box : boxes) {
       linked_.clear();
       for (std::uint32_t slot = bodies_[box.body].first_pair[box.node]; slot != none;
-           slot = pairs_[slot].next[side_of(slot, box.body)])
+           slot = pairs_[slot].next[side_of(slot, box.body, box.node)])
         linked_.push_back(slot);
       if (linked_.empty()) continue;
       count_->add(Counter::bound_change_events);
       for (const std::uint32_t slot : linked_) {
         // What a collapse has removed, or an expansion made anew in its place, needs nothing.
-        if (!pairs_[slot].used || node_of(slot, box.body) != box.node) continue;
+        if (!pairs_[slot].used || !has_node(slot, box.body, box.node)) continue;
         count_->add(Counter::nodes_visited);
         ++work_done_.decided;
         if (overlap_after(slot, now) != pairs_[slot].overlapping)
@@ -175,7 +181,8 @@ class SeparationList {
   /// Follows a change of geometry at t that the trees of `forest` have made already, all of them: `nodes` and
   /// `boxes` are what they told of it, in their order (boxes are sorted here). Costs what hangs below the
   /// pairs of changed nodes, and the pairs of changed boxes; the whole list of a body pair if a root changes.
-  /// O(nodes) room the first time, amortised O(change) after. Not between start_spans and stop_spans.
+  /// O(nodes) room the first time, amortised O(change) after; but what is within one body is made
+  /// anew as a whole. Not between start_spans and stop_spans.
   template <class Forest>
   ListEdit geometry_changed(double t, const Forest& forest, std::span<const ChangedBoxes::Node> nodes,
                             std::vector<ChangedBoxes::Box>& boxes) {
@@ -184,13 +191,14 @@ class SeparationList {
     time_ = t;
     work_done_ = {};
     read_trees(forest);
+    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) remove_self_pairs(i);
     remove_changed(nodes);
     for (const std::uint32_t slot : tops_) {
       work_.assign(1, slot);
       settle_new(now);
     }
     for (std::uint16_t i = 0; i < body_pairs_.size(); ++i)
-      if (roots_[i] == none && both_have_nodes(i)) start_pair(i, now);
+      if (roots_[i] == none && self_roots_[i].empty() && both_have_nodes(i)) start_pair(i, now);
     std::sort(boxes.begin(), boxes.end());
     boxes.erase(std::unique(boxes.begin(), boxes.end()), boxes.end());
     boxes_changed(boxes, now);
@@ -256,10 +264,49 @@ class SeparationList {
   }
   /// Makes the list of a body pair that has none.
   void start_pair(std::uint16_t bodies, const Instant<S>& now) {
+    if (body_pairs_[bodies].first == body_pairs_[bodies].second) {
+      start_self_pairs(bodies, now);
+      return;
+    }
     roots_[bodies] = new_block();
     insert(roots_[bodies], bodies, 0, 0, none, 0);
     work_.assign(1, roots_[bodies]);
     settle_new(now);
+  }
+
+  /// Each two children of each inner node, in a block for each.
+  void start_self_pairs(std::uint16_t bodies, const Instant<S>& now) {
+    const Topology& topology = *bodies_[body_pairs_[bodies].first].topology;
+    std::vector<std::uint32_t> inner;
+    if (!topology.nodes[0].is_leaf()) inner.push_back(0);
+    work_.clear();
+    while (!inner.empty()) {
+      const TopologyNode parent = topology.nodes[inner.back()];
+      inner.pop_back();
+      const std::uint32_t end = parent.first() + parent.count();
+      for (std::uint32_t child = parent.first(); child < end; ++child)
+        if (!topology.nodes[child].is_leaf()) inner.push_back(child);
+      if (parent.count() < 2) continue;
+      std::uint32_t slot = new_block();
+      self_roots_[bodies].push_back(slot);
+      for (std::uint32_t a = parent.first(); a < end; ++a)
+        for (std::uint32_t b = a + 1; b < end; ++b) {
+          insert(slot, bodies, a, b, none, 0);
+          work_.push_back(slot++);
+        }
+    }
+    settle_new(now);
+  }
+  /// Removes all pairs within a body, as far as there are any.
+  void remove_self_pairs(std::uint16_t bodies) {
+    for (const std::uint32_t block : self_roots_[bodies]) {
+      for (std::uint32_t slot = block; slot < block + block_ && pairs_[slot].used; ++slot) {
+        unsettle(slot);
+        remove(slot);
+      }
+      free_blocks_.push_back(block);
+    }
+    self_roots_[bodies].clear();
   }
 
   bool has_gone_node(const Pair& pair) const {
@@ -283,7 +330,7 @@ class SeparationList {
     linked_.clear();
     for (const auto& changed : nodes)
       for (std::uint32_t slot = bodies_[changed.body].first_pair[changed.node]; slot != none;
-           slot = pairs_[slot].next[side_of(slot, changed.body)]) {
+           slot = pairs_[slot].next[side_of(slot, changed.body, changed.node)]) {
         std::uint32_t top = slot;
         while (pairs_[top].father != none && has_gone_node(pairs_[top])) top = pairs_[top].father;
         if (pairs_[top].dirty) continue;
@@ -324,11 +371,14 @@ class SeparationList {
   std::uint32_t body_of(const Pair& pair, int side) const {
     return side == 0 ? body_pairs_[pair.bodies].first : body_pairs_[pair.bodies].second;
   }
-  int side_of(std::uint32_t slot, std::uint32_t body) const {
-    return body_pairs_[pairs_[slot].bodies].first == body ? 0 : 1;
+  /// Of a pair that has the node.
+  int side_of(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
+    return body_pairs_[pairs_[slot].bodies].first == body && pairs_[slot].a == node ? 0 : 1;
   }
-  std::uint32_t node_of(std::uint32_t slot, std::uint32_t body) const {
-    return side_of(slot, body) == 0 ? pairs_[slot].a : pairs_[slot].b;
+  bool has_node(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
+    const BodyPair& bodies = body_pairs_[pairs_[slot].bodies];
+    return (bodies.first == body && pairs_[slot].a == node) ||
+           (bodies.second == body && pairs_[slot].b == node);
   }
   TopologyNode node(const Pair& pair, int side) const {
     return bodies_[body_of(pair, side)].topology->nodes[side == 0 ? pair.a : pair.b];
@@ -367,10 +417,11 @@ class SeparationList {
     pair.bodies = bodies;
     pair.used = true;
     for (const int side : {0, 1}) {
-      std::uint32_t& first = bodies_[body_of(pair, side)].first_pair[side == 0 ? a : b];
+      const std::uint32_t own = side == 0 ? a : b;
+      std::uint32_t& first = bodies_[body_of(pair, side)].first_pair[own];
       pair.previous[side] = none;
       pair.next[side] = first;
-      if (first != none) pairs_[first].previous[side_of(first, body_of(pair, side))] = slot;
+      if (first != none) pairs_[first].previous[side_of(first, body_of(pair, side), own)] = slot;
       first = slot;
     }
   }
@@ -378,11 +429,12 @@ class SeparationList {
     Pair& pair = pairs_[slot];
     for (const int side : {0, 1}) {
       const std::uint32_t body = body_of(pair, side), next = pair.next[side], previous = pair.previous[side];
-      if (next != none) pairs_[next].previous[side_of(next, body)] = previous;
+      const std::uint32_t own = side == 0 ? pair.a : pair.b;
+      if (next != none) pairs_[next].previous[side_of(next, body, own)] = previous;
       if (previous != none)
-        pairs_[previous].next[side_of(previous, body)] = next;
+        pairs_[previous].next[side_of(previous, body, own)] = next;
       else
-        bodies_[body].first_pair[side == 0 ? pair.a : pair.b] = next;
+        bodies_[body].first_pair[own] = next;
     }
     cancel(slot);
     pair.used = false;
@@ -513,7 +565,8 @@ class SeparationList {
   std::vector<std::uint32_t> free_blocks_;
   std::vector<std::vector<LeafPair>> leaves_;  ///< [body pair]
   std::size_t list_size_ = 0;
-  std::vector<std::uint32_t> roots_;  ///< slot of each body pair's root pair, or none
+  std::vector<std::uint32_t> roots_;                    ///< slot of each body pair's root pair, or none
+  std::vector<std::vector<std::uint32_t>> self_roots_;  ///< [body pair] blocks of roots within one body
   std::vector<std::uint32_t> work_, linked_, tops_;
   ListEdit work_done_;         ///< since the last change of geometry began
   double time_ = 0, end_ = 0;  ///< around the instant of the event at hand

@@ -14,6 +14,7 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
   if (test.script.changes_plans() && !entry.info.can.plan_changes) return "skipped: plans cannot change";
   if (test.script.changes_geometry() && !entry.info.can.geometry_changes)
     return "skipped: geometry cannot change";
+  if (has_self_pairs(test.scene.pairs) && !entry.info.can.self_pairs) return "skipped: no self pairs";
   if (entry.info.max_primitive_pairs != 0)
     for (const BodyPair& pair : test.scene.pairs)
       if (std::uint64_t(test.scene.bodies[pair.first].primitives.count()) *

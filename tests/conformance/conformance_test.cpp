@@ -23,9 +23,7 @@ TEST_P(Conformance, KeepsItsGuaranteeOnEveryFrame) {
   const StrategyEntry& entry = find_strategy(id);
   const BuilderConfig builder = entry.info.topology.preferred;
   // Scripts that change the geometry do so at most frames, which takes its time.
-  const auto& with_geometry = geometry_scene_names();
-  const bool changes =
-      std::find(with_geometry.begin(), with_geometry.end(), scene_name) != with_geometry.end();
+  const bool changes = scene_name.find("geometry") != std::string::npos;
   for (std::uint32_t l : {1u, 7u, changes ? 20u : 100u}) {
     const std::string where = id + " on " + scene_name + ", l = " + std::to_string(l);
     expect_conforms(check(entry, synthetic_scene<float>(scene_name, l), l, {}, builder), where + ", float");
@@ -42,6 +40,7 @@ std::vector<std::string> strategy_ids() {
 std::vector<std::string> all_scene_names() {
   std::vector<std::string> names = synthetic_scene_names();
   names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
+  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
   return names;
 }
 
@@ -67,7 +66,8 @@ TEST_P(Configurations, AllConform) {
                                                                          ", width " + std::to_string(width) +
                                                                          ", leaf " + std::to_string(leaf));
   };
-  for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes", "geometry_changes"}) {
+  for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes", "geometry_changes",
+                                       "self_rolled_cloth", "self_plan_changes"}) {
     const auto in_float = synthetic_scene<float>(scene_name, 7);
     const auto in_double = synthetic_scene<double>(scene_name, 7);
     sweep(scene_name, [&](const BuilderConfig& builder, const std::string& where) {
@@ -189,6 +189,34 @@ TEST(Registry, DescribesEveryStrategy) {
   }
 }
 
+// A scene that asks for pairs within a body is answered, or refused at once.
+TEST(Registry, SelfPairsAreDeclaredOrRefused) {
+  const auto test = synthetic_scene<float>("self_rolled_cloth");
+  int able = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (entry.factory<float>() == nullptr) continue;
+    const auto make = [&] {
+      Session<float>(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    };
+    if (entry.info.can.self_pairs)
+      EXPECT_NO_THROW(make()) << entry.info.id;
+    else
+      EXPECT_THROW(make(), ConfigError) << entry.info.id;
+    able += entry.info.can.self_pairs ? 1 : 0;
+  }
+  // Scenes of this kind would prove nothing if there were nothing to find.
+  Playback<float> playback(test.scene);
+  playback.seek(4);
+  std::size_t within = 0;
+  for (const PrimitivePair& pair : brute_force_pairs(test.scene, playback)) {
+    if (pair.body_a != pair.body_b) continue;
+    ++within;
+    const Primitives& primitives = test.scene.bodies[pair.body_a].primitives;
+    EXPECT_FALSE(share_vertex(primitives[pair.primitive_a], primitives[pair.primitive_b]));
+  }
+  EXPECT_GT(within, 20u);
+}
+
 TEST(Registry, RejectsWhatItDoesNotKnow) {
   EXPECT_THROW(find_strategy("no_such_strategy"), ConfigError);
   const StrategyEntry& entry = registry().front();
@@ -228,6 +256,7 @@ class Spans : public testing::TestWithParam<std::tuple<std::string, std::string>
 template <class S>
 void expect_spans_enclose(const StrategyEntry& entry, const TestScene<S>& test, std::uint32_t l) {
   if (entry.factory<S>() == nullptr) return;
+  if (has_self_pairs(test.scene.pairs) && !entry.info.can.self_pairs) return;
   Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
   // The frames are looked at by a second playback, which makes the same changes.
   const SceneView<S> view(test.scene);
@@ -290,10 +319,17 @@ std::vector<std::string> ids_with_spans() {
   return ids;
 }
 
+std::vector<std::string> scenes_for_spans() {
+  std::vector<std::string> names = synthetic_scene_names();
+  for (const std::string& name : self_scene_names())
+    if (name.find("geometry") == std::string::npos) names.push_back(name);
+  return names;
+}
+
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Spans);
 INSTANTIATE_TEST_SUITE_P(Registry, Spans,
                          testing::Combine(testing::ValuesIn(ids_with_spans()),
-                                          testing::ValuesIn(synthetic_scene_names())),
+                                          testing::ValuesIn(scenes_for_spans())),
                          [](const auto& test) {
                            return std::get<0>(test.param) + "_on_" + std::get<1>(test.param);
                          });

@@ -48,7 +48,7 @@ class Binary : public testing::Test {
 const std::string tiny = "--scene waving_sheet --triangles 100 --keyframes 3 --l 2 --repetitions 2 ";
 
 TEST_F(Binary, HelpHasExamples) {
-  for (const char* command : {"list", "run", "bench", "report", "scene", "theory"}) {
+  for (const char* command : {"list", "run", "bench", "report", "scene", "theory", "ccd"}) {
     const Outcome help = kbvh(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find("Example"), std::string::npos) << command;
@@ -82,6 +82,10 @@ TEST_F(Binary, WrongUseIsCodeTwoAndOneSentence) {
       {"run --body missing.obj --body sphere", "missing.obj"},
       {"run --body bad.obj --body sphere", "bad.obj"},
       {"run --body sphere:size=3", "'size'"},
+      {"run --body sphere:triangles=20,self=perhaps", "self: expected true or false"},
+      {"run --scene tablecloth --strategies kinetic_aabb --continuous --l 1,2 --plan plan.json", "--plan"},
+      {"ccd nowhere.csv", "nowhere.csv"},
+      {"ccd plan.json", "plan.json"},
       {"run --plan missing.json", "missing.json"},
       {"run --plan plan.json", "plan.json: there is no key 'repetition'"},
       {"run --plan broken.json", "broken.json: line 1"},
@@ -98,6 +102,87 @@ TEST_F(Binary, WrongUseIsCodeTwoAndOneSentence) {
                                                                            << outcome.err;
     EXPECT_EQ(outcome.out, "") << arguments;
   }
+}
+
+TEST_F(Binary, PairsWithinBodiesAreCountedWhereTheyAreAskedFor) {
+  // Two squares of one body, as a tent of which each side goes through the other.
+  write_text(folder_ / "tent.obj",
+             "v 0 0 0\nv 1 0 1\nv 0 1 0\nv 1 0 0\nv 0 0 1\nv 1 1 0\nf 1 2 3\nf 4 5 6\n");
+  const std::string bodies =
+      "--body tent.obj,translate=0:0:9 --l 1 --repetitions 1 --strategies bottom_up,linear_bounds ";
+  const auto pairs = [&](const std::string& more, const std::string& out) {
+    const Outcome run = kbvh("run " + bodies + more + "--out " + out);
+    EXPECT_EQ(run.code, 0) << run.err;
+    const auto found = records(out + "/results.jsonl");
+    EXPECT_FALSE(found.empty()) << run.err;
+    return found.empty() ? json() : found[0];
+  };
+  const json without = pairs("--body sphere:triangles=100 ", "without");
+  EXPECT_EQ(without.at("verified").at("pairs"), 0);
+  const json with = pairs("--body sphere:triangles=100 --self ", "with");
+  EXPECT_GT(with.at("verified").at("pairs"), 0);
+  EXPECT_EQ(with.at("scene").at("bodies").at(0).at("self"), true);
+  EXPECT_NE(with.at("key"), without.at("key"));
+  // Who cannot is left out.
+  EXPECT_EQ(records("with/results.jsonl").size(), 1u);
+  EXPECT_EQ(records("without/results.jsonl").size(), 2u);
+  const json one = pairs("--body sphere:triangles=100,self=true ", "one");
+  EXPECT_EQ(one.at("verified").at("pairs"), 0);
+  EXPECT_EQ(one.at("scene").at("bodies").at(0).at("self"), false);
+  EXPECT_EQ(one.at("scene").at("bodies").at(1).at("self"), true);
+}
+
+TEST_F(Binary, ContactsBetweenKeyframesAreMeasuredAndKept) {
+  const std::string command =
+      "run --scene waving_sheet --triangles 200 --keyframes 4 --repetitions 2 --continuous "
+      "--self --out out";
+  const Outcome first = kbvh(command);
+  EXPECT_EQ(first.code, 0) << first.err;
+  const auto found = records();
+  ASSERT_GE(found.size(), 3u);
+  for (const json& record : found) {
+    EXPECT_EQ(record.at("scene").at("continuous"), true);
+    EXPECT_EQ(record.at("scene").at("frames"), 3);
+    EXPECT_TRUE(record.at("verified").at("holds"));
+    EXPECT_EQ(record.at("verified").at("pairs"), found[0].at("verified").at("pairs"));
+    EXPECT_GT(record.at("verified").at("pairs"), 0);
+    EXPECT_EQ(record.at("times").at("repetitions").size(), 2u);
+    const json& impacts = record.at("impacts");
+    EXPECT_EQ(impacts.at("tests").get<int>(),
+              impacts.at("filtered").get<int>() + impacts.at("exact").get<int>());
+    EXPECT_GT(impacts.at("tests"), 0);
+  }
+  // Not measured again; and frames are another thing.
+  EXPECT_EQ(kbvh(command).code, 0);
+  EXPECT_EQ(records().size(), found.size());
+  EXPECT_EQ(kbvh("run " + tiny + "--strategies bottom_up --out out").code, 0);
+  EXPECT_EQ(records().size(), found.size() + 1);
+}
+
+TEST_F(Binary, DecidesQueriesOfContinuousCollision) {
+  std::filesystem::create_directories(folder_ / "vertex-face");
+  // A vertex falls through a face from 1 to -1, and beside it.
+  std::string text;
+  for (const bool hits : {true, false}) {
+    const std::string x = hits ? "1,4" : "5,4", verdict = hits ? ",1\n" : ",0\n";
+    for (const char* z : {"1,1", "-1,1"})
+      text += x + ",1,4," + z + verdict + "0,1,0,1,0,1" + verdict + "1,1,0,1,0,1" + verdict + "0,1,1,1,0,1" +
+              verdict;
+  }
+  write_text(folder_ / "vertex-face" / "data.csv", text);
+  const Outcome right = kbvh("ccd . --seconds 0 --out out");
+  EXPECT_EQ(right.code, 0) << right.err;
+  const json all = json::parse(text_of_file(folder_ / "out" / "ccd.json"));
+  ASSERT_EQ(all.at("files").size(), 1u);
+  EXPECT_EQ(all.at("files")[0].at("queries"), 2);
+  EXPECT_EQ(all.at("files")[0].at("positives"), 1);
+  // A verdict that is not so is found out.
+  text.replace(text.find(",1\n"), 3, ",0\n");
+  for (std::size_t at = 0; (at = text.find(",1\n", at)) != std::string::npos;) text.replace(at, 3, ",0\n");
+  write_text(folder_ / "vertex-face" / "data.csv", text);
+  const Outcome wrong = kbvh("ccd . --seconds 0");
+  EXPECT_EQ(wrong.code, 1);
+  EXPECT_NE(wrong.err.find("1 verdict"), std::string::npos) << wrong.err;
 }
 
 TEST_F(Binary, ListsEveryStrategy) {

@@ -98,7 +98,8 @@ TEST(Plan, StudiesInheritAndOverride) {
 
 TEST(Plan, ErrorsNameFileKeyAndValue) {
   EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
-            "p.json: there is no key 'repetition'; known are builder, description, frames_limit, l, name, "
+            "p.json: there is no key 'repetition'; known are builder, continuous, description, frames_limit, "
+            "l, name, "
             "oracle_every, params, repetitions, scalars, scenes, strategies, studies, targets");
   EXPECT_TRUE(contains(plan_complaint("{\n  \"scenes\": ]\n}"), "p.json: line 2, column 13"));
   EXPECT_TRUE(contains(plan_complaint("[]"), "p.json: expected an object"));

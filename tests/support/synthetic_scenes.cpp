@@ -1,5 +1,6 @@
 #include "tests/support/synthetic_scenes.hpp"
 
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <optional>
@@ -94,6 +95,7 @@ struct RawScene {
   std::vector<RawBody> bodies;
   Script script = Script::none;
   std::optional<GeometryScriptStyle> geometry{};
+  std::vector<std::uint32_t> self{};  ///< bodies with pairs of their own
 };
 
 /// The scalar's largest admissible coordinate or velocity, and the smallest above zero.
@@ -258,6 +260,31 @@ RawScene raw_scene(const std::string& name, const Range& range) {
     scene.geometry = style;
     return scene;
   };
+  const auto within = [&range](const char* base, std::vector<std::uint32_t> bodies) {
+    RawScene scene = raw_scene(base, range);
+    scene.self = std::move(bodies);
+    return scene;
+  };
+  // A cloth that is rolled up tighter from keyframe to keyframe, and cuts itself, against an obstacle.
+  if (name == "self_rolled_cloth") {
+    const auto roll = [](int x, int y, int k, int axis) {
+      const double turn = 0.35 + 0.25 * k, radius = 0.5 - (0.02 + 0.008 * k) * x + 0.02 * ((x + y) % 3);
+      if (axis == 1) return 0.15 * y + 0.03 * ((x * 3 + k) % 4);
+      return axis == 0 ? radius * std::cos(turn * x) : radius * std::sin(turn * x);
+    };
+    return {{sheet(12, 6, roll), soup(40, 50, 1, 0.4, 0)}, Script::none, {}, {0}};
+  }
+  if (name == "self_soup_alone") return {{soup(120, 51, 4, 0.3, 0.3)}, Script::none, {}, {0}};
+  if (name == "self_sheets_crumpled") return within("integer_ties", {0, 1});
+  if (name == "self_coincident") return within("coincident_intervals", {0, 1});
+  if (name == "self_degenerate") return within("degenerate_triangles", {0});
+  if (name == "self_polygons") return within("polygons", {0, 1});
+  if (name == "self_points_and_nets") return within("points_against_nets", {0, 1});
+  if (name == "self_nothing_moves") return within("nothing_moves", {1});
+  if (name == "self_one_triangle_and_none") return within("one_triangle_and_none", {0, 1, 2});
+  if (name == "self_plan_changes") return within("plan_changes", {0});
+  if (name == "self_geometry_changes") return within("geometry_changes", {0, 1});
+  if (name == "self_geometry_to_nothing") return within("geometry_to_nothing", {1});
   if (name == "geometry_changes") return with_geometry("soups", {.seed = 31, .plans = true});
   if (name == "geometry_changes_shared") return with_geometry("sheets", {.seed = 32});
   if (name == "geometry_changes_ties")
@@ -363,6 +390,15 @@ const std::vector<std::string>& geometry_scene_names() {
   return names;
 }
 
+const std::vector<std::string>& self_scene_names() {
+  static const std::vector<std::string> names{
+      "self_rolled_cloth",    "self_soup_alone",       "self_sheets_crumpled",
+      "self_coincident",      "self_degenerate",       "self_polygons",
+      "self_points_and_nets", "self_nothing_moves",    "self_one_triangle_and_none",
+      "self_plan_changes",    "self_geometry_changes", "self_geometry_to_nothing"};
+  return names;
+}
+
 template <class S>
 TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_keyframe) {
   const Range range{double(admissible_magnitude<S>), double(std::numeric_limits<S>::denorm_min())};
@@ -376,6 +412,7 @@ TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_k
                                    FlightPlans<S>(body.vertex_count, body.times, std::move(positions))});
   }
   result.scene.pairs = all_pairs(result.scene.bodies);
+  for (const std::uint32_t body : raw.self) result.scene.pairs.push_back({body, body});
   validate(result.scene);
   result.frames = frame_times(result.scene, frames_per_keyframe);
   if (raw.script == Script::takes_off) {

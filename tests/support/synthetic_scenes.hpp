@@ -22,6 +22,9 @@ const std::vector<std::string>& synthetic_scene_names();
 /// The same where geometry changes, at every frame or every second one: for those who can follow.
 const std::vector<std::string>& geometry_scene_names();
 
+/// Scenes that ask for pairs within bodies, too; some of these change plans, or geometry.
+const std::vector<std::string>& self_scene_names();
+
 /// Makes one by name; deterministic. `frames_per_keyframe` places the script's changes at frames, keyframes
 /// and events.
 template <class S>

@@ -104,6 +104,11 @@ TEST(Oracle, SweepEqualsBruteForceEverywhere) {
     pairs += compare(synthetic_scene<float>(name).scene);
     pairs += compare(synthetic_scene<double>(name).scene);
   }
+  for (const std::string& name : self_scene_names()) {
+    EXPECT_EQ(has_self_pairs(synthetic_scene<float>(name).scene.pairs), true);
+    pairs += compare(synthetic_scene<float>(name).scene);
+    pairs += compare(synthetic_scene<double>(name).scene);
+  }
   EXPECT_GT(pairs, 10000u) << "the scenes no longer collide";
 }
 

@@ -1,0 +1,102 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "core/motion/exact_arithmetic.hpp"
+
+namespace kbvh {
+
+/// A polynomial in t with integer coefficients, of degree 4 at most: coefficient[i] of t^i. Degree -1: zero.
+class Polynomial {
+ public:
+  using Integer = Dyadic::Integer;
+  static constexpr int max_degree = 4;
+
+  Polynomial() = default;
+  /// value at t = 0 and at t = 1 of a polynomial of degree 1.
+  static Polynomial line(const Integer& begin, const Integer& end) {
+    Polynomial result;
+    result.coefficient_[0] = begin;
+    result.coefficient_[1] = end - begin;
+    result.set_degree(1);
+    return result;
+  }
+
+  int degree() const { return degree_; }
+  bool is_zero() const { return degree_ < 0; }
+  const Integer& operator[](int i) const { return coefficient_[i]; }
+
+  friend Polynomial operator+(const Polynomial& a, const Polynomial& b);
+  friend Polynomial operator-(const Polynomial& a, const Polynomial& b);
+  friend Polynomial operator-(const Polynomial& a);
+  /// Degrees must not add to more than `max_degree`.
+  friend Polynomial operator*(const Polynomial& a, const Polynomial& b);
+  Polynomial derivative() const;
+  /// A positive multiple of the remainder of this divided by `divisor`, which is not zero.
+  Polynomial remainder(const Polynomial& divisor) const;
+  /// Divides by (denominator t - numerator), which must be a factor, as often as it is one.
+  void divide_out(const Integer& numerator, const Integer& denominator);
+
+  /// Sign at t = numerator / 2^exponent.
+  int sign_at(const Integer& numerator, unsigned exponent) const;
+
+ private:
+  void set_degree(int at_most) {
+    degree_ = at_most;
+    while (degree_ >= 0 && coefficient_[degree_].is_zero()) --degree_;
+  }
+  void drop_powers_of_two();
+  Integer coefficient_[max_degree + 1];
+  int degree_ = -1;
+};
+
+/// A dyadic number numerator / 2^exponent.
+struct DyadicTime {
+  Polynomial::Integer numerator = 0;
+  unsigned exponent = 0;
+};
+
+/// The signed remainder sequence of p and h, which knows the Cauchy index of h / p between two times that are
+/// no roots of p (Basu, Pollack & Roy 2006, theorem 2.58): with h = p' the number of distinct roots of p,
+/// with h = p' q the sum over them of the signs of q.
+class SturmSequence {
+ public:
+  SturmSequence(const Polynomial& p, const Polynomial& h);
+  int index(const DyadicTime& begin, const DyadicTime& end) const {
+    return variations(begin) - variations(end);
+  }
+
+ private:
+  int variations(const DyadicTime& t) const;
+  std::vector<Polynomial> sequence_;
+};
+
+/// An algebraic number in [0, 1]: a dyadic one, or the only root of a polynomial between two dyadic ones,
+/// which are neighbours with one exponent.
+class AlgebraicTime {
+ public:
+  explicit AlgebraicTime(DyadicTime t) : begin_(t), end_(t), dyadic_(true) {}
+  AlgebraicTime(const Polynomial& p, DyadicTime begin, DyadicTime end)
+      : p_(p), begin_(std::move(begin)), end_(std::move(end)) {}
+
+  /// The sign of a polynomial of degree 2 at most. Exact.
+  int sign(const Polynomial& q) const;
+  /// Halves the interval until it is no wider than 2^-bits.
+  void refine(unsigned bits);
+  /// The interval as it is refined; exact down to a width of 2^-50, beyond that rounded outwards.
+  double begin() const { return rounded(begin_, 0); }
+  double end() const { return rounded(end_, dyadic_ && begin_.exponent <= 50 ? 0 : 1); }
+
+ private:
+  /// The sign of q everywhere between the ends, by its Bernstein coefficients there; 0 if they do not tell.
+  int sign_throughout(const Polynomial& q) const;
+  static double rounded(const DyadicTime& t, unsigned up);
+  Polynomial p_;
+  DyadicTime begin_, end_;
+  bool dyadic_ = false;
+};
+
+/// Appends the distinct roots of p, of degree 3 at most and not zero, that lie strictly between 0 and 1.
+void append_inner_roots(Polynomial p, std::vector<AlgebraicTime>& roots);
+
+}  // namespace kbvh

@@ -1,0 +1,92 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/continuous/impact.hpp"
+#include "core/motion/playback.hpp"
+#include "core/scene.hpp"
+
+namespace kbvh {
+
+using ContactBuffer = std::vector<Contact>;
+
+/// Orders contacts by kind, features and time, and compares them: for sets of them.
+bool operator<(const Contact& a, const Contact& b);
+bool operator==(const Contact& a, const Contact& b);
+
+/// Vertices, edges and faces of a body of triangles, for contacts. Faces are its primitives, vertices those
+/// of the faces; edges are unique and undirected, numbered by their larger and then by their smaller vertex.
+///
+/// Every vertex and every edge belongs to one face, the first that has it, so that a pair of features is
+/// found with one pair of faces only (representative triangles: Curtis, Tamstorf & Manocha 2008).
+class Features {
+ public:
+  struct Edge {
+    std::uint32_t vertices[2];  ///< smaller, larger
+  };
+  struct Face {
+    std::uint32_t vertices[3];
+    std::uint32_t edges[3];                            ///< from corner i to the next
+    std::uint8_t owned_vertices = 0, owned_edges = 0;  ///< bit i: corner i, edge i
+  };
+
+  Features() = default;
+  /// Throws std::invalid_argument unless all primitives are triangles.
+  explicit Features(const Primitives& primitives);
+
+  const std::vector<Edge>& edges() const { return edges_; }
+  const std::vector<Face>& faces() const { return faces_; }
+
+ private:
+  std::vector<Edge> edges_;
+  std::vector<Face> faces_;  ///< by primitive; of removed ones nothing is owned
+};
+
+/// The narrow phase of continuous collision detection between two frames: every vertex moves on a straight
+/// line from its position at the one (`start`) to that at the other (`find`). The positions are those of
+/// frames (truth B): at keyframes the stored ones. Keeps its buffers.
+template <class S>
+class ContactFinder {
+ public:
+  /// Throws std::invalid_argument, naming the body, unless all bodies in pairs consist of triangles.
+  explicit ContactFinder(const Scene<S>& scene);
+
+  /// The motion begins at the playback's time, with its positions, all of which must be current.
+  void start(const Playback<S>& playback);
+  /// It ends at the playback's time, with its positions. Appends the contacts of the features of pairs of
+  /// faces, each once if the pairs are; features that share a vertex make none. Times of impact are enclosed
+  /// to within `impact_width` of the motion's length, rounded outwards.
+  void find(const Playback<S>& playback, std::span<const PrimitivePair> pairs, ContactBuffer& out);
+  /// The same for every vertex against every face, and every edge against every edge, of the scene's pairs of
+  /// bodies: the oracle. O(n^2).
+  void find_all(const Playback<S>& playback, ContactBuffer& out);
+  /// The same as `find_all`, by sorting and sweeping the faces' boxes of the whole motion: for larger scenes.
+  void find_by_sweep(const Playback<S>& playback, ContactBuffer& out);
+
+  /// Positions of a body where the motion began, [vertex][3]; as in the playback, one scalar past the end may
+  /// be read.
+  const S* before(std::uint32_t body) const { return before_[body].data(); }
+  const ImpactStats& stats() const { return stats_; }
+
+ private:
+  void finish(const Playback<S>& playback);
+  void vertex_face(std::uint32_t body_a, std::uint32_t vertex, std::uint32_t body_b, std::uint32_t face,
+                   ContactBuffer& out);
+  void edge_edge(std::uint32_t body_a, std::uint32_t edge_a, std::uint32_t body_b, std::uint32_t edge_b,
+                 ContactBuffer& out);
+  void report(Contact contact, const MovingPoints& points, ContactBuffer& out);
+  void faces(const PrimitivePair& pair, ContactBuffer& out);
+
+  const Scene<S>* scene_;
+  std::vector<Features> features_;
+  std::vector<std::vector<S>> before_;             ///< [body]
+  std::vector<std::vector<double>> positions_[2];  ///< [end][body][vertex][3]
+  double begin_ = 0, end_ = 0;
+  ImpactStats stats_;
+};
+
+extern template class ContactFinder<float>;
+extern template class ContactFinder<double>;
+
+}  // namespace kbvh

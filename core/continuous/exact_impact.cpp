@@ -1,0 +1,173 @@
+// Impacts by integers: roots of the cubic and of the quadratics as algebraic numbers.
+
+#include <algorithm>
+#include <vector>
+
+#include "core/continuous/algebraic_time.hpp"
+#include "core/continuous/impact.hpp"
+
+namespace kbvh {
+namespace {
+
+using Integer = Polynomial::Integer;
+
+/// A vector that moves linearly, or the cross product of two: one polynomial for each axis.
+struct MovingVector {
+  Polynomial axis[3];
+};
+
+MovingVector operator-(const MovingVector& a, const MovingVector& b) {
+  return {{a.axis[0] - b.axis[0], a.axis[1] - b.axis[1], a.axis[2] - b.axis[2]}};
+}
+MovingVector cross(const MovingVector& a, const MovingVector& b) {
+  MovingVector result;
+  for (int k = 0; k < 3; ++k) {
+    const int u = (k + 1) % 3, v = (k + 2) % 3;
+    result.axis[k] = a.axis[u] * b.axis[v] - a.axis[v] * b.axis[u];
+  }
+  return result;
+}
+Polynomial dot(const MovingVector& a, const MovingVector& b) {
+  return a.axis[0] * b.axis[0] + a.axis[1] * b.axis[1] + a.axis[2] * b.axis[2];
+}
+
+/// All 24 coordinates as integers over one power of two: a common factor changes no verdict.
+void scale(const MovingPoints& points, MovingVector (&moving)[4]) {
+  Dyadic values[4][3][2];
+  int lowest = 0;
+  bool first = true;
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 3; ++k)
+      for (int end = 0; end < 2; ++end) {
+        Dyadic& value = values[i][k][end];
+        value = Dyadic((end == 0 ? points.begin : points.end)[i][k]);
+        if (value.sign() == 0) continue;
+        const int exponent = value.exponent() + int(lsb(abs(value.mantissa())));
+        lowest = first ? exponent : std::min(lowest, exponent);
+        first = false;
+      }
+  const auto integer = [&](const Dyadic& value) -> Integer {
+    if (value.sign() == 0) return 0;
+    const int shift = value.exponent() - lowest;
+    if (shift >= 0) return value.mantissa() << unsigned(shift);
+    return value.mantissa() / (Integer(1) << unsigned(-shift));
+  };
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 3; ++k)
+      moving[i].axis[k] = Polynomial::line(integer(values[i][k][0]), integer(values[i][k][1]));
+}
+
+/// One query, as polynomials. Vertex-face: a and b are the edges from the face's first corner and r goes from
+/// there to the vertex; where they touch, r = y a + x b with x, y, 1 - x - y >= 0, so that a x r = x n and
+/// r x b = y n with n = a x b. Edge-edge: a and b are the edges and r goes from one start to the other; there
+/// r = y a - x b with x and y in [0, 1], so that r x a = x n and r x b = y n.
+class ExactQuery {
+ public:
+  ExactQuery(Contact::Kind kind, const MovingPoints& points) : kind_(kind) {
+    scale(points, p_);
+    MovingVector a, b, r;
+    if (kind == Contact::Kind::vertex_face) {
+      a = p_[2] - p_[1];
+      b = p_[3] - p_[1];
+      r = p_[0] - p_[1];
+    } else {
+      a = p_[1] - p_[0];
+      b = p_[3] - p_[2];
+      r = p_[2] - p_[0];
+    }
+    normal_ = cross(a, b);
+    coplanar_ = dot(normal_, r);
+    const bool at_ends[2] = {coplanar_.sign_at(0, 0) == 0, coplanar_.sign_at(1, 0) == 0};
+    for (const int end : {0, 1})
+      if (at_ends[end]) times_.emplace_back(DyadicTime{end, 0});
+    if (!coplanar_.is_zero()) {
+      append_inner_roots(coplanar_, times_);
+      if (times_.empty()) return;
+    }
+    const MovingVector x = kind == Contact::Kind::vertex_face ? cross(a, r) : cross(r, a);
+    const MovingVector y = cross(r, b);
+    if (kind == Contact::Kind::vertex_face)
+      shares_ = {x, y, normal_ - x - y};
+    else
+      shares_ = {x, y, normal_ - x, normal_ - y};
+    if (coplanar_.is_zero() && !touch_at(times_[0])) add_times_in_plane();
+  }
+
+  Impact impact() {
+    Impact result;
+    constexpr unsigned bits = 20;
+    static_assert(impact_width == 1.0 / (1U << bits));
+    for (AlgebraicTime& t : times_) {
+      if (!touch_at(t)) continue;
+      if (t.end() == 0) return {true, 0, 0};
+      t.refine(bits);
+      if (!result.touches) result = {true, t.begin(), t.end()};
+      result.begin = std::min(result.begin, t.begin());
+      result.end = std::min(result.end, t.end());
+    }
+    return result;
+  }
+
+ private:
+  /// If all is in one plane for all time. The set of times of contact is closed, and nothing changes between
+  /// roots of what `touch_at` looks at: if there is any contact, there is one at such a root or at an end.
+  void add_times_in_plane() {
+    const auto add = [&](const MovingVector& vector) {
+      for (const Polynomial& q : vector.axis)
+        if (q.degree() >= 1) append_inner_roots(q, times_);
+    };
+    add(normal_);
+    for (const MovingVector& share : shares_) add(share);
+    for (const auto& [i, j] : differences()) add(p_[i] - p_[j]);
+  }
+
+  struct Two {
+    int i, j;
+  };
+  std::vector<Two> differences() const {
+    if (kind_ == Contact::Kind::vertex_face) return {{0, 1}, {0, 2}, {0, 3}};
+    return {{0, 2}, {0, 3}, {1, 2}, {1, 3}};
+  }
+
+  /// At a time at which the four points are coplanar.
+  bool touch_at(const AlgebraicTime& t) const {
+    for (int k = 0; k < 3; ++k) {
+      const int side = t.sign(normal_.axis[k]);
+      if (side == 0) continue;
+      // Seen along axis k nothing of their plane is lost.
+      for (const MovingVector& share : shares_)
+        if (t.sign(share.axis[k]) * side < 0) return false;
+      return true;
+    }
+    // A face that is a segment or a point, or edges that are parallel or points: an end of one lies on the
+    // other.
+    if (kind_ == Contact::Kind::vertex_face)
+      return on_segment(t, 0, 1, 2, shares_[0]) || on_segment(t, 0, 1, 3, shares_[1]) ||
+             on_segment(t, 0, 2, 3, shares_[2]);
+    return on_segment(t, 2, 0, 1, shares_[0]) || on_segment(t, 3, 0, 1, shares_[2]) ||
+           on_segment(t, 0, 2, 3, shares_[1]) || on_segment(t, 1, 2, 3, shares_[3]);
+  }
+  /// Is point i on the segment from j to k? `area` is twice that of the three, up to its sign.
+  bool on_segment(const AlgebraicTime& t, int i, int j, int k, const MovingVector& area) const {
+    for (const Polynomial& component : area.axis)
+      if (t.sign(component) != 0) return false;
+    for (int axis = 0; axis < 3; ++axis)
+      if (t.sign(p_[i].axis[axis] - p_[j].axis[axis]) * t.sign(p_[i].axis[axis] - p_[k].axis[axis]) > 0)
+        return false;
+    return true;
+  }
+
+  Contact::Kind kind_;
+  MovingVector p_[4], normal_;
+  Polynomial coplanar_;
+  std::vector<MovingVector> shares_;
+  std::vector<AlgebraicTime> times_;  ///< at which there may be contact
+};
+
+}  // namespace
+
+Impact find_impact_exact(Contact::Kind kind, const MovingPoints& points) {
+  return ExactQuery(kind, points).impact();
+}
+
+}  // namespace kbvh

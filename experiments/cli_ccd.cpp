@@ -1,0 +1,190 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "core/registry.hpp"
+#include "experiments/cli.hpp"
+#include "experiments/environment.hpp"
+#include "experiments/impact_queries.hpp"
+#include "experiments/io/bytes.hpp"
+#include "experiments/machine.hpp"
+#include "experiments/program.hpp"
+#include "experiments/progress.hpp"
+#include "experiments/table.hpp"
+#include "experiments/text.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr const char* examples = R"(Examples:
+  kbvh ccd
+  kbvh ccd queries/unit-tests frames/cloth-ball --out results/ccd
+Decides queries of continuous collision detection (a vertex and a face, or two edges, in linear motion) exactly, and
+compares with the verdicts that come with them: files of 8 rows a query in exact rationals, folders of such files, and
+pairs of frames with lists of pairs, as in the NYU CCD benchmark (Wang et al. 2021). Beside it, where they are built
+in, the peers' own continuous tests of the same two features, which answer in floating point.
+Exit codes: 0 all verdicts are right, 1 one is wrong, 2 wrong use or input.)";
+
+/// What one test said of the queries of one file, and how fast.
+struct Row {
+  std::uint64_t positives = 0, missed = 0, extra = 0, filtered = 0;
+  double seconds = 0;
+  std::uint64_t passes = 0;
+  double per_second(std::size_t queries) const {
+    return seconds > 0 ? double(queries) * double(passes) / seconds : 0;
+  }
+};
+
+struct Peer {
+  std::string id;
+  bool (*touches)(Contact::Kind, const MovingPoints&);
+};
+
+std::vector<Peer> peers() {
+  std::vector<Peer> found;
+  for (const StrategyEntry& entry : registry())
+    if (entry.info.own_impact != nullptr) found.push_back({entry.info.id, entry.info.own_impact});
+  return found;
+}
+
+/// One pass over all queries; `test` says whether they touch.
+template <class Test>
+void pass(const ImpactQueries& queries, Row& row, const Test& test) {
+  std::vector<std::uint8_t> said(queries.queries.size());
+  const auto begin = std::chrono::steady_clock::now();
+  for (std::size_t i = 0; i < said.size(); ++i)
+    said[i] = test(queries.queries[i].kind, queries.queries[i].moving()) ? 1 : 0;
+  row.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  if (row.passes++ > 0) return;
+  for (std::size_t i = 0; i < said.size(); ++i) {
+    const auto& truth = queries.queries[i].truth;
+    row.positives += said[i];
+    if (truth && *truth && said[i] == 0) ++row.missed;
+    if (truth && !*truth && said[i] == 1) ++row.extra;
+  }
+}
+
+/// The exact test and the peers by turns, until each was busy for `seconds`.
+std::vector<Row> measure(const ImpactQueries& queries, const std::vector<Peer>& others, double seconds) {
+  std::vector<Row> rows(1 + others.size());
+  for (bool again = true; again;) {
+    ImpactStats stats;
+    pass(queries, rows[0], [&](Contact::Kind kind, const MovingPoints& points) {
+      return find_impact(kind, points, &stats).touches;
+    });
+    rows[0].filtered = stats.filtered;
+    for (std::size_t i = 0; i < others.size(); ++i) pass(queries, rows[1 + i], others[i].touches);
+    again = false;
+    for (const Row& row : rows) again = again || row.seconds < seconds;
+  }
+  return rows;
+}
+
+json record_of(const Row& row, std::size_t queries) {
+  return {{"positives", row.positives},
+          {"missed", row.missed},
+          {"extra", row.extra},
+          {"passes", row.passes},
+          {"queries_per_second", row.per_second(queries)}};
+}
+
+struct Arguments {
+  std::vector<std::string> paths;
+  std::string out;
+  double seconds = 0.05;
+};
+
+int run(const Arguments& arguments) {
+  std::vector<ImpactQueries> files;
+  std::vector<std::string> paths = arguments.paths;
+  if (paths.empty()) paths.push_back((data_folder() / "ccd").string());
+  for (const std::string& path : paths)
+    for (ImpactQueries& queries : find_impact_queries(path)) files.push_back(std::move(queries));
+  if (files.empty()) throw io::InputError("no queries of continuous collision detection in " + joined(paths));
+  const std::vector<Peer> others = peers();
+  std::vector<std::vector<std::string>> table{
+      {"queries of", "queries", "touch", "missed", "extra", "filtered", "per second"}};
+  for (const Peer& peer : others)
+    for (const char* column : {" missed", " extra", " per second"}) table[0].push_back(peer.id + column);
+  json records = json::array();
+  std::uint64_t queries = 0, wrong = 0, unknown = 0;
+  Progress progress;
+  std::vector<Row> totals(1 + others.size());
+  const auto add_line = [&](const std::string& name, std::size_t count, const std::vector<Row>& rows) {
+    std::vector<std::string> line{
+        name,
+        std::to_string(count),
+        std::to_string(rows[0].positives),
+        std::to_string(rows[0].missed),
+        std::to_string(rows[0].extra),
+        fmt::format("{:.1f} %", count == 0 ? 0 : 100.0 * double(rows[0].filtered) / double(count)),
+        fmt::format("{:.3g}", rows[0].per_second(count))};
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+      line.push_back(std::to_string(rows[i].missed));
+      line.push_back(std::to_string(rows[i].extra));
+      line.push_back(fmt::format("{:.3g}", rows[i].per_second(count)));
+    }
+    table.push_back(std::move(line));
+  };
+  for (const ImpactQueries& file : files) {
+    progress.show(file.name);
+    const std::vector<Row> rows = measure(file, others, arguments.seconds);
+    add_line(file.name, file.queries.size(), rows);
+    json record = record_of(rows[0], file.queries.size());
+    record["name"] = file.name;
+    record["queries"] = file.queries.size();
+    record["filtered"] = rows[0].filtered;
+    for (std::size_t i = 0; i < others.size(); ++i)
+      record["peers"][others[i].id] = record_of(rows[1 + i], file.queries.size());
+    records.push_back(std::move(record));
+    queries += file.queries.size();
+    wrong += rows[0].missed + rows[0].extra;
+    for (const ImpactQuery& query : file.queries) unknown += query.truth ? 0 : 1;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      totals[i].positives += rows[i].positives;
+      totals[i].missed += rows[i].missed;
+      totals[i].extra += rows[i].extra;
+      totals[i].filtered += rows[i].filtered;
+      // Seconds for one pass over everything.
+      totals[i].seconds += rows[i].seconds / double(rows[i].passes);
+      totals[i].passes = 1;
+    }
+  }
+  progress.clear();
+  add_line("all", queries, totals);
+  std::fputs(columns(table).c_str(), stdout);
+  if (others.empty()) std::puts("No peer with a continuous test of its own is built in (FCL 0.7 has one).");
+  if (unknown > 0) std::printf("%s without a verdict to compare with.\n", counted(unknown, "query").c_str());
+  if (!arguments.out.empty()) {
+    const std::filesystem::path folder = arguments.out;
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) throw io::InputError("cannot make " + folder.string() + ": " + error.message());
+    const json all{{"commit", commit()}, {"dirty", dirty()}, {"machine", machine()}, {"files", records}};
+    io::write_file_atomically(folder / "ccd.json", all.dump(1) + "\n");
+  }
+  if (wrong == 0) return success;
+  say(counted(wrong, "verdict") + " that should have been the other");
+  return guarantee_broken;
+}
+
+}  // namespace
+
+void add_ccd(CLI::App& program, Action& action) {
+  CLI::App* command = program.add_subcommand("ccd", "decide queries of continuous collision detection");
+  command->footer(examples);
+  auto a = std::make_shared<Arguments>();
+  command->add_option("paths", a->paths, "files, folders, frame pairs (the data folder's ccd)");
+  command->add_option("--seconds", a->seconds, "of each test on each file, at least (0.05)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--out", a->out, "folder for ccd.json (none: the table only)");
+  command->callback([&action, a] { action = [a] { return run(*a); }; });
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,63 @@
+#pragma once
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/continuous/impact.hpp"
+
+namespace kbvh::experiments {
+
+/// One question of continuous collision detection, and the answer if it is known.
+struct ImpactQuery {
+  Contact::Kind kind = Contact::Kind::vertex_face;
+  double points[2][4][3] = {};  ///< [t = 0, t = 1][point]
+  std::optional<bool> truth;
+
+  MovingPoints moving() const {
+    return {{points[0][0], points[0][1], points[0][2], points[0][3]},
+            {points[1][0], points[1][1], points[1][2], points[1][3]}};
+  }
+};
+
+/// Queries that belong together: those of one file, or of one kind between two frames.
+struct ImpactQueries {
+  std::string name;
+  std::vector<ImpactQuery> queries;
+};
+
+/// Reads a file of queries as those of Wang et al. 2021 (NYU CCD benchmark): 8 rows for each, 4 points at t =
+/// 0 and 4 at t = 1, of x, y, z as numerator,denominator and, optionally, 0 or 1 for the verdict. The kind is
+/// said by the name of the file or of its folder: "vf", "vertex-face", "ee", "edge-edge". Throws
+/// io::InputError with the line, also for a number that is no double: nothing is rounded.
+ImpactQueries read_impact_queries(const std::filesystem::path& file);
+
+/// Two consecutive frames of a mesh, and which pairs of features are known to touch between them (ground
+/// truth of the same benchmark): frames/*.ply, boxes/*vf.json and *ee.json with pairs of ids, mma_bool/* with
+/// their verdicts. Ids: vertices, then edges, then faces; edges are the unique undirected ones, sorted by
+/// larger and then by smaller vertex.
+struct FramePair {
+  std::string name;
+  std::vector<double> positions[2];  ///< [vertex][3]
+  std::vector<std::array<std::uint32_t, 3>> faces;
+  std::vector<std::array<std::uint32_t, 2>> edges;
+  struct Listed {
+    Contact::Kind kind;
+    std::uint32_t first, second;  ///< vertex and face, or two edges: their own numbers
+    bool touches;
+  };
+  std::vector<Listed> listed;
+
+  ImpactQuery query(const Listed& pair) const;
+};
+/// Throws io::InputError.
+FramePair read_frame_pair(const std::filesystem::path& folder);
+/// Has the folder the layout of a frame pair?
+bool is_frame_pair(const std::filesystem::path& folder);
+
+/// All queries below a path: a file, a frame pair, or a folder of either. Sorted by name. Throws
+/// io::InputError if there are none.
+std::vector<ImpactQueries> find_impact_queries(const std::filesystem::path& path);
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,202 @@
+// Contacts between keyframes: every strategy that declares them against every feature with every other, on
+// the synthetic scenes whose bodies are triangles.
+#include "core/continuous/contacts.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/session.hpp"
+#include "tests/support/synthetic_scenes.hpp"
+
+namespace kbvh::test {
+namespace {
+
+std::vector<std::string> scene_names() {
+  std::vector<std::string> names;
+  for (const auto& list : {synthetic_scene_names(), self_scene_names()})
+    for (const std::string& name : list) {
+      bool suitable = true;
+      for (const char* part : {"polygons", "points", "plan", "geometry"})
+        suitable = suitable && name.find(part) == std::string::npos;
+      if (suitable) names.push_back(name);
+    }
+  return names;
+}
+
+template <class S>
+struct Truth {
+  std::vector<double> knots;
+  std::vector<ContactBuffer> contacts;  ///< of each interval, sorted
+  std::size_t total = 0;
+};
+
+template <class S>
+Truth<S> truth_of(const Scene<S>& scene) {
+  Truth<S> truth{overlaid_keyframes(scene), {}};
+  ContactFinder<S> finder(scene);
+  Playback<S> playback(scene);
+  for (std::size_t k = 0; k + 1 < truth.knots.size(); ++k) {
+    playback.seek(truth.knots[k]);
+    playback.evaluate_all();
+    finder.start(playback);
+    playback.seek(truth.knots[k + 1]);
+    playback.evaluate_all();
+    ContactBuffer all, swept;
+    finder.find_all(playback, all);
+    finder.find_by_sweep(playback, swept);
+    std::sort(all.begin(), all.end());
+    std::sort(swept.begin(), swept.end());
+    EXPECT_EQ(all, swept) << scene.name << ", interval " << k;
+    EXPECT_EQ(std::adjacent_find(all.begin(), all.end()), all.end());
+    for (const Contact& contact : all) {
+      EXPECT_LE(truth.knots[k], contact.begin);
+      EXPECT_LE(contact.begin, contact.end);
+      EXPECT_LE(contact.end, truth.knots[k + 1]);
+    }
+    truth.total += all.size();
+    truth.contacts.push_back(std::move(all));
+  }
+  return truth;
+}
+
+template <class S>
+void expect_contacts(const StrategyEntry& entry, const Scene<S>& scene, const Truth<S>& truth,
+                     const BuilderConfig& builder, int rounds, const std::string& where) {
+  if (entry.factory<S>() == nullptr) return;
+  Session<S> session(scene, {&entry, {}, builder}, CountingPolicy::counting);
+  PhaseTimes ignored;
+  // More than once, for `reset` starts over.
+  for (int round = 0; round < rounds; ++round) {
+    session.reset(truth.knots[0]);
+    for (std::size_t k = 0; k < truth.contacts.size(); ++k) {
+      ContactBuffer found;
+      session.contacts(truth.knots[k + 1], found, ignored);
+      std::sort(found.begin(), found.end());
+      ASSERT_EQ(found.size(), truth.contacts[k].size()) << where << ", interval " << k;
+      ASSERT_TRUE(found == truth.contacts[k]) << where << ", interval " << k;
+      PairBuffer pairs = session.swept_pairs();
+      std::sort(pairs.begin(), pairs.end());
+      EXPECT_EQ(std::adjacent_find(pairs.begin(), pairs.end()), pairs.end()) << where;
+      for (const PrimitivePair& pair : pairs)
+        ASSERT_TRUE(pair.body_a < pair.body_b ||
+                    (pair.body_a == pair.body_b && pair.primitive_a < pair.primitive_b))
+            << where;
+    }
+  }
+}
+
+class Contacts : public testing::TestWithParam<std::string> {};
+
+TEST_P(Contacts, AreThoseOfEveryFeatureWithEveryOther) {
+  // Nearly every decision there is one for exact arithmetic, or one with integers of thousands of bits.
+  const bool costly = GetParam() == "extreme_velocities" || GetParam() == "integer_ties" ||
+                      GetParam() == "self_sheets_crumpled" || GetParam() == "self_coincident";
+  const auto run = [&](const auto& test) {
+    using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
+    const Truth<S> truth = truth_of(test.scene);
+    for (const StrategyEntry& entry : registry()) {
+      if (!entry.info.can.contacts) continue;
+      const std::string where =
+          entry.info.id + " on " + test.scene.name + (sizeof(S) == 4 ? ", float" : ", double");
+      expect_contacts(entry, test.scene, truth, entry.info.topology.preferred, costly ? 1 : 2, where);
+      if (entry.info.topology.own || costly) continue;
+      for (const std::uint32_t leaf : {1u, 3u})
+        expect_contacts(entry, test.scene, truth,
+                        {.method = BuildMethod::sah, .width = leaf == 1 ? 4u : 2u, .leaf_size = leaf}, 1,
+                        where + ", leaf size " + std::to_string(leaf));
+    }
+  };
+  run(synthetic_scene<float>(GetParam()));
+  run(synthetic_scene<double>(GetParam()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, Contacts, testing::ValuesIn(scene_names()),
+                         [](const auto& test) { return test.param; });
+
+TEST(ContactScenes, HaveContacts) {
+  for (const char* name : {"soups", "four_bodies_own_keyframes", "self_rolled_cloth"}) {
+    const Truth<float> truth = truth_of(synthetic_scene<float>(name).scene);
+    EXPECT_GT(truth.total, 100u) << name;
+  }
+  // Within the cloth, and between it and the obstacle.
+  const Truth<float> truth = truth_of(synthetic_scene<float>("self_rolled_cloth").scene);
+  std::size_t within = 0, between = 0;
+  for (const ContactBuffer& contacts : truth.contacts)
+    for (const Contact& contact : contacts) ++(contact.body_a == contact.body_b ? within : between);
+  EXPECT_GT(within, 50u);
+  EXPECT_GT(between, 50u);
+}
+
+TEST(Features, EveryVertexAndEdgeHasOneOwner) {
+  Primitives primitives;
+  for (const auto& face : {std::vector<std::uint32_t>{0, 1, 2}, {2, 1, 3}, {4, 4, 5}, {3, 1, 2}})
+    primitives.add(face);
+  const Features features(primitives);
+  // By larger, then smaller vertex.
+  ASSERT_EQ(features.edges().size(), 7u);
+  const std::uint32_t expected[7][2] = {{0, 1}, {0, 2}, {1, 2}, {1, 3}, {2, 3}, {4, 4}, {4, 5}};
+  for (std::size_t i = 0; i < 7; ++i) {
+    EXPECT_EQ(features.edges()[i].vertices[0], expected[i][0]);
+    EXPECT_EQ(features.edges()[i].vertices[1], expected[i][1]);
+  }
+  std::vector<int> vertices(6), edges(7);
+  for (const Features::Face& face : features.faces())
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      vertices[face.vertices[i]] += face.owned_vertices >> i & 1;
+      edges[face.edges[i]] += face.owned_edges >> i & 1;
+      const auto& edge = features.edges()[face.edges[i]].vertices;
+      EXPECT_EQ(edge[0], std::min(face.vertices[i], face.vertices[(i + 1) % 3]));
+      EXPECT_EQ(edge[1], std::max(face.vertices[i], face.vertices[(i + 1) % 3]));
+    }
+  EXPECT_EQ(vertices, std::vector<int>(6, 1));
+  EXPECT_EQ(edges, std::vector<int>(7, 1));
+  Primitives quad;
+  quad.add(std::vector<std::uint32_t>{0, 1, 2, 3});
+  EXPECT_THROW(Features{quad}, std::invalid_argument);
+}
+
+// A triangle falls through another: at half of an interval from 2 to 6.
+TEST(ContactFinder, EnclosesTheTimeOfImpact) {
+  Scene<float> scene;
+  for (int body = 0; body < 2; ++body) {
+    Body<float> made;
+    made.primitives.add(std::vector<std::uint32_t>{0, 1, 2});
+    std::vector<float> positions;
+    for (int keyframe = 0; keyframe < (body == 0 ? 2 : 1); ++keyframe) {
+      const float z = body == 1 ? 0 : keyframe == 0 ? 1 : -1;
+      for (const float x : {0.25F, 0.25F, z, 1.25F, 0.25F, z + 2, 0.25F, 1.25F, z + 2})
+        positions.push_back(x);
+      if (body == 1) positions = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    }
+    made.plans = FlightPlans<float>(3, body == 0 ? std::vector<double>{2, 6} : std::vector<double>{0},
+                                    std::move(positions));
+    scene.bodies.push_back(std::move(made));
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  const Truth<float> truth = truth_of(scene);
+  ASSERT_EQ(truth.contacts.size(), 1u);
+  const auto first = std::min_element(truth.contacts[0].begin(), truth.contacts[0].end(),
+                                      [](const Contact& a, const Contact& b) { return a.begin < b.begin; });
+  ASSERT_NE(first, truth.contacts[0].end());
+  EXPECT_EQ(first->kind, Contact::Kind::vertex_face);
+  EXPECT_EQ(first->feature_a, 0u);
+  EXPECT_LE(first->begin, 4);
+  EXPECT_GE(first->end, 4);
+  EXPECT_LE(first->end - first->begin, 4 * impact_width + 1e-14);
+}
+
+TEST(Registry, ContactsAreDeclaredOrRefused) {
+  const auto test = synthetic_scene<float>("sheets");
+  for (const StrategyEntry& entry : registry()) {
+    if (entry.factory<float>() == nullptr || entry.info.can.contacts) continue;
+    Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    session.reset(0);
+    ContactBuffer contacts;
+    PhaseTimes ignored;
+    EXPECT_THROW(session.contacts(1, contacts, ignored), std::logic_error) << entry.info.id;
+  }
+}
+
+}  // namespace
+}  // namespace kbvh::test
