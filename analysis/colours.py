@@ -23,11 +23,11 @@ FAMILIES: dict[str, tuple[str, str]] = {
     "embree": ("#CC79A7", "P"),
     "lazy": ("#8C7A00", "<"),
     "linear": ("#882255", "h"),
+    "auto": ("#44AA99", "p"),
 }
 
 #: What families that are not known choose from.
 FREE: tuple[tuple[str, str], ...] = (
-    ("#44AA99", "p"),
     ("#5D4A9C", ">"),
     ("#AA4499", "8"),
     ("#117733", "*"),

@@ -186,6 +186,7 @@ class Runner {
     record["verified"] = verified_record(measured);
     record["counters"] = counters_record(measured.counters);
     record["bytes"] = measured.counters[Counter::bytes];
+    if (!measured.choice.empty()) record["choice"] = measured.choice;
     record["times"] = nullptr;
     if (measured.refused.empty())
       record["times"] = times_record(measured);

@@ -29,8 +29,9 @@ class DriftModel {
   }
 
   /// Frames for the next search; 0 if it is better to refit and to query at every frame, for `rest` frames.
-  int period() {
-    if (!known_) return first_period;
+  /// `step` is the mean way that a side closes in one frame, against the sides of two leaves.
+  int period(double step) {
+    if (!known_) return step > longest_step ? 0 : int(std::clamp(first_reach / step, 2.0, 8.0));
     double least = 0.97 * plain_cost();
     int best = 0;
     for (const int frames : {2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64}) {
@@ -52,10 +53,11 @@ class DriftModel {
   }
 
  private:
-  static constexpr int first_period = 4, shortest_rest = 16;
-  // In box tests: reading a vertex in a refit, or in the order of memory, twice; listing a pair; and what a
-  // candidate costs that is none.
-  static constexpr double refitting = 0.2, observing = 0.15, listing = 3, testing = 8;
+  static constexpr double longest_step = 0.12, first_reach = 0.15;
+  static constexpr int shortest_rest = 16;
+  // In box tests: reading a vertex in a refit, or in the order of memory, twice; listing a pair; and looking
+  // whether a listed pair meets now.
+  static constexpr double refitting = 0.2, observing = 0.15, listing = 3, checking = 3;
 
   double tests(double frames) const {
     const double grown = 1 + frames / period_ * counts_.reach, was = 1 + counts_.reach;
@@ -66,7 +68,7 @@ class DriftModel {
     const double search = refitting * counts_.reads + observing * counts_.vertices + tests(frames) +
                           listing * (counts_.overlapping + frames * per_frame);
     const double each = (watching_ == Watching::reads ? observing * counts_.vertices : 0) +
-                        testing * per_frame * (frames - 1) / 2;
+                        checking * (counts_.overlapping + per_frame * (frames - 1) / 2);
     return search / frames + each;
   }
   double plain_cost() const { return refitting * counts_.reads + tests(0); }

@@ -43,6 +43,7 @@ void NearPairs<S>::build(const NearSide<S>& a, const NearSide<S>& b, std::uint32
                          std::uint32_t body_b, const S (&reach)[6], std::uint64_t& tests) {
   WideHierarchy<S>&hierarchy_a = *a.hierarchy, &hierarchy_b = *b.hierarchy;
   const std::uint32_t width = hierarchy_a.topology().width;
+  kernels_ = hierarchy_a.kernels();
   stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
   leaf_pairs_.resize(2 * leaf_pair_room);
   const auto no_limit = Budget{}.box_tests;
@@ -104,6 +105,32 @@ void NearPairs<S>::sort(std::size_t found, std::uint32_t body_a, std::uint32_t b
 }
 
 template <class S>
+void NearPairs<S>::append(const FoundPair* pairs, std::size_t count, PairBuffer& out) {
+  const std::size_t before = out.size();
+  out.resize(before + count);
+  for (std::size_t i = 0; i < count; ++i)
+    out[before + i] = {pairs[i].body_a, pairs[i].primitive_a, pairs[i].body_b, pairs[i].primitive_b};
+}
+
+template <class S>
+void NearPairs<S>::read(double fraction, PairBuffer& out) const {
+  append(pairs_.data(), bucket_end_[bucket(float(fraction))], out);
+}
+
+template <class S>
+std::size_t NearPairs<S>::read_meeting(double fraction, const PrimitivesNow<S>& a, const PrimitivesNow<S>& b,
+                                       PairBuffer& out) {
+  const std::size_t end = bucket_end_[bucket(float(fraction))];
+  const NearKernels<S>& kernels = near_kernels<S>(kernels_);
+  chunk_.resize(chunk_room);
+  for (std::size_t first = 0; first < end; first += chunk_room) {
+    const std::size_t count = std::min(chunk_room, end - first);
+    append(chunk_.data(), kernels.meeting(pairs_.data() + first, count, a, b, chunk_.data()), out);
+  }
+  return end;
+}
+
+template <class S>
 void NearPairs<S>::clear() {
   pairs_.clear();
   std::fill(std::begin(bucket_end_), std::end(bucket_end_), 0);
@@ -115,7 +142,7 @@ std::size_t NearPairs<S>::bytes() const {
   for (const Leaves& own : leaves_)
     total += own.rows.size() * sizeof(S) + own.stamps.size() * sizeof(std::uint32_t);
   return total + stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
-         found_.capacity() * sizeof(NearPair) + pairs_.capacity() * sizeof(PrimitivePair);
+         found_.capacity() * sizeof(NearPair) + (pairs_.capacity() + chunk_.capacity()) * sizeof(FoundPair);
 }
 
 template class NearPairs<float>;

@@ -37,10 +37,10 @@ class NearPairs {
 
   /// Appends the pairs whose boxes can have met when no side has closed by more than this fraction of its
   /// reach; 0 to 1, rounding of the quotient included.
-  void read(double fraction, PairBuffer& out) const {
-    const std::uint32_t end = bucket_end_[bucket(float(fraction))];
-    out.insert(out.end(), pairs_.begin(), pairs_.begin() + std::ptrdiff_t(end));
-  }
+  void read(double fraction, PairBuffer& out) const;
+  /// The same, less those whose boxes do not overlap at the present positions. Returns how many it looked at.
+  std::size_t read_meeting(double fraction, const PrimitivesNow<S>& a, const PrimitivesNow<S>& b,
+                           PairBuffer& out);
   std::size_t count() const { return pairs_.size(); }
   /// How many of them overlapped when they were found.
   std::size_t overlapping() const { return bucket_end_[0]; }
@@ -52,6 +52,7 @@ class NearPairs {
   static std::uint32_t bucket(float ratio) {
     return ratio > 0 ? 1 + std::min(buckets - 2, std::uint32_t(ratio * float(buckets - 1))) : 0;
   }
+  static void append(const FoundPair* pairs, std::size_t count, PairBuffer& out);
   void sort(std::size_t found, std::uint32_t body_a, std::uint32_t body_b);
 
   struct Leaves {
@@ -65,7 +66,8 @@ class NearPairs {
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
   std::vector<NearPair> found_;
-  PairBuffer pairs_;
+  std::vector<FoundPair> pairs_, chunk_;
+  KernelSet kernels_{};
   std::uint32_t bucket_end_[buckets] = {};
 };
 

@@ -160,12 +160,49 @@ void drift(const S* now, const S* before, std::size_t vertices, S* interval) {
     }
 }
 
+/// Bit i is 0 only if coordinate i of a is larger.
+template <class S>
+[[gnu::always_inline]] inline unsigned not_larger(PlainPoint<S> a, PlainPoint<S> b) {
+  return (a.v[0] <= b.v[0] ? 1u : 0u) | (a.v[1] <= b.v[1] ? 2u : 0u) | (a.v[2] <= b.v[2] ? 4u : 0u);
+}
+template <class V>
+[[gnu::always_inline]] inline unsigned not_larger(V a, V b) {
+  return mask_bits(a <= b);
+}
+
+template <class S>
+std::size_t meeting(const FoundPair* pairs, std::size_t count, PrimitivesNow<S> a, PrimitivesNow<S> b,
+                    FoundPair* out) {
+  using P = Points<S, 1>;
+  using Pack = typename P::Pack;
+  const auto fit = [](const PrimitivesNow<S>& body, std::uint32_t primitive, Pack& lower, Pack& upper) {
+    const std::uint32_t* corner = body.vertices + body.offsets[primitive];
+    const std::uint32_t* end = body.vertices + body.offsets[primitive + 1];
+    lower = upper = P::load(body.positions + std::size_t(3) * *corner, body.positions);
+    for (++corner; corner != end; ++corner) {
+      const Pack p = P::load(body.positions + std::size_t(3) * *corner, body.positions);
+      lower = smaller(lower, p);
+      upper = larger(upper, p);
+    }
+  };
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    Pack lower_a, upper_a, lower_b, upper_b;
+    fit(a, pairs[i].primitive_a, lower_a, upper_a);
+    fit(b, pairs[i].primitive_b, lower_b, upper_b);
+    out[kept] = pairs[i];
+    kept += (not_larger(lower_a, upper_b) & not_larger(lower_b, upper_a) & 7u) == 7u ? 1 : 0;
+  }
+  return kept;
+}
+
 template <class S>
 constexpr NearKernels<S> table{{{&near<S, 2, 4>, &near<S, 2, 8>, &near<S, 2, 16>},
                                 {&near<S, 4, 4>, &near<S, 4, 8>, &near<S, 4, 16>},
                                 {&near<S, 8, 4>, &near<S, 8, 8>, &near<S, 8, 16>}},
                                {&widen<S, 2>, &widen<S, 4>, &widen<S, 8>},
-                               &drift<S>};
+                               &drift<S>,
+                               &meeting<S>};
 
 }  // namespace
 

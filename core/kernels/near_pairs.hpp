@@ -41,6 +41,14 @@ struct LeafNear {
   std::uint64_t tests;
 };
 
+/// One body's primitives as they are now: CSR lists, and positions [vertex][3], one number past the end
+/// readable.
+template <class S>
+struct PrimitivesNow {
+  const std::uint32_t *offsets, *vertices;
+  const S* positions;
+};
+
 template <class S>
 struct NearKernels {
   /// Goes on until all pairs of leaves are done or the next might not find room (`leaf_pair_step`).
@@ -52,6 +60,11 @@ struct NearKernels {
   /// The least and the largest of now - before over `vertices` points [vertex][3], each rounded to nearest:
   /// lower x, y, z, any, upper x, y, z, any.
   void (*drift)(const S* now, const S* before, std::size_t vertices, S* interval);
+
+  /// Keeps the pairs whose primitives' boxes overlap now, in their order; `out` has room for all of them.
+  /// Returns how many.
+  std::size_t (*meeting)(const FoundPair* pairs, std::size_t count, PrimitivesNow<S> a, PrimitivesNow<S> b,
+                         FoundPair* out);
 
   static constexpr std::size_t index(std::uint32_t width) { return width == 2 ? 0 : width == 4 ? 1 : 2; }
   Near near(std::uint32_t width, std::uint32_t padded) const {

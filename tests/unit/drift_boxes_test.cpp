@@ -91,7 +91,7 @@ TEST(DriftBoxes, OneSearchLastsForManyFrames) {
   // A sheet goes down through another one; the step of a frame is small against a triangle.
   const Scene<double> scene = grids<double>(30, 0.3, [](std::uint32_t) { return 0.05; });
   for (const char* id : {"drift_boxes", "drift_boxes_bounded"}) {
-    Play<double> play(scene, id, {});
+    Play<double> play(scene, id, {{"candidates", "listed"}});  // else looking at pairs counts as tests
     Play<double> refit(scene, "bottom_up", {});
     int searches = 0;
     for (int f = 1; f <= 100; ++f) {
@@ -110,10 +110,45 @@ TEST(DriftBoxes, WhatMovesTogetherStaysListed) {
   Scene<float> scene = grids<float>(20, 0.5, lifted);
   scene.bodies[1] = grid<float>(20, 0.5, 0.01, 3, lifted);
   scene.pairs = all_pairs(scene.bodies);
-  Play<float> play(scene, "drift_boxes", {});
+  Play<float> play(scene, "drift_boxes", {{"candidates", "listed"}});
   int searches = 0;
   for (int f = 1; f <= 100; ++f) searches += play.frame(0.01 * f)[Counter::box_tests] != 0 ? 1 : 0;
   EXPECT_LT(searches, 12);
+}
+
+// ---- Bounds over segments
+
+TEST(LinearBounds, BodiesFarApartGetOneBoxASegment) {
+  const Scene<float> scene = grids<float>(40, 50, lifted);
+  for (const char* id : {"linear_bounds", "interval_join"}) {
+    Play<float> play(scene, id, {});
+    EXPECT_EQ(play.frame(0.5)[Counter::vertex_reads], 0u) << id;
+    const Counters next = play.frame(1.5);  // the second segment
+    EXPECT_EQ(next[Counter::vertex_reads], scene.bodies[0].plans.vertex_count()) << id;
+    EXPECT_EQ(next[Counter::values_written], 0u) << id;
+    EXPECT_EQ(next[Counter::bodies_skipped], 2u) << id;
+    EXPECT_EQ(next[Counter::nodes_visited], 0u) << id;
+  }
+}
+
+TEST(LinearBounds, BodiesThatComeNearAgainGetAllTheirBoxes) {
+  // Apart for two segments, through each other in the third, apart again.
+  Scene<double> scene = grids<double>(10, 3, [](std::uint32_t) { return 0.0; });
+  std::vector<double> positions;
+  for (const double x : {0.0, 0.1, 0.2, 5.0, 5.1, 5.2})
+    for (std::uint32_t v = 0; v < 121; ++v)
+      for (const double c : {x + (v % 11) / 10.0, (v / 11) / 10.0, 0.02 * x}) positions.push_back(c);
+  scene.bodies[0].plans = FlightPlans<double>(121, {0, 1, 2, 3, 4, 5}, std::move(positions));
+  for (const char* id : {"linear_bounds", "interval_join", "drift_boxes", "drift_boxes_bounded", "auto"}) {
+    const StrategyEntry& entry = find_strategy(id);
+    Session<double> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+    Oracle<double> oracle(scene);
+    const std::vector<double> frames = frame_times(scene, 13);
+    const Verification result = verify(session, std::span<const double>(frames), oracle);
+    EXPECT_EQ(result.first_violation, "") << id;
+    EXPECT_EQ(result.audit.protrusion, 0) << id;
+    EXPECT_GT(session.strategy().counters()[Counter::bodies_skipped], 0u) << id;
+  }
 }
 
 }  // namespace
