@@ -21,6 +21,7 @@ struct Seen {
   double candidates = 0;          // pairs whose boxes overlap in a frame
   double reads = 0;               // vertices that a refit reads
   double step = 0;                // mean way of a vertex in a frame, against the mean side of a leaf's box
+  double spread = 1;              // how different the ways of one body's vertices are: 0: all the same; to 1
 };
 
 // Predicted nanoseconds per frame, fitted to tablecloth 16k, waving_sheet 8k, passing_spheres 5k and
@@ -30,21 +31,24 @@ double refit_cost(const Seen& seen) {
   return 0.27 * seen.reads + 28 * seen.candidates;
 }
 
-/// One search serves as many frames as a leaf takes to move by a part of its size.
+/// One search serves as many frames as a leaf takes to move by a part of its size. Where bodies deform, more
+/// pairs come near in those frames than a query takes to find.
 double drift_cost(const Seen& seen) {
   const double watching = 0.1 * seen.reads;
-  if (seen.candidates == 0) return 0.5 * watching;
+  if (seen.candidates == 0) return seen.step < 0.1 ? 0.5 * watching : 1.2 * refit_cost(seen);
+  if (seen.spread > 0.1) return 1.2 * refit_cost(seen);
   const double frames = seen.step > 0 ? std::min(0.2 / seen.step, 24.0) : 24;
-  if (frames < 3) return 1.05 * refit_cost(seen);
+  if (frames < 3) return 1.2 * refit_cost(seen);
   const double search = 0.35 * seen.reads + 45 * seen.candidates;
   return watching + search / frames + 15 * seen.candidates;
 }
 
 /// One join serves a segment; what lies between its ends costs the more, the further vertices move there.
+/// What moves as a whole passes by others; what deforms is held where it touches them.
 double join_cost(const Seen& seen) {
   const double l = seen.frames_per_segment, moves = seen.step * l;
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
-  return refit_cost(seen) * (9 / (l + 4) * (1 + 0.3 * moves) + 0.1 + 0.5 * moves);
+  return refit_cost(seen) * (8 / (l + 4) * (1 + 0.3 * moves) + (0.7 - 0.6 * seen.spread) * moves);
 }
 
 /// A strategy to choose, the parameters that differ from its defaults, and what it would cost. To offer
@@ -96,7 +100,7 @@ class Auto final : public Strategy<S> {
     frame_ = chosen_at_ = 0;
     step_ = 0;
     segment_end_ = t;
-    changes_ = false;
+    changes_ = chosen_for_contact_ = false;
     changed_.clear();
     body_changed_.assign(this->scene_.body_count(), 0);
     seen_ = {};
@@ -113,7 +117,8 @@ class Auto final : public Strategy<S> {
     const std::size_t last = active_;
     const int stayed = frame_ - chosen_at_;
     const bool due = frame_ == 1 || stayed >= (t >= segment_end_ ? shortest_stay : longest_stay) ||
-                     (seen_.changes_per_frame > 0 && !runners_[active_].all_positions);
+                     (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
+                     (seen_.candidates > 0) != chosen_for_contact_;
     if (step_ > 0 && due) choose(t);
     Runner& runner = runners_[active_];
     if (runner.all_positions) fetch_all();
@@ -237,21 +242,25 @@ class Auto final : public Strategy<S> {
   /// Looks at the plans, and takes what is predicted to be faster by `gain_` at least than what is in use.
   void choose(double t) {
     chosen_at_ = frame_;
+    chosen_for_contact_ = seen_.candidates > 0;
     double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
-    double largest = 0;
+    double largest = 0, spread = 0;
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
       if (seen_.changes_per_frame == 0) {  // else it takes long to find out, and nobody can rely on it
         begin = std::max(begin, motion_.lines_begin(body));
         end = std::min(end, motion_.lines_end(body));
       }
-      if (leaf_size_[body] > 0) largest = std::max(largest, way(body) / leaf_size_[body]);
+      if (leaf_size_[body] > 0) largest = std::max(largest, way(body, spread) / leaf_size_[body]);
     }
     segment_end_ = end > t ? end : t;
     const bool known =
         begin > -std::numeric_limits<double>::infinity() && end < std::numeric_limits<double>::infinity();
-    seen_.frames_per_segment =
-        known ? std::max(1.0, (end - begin) / step_) : std::numeric_limits<double>::infinity();
+    if (known)
+      seen_.frames_per_segment = std::max(1.0, (end - begin) / step_);
+    else if (frame_ == 1 || seen_.changes_per_frame > 0)
+      seen_.frames_per_segment = std::numeric_limits<double>::infinity();
     seen_.step = largest;
+    seen_.spread = spread;
     std::size_t best = active_;
     double least = runners_[active_].candidate->cost(seen_);
     for (std::size_t i = 0; i < runners_.size(); ++i) {
@@ -264,12 +273,13 @@ class Auto final : public Strategy<S> {
     active_ = best;
   }
 
-  /// The mean way of a body's vertices in one frame, from some of them, as they move now.
-  double way(std::uint32_t body) const {
+  /// The mean way of a body's vertices in one frame, from some of them, as they move now; and how much less
+  /// of it they have in common, as a share, if that is more than `spread`.
+  double way(std::uint32_t body, double& spread) const {
     const std::uint32_t count = this->scene_.vertex_count(body);
     if (count == 0 || (!this->scene_.moving(body) && seen_.changes_per_frame == 0)) return 0;
     const std::uint32_t taken = std::min(samples, count);
-    double sum = 0;
+    double sum = 0, together[3] = {};
     for (std::uint32_t i = 0; i < taken; ++i) {
       const auto vertex = std::uint32_t(std::uint64_t(i) * count / taken);
       double square = 0;
@@ -279,9 +289,13 @@ class Auto final : public Strategy<S> {
                                  ? double(piece.x1)
                                  : (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
         square += speed * speed;
+        together[axis] += speed;
       }
       sum += std::sqrt(square);
     }
+    const double common =
+        std::sqrt(together[0] * together[0] + together[1] * together[1] + together[2] * together[2]);
+    if (sum > 0) spread = std::max(spread, 1 - common / sum);
     return sum / taken * step_;
   }
 
@@ -293,6 +307,7 @@ class Auto final : public Strategy<S> {
   std::size_t active_ = 0;
   int frame_ = 0, chosen_at_ = 0;
   double step_ = 0, segment_end_ = 0;   ///< seconds
+  bool chosen_for_contact_ = false;     ///< there were candidates when the choice was made
   bool changes_ = false;                ///< of plans, since the last frame
   std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first one of each body
   std::vector<std::uint8_t> body_changed_;

@@ -120,6 +120,7 @@ class DriftStrategy : public Strategy<S> {
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
     std::uint64_t tests = 0;
+    const std::size_t before = out.size();
     if (search_due_) search(tests);
     for (std::size_t i = 0; i < near_.size(); ++i) {
       if (pair_is_near_[i] == 0) continue;
@@ -130,6 +131,7 @@ class DriftStrategy : public Strategy<S> {
         query_.run(hierarchies_[pair.first], pair.first, hierarchies_[pair.second], pair.second, this->scene_,
                    this->sampled_, {}, out, tests);
     }
+    if (period_ == 0) model_.queried(double(tests), double(out.size() - before));
     count_.add(Counter::box_tests, tests);
     return {};
   }

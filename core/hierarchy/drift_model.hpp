@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <cmath>
 
 namespace kbvh {
 
@@ -28,14 +29,22 @@ class DriftModel {
     known_ = true;
   }
 
+  /// A query at one frame, without lists.
+  void queried(double tests, double candidates) {
+    plain_tests_ = tests;
+    plain_candidates_ = candidates;
+  }
+
   /// Frames for the next search; 0 if it is better to refit and to query at every frame, for `rest` frames.
   /// `step` is the mean way that a side closes in one frame, against the sides of two leaves.
   int period(double step) {
-    if (!known_) return step > longest_step ? 0 : int(std::clamp(first_reach / step, 2.0, 8.0));
-    double least = 0.97 * plain_cost();
+    // What a list would hold cannot be told from an empty one.
+    if (!known_ || counts_.listed == 0) return step > longest_step ? 0 : int(std::clamp(first_reach / step, 2.0, 8.0));
+    double least = clear_gain * plain_cost();
     int best = 0;
     for (const int frames : {2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64}) {
-      if (frames > 4 * period_) break;  // no further than can be told from what was seen
+      if (frames > 4 * period_ || frames * step > longest_reach)
+        break;  // no further than can be told from what was seen
       const double cost = listed_cost(frames);
       if (!(cost < least)) continue;
       least = cost;
@@ -53,28 +62,36 @@ class DriftModel {
   }
 
  private:
-  static constexpr double longest_step = 0.12, first_reach = 0.15;
+  /// Predictions are not so good that less would be worth a try.
+  static constexpr double clear_gain = 0.9;
+  static constexpr double longest_step = 0.12, first_reach = 0.15, longest_reach = 0.3;
   static constexpr int shortest_rest = 16;
-  // In box tests: reading a vertex in a refit, or in the order of memory, twice; listing a pair; and looking
-  // whether a listed pair meets now.
-  static constexpr double refitting = 0.2, observing = 0.15, listing = 3, checking = 3;
+  // In box tests of a query: reading a vertex in a refit, or in the order of memory, twice; a box test of a
+  // search; listing a pair; and looking whether a listed pair meets now.
+  static constexpr double refitting = 0.2, observing = 0.15, searching = 1.3, listing = 4, checking = 5;
 
-  double tests(double frames) const {
-    const double grown = 1 + frames / period_ * counts_.reach, was = 1 + counts_.reach;
-    return counts_.tests * (grown * grown) / (was * was);
+  /// A count that is `none` with no reach and `some` with that of the last search, for one of `frames`.
+  double grown(double none, double some, double frames) const {
+    return none + std::max(0.0, some - none) * std::pow(frames / period_, 1.3);
+  }
+  /// Box tests of a query at one frame, as if there were no lists.
+  double tests() const {
+    if (plain_tests_ == 0) return counts_.tests / ((1 + counts_.reach) * (1 + counts_.reach));
+    return plain_tests_ * std::clamp((counts_.overlapping + 1) / (plain_candidates_ + 1), 0.1, 10.0);
   }
   double listed_cost(double frames) const {
-    const double per_frame = (counts_.listed - counts_.overlapping) / period_;
-    const double search = refitting * counts_.reads + observing * counts_.vertices + tests(frames) +
-                          listing * (counts_.overlapping + frames * per_frame);
-    const double each = (watching_ == Watching::reads ? observing * counts_.vertices : 0) +
-                        checking * (counts_.overlapping + per_frame * (frames - 1) / 2);
-    return search / frames + each;
+    const double listed = grown(counts_.overlapping, counts_.listed, frames);
+    const double search = refitting * counts_.reads + observing * counts_.vertices +
+                          searching * grown(tests(), counts_.tests, frames) + listing * listed;
+    const double active = counts_.overlapping + (listed - counts_.overlapping) / 2.3;
+    const double each = (watching_ == Watching::reads ? observing * counts_.vertices : 0) + checking * active;
+    return search / frames + each * (frames - 1) / frames;
   }
-  double plain_cost() const { return refitting * counts_.reads + tests(0); }
+  double plain_cost() const { return refitting * counts_.reads + tests(); }
 
   DriftCounts counts_;
   int period_ = 1, rest_ = shortest_rest;
+  double plain_tests_ = 0, plain_candidates_ = 0;
   Watching watching_ = Watching::reads;
   bool known_ = false;
 };
