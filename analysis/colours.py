@@ -24,11 +24,11 @@ FAMILIES: dict[str, tuple[str, str]] = {
     "lazy": ("#8C7A00", "<"),
     "linear": ("#882255", "h"),
     "approximate": ("#AA4499", "8"),
+    "auto": ("#44AA99", "p"),
 }
 
 #: What families that are not known choose from.
 FREE: tuple[tuple[str, str], ...] = (
-    ("#44AA99", "p"),
     ("#5D4A9C", ">"),
     ("#117733", "*"),
     ("#6B4C2A", "H"),

@@ -46,6 +46,10 @@ const char* name(Counter counter) {
       return "span_tests";
     case Counter::span_verdicts:
       return "span_verdicts";
+    case Counter::bodies_skipped:
+      return "bodies_skipped";
+    case Counter::nodes_skipped:
+      return "nodes_skipped";
     case Counter::bytes:
       return "bytes";
     case Counter::count:

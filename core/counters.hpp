@@ -29,6 +29,8 @@ enum class Counter : std::uint8_t {
   triangle_tests_exact,    ///< of these, the ones the filter left to exact arithmetic
   span_tests,              ///< attempts to decide a pair of triangles for a span of time
   span_verdicts,           ///< pairs that a frame found decided for a span already
+  bodies_skipped,          ///< bodies of which a frame looked at nothing, or at nothing but one box
+  nodes_skipped,           ///< nodes that an update left alone, since no query of the frame could read them
   bytes,                   ///< memory held by the strategy's own structures, in bytes (a level, not a sum)
   count
 };

@@ -88,4 +88,22 @@ std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<
                                     Playback<S>& playback, Topologies topologies, const Params& params,
                                     CountingPolicy policy);
 
+/// Makes instances for a strategy that consists of others and hands calls on to them.
+template <class S>
+struct NestedStrategies {
+  /// As `create`. Throws ConfigError, too, if the instance is to know more of the future than `motion` does.
+  template <class Motion>
+  static std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<S>& scene,
+                                             const Motion& motion, Topologies topologies,
+                                             const Params& params, CountingPolicy policy) {
+    constexpr Foresight offered = std::is_base_of_v<ClipMotion<S>, Motion>      ? Foresight::whole_clip
+                                  : std::is_base_of_v<SegmentMotion<S>, Motion> ? Foresight::next_keyframe
+                                  : std::is_base_of_v<SteppedMotion<S>, Motion> ? Foresight::step_bound
+                                                                                : Foresight::none;
+    if (entry.info.foresight > offered)
+      throw ConfigError("'" + entry.info.id + "' has to know more of the future than there is to know");
+    return kbvh::create(entry, scene, *motion.playback_, std::move(topologies), params, policy);
+  }
+};
+
 }  // namespace kbvh

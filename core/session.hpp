@@ -64,7 +64,9 @@ class Session {
   /// Moves to t, with positions if the strategy wants all of them, and advances.
   void advance(double t, PhaseTimes& times) {
     playback_.seek(t);
-    if (info_->positions == PositionUse::all) timed(times.motion, [&] { playback_.evaluate_all(); });
+    if (info_->positions == PositionUse::all ||
+        (info_->positions == PositionUse::varying && strategy_->wants_all_positions()))
+      timed(times.motion, [&] { playback_.evaluate_all(); });
     timed(times.update, [&] { strategy_->advance(t); });
   }
   /// Fills `pairs` with the confirmed pairs at the current time.

@@ -33,6 +33,7 @@ enum class Guarantee : std::uint8_t {
 enum class PositionUse : std::uint8_t {
   all,      ///< the driver evaluates every vertex before `advance`; its time is motion time
   fetched,  ///< the strategy fetches what it reads; that time is its own
+  varying,  ///< one or the other, as `wants_all_positions` says before each frame
 };
 
 /// What else a strategy can do; calls that it does not declare throw std::logic_error.
@@ -163,6 +164,12 @@ class Strategy {
 
   /// Memory held by the strategy's own structures, in bytes.
   virtual std::size_t bytes() const = 0;
+
+  /// PositionUse::varying: are all positions to be evaluated before the next `advance`?
+  virtual bool wants_all_positions() const { return true; }
+
+  /// What a strategy that chooses has chosen since `reset`, in words; empty for all others.
+  virtual std::string choice() const { return {}; }
 
   /// Everything counted since `reset`; all zero but for triangle tests and bytes in a silent instance.
   Counters counters() const {

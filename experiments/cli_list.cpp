@@ -69,7 +69,9 @@ json strategy_json(const Info& info) {
           {"foresight", word(info.foresight)},
           {"tightness", word(info.tightness)},
           {"guarantee", word(info.guarantee)},
-          {"positions", info.positions == PositionUse::all ? "all" : "fetched"},
+          {"positions", info.positions == PositionUse::all       ? "all"
+                        : info.positions == PositionUse::fetched ? "fetched"
+                                                                 : "varying"},
           {"scalars", scalars_of(info)},
           {"own_scalar", info.own_scalar},
           {"capabilities", capabilities_of(info)},

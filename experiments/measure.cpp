@@ -127,6 +127,7 @@ template <class S>
 const ClipTimes& Measurement<S>::play(std::size_t i) {
   Entrant& entrant = entrants_[i];
   entrant.measured.repetitions.push_back(play_clip<S>(*entrant.session, frames_, script_, pairs_));
+  entrant.measured.choice = entrant.session->strategy().choice();
   return entrant.measured.repetitions.back();
 }
 

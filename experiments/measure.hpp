@@ -28,6 +28,7 @@ struct Measured {
   Counters counters;
   std::string refused;  ///< why it gets no time, or empty
   double build_seconds = 0;
+  std::string choice;  ///< of a strategy that chooses, at the end of the clip
   std::vector<ClipTimes> repetitions;
 };
 

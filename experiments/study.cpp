@@ -248,6 +248,7 @@ class Runner {
     record["counters"] = counters_record(measured.counters);
     record["events_at_depth"] = depths_record(measured.counters);
     record["bytes"] = measured.counters[Counter::bytes];
+    if (!measured.choice.empty()) record["choice"] = measured.choice;
     record["times"] = nullptr;
     if (measured.refused.empty())
       record["times"] = times_record(measured);

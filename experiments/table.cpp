@@ -116,7 +116,7 @@ std::string results_table(const std::vector<json>& records) {
   for (const char* column : {"x refit", "with motion", "missed", "extra", "protrusion", "looseness"})
     head.push_back(column);
   std::vector<std::vector<std::string>> rows{head};
-  std::string refusals;
+  std::string refusals, choices;
   for (const json& record : records) {
     const json& verified = record.at("verified");
     const std::string label = record.at("strategy").at("label").get<std::string>();
@@ -138,8 +138,10 @@ std::string results_table(const std::vector<json>& records) {
     row.push_back(audited ? fraction(verified.at("protrusion").get<double>()) : "-");
     row.push_back(audited ? fraction(verified.at("looseness").get<double>()) : "-");
     rows.push_back(std::move(row));
+    if (record.contains("choice"))
+      choices += "  " + label + " chose " + record.at("choice").get<std::string>() + "\n";
   }
-  text += columns(rows) + refusals;
+  text += columns(rows) + refusals + choices;
   std::set<std::string> runs;
   for (const json& record : records) runs.insert(record.value("run", std::string()));
   if (runs.size() > 1)

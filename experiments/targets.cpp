@@ -45,6 +45,7 @@ TargetSelector read_selector(JsonReader& target, const std::string& key) {
   JsonReader keys(*value, place);
   TargetSelector selector;
   selector.strategy = needed_word(keys, "strategy");
+  selector.or_else = keys.words("or");
   selector.phase = needed_word(keys, "phase");
   if (!has(phases, selector.phase))
     keys.fail("phase", "expected one of " + joined(phases) + ", got '" + selector.phase + "'");
@@ -129,7 +130,8 @@ void check_target_scenes(const Plan& plan) {
 // --- which contestants ----------------------------------------------------------------------------------
 
 bool matches(const TargetSelector& selector, const json& strategy) {
-  if (strategy.at("id") != selector.strategy) return false;
+  const std::string id = strategy.at("id").get<std::string>();
+  if (id != selector.strategy && !has(selector.or_else, id)) return false;
   for (const auto& [key, values] : selector.params)
     if (!has(values, strategy.at("params").value(key, std::string()))) return false;
   if (selector.builder.empty()) return true;
@@ -155,7 +157,9 @@ std::string described(const TargetSelector& selector) {
   add("width", widths);
   add("leaf_size", sizes);
   for (const auto& [key, values] : selector.params) add(key, values);
-  return selector.strategy + (facts.empty() ? "" : " with " + joined(facts));
+  std::string who = selector.strategy;
+  for (const std::string& other : selector.or_else) who += " or " + other;
+  return who + (facts.empty() ? "" : " with " + joined(facts));
 }
 
 namespace {
@@ -168,6 +172,12 @@ bool asked_for_if_there(const Plan& plan, const std::string& id) {
 }
 
 void check_selector(const Plan& plan, const TargetSelector& selector, const std::string& place) {
+  for (const std::string& other : selector.or_else) {
+    TargetSelector one = selector;
+    one.strategy = other;
+    one.or_else.clear();
+    check_selector(plan, one, place);
+  }
   const StrategyEntry* entry = known_strategy(selector.strategy);
   if (entry == nullptr) {
     if (asked_for_if_there(plan, selector.strategy)) return;

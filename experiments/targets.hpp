@@ -14,7 +14,8 @@ struct Plan;
 /// Contestants by what is said of them, and the phase whose time counts. Several may match (say, several leaf
 /// sizes): the one with the smallest median stands for them all.
 struct TargetSelector {
-  std::string strategy;  ///< id
+  std::string strategy;              ///< id
+  std::vector<std::string> or_else;  ///< ids of others that may stand there as well
   std::string phase;  ///< "motion", "update", "traversal", "triangle_tests", "query", "candidates", "total"
   BuilderRequest builder;  ///< any of these values; empty: whatever was measured
   Sweep params;            ///< likewise

@@ -58,7 +58,7 @@ class LinearBoundsStrategy final : public Strategy<S> {
   }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
-    return AuditView{bounds_.side(body).hierarchy.topology(), bounds_.boxes_at(body, this->time()), {}};
+    return bounds_.audit_view(body, this->time());
   }
 
   std::size_t bytes() const override {

@@ -45,8 +45,10 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
   body_b_ = body_b;
   const bool self = body_a == body_b;
   std::size_t found = 0;
+  if (bounds.side(body_a).apart || bounds.side(body_b).apart)  // rows are made anew when they meet again
+    leaves_[0].at_rest = leaves_[1].at_rest = false;
   auto &a = bounds.side(body_a), &b = bounds.side(body_b);
-  if (!a.hierarchy.empty() && !b.hierarchy.empty()) {
+  if (!a.hierarchy.empty() && !b.hierarchy.empty() && !a.apart && !b.apart) {
     const std::uint32_t width = a.hierarchy.topology().width;
     const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(a.hierarchy.kernels());
     stack_.resize(std::max<std::size_t>(stack_.size(), 1024));

@@ -5,6 +5,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/kernels/bounds.hpp"
+
 namespace kbvh {
 
 namespace {
@@ -19,7 +21,9 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
       motion_(motion),
       pieces_(pieces),
       sides_(scene.body_count()),
-      refits_(scene.body_count(), 0) {
+      refits_(scene.body_count(), 0),
+      skipped_(scene.body_count()),
+      near_(scene.body_count(), 0) {
   for (std::uint32_t body = 0; body < body_count(); ++body) {
     Side& side = sides_[body];
     side.hierarchy.assign(std::move(topologies[body]), scene.primitives(body), kernels);
@@ -72,9 +76,15 @@ bool LinearBounds<S>::make_end(std::uint32_t body, std::uint32_t end, double t) 
   const std::uint32_t array = side.array(end);
   side.positions[end] = motion_.positions_on_lines(body, t, side.room[array]);
   if (side.hierarchy.empty()) return true;
-  side.hierarchy.refit_into(side.lanes[array].data(), side.own[array].data(), side.positions[end]);
-  ++refits_[body];
-  const S* own = side.own[array].data();
+  S* own = side.own[array].data();
+  if (side.apart) {
+    const VertexRun all{0, scene_.vertex_count(body)};
+    bounds_kernels<S>(side.hierarchy.kernels()).of_runs(&all, 1, side.positions[end], own);
+    ++skipped_[body].apart;
+  } else {
+    side.hierarchy.refit_into(side.lanes[array].data(), own, side.positions[end]);
+    ++refits_[body];
+  }
   return std::all_of(own, own + 3, [](S x) { return std::isfinite(x); }) &&
          std::all_of(own + 4, own + 7, [](S x) { return std::isfinite(x); });
 }
@@ -95,6 +105,7 @@ void LinearBounds<S>::start() {
   step_ = 0;
   foreseen_ = 1;
   std::fill(refits_.begin(), refits_.end(), 0);
+  std::fill(skipped_.begin(), skipped_.end(), Skipped{});
   restart();
 }
 
@@ -106,7 +117,7 @@ void LinearBounds<S>::plans_changed() {
 
 template <class S>
 void LinearBounds<S>::restart() {
-  for (Side& side : sides_) side.current = false;
+  for (Side& side : sides_) side.current = side.apart = false;
   end_ = none;
   advance();
 }
@@ -141,7 +152,10 @@ void LinearBounds<S>::go_on() {
   for (std::uint32_t body = 0; body < body_count(); ++body) {
     Side& side = sides_[body];
     const bool rests = motion_.at_rest(body);
-    if (rests && side.current && side.at_rest) continue;  // where it was
+    if (rests && side.current && side.at_rest) {  // where it was
+      ++skipped_[body].at_rest;
+      continue;
+    }
     if (goes_on && !side.at_rest) {
       side.first = 1 - side.first;
       side.positions[0] = side.positions[1];
@@ -163,6 +177,43 @@ void LinearBounds<S>::go_on() {
     }
   }
   for (Side& side : sides_) make_margin(side);
+  part_bodies();
+}
+
+template <class S>
+Box<S> LinearBounds<S>::swept(const Side& side) const {
+  Box<S> box;
+  for (std::uint32_t end = 0; end < 2; ++end) {
+    const S* own = side.own[side.array(end)].data();
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lower[axis] = std::min(box.lower[axis], own[axis] - 2 * side.margin);
+      box.upper[axis] = std::max(box.upper[axis], own[axis + 4] + 2 * side.margin);
+    }
+  }
+  return box;
+}
+
+/// Which bodies meet another's box over the segment. Those that come near again get all their boxes; those
+/// that are apart get one from the next segment on, and keep those they have until then.
+template <class S>
+void LinearBounds<S>::part_bodies() {
+  for (std::uint32_t body = 0; body < body_count(); ++body) near_[body] = 0;
+  for (const BodyPair& pair : scene_.pairs()) {
+    const Side &a = sides_[pair.first], &b = sides_[pair.second];
+    if (a.hierarchy.empty() || b.hierarchy.empty() || !overlap(swept(a), swept(b))) continue;
+    near_[pair.first] = near_[pair.second] = 1;
+  }
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    Side& side = sides_[body];
+    if (near_[body] == 0) {
+      // What rests has its boxes already; a root that is a leaf lies where those of others do.
+      side.apart = side.apart || (!side.at_rest && side.hierarchy.topology().size() > 1);
+    } else if (side.apart) {
+      side.apart = false;
+      make_end(body, 0, side.at_rest ? motion_.time() : begin_);
+      if (!side.at_rest) make_end(body, 1, end_);
+    }
+  }
 }
 
 template <class S>
@@ -190,6 +241,16 @@ std::vector<Box<double>> LinearBounds<S>::boxes_at(std::uint32_t body, double t)
     boxes.push_back(box);
   }
   return boxes;
+}
+
+template <class S>
+AuditView LinearBounds<S>::audit_view(std::uint32_t body, double t) const {
+  const Side& side = sides_[body];
+  AuditView view{side.hierarchy.topology(), boxes_at(body, t), {}};
+  if (!side.apart || view.boxes.empty()) return view;
+  view.stale.assign(view.boxes.size(), 1);
+  view.stale[0] = 0;
+  return view;
 }
 
 template <class S>

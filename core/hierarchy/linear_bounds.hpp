@@ -27,6 +27,8 @@ class LinearBounds {
     const S* positions[2] = {nullptr, nullptr};  ///< by end
     std::uint32_t first = 0;                     ///< which array holds the begin
     bool at_rest = false, current = false;
+    /// It met no other body's box over this segment: of its boxes there is the root's and no other.
+    bool apart = false;
     S margin = 0;
 
     std::uint32_t array(std::uint32_t end) const { return at_rest ? first : (first + end) % 2; }
@@ -59,13 +61,22 @@ class LinearBounds {
 
   const SceneView<S>& scene() const { return scene_; }
   std::uint32_t body_count() const { return std::uint32_t(sides_.size()); }
+  std::uint32_t vertex_count(std::uint32_t body) const { return scene_.vertex_count(body); }
   Side& side(std::uint32_t body) { return sides_[body]; }
   const Side& side(std::uint32_t body) const { return sides_[body]; }
 
   /// Boxes of a body at a time of the segment, one for each node of its topology, in double; larger than
   /// those that a query reads by nothing but rounding.
   std::vector<Box<double>> boxes_at(std::uint32_t body, double t) const;
+  /// The same with what there is no box of marked as stale.
+  AuditView audit_view(std::uint32_t body, double t) const;
 
+  /// How often a body was left alone when a segment began, since this was asked last: at rest, or apart and
+  /// but for one box.
+  struct Skipped {
+    std::uint64_t at_rest = 0, apart = 0;
+  };
+  Skipped take_skipped(std::uint32_t body) { return std::exchange(skipped_[body], {}); }
   /// How often boxes were made at an end of a segment, since this was asked last.
   std::uint64_t take_refits(std::uint32_t body) { return std::exchange(refits_[body], 0); }
 
@@ -77,6 +88,8 @@ class LinearBounds {
   void go_on();
   void choose_segment(double t);
   bool make_end(std::uint32_t body, std::uint32_t end, double t);
+  void part_bodies();
+  Box<S> swept(const Side& side) const;
   void make_margin(Side& side) const;
 
   SceneView<S> scene_;
@@ -87,6 +100,8 @@ class LinearBounds {
   double foreseen_ = 1;         ///< frames that a segment without an end is made for
   std::vector<Side> sides_;
   std::vector<std::uint64_t> refits_;
+  std::vector<Skipped> skipped_;
+  std::vector<std::uint8_t> near_;  ///< by body: to another one, over the segment
 };
 
 /// The parameter `pieces` of strategies with linear bounds, and its value: 1 to 64. Throws ConfigError.
@@ -102,6 +117,10 @@ void count_linear_update(LinearBounds<S>& bounds, Count& count) {
     count.add(Counter::nodes_visited, ends * nodes);
     count.add(Counter::values_written, 6 * ends * nodes);
     count.add(Counter::vertex_reads, ends * hierarchy.leaf_vertex_count());
+    const auto skipped = bounds.take_skipped(body);
+    count.add(Counter::vertex_reads, skipped.apart * bounds.vertex_count(body));
+    count.add(Counter::bodies_skipped, skipped.at_rest + skipped.apart);
+    count.add(Counter::nodes_skipped, (skipped.at_rest + skipped.apart) * nodes);
   }
 }
 

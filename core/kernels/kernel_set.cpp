@@ -8,6 +8,7 @@
 
 #include "core/kernels/bounds.hpp"
 #include "core/kernels/limits.hpp"
+#include "core/kernels/near_pairs.hpp"
 #include "core/kernels/span_tests.hpp"
 #include "core/kernels/wide_inflate.hpp"
 #include "core/kernels/wide_linear.hpp"
@@ -105,6 +106,14 @@ const BoundsKernels<float>& bounds_kernels(KernelSet set) {
 template <>
 const BoundsKernels<double>& bounds_kernels(KernelSet set) {
   return KBVH_SELECT_KERNELS(set, bounds_double);
+}
+template <>
+const NearKernels<float>& near_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, near_float);
+}
+template <>
+const NearKernels<double>& near_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, near_double);
 }
 template <>
 const WideInflateKernels<float>& wide_inflate_kernels(KernelSet set) {

@@ -16,6 +16,9 @@ enum class Foresight : std::uint8_t {
   whole_clip,     ///< and every flight plan to its end
 };
 
+template <class S>
+struct NestedStrategies;  // registry.hpp
+
 /// Foresight::none. Positions are truth B at the current frame.
 template <class S>
 class SampledMotion {
@@ -39,6 +42,9 @@ class SampledMotion {
 
  protected:
   Playback<S>* playback_;
+
+ private:
+  friend struct NestedStrategies<S>;
 };
 
 /// Foresight::step_bound.

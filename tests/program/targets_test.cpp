@@ -83,9 +83,9 @@ TEST(Targets, ErrorsNameFileTargetAndKey) {
   EXPECT_EQ(with("/extra", 1),
             "p.json: targets[0]: there is no key 'extra'; known are aim, at_least, denominator, l, note, "
             "numerator, over, scalar, scenes, what");
-  EXPECT_EQ(
-      with("/numerator/extra", 1),
-      "p.json: targets[0]: numerator: there is no key 'extra'; known are builder, params, phase, strategy");
+  EXPECT_EQ(with("/numerator/extra", 1),
+            "p.json: targets[0]: numerator: there is no key 'extra'; known are builder, or, params, phase, "
+            "strategy");
   EXPECT_EQ(
       with("/denominator/phase", "lunch"),
       "p.json: targets[0]: denominator: phase: expected one of motion, update, traversal, triangle_tests, "

@@ -1,0 +1,338 @@
+// One strategy that picks among others, by what it can see: how many frames fall into a segment of the flight
+// plans, how far vertices move from frame to frame, whether plans change, how many candidates there are. The
+// choice is made from counts and plans only, never from a clock, so that a run can be repeated.
+//
+// Each candidate has one instance from the first frame on, with hierarchies of its own: that costs the memory
+// of all of them, and saves making one when it is wanted. Those that are not in use stand still.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+/// What a choice is made from.
+struct Seen {
+  double frames_per_segment = 1;  // of the present one; infinite if it has no end
+  double changes_per_frame = 0;   // frames with changes of plans, as a share of the last ones
+  double candidates = 0;          // pairs whose boxes overlap in a frame
+  double reads = 0;               // vertices that a refit reads
+  double step = 0;                // mean way of a vertex in a frame, against the mean side of a leaf's box
+  double spread = 1;              // how different the ways of one body's vertices are: 0: all the same; to 1
+};
+
+// Predicted nanoseconds per frame, fitted to tablecloth 16k, waving_sheet 8k, passing_spheres 5k and
+// expanding_sphere 5k at l = 1, 3, 10, 30 (Zen 5, float): only their order counts.
+
+double refit_cost(const Seen& seen) {
+  return 0.27 * seen.reads + 28 * seen.candidates;
+}
+
+/// One search serves as many frames as a leaf takes to move by a part of its size. Where bodies deform, more
+/// pairs come near in those frames than a query takes to find.
+double drift_cost(const Seen& seen) {
+  const double watching = 0.1 * seen.reads;
+  if (seen.candidates == 0) return seen.step < 0.1 ? 0.5 * watching : 1.2 * refit_cost(seen);
+  if (seen.spread > 0.1) return 1.2 * refit_cost(seen);
+  const double frames = seen.step > 0 ? std::min(0.2 / seen.step, 24.0) : 24;
+  if (frames < 3) return 1.2 * refit_cost(seen);
+  const double search = 0.35 * seen.reads + 45 * seen.candidates;
+  return watching + search / frames + 15 * seen.candidates;
+}
+
+/// One join serves a segment; what lies between its ends costs the more, the further vertices move there.
+/// What moves as a whole passes by others; what deforms is held where it touches them.
+double join_cost(const Seen& seen) {
+  const double l = seen.frames_per_segment, moves = seen.step * l;
+  if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
+  return refit_cost(seen) * (8 / (l + 4) * (1 + 0.3 * moves) + (0.7 - 0.6 * seen.spread) * moves);
+}
+
+/// A strategy to choose, the parameters that differ from its defaults, and what it would cost. To offer
+/// another one, add a line: any registered strategy that follows plan changes will do.
+struct Candidate {
+  const char* id;
+  std::map<std::string, std::string> params;
+  double (*cost)(const Seen&);
+};
+const std::vector<Candidate>& candidates() {
+  static const std::vector<Candidate> list{
+      {"bottom_up", {}, &refit_cost},  // first: it answers until something is known
+      {"drift_boxes", {}, &drift_cost},
+      {"interval_join", {}, &join_cost},
+  };
+  return list;
+}
+
+template <class S, class Count>
+class Auto final : public Strategy<S> {
+ public:
+  static constexpr Foresight foresight = Foresight::next_keyframe;
+
+  Auto(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params& params)
+      : Strategy<S>(scene, motion), motion_(motion), gain_(params.number("gain")) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) measure(topologies[body], body);
+    constexpr auto policy = Count::enabled ? CountingPolicy::counting : CountingPolicy::silent;
+    for (const Candidate& candidate : candidates()) {
+      const auto found = std::find_if(registry().begin(), registry().end(), [&](const StrategyEntry& entry) {
+        return entry.info.id == candidate.id;
+      });
+      if (found == registry().end() || !found->info.can.plan_changes) continue;
+      const Params own(found->info.id, found->info.parameters, candidate.params);
+      runners_.push_back({&candidate, found->info.positions == PositionUse::all,
+                          NestedStrategies<S>::create(*found, scene, motion, topologies, own, policy)});
+    }
+    if (runners_.empty()) throw ConfigError("auto has nothing to choose from");
+  }
+
+  void reset(double t) override {
+    this->start_at(t);
+    for (Runner& runner : runners_) {
+      runner.strategy->reset(t);
+      runner.fresh = true;
+      runner.frames = 0;
+    }
+    retired_ = {};
+    active_ = 0;
+    frame_ = chosen_at_ = 0;
+    step_ = 0;
+    segment_end_ = t;
+    changes_ = chosen_for_contact_ = false;
+    changed_.clear();
+    body_changed_.assign(this->scene_.body_count(), 0);
+    seen_ = {};
+    for (const double reads : reads_) seen_.reads += reads;
+  }
+
+  void advance(double t) override {
+    const double before = this->time();
+    this->move_to(t);
+    ++frame_;
+    seen_.changes_per_frame += ((changes_ ? 1.0 : 0.0) - seen_.changes_per_frame) / std::min(frame_, 16);
+    changes_ = false;
+    if (t > before) step_ = t - before;
+    const std::size_t last = active_;
+    const int stayed = frame_ - chosen_at_;
+    const bool due = frame_ == 1 || stayed >= (t >= segment_end_ ? shortest_stay : longest_stay) ||
+                     (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
+                     (seen_.candidates > 0) != chosen_for_contact_;
+    if (step_ > 0 && due) choose(t);
+    Runner& runner = runners_[active_];
+    if (runner.all_positions) fetch_all();
+    if (active_ == last || runner.fresh) {
+      runner.strategy->advance(t);
+    } else {
+      add(retired_, runner.strategy->counters());
+      fetch_all();
+      runner.strategy->reset(t);
+      // It knows the plans as they are, but not which bodies are at rest no more.
+      if (!changed_.empty()) runner.strategy->flight_plans_changed(t, changed_);
+    }
+    for (Runner& other : runners_) other.fresh = false;
+    ++runner.frames;
+  }
+
+  QueryStatus candidates_at(double t, PairBuffer& out, const Budget& budget) override {
+    const std::size_t before = out.size();
+    const QueryStatus status = runners_[active_].strategy->candidates_at(t, out, budget);
+    // Other strategies leave out what they know to be apart: then the last count stays the best there is.
+    if (runners_[active_].all_positions) seen_.candidates = double(out.size() - before);
+    return status;
+  }
+
+  void confirm(double t, PairBuffer& pairs) override { runners_[active_].strategy->confirm(t, pairs); }
+
+  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
+    this->stand_at(t);
+    for (const PlanChange<S>& change : changes) {
+      if (body_changed_[change.body] != 0) continue;
+      body_changed_[change.body] = 1;
+      changed_.push_back(change);
+    }
+    runners_[active_].strategy->flight_plans_changed(t, changes);
+    for (std::size_t i = 0; i < runners_.size(); ++i)
+      if (i != active_) runners_[i].fresh = false;
+    changes_ = true;
+  }
+
+  bool wants_all_positions() const override { return runners_[active_].all_positions; }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    return runners_[active_].strategy->audit_view(body);
+  }
+
+  std::string choice() const override {
+    std::string text;
+    for (const Runner& runner : runners_)
+      if (runner.frames > 0)
+        text += (text.empty() ? "" : ", ") + std::string(runner.candidate->id) + " for " +
+                std::to_string(runner.frames) + (runner.frames == 1 ? " frame" : " frames");
+    char last[160];
+    std::snprintf(
+        last, sizeof last,
+        " (last seen: %.3g frames per segment, steps of %.2g leaves, %.0f candidates, plans changed "
+        "at %.2g of frames)",
+        seen_.frames_per_segment, seen_.step, seen_.candidates, seen_.changes_per_frame);
+    return text.empty() ? text : text + last;
+  }
+
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const Runner& runner : runners_) total += runner.strategy->bytes();
+    return total;
+  }
+
+ protected:
+  Counters counted() const override {
+    Counters table = retired_;
+    for (const Runner& runner : runners_) add(table, runner.strategy->counters());
+    return table;
+  }
+
+ private:
+  struct Runner {
+    const Candidate* candidate;
+    bool all_positions;
+    std::unique_ptr<Strategy<S>> strategy;
+    bool fresh = false;  ///< as `reset` left it
+    int frames = 0;      ///< that it answered
+  };
+  /// Frames after which the choice is thought over within one segment, and if there is a new one.
+  static constexpr int longest_stay = 64, shortest_stay = 8;
+  static constexpr std::uint32_t samples = 16;
+
+  static void add(Counters& sum, const Counters& other) {
+    for (const Counter peak : {Counter::list_peak, Counter::queue_peak}) {
+      const std::uint64_t most = std::max(sum[peak], other[peak]);
+      sum[peak] = most - other[peak];
+    }
+    for (std::size_t c = 0; c < sum.values.size(); ++c) sum.values[c] += other.values[c];
+  }
+
+  /// Of a body's hierarchy: the mean side of leaves' boxes at present, and the vertices in its leaves.
+  void measure(const Topology& topology, std::uint32_t body) {
+    const Primitives& primitives = this->scene_.primitives(body);
+    double sum = 0, leaves = 0, reads = 0;
+    std::vector<std::uint32_t> unique;
+    for (const TopologyNode& node : topology.nodes) {
+      if (!node.is_leaf()) continue;
+      Box<S> box;
+      unique.clear();
+      for (std::uint32_t k = node.first(); k < node.first() + node.count(); ++k)
+        for (const std::uint32_t v : primitives[topology.primitives[k]]) {
+          box.extend(motion_.position(body, v));
+          unique.push_back(v);
+        }
+      std::sort(unique.begin(), unique.end());
+      reads += double(std::unique(unique.begin(), unique.end()) - unique.begin());
+      for (int axis = 0; axis < 3; ++axis) sum += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
+      ++leaves;
+    }
+    leaf_size_.push_back(leaves == 0 ? 0 : sum / leaves);
+    reads_.push_back(this->scene_.moving(body) ? reads : 0);
+  }
+
+  void fetch_all() {
+    for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) this->sampled_.fetch_all(body);
+  }
+
+  /// Looks at the plans, and takes what is predicted to be faster by `gain_` at least than what is in use.
+  void choose(double t) {
+    chosen_at_ = frame_;
+    chosen_for_contact_ = seen_.candidates > 0;
+    double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
+    double largest = 0, spread = 0;
+    for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
+      if (seen_.changes_per_frame == 0) {  // else it takes long to find out, and nobody can rely on it
+        begin = std::max(begin, motion_.lines_begin(body));
+        end = std::min(end, motion_.lines_end(body));
+      }
+      if (leaf_size_[body] > 0) largest = std::max(largest, way(body, spread) / leaf_size_[body]);
+    }
+    segment_end_ = end > t ? end : t;
+    const bool known =
+        begin > -std::numeric_limits<double>::infinity() && end < std::numeric_limits<double>::infinity();
+    if (known)
+      seen_.frames_per_segment = std::max(1.0, (end - begin) / step_);
+    else if (frame_ == 1 || seen_.changes_per_frame > 0)
+      seen_.frames_per_segment = std::numeric_limits<double>::infinity();
+    seen_.step = largest;
+    seen_.spread = spread;
+    std::size_t best = active_;
+    double least = runners_[active_].candidate->cost(seen_);
+    for (std::size_t i = 0; i < runners_.size(); ++i) {
+      const double cost = runners_[i].candidate->cost(seen_);
+      if (cost < least && cost * gain_ < runners_[active_].candidate->cost(seen_)) {
+        least = cost;
+        best = i;
+      }
+    }
+    active_ = best;
+  }
+
+  /// The mean way of a body's vertices in one frame, from some of them, as they move now; and how much less
+  /// of it they have in common, as a share, if that is more than `spread`.
+  double way(std::uint32_t body, double& spread) const {
+    const std::uint32_t count = this->scene_.vertex_count(body);
+    if (count == 0 || (!this->scene_.moving(body) && seen_.changes_per_frame == 0)) return 0;
+    const std::uint32_t taken = std::min(samples, count);
+    double sum = 0, together[3] = {};
+    for (std::uint32_t i = 0; i < taken; ++i) {
+      const auto vertex = std::uint32_t(std::uint64_t(i) * count / taken);
+      double square = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        const Piece<S> piece = motion_.piece(body, vertex, axis);
+        const double speed = piece.kind == PieceKind::ray
+                                 ? double(piece.x1)
+                                 : (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
+        square += speed * speed;
+        together[axis] += speed;
+      }
+      sum += std::sqrt(square);
+    }
+    const double common =
+        std::sqrt(together[0] * together[0] + together[1] * together[1] + together[2] * together[2]);
+    if (sum > 0) spread = std::max(spread, 1 - common / sum);
+    return sum / taken * step_;
+  }
+
+  SegmentMotion<S> motion_;
+  double gain_;
+  std::vector<Runner> runners_;
+  std::vector<double> leaf_size_, reads_;  ///< by body
+  Counters retired_;                       ///< of what was counted before an instance started anew
+  std::size_t active_ = 0;
+  int frame_ = 0, chosen_at_ = 0;
+  double step_ = 0, segment_end_ = 0;   ///< seconds
+  bool chosen_for_contact_ = false;     ///< there were candidates when the choice was made
+  bool changes_ = false;                ///< of plans, since the last frame
+  std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first one of each body
+  std::vector<std::uint8_t> body_changed_;
+  Seen seen_;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(auto) {
+  using namespace kbvh;
+  return {make_entry<Auto>({
+      .id = "auto",
+      .title = "automatic choice",
+      .family = "auto",
+      .citation = "kbvh",
+      .tightness = Tightness::conservative,
+      .positions = PositionUse::varying,
+      .can = {.plan_changes = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+      .parameters =
+          {{"gain",
+            "1.1",
+            {},
+            "another strategy is taken if it is predicted to be so many times faster than the one in use",
+            1}},
+  })};
+}

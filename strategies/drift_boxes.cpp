@@ -1,0 +1,579 @@
+// Boxes that drift: positions come frame by frame, with no foresight, and all that is known of a body is how
+// far its vertices have moved, as an interval for each axis, since the frame in which its boxes were made.
+// Old boxes larger by those intervals hold every vertex; two bodies can only meet where the intervals let
+// their old boxes touch. So one traversal, over boxes swept over the motion of some frames, finds the
+// candidates of all these frames, in the order in which the motion lets them meet, and a frame takes the
+// beginning of that list (core/hierarchy/near_pairs.hpp). Bodies that cannot meet any other get one box a
+// frame and nothing below it.
+//
+// How far vertices have moved is found by reading each of them twice (then and now, in the order of memory),
+// or, in the variant with a bound on steps, by nothing but an addition for each body.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/geometry/predicates.hpp"
+#include "core/hierarchy/drift_model.hpp"
+#include "core/hierarchy/near_pairs.hpp"
+#include "core/kernels/bounds.hpp"
+#include "core/registry.hpp"
+
+namespace kbvh {
+namespace {
+
+/// What is looked at of a body at a frame.
+enum class Watch : std::uint8_t {
+  nothing,  ///< it rests
+  box,      ///< it is too far from all others: its own box
+  drift,    ///< how far its vertices moved since its boxes were made
+};
+
+double below(double value) {
+  return std::nextafter(value, -std::numeric_limits<double>::infinity());
+}
+double above(double value) {
+  return std::nextafter(value, std::numeric_limits<double>::infinity());
+}
+
+/// One body since its boxes were made, "then". Sides are lower x, y, z, upper x, y, z.
+template <class S>
+struct DriftBody {
+  AlignedArray<S> before;                      // positions then, of those whose drift is read
+  double low[3] = {}, high[3] = {};            // no vertex moved by less, or more, since then
+  double rate_low[3] = {}, rate_high[3] = {};  // the same in one frame, as was seen last
+  Box<double> box, box_then;                   // hold every vertex now, and then
+  S margin[6] = {};                            // by which its boxes are larger than the vertices were then
+  double slack = 0;                            // more than all roundings of a comparison of boxes
+  double moved = 0, rounding = 0;              // the bound on steps: the way of any vertex since then
+  double leaf_size = 0;                        // mean side of a leaf's box
+  Watch watch = Watch::nothing;
+  bool near = false;     // to another body: it takes part in searches
+  bool changed = false;  // plans of its own: it is no body at rest any more
+  bool widened = false;  // boxes hold the margin already (bodies at rest)
+};
+
+template <class S, class Count, class Motion>
+class DriftStrategy : public Strategy<S> {
+  using Body = DriftBody<S>;
+  static constexpr bool bounded = std::is_same_v<Motion, SteppedMotion<S>>;
+
+ public:
+  DriftStrategy(const SceneView<S>& scene, const Motion& motion, Topologies topologies, const Params& params)
+      : Strategy<S>(scene, motion),
+        motion_(motion),
+        kernels_(active_kernel_set()),
+        lists_(params.word("lists") == "never" ? Lists::never : Lists::tuned),
+        checks_(params.word("candidates") == "boxes"),
+        hierarchies_(scene.body_count()),
+        bodies_(scene.body_count()),
+        near_(scene.pairs().size()),
+        pair_is_near_(scene.pairs().size(), 0) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), kernels_);
+    for (const BodyPair& pair : scene.pairs())
+      if (!hierarchies_[pair.first].suits(hierarchies_[pair.second]))
+        throw std::invalid_argument("topologies of all bodies need one width and leaf size");
+  }
+
+  void reset(double t) override {
+    this->start_at(t);
+    model_ = {};
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+      Body& body = bodies_[index];
+      body.changed = body.widened = false;
+      body.near = true;
+      std::fill_n(body.rate_low, 3, 0.0);
+      std::fill_n(body.rate_high, 3, 0.0);
+      body.watch = may_move(index) ? Watch::drift : Watch::nothing;
+      make_boxes(index);
+      measure_leaves(index);
+      remember(index);
+    }
+    std::fill(pair_is_near_.begin(), pair_is_near_.end(), 1);
+    frames_ = 0;
+    period_ = 0;
+    plain_left_ = 1;
+    search_due_ = plans_changed_ = false;
+    count_.table = {};
+    first_fetch_ = this->sampled_.fetched();
+  }
+
+  void advance(double t) override {
+    const double last = this->time();
+    this->move_to(t);
+    ++frames_;
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) observe(index, last, t);
+    const bool listed = period_ > 0;
+    if (listed && !search_due_ && !plans_changed_ && covered()) return;
+    plans_changed_ = false;
+    if (!listed && --plain_left_ > 0) {
+      // The frame before lists are tried again is remembered, so that there is a motion to judge by.
+      for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+        if (!bodies_[index].near || bodies_[index].watch == Watch::nothing) continue;
+        make_boxes(index);
+        if (plain_left_ == 1) remember(index);
+      }
+      if (!meets_newly()) return;
+    }
+    begin_period();
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
+    std::uint64_t tests = 0;
+    const std::size_t before = out.size();
+    if (search_due_) search(tests);
+    for (std::size_t i = 0; i < near_.size(); ++i) {
+      if (pair_is_near_[i] == 0) continue;
+      const BodyPair pair = this->scene_.pairs()[i];
+      if (period_ > 0)
+        tests += read(i, pair, out);
+      else
+        query_.run(hierarchies_[pair.first], pair.first, hierarchies_[pair.second], pair.second, this->scene_,
+                   this->sampled_, {}, out, tests);
+    }
+    if (period_ == 0) model_.queried(double(tests), double(out.size() - before));
+    count_.add(Counter::box_tests, tests);
+    return {};
+  }
+
+  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
+    this->stand_at(t);
+    for (const PlanChange<S>& change : changes) {
+      Body& body = bodies_[change.body];
+      body.changed = true;
+      if (body.watch != Watch::nothing || hierarchies_[change.body].empty()) continue;
+      body.watch = bounded ? Watch::drift : Watch::box;  // at rest up to now
+      body.widened = false;
+      plans_changed_ = true;
+    }
+    // The way so far stays bounded; from the stored position on, rounding starts over.
+    if constexpr (bounded)
+      for (Body& body : bodies_)
+        if (body.changed) body.moved = above(body.moved + body.rounding);
+  }
+
+  std::optional<AuditView> audit_view(std::uint32_t index) const override {
+    const Body& body = bodies_[index];
+    const auto& hierarchy = hierarchies_[index];
+    AuditView view{hierarchy.topology(), {}, {}};
+    const bool old = period_ > 0 && body.watch == Watch::drift;
+    for (std::uint32_t node = 0; node < view.topology.size(); ++node) {
+      Box<double> box = to_double(hierarchy.box(node));
+      for (int axis = 0; old && axis < 3; ++axis) {
+        box.lower[axis] = below(box.lower[axis] + body.low[axis]);
+        box.upper[axis] = above(box.upper[axis] + body.high[axis]);
+      }
+      view.boxes.push_back(box);
+    }
+    if (body.near || body.watch == Watch::nothing || view.boxes.empty()) return view;
+    view.stale.assign(view.boxes.size(), 1);
+    view.boxes[0] = body.box;
+    view.stale[0] = 0;
+    return view;
+  }
+
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
+    for (const auto& body : bodies_) total += body.before.capacity() * sizeof(S);
+    for (const auto& near : near_) total += near.bytes();
+    return total;
+  }
+
+ protected:
+  Counters counted() const override {
+    Counters table = count_.table;
+    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
+    return table;
+  }
+
+ private:
+  enum class Lists : std::uint8_t { tuned, never };
+  static constexpr double eps = std::numeric_limits<S>::epsilon();
+
+  bool may_move(std::uint32_t index) const {
+    return (this->scene_.moving(index) || bodies_[index].changed) && !hierarchies_[index].empty();
+  }
+
+  // ---- What a frame looks at ------------------------------------------------------------------------------
+
+  void observe(std::uint32_t index, double last, double t) {
+    Body& body = bodies_[index];
+    const std::uint32_t nodes = hierarchies_[index].topology().size();
+    if (body.watch == Watch::nothing) {
+      count_.add(Counter::bodies_skipped);
+      count_.add(Counter::nodes_skipped, nodes);
+      return;
+    }
+    if constexpr (bounded) {
+      const double way = motion_.displacement_bound(index, last, t);
+      if (way > 0) {
+        body.moved = above(body.moved + way);
+        // Both positions are the plan's, rounded.
+        const double most = above(body.moved + 2 * body.rounding + 2 * (eps * body.moved));
+        drifted(body, most, way);
+      }
+      count_.add(Counter::nodes_skipped, nodes);
+      if (!body.near) count_.add(Counter::bodies_skipped);
+    } else if (period_ > 0 || plain_left_ <= 1 || !body.near) {
+      if (body.watch == Watch::box) {
+        const Box<double> before = body.box;
+        take_box(index);
+        for (int axis = 0; axis < 3; ++axis) {
+          const double lower = body.box.lower[axis] - before.lower[axis],
+                       upper = body.box.upper[axis] - before.upper[axis];
+          body.rate_low[axis] = std::min(lower, upper);
+          body.rate_high[axis] = std::max(lower, upper);
+        }
+        count_.add(Counter::bodies_skipped);
+      } else {
+        read_drift(index);
+      }
+      count_.add(Counter::nodes_skipped, nodes);
+    }
+  }
+
+  /// The box of all vertices now.
+  void take_box(std::uint32_t index) {
+    this->sampled_.fetch_all(index);
+    const VertexRun all{0, this->scene_.vertex_count(index)};
+    S box[8];
+    bounds_kernels<S>(kernels_).of_runs(&all, 1, this->sampled_.positions(index), box);
+    for (int axis = 0; axis < 3; ++axis) {
+      bodies_[index].box.lower[axis] = double(box[axis]);
+      bodies_[index].box.upper[axis] = double(box[axis + 4]);
+    }
+    count_.add(Counter::vertex_reads, all.count);
+  }
+
+  void read_drift(std::uint32_t index) {
+    Body& body = bodies_[index];
+    const std::uint32_t count = this->scene_.vertex_count(index);
+    S interval[8];
+    near_kernels<S>(kernels_).drift(this->sampled_.positions(index), body.before.data(), count, interval);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double low = double(interval[axis]), high = double(interval[axis + 4]);
+      body.rate_low[axis] = low / frames_;
+      body.rate_high[axis] = high / frames_;
+      body.low[axis] = low - std::abs(low) * eps;
+      body.high[axis] = high + std::abs(high) * eps;
+    }
+    put_box(body);
+    count_.add(Counter::vertex_reads, 2 * std::uint64_t(count));
+  }
+
+  static void drifted(Body& body, double most, double way) {
+    for (int axis = 0; axis < 3; ++axis) {
+      body.low[axis] = -most;
+      body.high[axis] = most;
+      body.rate_low[axis] = -way;
+      body.rate_high[axis] = way;
+    }
+    put_box(body);
+  }
+  static void put_box(Body& body) {
+    for (int axis = 0; axis < 3; ++axis) {
+      body.box.lower[axis] = below(body.box_then.lower[axis] + body.low[axis]);
+      body.box.upper[axis] = above(body.box_then.upper[axis] + body.high[axis]);
+    }
+  }
+
+  // ---- What a period of frames has in common --------------------------------------------------------------
+
+  /// By how much side k of the gap between two bodies (near_pairs.hpp) may have closed, and how much it may.
+  static double closing(const Body& a, const Body& b, std::size_t k) {
+    return k < 3 ? a.high[k] - b.low[k] : b.high[k - 3] - a.low[k - 3];
+  }
+  static S reach(const Body& a, const Body& b, std::size_t k) {
+    return k < 3 ? a.margin[k + 3] + b.margin[k] : b.margin[k] + a.margin[k - 3];
+  }
+  /// Which fraction of the reach the frame has used, quotients rounded up.
+  double used(const BodyPair& pair) const {
+    const Body &a = bodies_[pair.first], &b = bodies_[pair.second];
+    double most = 0;
+    for (std::size_t k = 0; k < 6; ++k)
+      most = std::max(most, closing(a, b, k) / double(reach(a, b, k)) * (1 + 0x1p-16));
+    return std::min(most, 1.0);
+  }
+  bool covered() const {
+    for (std::size_t i = 0; i < near_.size(); ++i) {
+      const Body &a = bodies_[this->scene_.pairs()[i].first], &b = bodies_[this->scene_.pairs()[i].second];
+      if (pair_is_near_[i] == 0) {
+        if (overlap(a.box, b.box)) return false;
+        continue;
+      }
+      for (std::size_t k = 0; k < 6; ++k)
+        if (!(closing(a, b, k) + a.slack + b.slack <= double(reach(a, b, k)) * (1 - 0x1p-16))) return false;
+    }
+    return true;
+  }
+  bool meets_newly() const {
+    for (std::size_t i = 0; i < near_.size(); ++i) {
+      const BodyPair pair = this->scene_.pairs()[i];
+      if (pair_is_near_[i] == 0 && overlap(bodies_[pair.first].box, bodies_[pair.second].box)) return true;
+    }
+    return false;
+  }
+
+  void begin_period() {
+    if (lists_ == Lists::tuned && (period_ > 0 || plain_left_ <= 0)) {
+      period_ = model_.period(step());
+      plain_left_ = period_ > 0 ? 0 : model_.rest();
+    } else if (period_ == 0) {
+      plain_left_ = std::max(plain_left_, 1);
+    }
+    if (lists_ == Lists::never) plain_left_ = 1 << 20;
+    for (const Body& body : bodies_)
+      for (int axis = 0; axis < 3; ++axis)
+        if (!(std::abs(body.rate_low[axis]) + std::abs(body.rate_high[axis]) <
+              double(admissible_magnitude<S>) / 1024))
+          period_ = 0;
+    if (period_ == 0) plain_left_ = std::max(plain_left_, 1);
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) set_margin(index);
+    find_near();
+    if (bounded && take_late_boxes()) find_near();
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+      Body& body = bodies_[index];
+      if (!may_move(index)) {
+        if (period_ > 0 && body.near && !body.widened) widen(index);
+        continue;
+      }
+      if (!body.near) {
+        body.watch = bounded ? Watch::drift : Watch::box;
+        continue;
+      }
+      body.watch = Watch::drift;
+      make_boxes(index);
+      if (period_ == 0 && plain_left_ > 1) continue;
+      remember(index);
+      if (period_ > 0) widen(index);
+    }
+    frames_ = 0;
+    search_due_ = period_ > 0;
+  }
+
+  /// Of bodies that are near only if they moved as far as they can: where they are. Were there any?
+  bool take_late_boxes() {
+    bool any = false;
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+      Body& body = bodies_[index];
+      if (!body.near || !(body.moved > 0)) continue;
+      take_box(index);
+      body.box_then = body.box;
+      stand(body);
+      any = true;
+    }
+    return any;
+  }
+
+  /// The mean way that a side of the gap between two bodies closes in a frame, against the sides of two
+  /// leaves; the largest of all pairs.
+  double step() const {
+    double largest = 0;
+    for (const BodyPair& pair : this->scene_.pairs()) {
+      const Body &a = bodies_[pair.first], &b = bodies_[pair.second];
+      double sum = 0;
+      for (int axis = 0; axis < 3; ++axis)
+        sum += std::max(0.0, a.rate_high[axis]) + std::max(0.0, -a.rate_low[axis]) +
+               std::max(0.0, b.rate_high[axis]) + std::max(0.0, -b.rate_low[axis]);
+      const double size = a.leaf_size + b.leaf_size;
+      if (size > 0) largest = std::max(largest, sum / 6 / size);
+    }
+    return largest;
+  }
+
+  void set_margin(std::uint32_t index) {
+    Body& body = bodies_[index];
+    if (body.widened) return;  // a body at rest
+    double largest = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      largest = std::max({largest, std::abs(body.box.lower[axis]), std::abs(body.box.upper[axis])});
+    body.slack = 8 * eps * largest;
+    const double least = std::max(2 * body.slack, 4 * double(std::numeric_limits<S>::min()));
+    const double frames = 1.0625 * period_, moves = may_move(index) ? frames : 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      body.margin[axis] = S(least + moves * std::max(0.0, -body.rate_low[axis]));
+      body.margin[axis + 3] = S(least + moves * std::max(0.0, body.rate_high[axis]));
+    }
+  }
+
+  /// Bodies that may meet while they keep to their margins.
+  void find_near() {
+    for (Body& body : bodies_) body.near = false;
+    const auto swept = [](const Body& body) {
+      Box<double> box = body.box;
+      for (int axis = 0; axis < 3; ++axis) {
+        box.lower[axis] -= 2 * double(body.margin[axis]);
+        box.upper[axis] += 2 * double(body.margin[axis + 3]);
+      }
+      return box;
+    };
+    for (std::size_t i = 0; i < near_.size(); ++i) {
+      const BodyPair pair = this->scene_.pairs()[i];
+      const bool near = !hierarchies_[pair.first].empty() && !hierarchies_[pair.second].empty() &&
+                        overlap(swept(bodies_[pair.first]), swept(bodies_[pair.second]));
+      pair_is_near_[i] = near ? 1 : 0;
+      if (near) bodies_[pair.first].near = bodies_[pair.second].near = true;
+    }
+  }
+
+  void make_boxes(std::uint32_t index) {
+    Body& body = bodies_[index];
+    auto& hierarchy = hierarchies_[index];
+    if (hierarchy.empty()) return;
+    this->sampled_.fetch_all(index);
+    hierarchy.positions_changed();
+    hierarchy.refit(this->sampled_.positions(index));
+    body.box = body.box_then = to_double(hierarchy.box(0));
+    stand(body);
+    const std::uint32_t nodes = hierarchy.topology().size();
+    count_.add(Counter::nodes_visited, nodes);
+    count_.add(Counter::values_written, std::uint64_t(6) * nodes);
+    count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
+  }
+  /// Then is now.
+  void stand(Body& body) {
+    std::fill_n(body.low, 3, 0.0);
+    std::fill_n(body.high, 3, 0.0);
+    body.moved = 0;
+    double largest = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      largest = std::max({largest, std::abs(body.box.lower[axis]), std::abs(body.box.upper[axis])});
+    body.rounding = above(largest * eps / 2) + double(std::numeric_limits<S>::denorm_min());
+  }
+  void remember(std::uint32_t index) {
+    if (bounded || !may_move(index)) return;
+    const S* positions = this->sampled_.positions(index);
+    bodies_[index].before.assign(positions, positions + std::size_t(3) * this->scene_.vertex_count(index));
+    frames_ = 0;
+  }
+  void widen(std::uint32_t index) {
+    auto& hierarchy = hierarchies_[index];
+    near_kernels<S>(kernels_).widen(hierarchy.topology().width)(hierarchy.arrays(), hierarchy.node_count(),
+                                                                bodies_[index].margin);
+    bodies_[index].widened = !may_move(index);
+  }
+
+  /// The candidates of two bodies from their list; returns the box tests made.
+  std::uint64_t read(std::size_t i, const BodyPair& pair, PairBuffer& out) {
+    // At the frame of the search the list begins with what overlaps, exactly.
+    const double fraction = frames_ == 0 ? 0 : used(pair);
+    if (!checks_ || frames_ == 0) {
+      near_[i].read(fraction, out);
+      return 0;
+    }
+    return near_[i].read_meeting(fraction, now(pair.first), now(pair.second), out);
+  }
+  PrimitivesNow<S> now(std::uint32_t index) const {
+    const Primitives& primitives = this->scene_.primitives(index);
+    return {primitives.offsets.data(), primitives.vertices.data(), this->sampled_.positions(index)};
+  }
+
+  void search(std::uint64_t& tests) {
+    std::uint64_t made = 0;
+    DriftCounts counts;
+    for (std::size_t i = 0; i < near_.size(); ++i) {
+      near_[i].clear();
+      if (pair_is_near_[i] == 0) continue;
+      const BodyPair pair = this->scene_.pairs()[i];
+      const Body &a = bodies_[pair.first], &b = bodies_[pair.second];
+      S within[6];
+      double mean = 0;
+      for (std::size_t k = 0; k < 6; ++k) {
+        within[k] = reach(a, b, k);
+        mean += double(within[k]) / 6;
+      }
+      near_[i].build(side(pair.first), side(pair.second), pair.first, pair.second, within, made);
+      counts.overlapping += double(near_[i].overlapping());
+      counts.listed += double(near_[i].count());
+      const double size = a.leaf_size + b.leaf_size;
+      if (size > 0) counts.reach = std::max(counts.reach, mean / size);
+    }
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+      if (!bodies_[index].near || !may_move(index)) continue;
+      counts.reads += double(hierarchies_[index].leaf_vertex_count());
+      counts.vertices += double(this->scene_.vertex_count(index));
+    }
+    counts.tests = double(made);
+    model_.searched(counts, period_, bounded ? DriftModel::Watching::free : DriftModel::Watching::reads);
+    tests += made;
+    search_due_ = false;
+  }
+  NearSide<S> side(std::uint32_t index) {
+    return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin, !may_move(index)};
+  }
+
+  /// Mean side of the leaves' boxes.
+  void measure_leaves(std::uint32_t index) {
+    const auto& hierarchy = hierarchies_[index];
+    double sum = 0, leaves = 0;
+    for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
+      if (!hierarchy.topology().nodes[node].is_leaf()) continue;
+      const Box<S> box = hierarchy.box(node);
+      for (int axis = 0; axis < 3; ++axis) sum += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
+      ++leaves;
+    }
+    bodies_[index].leaf_size = leaves == 0 ? 0 : sum / leaves;
+  }
+
+  Motion motion_;
+  KernelSet kernels_;
+  Lists lists_;
+  bool checks_;
+  std::vector<WideHierarchy<S>> hierarchies_;
+  std::vector<Body> bodies_;
+  std::vector<NearPairs<S>> near_;  ///< one for each pair of bodies
+  std::vector<std::uint8_t> pair_is_near_;
+  WideQuery<S> query_;
+  DriftModel model_;
+  int frames_ = 0;      ///< since positions were remembered
+  int period_ = 0;      ///< frames that one search is to last; 0: refits and queries at every frame
+  int plain_left_ = 0;  ///< such frames, until lists are tried again
+  bool search_due_ = false, plans_changed_ = false;
+  Count count_;
+  std::uint64_t first_fetch_ = 0;
+};
+
+template <class S, class Count>
+class DriftBoxes final : public DriftStrategy<S, Count, SampledMotion<S>> {
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  using DriftStrategy<S, Count, SampledMotion<S>>::DriftStrategy;
+};
+
+template <class S, class Count>
+class DriftBoxesBounded final : public DriftStrategy<S, Count, SteppedMotion<S>> {
+ public:
+  static constexpr Foresight foresight = Foresight::step_bound;
+  using DriftStrategy<S, Count, SteppedMotion<S>>::DriftStrategy;
+};
+
+Info drift_info() {
+  return {
+      .family = "lazy",
+      .citation = "kbvh; lists of neighbours after Verlet 1967",
+      .tightness = Tightness::conservative,
+      .can = {.plan_changes = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+      .parameters = {{"lists",
+                      "tuned",
+                      {"tuned", "never"},
+                      "one search for as many frames as counts of work say, or one at every frame"},
+                     {"candidates",
+                      "boxes",
+                      {"boxes", "listed"},
+                      "listed pairs whose boxes overlap at the frame, as of any query; or all that may"}}};
+}
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(drift_boxes) {
+  using namespace kbvh;
+  Info read = drift_info(), bounded = drift_info();
+  read.id = "drift_boxes";
+  read.title = "drifting boxes";
+  bounded.id = "drift_boxes_bounded";
+  bounded.title = "drifting boxes, bounded steps";
+  return {make_entry<DriftBoxes>(std::move(read)), make_entry<DriftBoxesBounded>(std::move(bounded))};
+}

@@ -1,0 +1,72 @@
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/session.hpp"
+
+namespace kbvh::test {
+
+/// A grid of 2 n^2 triangles with its lower left corner at (x, y, 0), and keyframes at 0, 1, ... that move
+/// vertex (i, j) by step(i) along z from one to the next.
+template <class S, class Step>
+Body<S> grid(std::uint32_t n, double x, double y, std::uint32_t keyframes, Step&& step) {
+  Body<S> body;
+  std::vector<double> times;
+  std::vector<S> positions;
+  for (std::uint32_t k = 0; k < keyframes; ++k) {
+    times.push_back(k);
+    for (std::uint32_t j = 0; j <= n; ++j)
+      for (std::uint32_t i = 0; i <= n; ++i)
+        for (const double c : {x + i / double(n), y + j / double(n), k * step(i)}) positions.push_back(S(c));
+  }
+  for (std::uint32_t j = 0; j < n; ++j)
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::uint32_t a = j * (n + 1) + i, b = a + n + 1;
+      body.primitives.add(std::vector<std::uint32_t>{a, a + 1, b});
+      body.primitives.add(std::vector<std::uint32_t>{b, a + 1, b + 1});
+    }
+  body.plans = FlightPlans<S>((n + 1) * (n + 1), std::move(times), std::move(positions));
+  return body;
+}
+
+/// A grid that moves and one at rest, `apart` from it along x.
+template <class S, class Step>
+Scene<S> grids(std::uint32_t n, double apart, Step&& step) {
+  Scene<S> scene;
+  scene.bodies.push_back(grid<S>(n, 0, 0, 3, step));
+  scene.bodies.push_back(grid<S>(n, apart, 0.01, 1, [](std::uint32_t) { return 0.0; }));
+  scene.pairs = all_pairs(scene.bodies);
+  return scene;
+}
+
+/// Plays a clip, query included, and tells what each frame added to a counter.
+template <class S>
+struct Play {
+  Play(const Scene<S>& scene, const char* id, std::map<std::string, std::string> params)
+      : session(scene, {&find_strategy(id), std::move(params), find_strategy(id).info.topology.preferred},
+                CountingPolicy::counting) {
+    session.reset(0);
+    session.query(pairs, times);
+    last = session.strategy().counters();
+  }
+  Counters frame(double t) {
+    session.advance(t, times);
+    session.query(pairs, times);
+    const Counters now = session.strategy().counters();
+    Counters added;
+    for (std::size_t c = 0; c < added.values.size(); ++c) added.values[c] = now.values[c] - last.values[c];
+    last = now;
+    return added;
+  }
+  Session<S> session;
+  PairBuffer pairs;
+  PhaseTimes times;
+  Counters last;
+};
+
+/// Steps: all vertices move, or those on the left side only.
+inline constexpr auto lifted = [](std::uint32_t) { return 1.0; };
+inline constexpr auto left_side = [](std::uint32_t i) { return i == 0 ? 0.01 : 0.0; };
+
+}  // namespace kbvh::test
