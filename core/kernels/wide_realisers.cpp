@@ -25,6 +25,29 @@ constexpr std::size_t lanes_for(std::size_t many) {
   return lanes;
 }
 
+/// The coordinates at `lanes` places. Not by way of memory where that can be helped: a load of several
+/// numbers waits until all of them have been stored.
+template <class S, std::size_t lanes>
+[[gnu::always_inline]] inline Vector<S, lanes> gathered(const std::uint32_t* places, const S* positions) {
+#if defined(KBVH_KERNELS_avx2) || defined(KBVH_KERNELS_avx512)
+  if constexpr (sizeof(S) == 4 && lanes == 8)
+    return (Vector<S, lanes>)_mm256_i32gather_ps((const float*)positions,
+                                                 _mm256_loadu_si256((const __m256i*)places), 4);
+  else if constexpr (sizeof(S) == 8 && lanes == 4)
+    return (Vector<S, lanes>)_mm256_i32gather_pd((const double*)positions,
+                                                 _mm_loadu_si128((const __m128i*)places), 8);
+  else
+#endif
+  {
+    Vector<S, lanes> values;
+    if constexpr (lanes == 1)
+      values = positions[*places];
+    else
+      for (std::size_t i = 0; i < lanes; ++i) values[i] = positions[places[i]];
+    return values;
+  }
+}
+
 /// Bit i: the realiser's coordinate is not the bound, which lies in the rows as it is stored there.
 template <class S, std::uint32_t width>
 [[gnu::always_inline]] inline std::uint64_t lost_sides(const std::uint32_t* realisers, const S* positions,
@@ -32,11 +55,9 @@ template <class S, std::uint32_t width>
   constexpr std::size_t scalars = 6 * width;
   constexpr std::size_t lanes = lanes_for<S>(3 * width);
   using V = Vector<S, lanes>;
-  alignas(64) S values[scalars];
-  collect_some(realisers, positions, scalars, values);
   std::uint64_t bits = 0;
   for (std::size_t i = 0; i < scalars; i += lanes) {
-    V value = load_lanes<V>(values + i);
+    V value = gathered<S, lanes>(realisers + i, positions);
     if (i >= 3 * width) value = -value;
     const V bound = load_lanes<V>(rows + i);
     // A bound is stored so that less is further out. Empty lanes are infinite: nothing is larger.

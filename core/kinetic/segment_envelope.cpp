@@ -81,78 +81,165 @@ void SegmentEnvelope<S>::make(WideHierarchy<S>& hierarchy, const WideRealisers& 
   for (std::uint32_t end = hierarchy.node_count(); end > 0;) {
     const std::uint32_t begin = end > block ? end - block : 0;
     check(arrays, realisers.data(), p1, lost_.data(), begin, end);
-    for (std::uint32_t node = end; node-- > begin;)
-      if (lost_[node] != 0) walk_node(hierarchy, realisers, node);
+    walk_leaves(hierarchy, realisers, begin, end);
+    for (std::uint32_t node = end; node-- > begin;) walk_above(hierarchy, realisers, node);
     end = begin;
   }
   fill_buckets();
 }
 
+/// The active sides that are boxes of leaves, of a range of nodes. First the lines of all of them are looked
+/// up, then they are walked: so one waits for memory while others are computed.
 template <class S>
-void SegmentEnvelope<S>::walk_node(WideHierarchy<S>& hierarchy, const WideRealisers& realisers,
-                                   std::uint32_t index) {
+void SegmentEnvelope<S>::walk_leaves(WideHierarchy<S>& hierarchy, const WideRealisers& realisers,
+                                     std::uint32_t begin, std::uint32_t end) {
   const WideArrays<S> h = hierarchy.arrays();
-  const WideNode node = h.nodes[index];
   const auto scalars = std::uint32_t(lane_scalars(width_));
-  counts_.active_sides += std::uint64_t(std::popcount(lost_[index]));
-  for (std::uint64_t left = lost_[index]; left != 0; left &= left - 1) {
-    const auto bit = std::uint32_t(std::countr_zero(left));
-    const std::uint32_t row = bit / width_, lane = bit % width_, axis = row % 3, slot = index * scalars + bit;
-    const double sign = row < 3 ? -1.0 : 1.0;
-    const std::uint32_t place = realisers[slot];
-    const Line now{sign * double(p0_[place]), sign * double(p1_[place]), place};
-    lines_.clear();
-    const auto consider = [&](std::uint32_t other) {
-      const double end = sign * double(p1_[other]);
-      if (end > now.end) lines_.push_back({sign * double(p0_[other]), end, other});
-    };
-    if (lane < node.leaf_count) {
-      const std::uint32_t* list = h.vertices + node.list + list_place(lane, width_);
-      for (std::uint32_t i = 0; i < node.length; ++i) consider(list[i * width_] + axis);
-    } else {
-      const std::uint32_t child = node.first_child + lane - node.leaf_count, first = row * width_;
-      for (std::uint32_t i = 0; i < h.nodes[child].count; ++i) {
-        const std::uint32_t below = child * scalars + first + i;
-        consider(realisers[below]);
-        if ((lost_[child] >> (first + i) & 1) == 0) continue;
-        for (std::size_t s = first_store_[below]; s < made_.size() && made_[s].slot == below; ++s)
-          consider(made_[s].realiser);
+  std::uint64_t first_lanes = 0;  // lane 0 of every row
+  for (std::uint32_t row = 0; row < 6; ++row) first_lanes |= std::uint64_t(1) << (row * width_);
+  walks_.clear();
+  std::size_t total = 0;
+  for (std::uint32_t index = begin; index < end; ++index) {
+    if (lost_[index] == 0) continue;
+    counts_.active_sides += std::uint64_t(std::popcount(lost_[index]));
+    const WideNode node = h.nodes[index];
+    std::uint64_t left = lost_[index] & first_lanes * ((std::uint64_t(1) << node.leaf_count) - 1);
+    for (; left != 0; left &= left - 1) {
+      const auto bit = std::uint32_t(std::countr_zero(left));
+      const std::uint32_t row = bit / width_, axis = row % 3, slot = index * scalars + bit;
+      const std::uint32_t* list = h.vertices + node.list + list_place(bit % width_, width_);
+      Line* lines = room_for(total + node.length) + total;
+      const S sign = row < 3 ? S(-1) : S(1);
+      const std::uint32_t realiser = realisers[slot];
+      const S reached = sign * p1_[realiser];
+      // Which lines end further out nobody can predict: no branch. Lists are filled up with their last
+      // vertex.
+      std::uint32_t count = 0, last = realiser;
+      for (std::uint32_t i = 0; i < node.length; ++i) {
+        const std::uint32_t place = list[i * width_] + axis;
+        const S further = sign * p1_[place];
+        lines[count].end = further;
+        lines[count].place = place;
+        count += std::uint32_t(further > reached) & std::uint32_t(place != last);
+        last = place;
       }
+      for (std::uint32_t i = 0; i < count; ++i) __builtin_prefetch(p0_ + lines[i].place);
+      __builtin_prefetch(p0_ + realiser);
+      walks_.push_back({slot, realiser, count});
+      total += count;
     }
-    first_store_[slot] = std::uint32_t(made_.size());
-    walk(slot, now);
+  }
+  std::size_t first = 0;
+  for (const Walk& one : walks_) {
+    const S sign = is_lower(one.slot) ? S(-1) : S(1);
+    Line* lines = lines_.data() + first;
+    for (std::uint32_t i = 0; i < one.count; ++i) lines[i].begin = sign * p0_[lines[i].place];
+    walk(one.slot, {sign * p0_[one.realiser], sign * p1_[one.realiser], one.realiser}, lines, one.count);
+    first += one.count;
   }
 }
 
-/// From the line that is ahead at the begin to the one that is ahead at the end; `lines_` are those that end
+/// The active sides of one node that are boxes of nodes, of which the envelopes are there.
+template <class S>
+void SegmentEnvelope<S>::walk_above(WideHierarchy<S>& hierarchy, const WideRealisers& realisers,
+                                    std::uint32_t index) {
+  const WideArrays<S> h = hierarchy.arrays();
+  const WideNode node = h.nodes[index];
+  if (node.leaf_count == node.count) return;
+  const auto scalars = std::uint32_t(lane_scalars(width_));
+  for (std::uint64_t left = lost_[index]; left != 0; left &= left - 1) {
+    const auto bit = std::uint32_t(std::countr_zero(left));
+    const std::uint32_t row = bit / width_, lane = bit % width_, slot = index * scalars + bit;
+    if (lane < node.leaf_count) continue;
+    const S sign = row < 3 ? S(-1) : S(1);
+    const auto line_of = [&](std::uint32_t place) {
+      return Line{sign * p0_[place], sign * p1_[place], place};
+    };
+    const Line now = line_of(realisers[slot]);
+    const std::uint32_t child = node.first_child + lane - node.leaf_count, first = row * width_;
+    const std::uint32_t* below = realisers.data() + child * scalars + first;
+    const std::uint32_t children = h.nodes[child].count;
+    std::size_t count = 0;
+    Line* lines = room_for(width_);
+    for (std::uint32_t i = 0; i < children; ++i) {
+      lines[count] = line_of(below[i]);
+      count += lines[count].end > now.end ? 1 : 0;
+    }
+    std::uint64_t others = lost_[child] >> first & ((std::uint64_t(1) << width_) - 1);
+    for (; others != 0; others &= others - 1) {
+      const std::uint32_t under = child * scalars + first + std::uint32_t(std::countr_zero(others));
+      for (std::size_t s = first_store_[under]; s < made_.size() && made_[s].slot == under; ++s) {
+        lines = room_for(count + 1);
+        lines[count] = line_of(made_[s].realiser);
+        count += lines[count].end > now.end ? 1 : 0;
+      }
+    }
+    walk(slot, now, lines, count);
+  }
+}
+
+template <class S>
+typename SegmentEnvelope<S>::Line* SegmentEnvelope<S>::room_for(std::size_t lines) {
+  if (lines > lines_.size()) lines_.resize(2 * lines);
+  return lines_.data();
+}
+
+/// The fraction of the segment at which `later`, which is not ahead at first and is in the end, meets `now`.
+template <class S>
+double SegmentEnvelope<S>::meeting(const Line& now, const Line& later) {
+  const double behind = double(now.begin) - double(later.begin);
+  return behind / (behind + (double(later.end) - double(now.end)));
+}
+
+/// From the line that is ahead at the begin to the one that is ahead at the end; `lines` are those that end
 /// further out than it.
 template <class S>
-void SegmentEnvelope<S>::walk(std::uint32_t slot, Line now) {
+void SegmentEnvelope<S>::walk(std::uint32_t slot, Line now, Line* lines, std::size_t count) {
+  first_store_[slot] = std::uint32_t(made_.size());
   double since = 0;
-  while (!lines_.empty()) {
-    const Line* first = nullptr;
-    double earliest = 0;
-    for (const Line& line : lines_) {
-      // Nobody was ahead of `now` at the begin, or before it took over.
-      const double behind = std::max(0.0, now.begin - line.begin);
-      const double fraction = behind / (behind + (line.end - now.end));
-      if (first != nullptr) {
-        if (fraction > earliest + 2 * fraction_error) continue;
-        if (fraction >= earliest - 2 * fraction_error) {
-          if (line.begin == first->begin && line.end == first->end) continue;
-          ++counts_.exact;
-          if (!comes_first(line, *first, now)) continue;
-        }
-      }
-      first = &line;
-      earliest = fraction;
+  while (count > 0) {
+    counts_.crossings += count;
+    std::size_t first = 0;
+    double earliest = meeting(now, lines[0]), next = 2;
+    for (std::size_t i = 1; i < count; ++i) {
+      const double fraction = meeting(now, lines[i]);
+      const bool earlier = fraction < earliest;
+      const double later = earlier ? earliest : fraction;
+      next = next < later ? next : later;
+      earliest = earlier ? fraction : earliest;
+      first = earlier ? i : first;
     }
-    counts_.crossings += lines_.size();
-    since = std::max(since, earliest);
-    now = *first;
+    if (next <= earliest + 2 * fraction_error) first = first_exactly(now, lines, count);
+    since = since < earliest ? earliest : since;
+    now = lines[first];
     made_.push_back({std::uint32_t(std::min(since * key_steps, key_steps - 1)), slot, now.place});
-    std::erase_if(lines_, [&](const Line& line) { return !(line.end > now.end); });
+    if (count == 1) return;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      lines[kept] = lines[i];
+      kept += lines[i].end > now.end ? 1 : 0;
+    }
+    count = kept;
   }
+}
+
+/// Of the lines the one that takes over first, where times are too close to tell.
+template <class S>
+std::size_t SegmentEnvelope<S>::first_exactly(const Line& now, const Line* lines, std::size_t count) {
+  std::size_t first = 0;
+  double earliest = meeting(now, lines[0]);
+  for (std::size_t i = 1; i < count; ++i) {
+    const double fraction = meeting(now, lines[i]);
+    if (fraction > earliest + 2 * fraction_error) continue;
+    if (fraction >= earliest - 2 * fraction_error) {
+      if (lines[i].begin == lines[first].begin && lines[i].end == lines[first].end) continue;
+      ++counts_.exact;
+      if (!comes_first(lines[i], lines[first], now)) continue;
+    }
+    first = i;
+    earliest = fraction;
+  }
+  return first;
 }
 
 /// Does x overtake the winner before y does? Of two that do at one instant the one that stays ahead counts.
@@ -235,7 +322,8 @@ template <class S>
 std::size_t SegmentEnvelope<S>::bytes() const {
   return own_.size() * sizeof(S) + lost_.size() * sizeof(std::uint64_t) +
          (first_store_.size() + bucket_.capacity()) * sizeof(std::uint32_t) +
-         (made_.capacity() + stores_.capacity()) * sizeof(Store) + lines_.capacity() * sizeof(Line);
+         (made_.capacity() + stores_.capacity()) * sizeof(Store) + lines_.capacity() * sizeof(Line) +
+         walks_.capacity() * sizeof(Walk);
 }
 
 template void find_realisers(WideHierarchy<float>&, const float*, WideRealisers&);

@@ -64,11 +64,19 @@ class SegmentEnvelope {
     std::uint32_t key, slot, realiser;
   };
   struct Line {
-    double begin, end;  ///< values, seen from the side: more is further out
+    S begin, end;  ///< values, seen from the side: more is further out
     std::uint32_t place;
   };
-  void walk_node(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, std::uint32_t node);
-  void walk(std::uint32_t slot, Line now);
+  struct Walk {
+    std::uint32_t slot, realiser, count;  ///< of its lines
+  };
+  void walk_leaves(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, std::uint32_t begin,
+                   std::uint32_t end);
+  void walk_above(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, std::uint32_t node);
+  void walk(std::uint32_t slot, Line now, Line* lines, std::size_t count);
+  Line* room_for(std::size_t lines);
+  static double meeting(const Line& now, const Line& later);
+  std::size_t first_exactly(const Line& now, const Line* lines, std::size_t count);
   bool comes_first(const Line& x, const Line& y, const Line& winner) const;
   Piece<S> piece(std::uint32_t place) const;
   bool is_lower(std::uint32_t slot) const { return slot % lane_scalars(width_) < 3 * width_; }
@@ -86,6 +94,7 @@ class SegmentEnvelope {
   std::uint32_t bucket_shift_ = 0;          ///< key >> shift is its bucket
   std::size_t next_ = 0, ordered_ = 0;      ///< first store not carried out; stores before are in order
   std::vector<Line> lines_;
+  std::vector<Walk> walks_;
   EnvelopeCounts counts_;
 };
 
