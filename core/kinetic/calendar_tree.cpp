@@ -228,11 +228,43 @@ void CalendarTree<S>::make_due(std::uint32_t slot) {
   levels_[depth_[slot / scalars_]].push_back(slot);
 }
 
+/// Asks for what `determine` reads of some sides: nearly all of it comes from far away.
+template <class S>
+void CalendarTree<S>::fetch_ahead(const WideArrays<S>& h, const WideRealisers& realisers,
+                                  std::span<const std::uint32_t> slots) const {
+  const auto each_place = [&](std::uint32_t slot, const auto& visit) {
+    const std::uint32_t bit = slot % scalars_, row = bit / width_, lane = bit % width_;
+    const WideNode& node = h.nodes[slot / scalars_];
+    if (lane < node.leaf_count) {
+      const std::uint32_t* places = h.vertices + node.list + list_place(lane, width_);
+      for (std::uint32_t i = 0; i < node.length; ++i) visit(places + i * width_, row % 3);
+    } else {
+      const std::uint32_t child = node.first_child + lane - node.leaf_count;
+      const std::uint32_t* places = realisers.data() + std::size_t(child) * scalars_ + row * width_;
+      for (std::uint32_t i = 0; i < h.nodes[child].count; ++i) visit(places + i, 0u);
+    }
+  };
+  for (const std::uint32_t slot : slots) {
+    each_place(slot, [](const std::uint32_t* place, std::uint32_t) { __builtin_prefetch(place); });
+    __builtin_prefetch(&realisers[slot]);
+    __builtin_prefetch(&entries_[slot]);
+  }
+  for (const std::uint32_t slot : slots)
+    each_place(slot, [this](const std::uint32_t* place, std::uint32_t axis) {
+      __builtin_prefetch(&lines_[*place + axis]);
+    });
+}
+
 /// Determines all sides in `levels_` anew, deepest first, and those above that follow from them.
 template <class S>
 void CalendarTree<S>::process(const WideArrays<S>& h, WideRealisers& realisers) {
   for (std::size_t depth = levels_.size(); depth-- > 0;) {
+    std::size_t fetched = 0;
     for (std::size_t i = 0; i < levels_[depth].size(); ++i) {  // depths saturate: it may grow
+      if (i == fetched) {
+        fetched = std::min(levels_[depth].size(), i + together);
+        fetch_ahead(h, realisers, {levels_[depth].data() + i, fetched - i});
+      }
       const std::uint32_t slot = levels_[depth][i];
       due_[slot] = 0;
       const std::uint32_t before = realisers[slot];
@@ -301,23 +333,37 @@ void CalendarTree<S>::plans_changed(WideHierarchy<S>& hierarchy, WideRealisers& 
     new_plan_[change.vertex] = change_;
     read_line(change.vertex);
   }
-  for (const PlanChange<S>& change : changes) {
-    const std::uint32_t v = change.vertex;
-    if (change.body != body_ || v >= new_plan_.size()) continue;
-    for (std::uint32_t k = first_leaf_[v]; k < first_leaf_[v + 1]; ++k)
-      for (std::uint32_t row = 0; row < 6; ++row) {
-        const std::uint32_t slot = leaves_[k] + row * width_, realiser = realisers[slot];
-        if (has_new_plan(realiser)) {
-          make_due(slot);
-          continue;
-        }
-        ++counts_.certificates;
-        const bool lower = row < 3;
-        const double time = failure(candidate(realiser, lower), candidate(3 * v + row % 3, lower), lower);
-        if (time < std::min(entries_[slot].time, end_)) schedule(slot, time);
-        if (time <= now_) make_due(slot);
+  const auto each_leaf = [&](const auto& visit) {
+    for (const PlanChange<S>& change : changes) {
+      const std::uint32_t v = change.vertex;
+      if (change.body != body_ || v >= new_plan_.size()) continue;
+      for (std::uint32_t k = first_leaf_[v]; k < first_leaf_[v + 1]; ++k) visit(v, leaves_[k]);
+    }
+  };
+  // What is read comes from far away: first it is asked for.
+  each_leaf([&](std::uint32_t, std::uint32_t leaf) {
+    for (std::uint32_t row = 0; row < 6; ++row) {
+      __builtin_prefetch(&realisers[leaf + row * width_]);
+      __builtin_prefetch(&entries_[leaf + row * width_]);
+    }
+  });
+  each_leaf([&](std::uint32_t, std::uint32_t leaf) {
+    for (std::uint32_t row = 0; row < 6; ++row) __builtin_prefetch(&lines_[realisers[leaf + row * width_]]);
+  });
+  each_leaf([&](std::uint32_t v, std::uint32_t leaf) {
+    for (std::uint32_t row = 0; row < 6; ++row) {
+      const std::uint32_t slot = leaf + row * width_, realiser = realisers[slot];
+      if (has_new_plan(realiser)) {
+        make_due(slot);
+        continue;
       }
-  }
+      ++counts_.certificates;
+      const bool lower = row < 3;
+      const double time = failure(candidate(realiser, lower), candidate(3 * v + row % 3, lower), lower);
+      if (time < std::min(entries_[slot].time, end_)) schedule(slot, time);
+      if (time <= now_) make_due(slot);
+    }
+  });
   process(hierarchy.arrays(), realisers);
 }
 

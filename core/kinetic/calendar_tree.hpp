@@ -55,6 +55,7 @@ class CalendarTree {
   static constexpr std::uint32_t none = ~std::uint32_t(0);
   static constexpr double never = std::numeric_limits<double>::infinity();
   static constexpr std::uint32_t buckets = 1024;
+  static constexpr std::size_t together = 8;  ///< sides that are asked for at once
 
   /// A coordinate in double: first + slope * (t - begin_); off by less than error_ until end_.
   struct Line {
@@ -85,6 +86,8 @@ class CalendarTree {
   void schedule(std::uint32_t slot, double time);
   void unschedule(std::uint32_t slot);
   std::uint32_t bucket_of(double time) const;
+  void fetch_ahead(const WideArrays<S>& h, const WideRealisers& realisers,
+                   std::span<const std::uint32_t> slots) const;
   void make_due(std::uint32_t slot);
   void process(const WideArrays<S>& h, WideRealisers& realisers);
   bool has_new_plan(std::uint32_t place) const { return new_plan_[place / 3] == change_; }
