@@ -39,6 +39,11 @@ void find_realisers(WideHierarchy<S>& hierarchy, const S* positions, WideRealise
 template <class S>
 class SegmentEnvelope {
  public:
+  /// From `key` on, `slot` of the realisers is `realiser`. A key is the fraction of the segment, in steps of
+  /// 2^-32, rounded down.
+  struct Store {
+    std::uint32_t key, slot, realiser;
+  };
   /// Takes the shape of a hierarchy. Allocates.
   void assign(const WideHierarchy<S>& hierarchy);
 
@@ -51,6 +56,9 @@ class SegmentEnvelope {
   /// due).
   void advance(double t, WideRealisers& realisers);
 
+  /// The stores of the segment, those of one side in the order of time.
+  const std::vector<Store>& stores() const { return made_; }
+
   double begin() const { return t0_; }
   double end() const { return t1_; }
   const EnvelopeCounts& counts() const { return counts_; }
@@ -58,11 +66,6 @@ class SegmentEnvelope {
   std::size_t bytes() const;
 
  private:
-  /// From `key` on, `slot` of the realisers is `realiser`. A key is the fraction of the segment, in steps of
-  /// 2^-32, rounded down.
-  struct Store {
-    std::uint32_t key, slot, realiser;
-  };
   struct Line {
     S begin, end;  ///< values, seen from the side: more is further out
     std::uint32_t place;
