@@ -1,6 +1,7 @@
 #include "core/kinetic/calendar_tree.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/motion/exact_piece.hpp"
@@ -12,6 +13,7 @@ CalendarTree<S>::CalendarTree(WideHierarchy<S>& hierarchy, const SegmentMotion<S
     : motion_(motion),
       body_(body),
       width_(hierarchy.topology().width),
+      width_shift_(std::uint32_t(std::countr_zero(width_))),
       scalars_(std::uint32_t(lane_scalars(width_))),
       heads_(buckets, none) {
   const WideArrays<S> layout = hierarchy.arrays();
@@ -152,28 +154,36 @@ double CalendarTree<S>::failure(const Candidate& winner, const Candidate& other,
 /// Who realises a side now, and until when for certain.
 template <class S>
 void CalendarTree<S>::determine(const WideArrays<S>& h, WideRealisers& realisers, std::uint32_t slot) {
-  const std::uint32_t index = slot / scalars_, bit = slot % scalars_, row = bit / width_, lane = bit % width_;
+  const auto [index, row, lane] = place_of(slot);
   const WideNode& node = h.nodes[index];
   const bool lower = row < 3;
   Candidate* list = candidates_.data();
-  std::uint32_t count = 0;
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  double reached = -infinity, second = -infinity;
+  std::uint32_t count = 0, best = 0;
+  const auto take = [&](std::uint32_t place) {
+    list[count] = candidate(place, lower);
+    const double now = list[count].now;
+    const bool further = now > reached;
+    const double behind = further ? reached : now;
+    second = behind > second ? behind : second;
+    reached = further ? now : reached;
+    best = further ? count : best;
+    ++count;
+  };
   if (lane < node.leaf_count) {
     const std::uint32_t* places = h.vertices + node.list + list_place(lane, width_);
-    for (; count < node.length; ++count) list[count] = candidate(places[count * width_] + row % 3, lower);
+    for (std::uint32_t i = 0; i < node.length; ++i) take(places[i * width_] + row % 3);
   } else {
     const std::uint32_t child = node.first_child + lane - node.leaf_count;
     const std::uint32_t* places = realisers.data() + std::size_t(child) * scalars_ + row * width_;
-    for (; count < h.nodes[child].count; ++count) list[count] = candidate(places[count], lower);
+    for (std::uint32_t i = 0; i < h.nodes[child].count; ++i) take(places[i]);
   }
   counts_.reads += count;
   ++counts_.sides;
-  std::uint32_t best = 0;
-  for (std::uint32_t i = 1; i < count; ++i) best = list[i].now > list[best].now ? i : best;
   // Those that may be just as far out: of several that are, the one that ends furthest out.
-  const double reached = list[best].now - 4.02 * error_;
-  std::uint32_t close = 0;
-  for (std::uint32_t i = 0; i < count; ++i) close += !(list[i].now < reached) ? 1 : 0;
-  if (close > 1)
+  reached -= 4.02 * error_;
+  if (!(second < reached))
     for (std::uint32_t i = 0; i < count; ++i) {
       if (list[i].now < reached || list[i].place == list[best].place) continue;
       const int now = ahead(list[i].place, list[best].place, lower, now_);
@@ -225,7 +235,7 @@ template <class S>
 void CalendarTree<S>::make_due(std::uint32_t slot) {
   if (due_[slot] != 0) return;
   due_[slot] = 1;
-  levels_[depth_[slot / scalars_]].push_back(slot);
+  levels_[depth_[place_of(slot).node]].push_back(slot);
 }
 
 /// Asks for what `determine` reads of some sides: nearly all of it comes from far away.
@@ -233,8 +243,8 @@ template <class S>
 void CalendarTree<S>::fetch_ahead(const WideArrays<S>& h, const WideRealisers& realisers,
                                   std::span<const std::uint32_t> slots) const {
   const auto each_place = [&](std::uint32_t slot, const auto& visit) {
-    const std::uint32_t bit = slot % scalars_, row = bit / width_, lane = bit % width_;
-    const WideNode& node = h.nodes[slot / scalars_];
+    const auto [index, row, lane] = place_of(slot);
+    const WideNode& node = h.nodes[index];
     if (lane < node.leaf_count) {
       const std::uint32_t* places = h.vertices + node.list + list_place(lane, width_);
       for (std::uint32_t i = 0; i < node.length; ++i) visit(places + i * width_, row % 3);
@@ -269,14 +279,14 @@ void CalendarTree<S>::process(const WideArrays<S>& h, WideRealisers& realisers) 
       due_[slot] = 0;
       const std::uint32_t before = realisers[slot];
       determine(h, realisers, slot);
-      const std::uint32_t node = slot / scalars_;
+      const auto [node, row, lane] = place_of(slot);
       if (realisers[slot] == before && !has_new_plan(before)) {
         ++counts_.idle;
         continue;
       }
       counts_.changes += realisers[slot] != before ? 1 : 0;
       // The side of the same kind, of this node's box.
-      if (node != 0) make_due(above_[node] + slot % scalars_ / width_ * width_);
+      if (node != 0) make_due(above_[node] + row * width_);
     }
     levels_[depth].clear();
   }

@@ -73,9 +73,15 @@ class CalendarTree {
   };
 
   void start(WideHierarchy<S>& hierarchy, WideRealisers& realisers);
+  struct Place {
+    std::uint32_t node, row, lane;
+  };
+  Place place_of(std::uint32_t slot) const {
+    const std::uint32_t rows = slot >> width_shift_;
+    return {rows / 6, rows % 6, slot & (width_ - 1)};
+  }
   void read_line(std::uint32_t vertex);
   void choose_end(double t);
-  bool is_lower(std::uint32_t slot) const { return slot % scalars_ < 3 * width_; }
   Piece<S> piece(std::uint32_t place) const { return motion_.piece(body_, place / 3, int(place % 3)); }
   /// The sign of what x is ahead of y, seen from the side, at a time of the segment.
   int ahead(std::uint32_t x, std::uint32_t y, bool lower, double t);
@@ -93,7 +99,7 @@ class CalendarTree {
   bool has_new_plan(std::uint32_t place) const { return new_plan_[place / 3] == change_; }
 
   SegmentMotion<S> motion_;
-  std::uint32_t body_, width_, scalars_;
+  std::uint32_t body_, width_, width_shift_, scalars_;
   double begin_ = 0, now_ = 0, end_ = 0;  ///< of the segment
   double horizon_ = 1;                    ///< how far ahead a segment without an end is taken
   double error_ = 0, scale_ = 0;
