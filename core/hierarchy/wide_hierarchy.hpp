@@ -57,6 +57,11 @@ class WideHierarchy {
   std::uint32_t wide_node(std::uint32_t node) const { return places_[node].wide; }
   /// The wide node that holds the box of a node of the topology; `no_node` for a root that is no leaf.
   std::uint32_t wide_parent(std::uint32_t node) const { return places_[node].node; }
+  /// Where a bound of a node of the topology stands in arrays laid out as `WideArrays::lanes`, rows in the
+  /// order given there; not for a root that is no leaf.
+  std::size_t row_place(std::uint32_t node, std::uint32_t row) const {
+    return places_[node].node * lane_scalars(topology_.width) + row * topology_.width + places_[node].lane;
+  }
   /// Unique vertices of the leaves of one wide node, summed over its leaves.
   std::uint32_t leaf_vertices_of(std::uint32_t wide) const { return listed_[wide]; }
 

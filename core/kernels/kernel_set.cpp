@@ -12,6 +12,7 @@
 #include "core/kernels/span_tests.hpp"
 #include "core/kernels/wide_inflate.hpp"
 #include "core/kernels/wide_linear.hpp"
+#include "core/kernels/wide_realisers.hpp"
 
 namespace kbvh {
 
@@ -131,6 +132,15 @@ const WideLinearKernels<float>& wide_linear_kernels(KernelSet set) {
 template <>
 const WideLinearKernels<double>& wide_linear_kernels(KernelSet set) {
   return KBVH_SELECT_KERNELS(set, wide_linear_double);
+}
+
+template <>
+const WideRealiserKernels<float>& wide_realiser_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, wide_realisers_float);
+}
+template <>
+const WideRealiserKernels<double>& wide_realiser_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, wide_realisers_double);
 }
 
 template <>

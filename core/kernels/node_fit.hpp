@@ -139,5 +139,35 @@ template <class S, std::uint32_t width>
   }
 }
 
+/// A node whose children are all leaves.
+template <class S, std::uint32_t width>
+[[gnu::always_inline]] inline void fit_leaves(const WideArrays<S>& h, const WideNode& node,
+                                              const S* positions, S* rows, S* own) {
+  NodeFit<S, width> fit;
+  fit.from_lists(h.vertices + node.list, node.length, positions, rows);
+  fit.store_own(own);
+  if (node.leaf_count != width) put_right<S, width>(h, node, rows, own);
+}
+
+/// Any other; the own boxes of children that are nodes must be current.
+template <class S, std::uint32_t width>
+[[gnu::always_inline]] inline void fit_above(const WideArrays<S>& h, const WideNode& node, const S* positions,
+                                             S* rows, S* own) {
+  NodeFit<S, width> fit;
+  if (2 * node.leaf_count >= width) {
+    fit.from_lists(h.vertices + node.list, node.length, positions, rows);
+    fit.store_own(own);
+    put_right<S, width>(h, node, rows, own);
+  } else if (node.leaf_count == 0) {
+    const S* boxes[width];
+    for (std::uint32_t lane = 0; lane < width; ++lane)
+      boxes[lane] = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane) : empty_box<S>;
+    fit.from_boxes(boxes, rows);
+    fit.store_own(own);
+  } else {
+    fit_single<S, width>(h, node, positions, rows, own);
+  }
+}
+
 }  // namespace
 }  // namespace kbvh

@@ -12,32 +12,13 @@ void refit(WideArrays<S> h, const S* positions, std::uint32_t begin, std::uint32
   for (std::uint32_t i = begin; i < end; ++i) {
     const WideNode& node = h.nodes[i];
     if (node.leaf_count != node.count) continue;
-    S* rows = h.lanes + std::size_t(i) * 6 * width;
-    S* own = h.own + std::size_t(8) * i;
-    NodeFit<S, width> fit;
-    fit.from_lists(h.vertices + node.list, node.length, positions, rows);
-    fit.store_own(own);
-    if (node.leaf_count != width) put_right<S, width>(h, node, rows, own);
+    fit_leaves<S, width>(h, node, positions, h.lanes + std::size_t(i) * 6 * width,
+                         h.own + std::size_t(8) * i);
   }
   for (std::uint32_t i = end; i-- > begin;) {
     const WideNode& node = h.nodes[i];
     if (node.leaf_count == node.count) continue;
-    S* rows = h.lanes + std::size_t(i) * 6 * width;
-    S* own = h.own + std::size_t(8) * i;
-    NodeFit<S, width> fit;
-    if (2 * node.leaf_count >= width) {
-      fit.from_lists(h.vertices + node.list, node.length, positions, rows);
-      fit.store_own(own);
-      put_right<S, width>(h, node, rows, own);
-    } else if (node.leaf_count == 0) {
-      const S* boxes[width];
-      for (std::uint32_t lane = 0; lane < width; ++lane)
-        boxes[lane] = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane) : empty_box<S>;
-      fit.from_boxes(boxes, rows);
-      fit.store_own(own);
-    } else {
-      fit_single<S, width>(h, node, positions, rows, own);
-    }
+    fit_above<S, width>(h, node, positions, h.lanes + std::size_t(i) * 6 * width, h.own + std::size_t(8) * i);
   }
 }
 
