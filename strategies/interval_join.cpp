@@ -95,7 +95,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
     this->stand_at(t0);
     this->move_to(t1);
     if (!(bounds_.begin() <= t0 && t1 <= bounds_.end()))
-      throw std::invalid_argument("contacts are asked for across a knot of a plan, or with pieces > 1");
+      throw std::invalid_argument("contacts are asked for across a knot of a plan");
     std::uint64_t tests = 0;
     for (std::size_t i = 0; i < sweeps_.size(); ++i) {
       const BodyPair& pair = this->scene_.pairs()[i];

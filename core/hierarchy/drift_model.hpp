@@ -39,7 +39,8 @@ class DriftModel {
   /// `step` is the mean way that a side closes in one frame, against the sides of two leaves.
   int period(double step) {
     // What a list would hold cannot be told from an empty one.
-    if (!known_ || counts_.listed == 0) return step > longest_step ? 0 : int(std::clamp(first_reach / step, 2.0, 8.0));
+    if (!known_ || counts_.listed == 0)
+      return step > longest_step ? 0 : int(std::clamp(first_reach / step, 2.0, 8.0));
     double least = clear_gain * plain_cost();
     int best = 0;
     for (const int frames : {2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64}) {

@@ -20,6 +20,7 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
     : scene_(scene),
       motion_(motion),
       pieces_(pieces),
+      wanted_pieces_(pieces),
       sides_(scene.body_count()),
       refits_(scene.body_count(), 0),
       skipped_(scene.body_count()),
@@ -101,6 +102,7 @@ void LinearBounds<S>::make_margin(Side& side) const {
 
 template <class S>
 void LinearBounds<S>::start() {
+  pieces_ = wanted_pieces_;
   last_ = motion_.time();
   step_ = 0;
   foreseen_ = 1;
@@ -139,7 +141,12 @@ bool LinearBounds<S>::advance() {
 template <class S>
 void LinearBounds<S>::enter() {
   note_time();
-  if (end_ == none || motion_.time() >= end_) go_on();
+  if (pieces_ != 1) {
+    pieces_ = 1;
+    restart();
+  } else if (end_ == none || motion_.time() >= end_) {
+    go_on();
+  }
 }
 
 template <class S>

@@ -47,8 +47,9 @@ class LinearBounds {
   void start();
   /// The same if the present time is not in the segment any more. Returns whether it began a new one.
   bool advance();
-  /// The bounds of the segment that the motion's present time is in and not the last of: where `advance`
-  /// would stay at the end of one, this goes on to the next.
+  /// The bounds of the whole segment, not of a piece of it, that the motion's present time is in and not the
+  /// last of: where `advance` would stay at the end of one, this goes on to the next. Segments are whole
+  /// until `start`.
   void enter();
   /// Plans have changed at the motion's present time: the rest of the segment is another one.
   void plans_changed();
@@ -94,7 +95,7 @@ class LinearBounds {
 
   SceneView<S> scene_;
   SegmentMotion<S> motion_;
-  std::uint32_t pieces_;
+  std::uint32_t pieces_, wanted_pieces_;
   double begin_ = 0, end_ = 0;
   double last_ = 0, step_ = 0;  ///< time of the last frame, and from the one before
   double foreseen_ = 1;         ///< frames that a segment without an end is made for

@@ -70,8 +70,9 @@ class RoundedClock {
         if (!(double(time) >= std::max(now.begin, times[k]) && double(time) < times[k + 1])) continue;
       }
       event.hint = double(time);
-      // What follows is looked for in this segment or later ones, so that no event comes twice.
-      event.begin = event.end = std::max(double(time), times[k]);
+      // What follows is looked for from within this segment on: no event comes twice, and those that are
+      // still to come in it are not passed over because this one was rounded to its end.
+      event.begin = event.end = std::clamp(double(time), times[k], std::nextafter(times[k + 1], times[k]));
       event.error = 0;
       return true;
     }

@@ -41,7 +41,7 @@ struct CaseResult {
 
 struct RunLimits {
   double seconds = 100;  ///< processor time of one contestant on one scene; more is a hang
-  bool silent = false;  ///< drop what child processes print
+  bool silent = false;   ///< drop what child processes print
 };
 
 /// All contestants on one scene, each in a process that may crash or hang; `scalar` is "float" or "double".

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 
 #include "core/session.hpp"
 #include "tests/support/synthetic_scenes.hpp"
@@ -62,9 +63,10 @@ Truth<S> truth_of(const Scene<S>& scene) {
 
 template <class S>
 void expect_contacts(const StrategyEntry& entry, const Scene<S>& scene, const Truth<S>& truth,
-                     const BuilderConfig& builder, int rounds, const std::string& where) {
+                     const BuilderConfig& builder, int rounds, const std::string& where,
+                     const std::map<std::string, std::string>& params = {}) {
   if (entry.factory<S>() == nullptr) return;
-  Session<S> session(scene, {&entry, {}, builder}, CountingPolicy::counting);
+  Session<S> session(scene, {&entry, params, builder}, CountingPolicy::counting);
   PhaseTimes ignored;
   // More than once, for `reset` starts over.
   for (int round = 0; round < rounds; ++round) {
@@ -184,6 +186,54 @@ TEST(ContactFinder, EnclosesTheTimeOfImpact) {
   EXPECT_LE(first->begin, 4);
   EXPECT_GE(first->end, 4);
   EXPECT_LE(first->end - first->begin, 4 * impact_width + 1e-14);
+}
+
+// Boxes of pieces of segments are for frames; contacts are of whole segments.
+TEST(ContactScenes, PiecesOfSegmentsMakeNoDifference) {
+  const auto test = synthetic_scene<float>("self_rolled_cloth");
+  const Truth<float> truth = truth_of(test.scene);
+  for (const StrategyEntry& entry : registry()) {
+    const bool has_pieces =
+        std::any_of(entry.info.parameters.begin(), entry.info.parameters.end(),
+                    [](const Parameter& parameter) { return parameter.name == "pieces"; });
+    if (!has_pieces || !entry.info.can.contacts) continue;
+    expect_contacts(entry, test.scene, truth, entry.info.topology.preferred, 2, entry.info.id,
+                    {{"pieces", "3"}});
+  }
+}
+
+// Contacts, then frames from the first on, then contacts again; and none after a change of plans.
+TEST(ContactScenes, ResetComesBetweenContactsAndFrames) {
+  const auto test = synthetic_scene<float>("self_rolled_cloth");
+  const Truth<float> truth = truth_of(test.scene);
+  for (const StrategyEntry& entry : registry()) {
+    if (!entry.info.can.contacts || entry.factory<float>() == nullptr) continue;
+    Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    PhaseTimes ignored;
+    for (int round = 0; round < 2; ++round) {
+      session.reset(truth.knots[0]);
+      ContactBuffer found;
+      session.contacts(truth.knots[1], found, ignored);
+      std::sort(found.begin(), found.end());
+      EXPECT_TRUE(found == truth.contacts[0]) << entry.info.id;
+      session.reset(truth.knots[0]);
+      for (const double t : {truth.knots[0], 0.5 * (truth.knots[0] + truth.knots[1]), truth.knots[2]}) {
+        if (t != truth.knots[0]) session.advance(t, ignored);
+        PairBuffer pairs;
+        session.query(pairs, ignored);
+        std::sort(pairs.begin(), pairs.end());
+        Playback<float> playback(test.scene);
+        playback.seek(t);
+        EXPECT_EQ(pairs, brute_force_pairs(test.scene, playback)) << entry.info.id << " at " << t;
+      }
+    }
+    if (!entry.info.can.plan_changes) continue;
+    const PlanChange<float> change{};
+    session.reset(truth.knots[0]);
+    session.change_plans({&change, 1}, ignored);
+    ContactBuffer found;
+    EXPECT_THROW(session.contacts(truth.knots[1], found, ignored), std::logic_error) << entry.info.id;
+  }
 }
 
 TEST(Registry, ContactsAreDeclaredOrRefused) {
