@@ -43,7 +43,7 @@ struct ImpactStats {
 /// ch. 2), so that what is exactly on a border is known to be. Verdicts can be compared with those of Brochu,
 /// Edwards & Bridson 2012, which give the parity of the number of contacts only, and of Wang et al. 2021.
 ///
-/// Any finite coordinates up to admissible_magnitude<double> are exact. A filtered test costs some 100 ns, an
+/// Any finite coordinates up to admissible_magnitude<double> are exact. A filtered test costs 0.1 to 1 us, an
 /// exact one some 10 us and more where exponents differ much; it may allocate. Thread-safe; `stats`, if
 /// given, must not be shared between threads.
 Impact find_impact(Contact::Kind kind, const MovingPoints& points, ImpactStats* stats = nullptr);
