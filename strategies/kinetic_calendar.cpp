@@ -2,8 +2,8 @@
 // in a calendar of buckets by time; frames determine anew what may have changed until then, level by level
 // (core/kinetic/calendar_tree.hpp).
 
-#include "core/hierarchy/realiser_strategy.hpp"
 #include "core/kinetic/calendar_tree.hpp"
+#include "core/kinetic/realiser_strategy.hpp"
 #include "core/registry.hpp"
 
 namespace kbvh {

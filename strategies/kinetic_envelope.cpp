@@ -2,7 +2,7 @@
 // finds the sides whose realiser will change in it, and the upper envelopes of these few give a list of
 // stores, sorted by time, that frames carry out (core/kinetic/segment_envelope.hpp).
 
-#include "core/hierarchy/realiser_strategy.hpp"
+#include "core/kinetic/realiser_strategy.hpp"
 #include "core/kinetic/segment_envelope.hpp"
 #include "core/registry.hpp"
 

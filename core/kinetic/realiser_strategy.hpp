@@ -7,6 +7,7 @@
 #include "core/hierarchy/wide_hierarchy.hpp"
 #include "core/kernels/wide_realisers.hpp"
 #include "core/kinetic/segment_envelope.hpp"
+#include "core/motion/round_positions.hpp"
 #include "core/strategy.hpp"
 
 namespace kbvh {
