@@ -21,6 +21,7 @@ import claims as paper_claims
 import figures
 import paper_figures
 import ratios
+import robustness
 import scene_pictures
 import tables
 import targets_table
@@ -136,6 +137,8 @@ def write(
         own_sections=[section for section in sections if section.own],
         every_section=sections,
         strategies=_strategies(study),
+        stress=robustness.stress(folder),
+        ccd=robustness.ccd(folder),
         limits=limits(study),
         symbols={contestant: Markup(symbol(look)) for contestant, look in all_looks.items()},
     )
