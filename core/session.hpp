@@ -90,8 +90,8 @@ class Session {
   /// std::logic_error after changes of plans or geometry, of which it knows nothing. Returns the pairs of
   /// primitives that came to the narrow phase.
   std::size_t contacts(double t, ContactBuffer& out, PhaseTimes& times) {
-    if (!finder_) finder_.emplace(*scene_);
     if (changed_) throw std::logic_error("contacts are not found after changes of plans or geometry");
+    if (!finder_) finder_.emplace(*scene_);
     playback_.evaluate_all();
     finder_->start(playback_);
     const double from = playback_.time();

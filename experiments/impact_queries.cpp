@@ -17,10 +17,17 @@ using boost::multiprecision::cpp_int;
 namespace {
 
 std::optional<Contact::Kind> kind_named(const std::string& name) {
-  if (name.find("vertex-face") != std::string::npos || name.find("vf") != std::string::npos)
-    return Contact::Kind::vertex_face;
-  if (name.find("edge-edge") != std::string::npos || name.find("ee") != std::string::npos)
-    return Contact::Kind::edge_edge;
+  // A word of the name, not letters within one: sheets and knees are no edges.
+  const auto has = [&](const std::string& word) {
+    const auto letter = [&](std::size_t at) {
+      return at < name.size() && std::isalpha(static_cast<unsigned char>(name[at])) != 0;
+    };
+    for (std::size_t at = name.find(word); at != std::string::npos; at = name.find(word, at + 1))
+      if ((at == 0 || !letter(at - 1)) && !letter(at + word.size())) return true;
+    return false;
+  };
+  if (has("vertex-face") || has("vf")) return Contact::Kind::vertex_face;
+  if (has("edge-edge") || has("ee")) return Contact::Kind::edge_edge;
   return {};
 }
 
@@ -38,10 +45,17 @@ bool is_integer(const std::string& text) {
 /// A quotient that is a double, exactly; nothing if it is none.
 std::optional<double> exact_quotient(const std::string& top, const std::string& bottom) {
   if (!is_integer(top) || !is_integer(bottom)) return {};
-  const cpp_int numerator(top), denominator(bottom);
+  // A number that begins with a zero would be read as an octal one.
+  const auto decimal = [](const std::string& text) {
+    const bool negative = text.starts_with('-');
+    const std::size_t first = std::min(text.find_first_not_of('0', negative ? 1 : 0), text.size() - 1);
+    const cpp_int value(text.substr(first));
+    return negative ? cpp_int(-value) : value;
+  };
+  const cpp_int numerator = decimal(top), denominator = decimal(bottom);
   if (denominator <= 0) return {};
   const cpp_int divisor = gcd(numerator, denominator);
-  cpp_int odd = numerator / (divisor == 0 ? cpp_int(1) : divisor), power = denominator / divisor;
+  cpp_int odd = numerator / divisor, power = denominator / divisor;
   if (odd == 0) return 0.0;
   const int down = int(lsb(power));
   if (power != cpp_int(1) << unsigned(down)) return {};

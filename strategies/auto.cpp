@@ -52,7 +52,8 @@ double join_cost(const Seen& seen) {
 }
 
 /// A strategy to choose, the parameters that differ from its defaults, and what it would cost. To offer
-/// another one, add a line: any registered strategy that follows plan changes will do.
+/// another one, add a line: any registered strategy that follows plan changes and
+/// knows no more than the next keyframe will do.
 struct Candidate {
   const char* id;
   std::map<std::string, std::string> params;
@@ -90,6 +91,7 @@ class Auto final : public Strategy<S> {
 
   void reset(double t) override {
     this->start_at(t);
+    first_fetch_ = this->sampled_.fetched();
     for (Runner& runner : runners_) {
       runner.strategy->reset(t);
       runner.fresh = true;
@@ -189,6 +191,7 @@ class Auto final : public Strategy<S> {
   Counters counted() const override {
     Counters table = retired_;
     for (const Runner& runner : runners_) add(table, runner.strategy->counters());
+    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
     return table;
   }
 
@@ -209,7 +212,10 @@ class Auto final : public Strategy<S> {
       const std::uint64_t most = std::max(sum[peak], other[peak]);
       sum[peak] = most - other[peak];
     }
+    const std::uint64_t fetched = sum[Counter::positions_fetched];
     for (std::size_t c = 0; c < sum.values.size(); ++c) sum.values[c] += other.values[c];
+    // All instances read the same positions, and each counts what any of them fetches.
+    sum[Counter::positions_fetched] = fetched;
   }
 
   /// Of a body's hierarchy: the mean side of leaves' boxes at present, and the vertices in its leaves.
@@ -305,6 +311,7 @@ class Auto final : public Strategy<S> {
   std::vector<double> leaf_size_, reads_;  ///< by body
   Counters retired_;                       ///< of what was counted before an instance started anew
   std::size_t active_ = 0;
+  std::uint64_t first_fetch_ = 0;
   int frame_ = 0, chosen_at_ = 0;
   double step_ = 0, segment_end_ = 0;   ///< seconds
   bool chosen_for_contact_ = false;     ///< there were candidates when the choice was made

@@ -89,6 +89,8 @@ class DriftStrategy : public Strategy<S> {
       measure_leaves(index);
       remember(index);
     }
+    // A body that rests again may have been moved by plans of its own before.
+    for (auto& near : near_) near.forget();
     std::fill(pair_is_near_.begin(), pair_is_near_.end(), 1);
     frames_ = 0;
     period_ = 0;
@@ -149,7 +151,8 @@ class DriftStrategy : public Strategy<S> {
     // The way so far stays bounded; from the stored position on, rounding starts over.
     if constexpr (bounded)
       for (Body& body : bodies_)
-        if (body.changed) body.moved = above(body.moved + body.rounding);
+        if (body.changed)  // enlarged, for so is what a change of a body far from here has been rounded by
+          body.moved = above(above(body.moved + body.rounding) + eps * body.moved);
   }
 
   std::optional<AuditView> audit_view(std::uint32_t index) const override {

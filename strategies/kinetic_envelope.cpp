@@ -70,7 +70,7 @@ class KineticEnvelope final : public RealiserStrategy<S, Count> {
   std::size_t bytes() const override {
     std::size_t total = Base::bytes();
     for (const State& state : states_)
-      total += state.envelope.bytes() + 2 * state.room[0].capacity() * sizeof(S);
+      total += state.envelope.bytes() + (state.room[0].capacity() + state.room[1].capacity()) * sizeof(S);
     return total;
   }
 

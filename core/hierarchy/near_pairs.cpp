@@ -39,6 +39,14 @@ NearLeaves<S> NearPairs<S>::leaves(const NearSide<S>& side, Leaves& own) {
 }
 
 template <class S>
+void NearPairs<S>::forget() {
+  for (Leaves& own : leaves_) {
+    std::fill(own.stamps.begin(), own.stamps.end(), 0);
+    own.stamp = 1;
+  }
+}
+
+template <class S>
 void NearPairs<S>::build(const NearSide<S>& a, const NearSide<S>& b, std::uint32_t body_a,
                          std::uint32_t body_b, const S (&reach)[6], std::uint64_t& tests) {
   WideHierarchy<S>&hierarchy_a = *a.hierarchy, &hierarchy_b = *b.hierarchy;

@@ -34,6 +34,8 @@ class NearPairs {
   void build(const NearSide<S>& a, const NearSide<S>& b, std::uint32_t body_a, std::uint32_t body_b,
              const S (&reach)[6], std::uint64_t& tests);
   void clear();
+  /// Positions may have changed in ways that nobody has told of: the next `build` takes nothing over.
+  void forget();
 
   /// Appends the pairs whose boxes can have met when no side has closed by more than this fraction of its
   /// reach; 0 to 1, rounding of the quotient included.

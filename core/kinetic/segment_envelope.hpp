@@ -27,7 +27,7 @@ void find_realisers(WideHierarchy<S>& hierarchy, const S* positions, WideRealise
 /// moves along a line between two stored positions.
 ///
 /// A side whose realiser at the begin also realises it at the end does so throughout: both are linear, and
-/// nobody is ahead of it at either end. So one pass of the cost of a refit finds the few sides that are
+/// nobody is ahead of it at either end. So one pass of the cost of a few refits finds the few sides that are
 /// *active*, and each of those is the upper envelope of lines, which is walked from crossing to crossing.
 /// Envelopes of inner nodes are those of the lines that take part in the envelopes below. What comes of it is
 /// a list of stores, (time, side, new realiser), in buckets by time; frames carry out those that are due.
@@ -49,7 +49,7 @@ class SegmentEnvelope {
 
   /// Makes the envelopes of the segment from t0 to t1 > t0, in which vertices move from p0 to p1, both
   /// [vertex][3] with one readable number behind, and both stored numbers. `realisers` are those at t0.
-  /// O(nodes + vertices of leaves) as fast as a refit, and O(lines of a side) for each store.
+  /// O(nodes + vertices of leaves), and O(lines of a side) for each store.
   void make(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, const S* p0, const S* p1, double t0,
             double t1);
   /// Brings the realisers from the last time asked for (first: t0) to t, t0 <= t <= t1. O(stores that are

@@ -25,7 +25,7 @@ PLAN = {
 
 
 def readable(file: Path) -> list[dict]:
-    """Whole lines as records; the last line may be half of one."""
+    """All lines as records; half a line is a failure."""
     if not file.exists():
         return []
     *whole, rest = file.read_bytes().split(b"\n")

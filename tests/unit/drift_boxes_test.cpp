@@ -73,6 +73,26 @@ TEST(DriftBoxes, WithABoundOnStepsBodiesFarApartCostNothing) {
   }
 }
 
+TEST(DriftBoxes, ABodyThatRestsAgainAfterAResetIsWhereItWas) {
+  // So slow that lists of near pairs are kept; the body at rest is shifted by a script, and then it is not.
+  const Scene<float> scene = grids<float>(20, 0.5, left_side);
+  std::vector<double> frames;
+  for (int f = 0; f <= 60; ++f) frames.push_back(0.01 * f);
+  PlanScript<float> script;
+  script.steps.push_back({.time = frames[2]});
+  for (std::uint32_t v = 0; v < scene.bodies[1].plans.vertex_count(); ++v)
+    script.steps[0].changes.push_back({.body = 1, .vertex = v, .velocity = {0.3f, 0, 0}});
+  for (const char* id : {"drift_boxes", "drift_boxes_bounded", "auto"}) {
+    Session<float> session(scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred},
+                           CountingPolicy::counting);
+    Oracle<float> with(scene, {}, hash(script)), without(scene);
+    EXPECT_EQ(verify(session, std::span<const double>(frames), with, &script).first_violation, "") << id;
+    const Verification again = verify(session, std::span<const double>(frames), without);
+    EXPECT_EQ(again.first_violation, "") << id << ": moved, though it has been reset";
+    EXPECT_GT(again.pairs, 0u) << id;
+  }
+}
+
 TEST(DriftBoxes, ABodyAtRestIsNeverRead) {
   // Both at rest, and crossing: a plan that changes nothing makes the scene one of bodies that may move.
   const Scene<float> scene = grids<float>(20, 0.5, [](std::uint32_t) { return 0.0; });
