@@ -174,10 +174,13 @@ class RealiserStrategy : public Strategy<S> {
   Box<double> realised_box(std::uint32_t index, std::uint32_t node) const {
     const Body& body = bodies_[index];
     Box<double> box;
-    for (std::uint32_t row = 0; row < 6; ++row) {
+    const auto coordinate = [&](std::uint32_t row) {
       const std::uint32_t place = body.realisers[body.hierarchy.row_place(node, row)];
-      const S value = this->sampled_.position(index, place / 3)[place % 3];
-      (row < 3 ? box.lower : box.upper)[row % 3] = double(value);
+      return double(this->sampled_.position(index, place / 3)[place % 3]);
+    };
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      box.lower[axis] = coordinate(axis);
+      box.upper[axis] = coordinate(3 + axis);
     }
     return box;
   }
