@@ -28,7 +28,8 @@ Meshes simulated(const Config& config, Simulate simulate, const std::string& wha
   if (!folder.empty() && std::filesystem::exists(file, error)) {
     try {
       return io::load_cache(file);
-    } catch (const io::InputError&) {  // damaged or of another version: made anew below
+    } catch (const io::InputError& problem) {
+      say(std::string("warning: ") + problem.what() + "; the scene is simulated anew");
     }
   }
   const auto report = [&](double fraction) {

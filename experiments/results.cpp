@@ -24,6 +24,8 @@ ResultStore::ResultStore(const std::filesystem::path& folder)
                          (error ? ": " + error.message() : ""));
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
     throw io::InputError("the output folder '" + folder.string() + "' cannot be written");
+  if (std::filesystem::exists(file_, error) && !std::filesystem::is_regular_file(file_, error))
+    throw io::InputError(file_.string() + ": is not a file that results can be added to");
   std::ifstream in(file_, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   broken_end_ = !text.empty() && text.back() != '\n';

@@ -180,7 +180,8 @@ PlanScript<S> recorded_reversals(const Scene<S>& scene, const ReversalRule& rule
   if (std::filesystem::exists(file, error)) {
     try {
       return read_script<S>(file);
-    } catch (const io::InputError&) {  // damaged or of another version: made anew below
+    } catch (const io::InputError& problem) {
+      say(std::string("warning: ") + problem.what() + "; the script is recorded anew");
     }
   }
   PlanScript<S> script = record_reversals(scene, rule, progress);

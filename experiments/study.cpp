@@ -98,6 +98,7 @@ class Runner {
       return;
     }
     Oracle<S> oracle(scene, cache_folder(), hash(script));
+    if (!oracle.problem().empty()) note("warning: " + oracle.problem());
     std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
     if (has_own_frames(loaded)) {
       if (per_keyframe != std::vector<std::uint32_t>{1})
@@ -109,6 +110,9 @@ class Runner {
       if (study.frames_limit > 0 && frames.size() > study.frames_limit) frames.resize(study.frames_limit);
       group(study, contestants, loaded, scene, script, oracle, l, frames);
     }
+    const std::string before = oracle.problem();
+    oracle.keep();
+    if (oracle.problem() != before) note("warning: " + oracle.problem());
   }
 
   /// All contestants on one scene, in one scalar, at one l: what one table shows.

@@ -22,11 +22,13 @@ class KineticSeparationList final : public Strategy<S> {
   KineticSeparationList(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                         const Params& params)
       : Strategy<S>(scene, motion) {
+    const int look_ahead = std::stoi(params.word("look_ahead"));
     if (params.word("queue") == AvlQueue<S>::name)
-      collision_ = std::make_unique<Collision<AvlEventQueue>>(scene, motion, std::move(topologies), count_);
+      collision_ = std::make_unique<Collision<AvlEventQueue>>(scene, motion, std::move(topologies), count_,
+                                                              look_ahead);
     else
-      collision_ =
-          std::make_unique<Collision<BinaryHeapEventQueue>>(scene, motion, std::move(topologies), count_);
+      collision_ = std::make_unique<Collision<BinaryHeapEventQueue>>(scene, motion, std::move(topologies),
+                                                                     count_, look_ahead);
   }
 
   void reset(double t) override {
@@ -225,6 +227,10 @@ KBVH_STRATEGY(kinetic_separation_list) {
       .parameters = {{"queue",
                       "avl",
                       {"avl", "binary_heap"},
-                      "event queue: the paper's AVL tree, or an indexed binary heap"}},
+                      "event queue: the paper's AVL tree, or an indexed binary heap"},
+                     {"look_ahead",
+                      "32",
+                      {"1", "8", "32", "1000000"},
+                      "linear pieces up to which the next event of a pair is looked for at once"}},
   })};
 }

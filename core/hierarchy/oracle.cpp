@@ -1,5 +1,6 @@
 #include "core/hierarchy/oracle.hpp"
 
+#include "core/hasher.hpp"
 #include "core/hierarchy/builders.hpp"
 #include "core/hierarchy/self_pairs.hpp"
 
@@ -106,7 +107,7 @@ std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playb
 
 namespace {
 constexpr std::uint64_t cache_magic =
-    0x6b62766f72633031ull;  // "kbvorc01": change with the format or the test
+    0x6b62766f72633032ull;  // "kbvorc02": change with the format or the test
 }
 
 template <class S>
@@ -121,15 +122,26 @@ Oracle<S>::Oracle(const Scene<S>& scene, std::filesystem::path cache_folder, std
     std::snprintf(file_name, sizeof file_name, "oracle-%016llx-%016llx.bin",
                   static_cast<unsigned long long>(hash(scene)), static_cast<unsigned long long>(script));
   file_ = cache_folder / file_name;
-  load();
+  std::error_code error;
+  if (std::filesystem::exists(file_, error) && !load())
+    problem_ = file_.string() + ": damaged or of another version, true pairs are computed anew";
 }
 
 template <class S>
 Oracle<S>::~Oracle() {
+  keep();
+}
+
+template <class S>
+void Oracle<S>::keep() {
+  if (!grown_ || file_.empty()) return;
+  grown_ = false;
+  bool written = false;
   try {
-    if (grown_ && !file_.empty()) save();
-  } catch (...) {  // a cache that cannot be written costs time, never a result
+    written = save();
+  } catch (const std::exception&) {
   }
+  if (!written) problem_ = file_.string() + ": cannot be written, true pairs are not kept";
 }
 
 template <class S>
@@ -142,55 +154,70 @@ const std::vector<PrimitivePair>& Oracle<S>::pairs(Playback<S>& playback) {
   return entry->second;
 }
 
+/// The file: magic, number of times, size in bytes; for each time t, number of pairs, pairs; hash of all
+/// before.
 template <class S>
-void Oracle<S>::load() {
+bool Oracle<S>::load() {
   std::ifstream in(file_, std::ios::binary | std::ios::ate);
-  if (!in) return;
-  const auto size = std::uint64_t(in.tellg());
+  const auto size = std::uint64_t(std::max<std::streamoff>(in.tellg(), 0));
   in.seekg(0);
-  const auto read = [&](auto& value) { return bool(in.read(reinterpret_cast<char*>(&value), sizeof value)); };
-  std::uint64_t magic = 0, times = 0, total = 0;
-  if (!read(magic) || magic != cache_magic || !read(times) || !read(total) || total != size) return;
+  Hasher hasher;
+  const auto read = [&](void* to, std::size_t bytes) {
+    if (!in.read(static_cast<char*>(to), std::streamsize(bytes))) return false;
+    hasher.bytes(to, bytes);
+    return true;
+  };
+  std::uint64_t head[3];
+  if (!read(head, sizeof head) || head[0] != cache_magic || head[2] != size) return false;
   std::map<double, std::vector<PrimitivePair>> known;
-  for (std::uint64_t i = 0; i < times; ++i) {
+  for (std::uint64_t i = 0; i < head[1]; ++i) {
     double t = 0;
     std::uint64_t count = 0;
-    if (!read(t) || !read(count) || count > size / sizeof(PrimitivePair)) return;
+    if (!read(&t, sizeof t) || !read(&count, sizeof count) || count > size / sizeof(PrimitivePair))
+      return false;
     std::vector<PrimitivePair> pairs(count);
-    if (!in.read(reinterpret_cast<char*>(pairs.data()), std::streamsize(count * sizeof(PrimitivePair))))
-      return;
+    if (!read(pairs.data(), count * sizeof(PrimitivePair))) return false;
     known.emplace(t, std::move(pairs));
   }
+  const std::uint64_t expected = hasher.value();
+  std::uint64_t found = 0;
+  if (!read(&found, sizeof found) || found != expected) return false;
   known_ = std::move(known);
+  return true;
 }
 
 template <class S>
-void Oracle<S>::save() const {
+bool Oracle<S>::save() const {
   std::filesystem::create_directories(file_.parent_path());
   auto temporary = file_;
   temporary += "." + std::to_string(::getpid());
   {
     std::ofstream out(temporary, std::ios::binary);
-    const auto write = [&](const auto& value) {
-      out.write(reinterpret_cast<const char*>(&value), sizeof value);
+    Hasher hasher;
+    const auto write = [&](const void* from, std::size_t bytes) {
+      out.write(static_cast<const char*>(from), std::streamsize(bytes));
+      hasher.bytes(from, bytes);
     };
-    std::uint64_t total = 24;
-    for (const auto& [t, pairs] : known_) total += 16 + pairs.size() * sizeof(PrimitivePair);
-    write(cache_magic);
-    write(std::uint64_t(known_.size()));
-    write(total);
+    std::uint64_t head[3] = {cache_magic, known_.size(), sizeof head + 8};
+    for (const auto& [t, pairs] : known_) head[2] += 16 + pairs.size() * sizeof(PrimitivePair);
+    write(head, sizeof head);
     for (const auto& [t, pairs] : known_) {
-      write(t);
-      write(std::uint64_t(pairs.size()));
-      out.write(reinterpret_cast<const char*>(pairs.data()),
-                std::streamsize(pairs.size() * sizeof(PrimitivePair)));
+      const std::uint64_t count = pairs.size();
+      write(&t, sizeof t);
+      write(&count, sizeof count);
+      write(pairs.data(), count * sizeof(PrimitivePair));
     }
+    const std::uint64_t check = hasher.value();
+    write(&check, sizeof check);
     if (!out.flush()) {
-      std::filesystem::remove(temporary);
-      return;
+      out.close();
+      std::error_code ignored;
+      std::filesystem::remove(temporary, ignored);
+      return false;
     }
   }
   std::filesystem::rename(temporary, file_);
+  return true;
 }
 
 #define KBVH_INSTANTIATE(S)                                                             \

@@ -13,9 +13,9 @@ class KineticCollision {
   using List = SeparationList<S, Queue, Count>;
 
   KineticCollision(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
-                   Count& count)
+                   Count& count, int look_ahead = OverlapClock<S>::usual_look_ahead)
       : forest_(scene, motion, std::move(topologies), count, ChangedBoxes{&changed_, &nodes_}),
-        list_(scene, forest_, count) {}
+        list_(scene, forest_, count, look_ahead) {}
   KineticCollision(const KineticCollision&) = delete;  // the trees point to `changed_` and `nodes_`
   KineticCollision& operator=(const KineticCollision&) = delete;
 

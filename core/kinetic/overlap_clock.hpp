@@ -109,12 +109,14 @@ struct RealisedBox {
 };
 
 /// The moment at which two boxes begin or cease to overlap: the root of two pieces, within `error` of `hint`.
+/// Or one up to which it is known that they do not, and at which the clock is to be asked again.
 template <class S>
 struct OverlapEvent {
   double hint = 0, error = 0;
   Crossing<S> crossing;
   std::uint32_t slot = 0;
   std::uint32_t depth = 0;  ///< of the pair below the pair of roots
+  bool review = false;      ///< nothing happens at `hint`, exactly
 
   /// Doubles on either side of the moment.
   double not_after() const { return std::nextafter(hint - error, -std::numeric_limits<double>::infinity()); }
@@ -126,10 +128,15 @@ struct OverlapEvent {
 /// erratum: the overlap intervals of the axes are intersected). Boxes are closed, the first one widened as
 /// `Widening` says. "After" an instant means right after it: a contact of no duration is none, which the
 /// margin allows. Boxes are taken with the realisers that they have; who changes one asks anew.
+///
+/// It looks some linear pieces ahead and then asks to be asked again: realisers seldom last through a clip,
+/// and looking to its end each time would be quadratic in its keyframes.
 template <class S>
 class OverlapClock {
  public:
   using Event = OverlapEvent<S>;
+  static constexpr int usual_look_ahead = 32;
+  explicit OverlapClock(int look_ahead = usual_look_ahead) : look_ahead_(look_ahead) {}
 
   /// Strict weak order of events: exact time, higher pair, slot.
   bool earlier(const Event& a, const Event& b) const {
@@ -159,10 +166,13 @@ class OverlapClock {
     return true;
   }
 
-  /// The first moment after `now` from which on boxes that are apart right after `now` overlap; false: never.
+  /// The first moment after `now` from which on boxes that are apart right after `now` overlap, or a review;
+  /// false: never.
   bool next_overlap(const RealisedBox<S>& a, const RealisedBox<S>& b, const Instant<S>& now,
                     Event& event) const {
     Instant<S> instant = now;
+    int pieces = look_ahead_;
+    event.review = false;
     // Each axis in turn moves the instant on to where it does not separate; done when six in a row agree.
     for (int side = 0, agreed = 0; agreed < 6; side = (side + 1) % 6) {
       Gap gap(a, b, side, instant);
@@ -171,29 +181,41 @@ class OverlapClock {
         continue;
       }
       Crossing<S> crossing;
-      if (!gap.first_closing(crossing) || !set(event, crossing)) return false;
+      if (!gap.first_closing(pieces, crossing)) {
+        if (!std::isfinite(gap.known_until())) return false;
+        set_review(event, gap.known_until());
+        return true;
+      }
+      if (!set(event, crossing)) return false;
       instant = event.instant();
       agreed = 1;
     }
     return true;
   }
 
-  /// The first moment after `now` right after which boxes that overlap right after `now` do not; false:
-  /// never.
+  /// The first moment after `now` right after which boxes that overlap right after `now` do not, or a review;
+  /// false: never.
   bool next_separation(const RealisedBox<S>& a, const RealisedBox<S>& b, const Instant<S>& now,
                        Event& event) const {
+    constexpr double never = std::numeric_limits<double>::infinity();
     bool found = false;
-    double latest = std::numeric_limits<double>::infinity();
+    double latest = never, known_until = never;
+    event.review = false;
     for (int side = 0; side < 6; ++side) {
       Crossing<S> crossing;
       Event other = event;
-      if (!Gap(a, b, side, now).first_opening(latest, crossing) || !set(other, crossing)) continue;
+      Gap gap(a, b, side, now);
+      const bool opens = gap.first_opening(look_ahead_, std::min(latest, known_until), crossing);
+      known_until = std::min(known_until, gap.known_until());
+      if (!opens || !set(other, crossing)) continue;
       if (found && compare_times(event, other) <= 0) continue;
       found = true;
       event = other;
       latest = event.not_before();
     }
-    return found;
+    if (known_until == never || (found && due(event, known_until))) return found;
+    set_review(event, known_until);
+    return true;
   }
 
  private:
@@ -221,9 +243,10 @@ class OverlapClock {
       return sign != 0 ? sign : compare_slopes(u, l);
     }
 
-    /// From a gap that is negative: where it is no longer.
-    bool first_closing(Crossing<S>& crossing) {
-      for (;;) {
+    /// From a gap that is negative: where it is no longer. Takes what it looks at off `pieces`, and gives up
+    /// when none is left.
+    bool first_closing(int& pieces, Crossing<S>& crossing) {
+      for (double begin = -never;;) {
         const double end = this->end();
         if (std::isinf(end)) {
           if (compare_slopes(upper_.piece(), lower_.piece()) <= 0) return false;
@@ -232,16 +255,20 @@ class OverlapClock {
         }
         const int sign = sign_at(end);
         if (sign >= 0) crossing = {lower_.piece(), upper_.piece()};
+        // It is negative throughout this piece.
+        if (sign < 0 && --pieces < 0 && std::isfinite(begin)) return gives_up(begin);
         next(end);
         if (sign > 0) return true;
         // At zero it depends on where it goes from there.
         if (sign == 0 && compare_slopes(upper_.piece(), lower_.piece()) >= 0) return true;
+        begin = end;
       }
     }
 
-    /// From a gap that is not negative: where it becomes so, unless that is after `latest`.
-    bool first_opening(double latest, Crossing<S>& crossing) {
-      for (double begin = -std::numeric_limits<double>::infinity(); begin <= latest;) {
+    /// From a gap that is not negative: where it becomes so, unless that is after `latest`. Gives up
+    /// when that is not known after so many pieces.
+    bool first_opening(int pieces, double latest, Crossing<S>& crossing) {
+      for (double begin = -never; begin <= latest;) {
         const double end = this->end();
         const int sign = std::isinf(end) ? compare_slopes(upper_.piece(), lower_.piece()) : sign_at(end);
         if (sign < 0) {
@@ -249,13 +276,25 @@ class OverlapClock {
           return true;
         }
         if (std::isinf(end)) return false;
+        // It is not negative throughout this piece.
+        if (--pieces < 0) return gives_up(begin);
         next(end);
         begin = end;
       }
       return false;
     }
 
+    /// When a search gave up: begin of a piece through which the gap has the sign it began with. Infinite
+    /// when it did not.
+    double known_until() const { return known_until_; }
+
    private:
+    static constexpr double never = std::numeric_limits<double>::infinity();
+
+    bool gives_up(double begin) {
+      known_until_ = begin;
+      return false;
+    }
     static bool is_crossing(const Crossing<S>& crossing, const Piece<S>& u, const Piece<S>& l) {
       return (crossing.winner == u && crossing.loser == l) || (crossing.winner == l && crossing.loser == u);
     }
@@ -272,8 +311,20 @@ class OverlapClock {
 
     int axis_;
     PieceWalk<S> upper_, lower_;
+    double known_until_ = never;
   };
 
+  int look_ahead_;
+
+  static void set_review(Event& event, double t) {
+    const Piece<S> rest{t, std::numeric_limits<double>::infinity(), S(0), S(0), PieceKind::ray};
+    Piece<S> rises = rest;
+    rises.x1 = 1;
+    event.crossing = {rises, rest};
+    event.hint = t;
+    event.error = 0;
+    event.review = true;
+  }
   static bool set(Event& event, const Crossing<S>& crossing) {
     const TimeEstimate estimate = crossing_estimate(crossing);
     if (!std::isfinite(estimate.time)) return false;  // beyond any time that can be asked for

@@ -59,6 +59,8 @@ struct ListEdit {
 ///   inner, overlapping: they are apart ("fathers do not overlap"): all below goes. The paper schedules this
 ///     with each child and has to insert the father once; here it is the father's own;
 ///   leaves, overlapping: they are apart ("leaves do not overlap").
+/// Or, where that is too far ahead, one at which only its next event is looked for (OverlapClock); it is
+/// counted as an operation on the queue.
 /// When a box changes ("BV change": another realiser, or another plan of one), the pairs that it takes part
 /// in, which are linked from it, are decided anew.
 ///
@@ -105,8 +107,8 @@ class SeparationList {
   };
 
   template <class Forest>
-  SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count)
-      : queue_(clock_, 0), count_(&count), leaves_(scene.pairs().size()) {
+  SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count, int look_ahead)
+      : clock_(look_ahead), queue_(clock_, 0), count_(&count), leaves_(scene.pairs().size()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const auto& tree = forest.tree(body);
       bodies_.push_back({&tree.topology(), nullptr, &forest.clock().plans(body), {}, {}});
@@ -145,6 +147,10 @@ class SeparationList {
     const Event event = queue_.top();
     queue_.pop();
     count_->add(Counter::queue_operations);
+    if (event.review) {
+      schedule(event.slot, Instant<S>::at(event.hint));
+      return;
+    }
     count_->add(Counter::certificates_failed);
     count_->add(pairs_[event.slot].overlapping ? kind_of_separation(event.slot) : Counter::overlap_events);
     time_ = event.not_after();

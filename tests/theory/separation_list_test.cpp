@@ -120,11 +120,13 @@ class Auditor {
 
 struct Kinds {
   std::uint64_t overlap = 0, fathers = 0, leaves = 0, changes = 0, geometry = 0;
+  bool operator==(const Kinds&) const = default;
 };
 
 /// Plays a scene event by event and audits some `audits` times.
 template <class S, template <class> class Queue>
-Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t audits) {
+Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t audits,
+           int look_ahead = OverlapClock<S>::usual_look_ahead) {
   using Collision = KineticCollision<S, Queue, Counting>;
   const auto test = synthetic_scene<S>(name, 2);
   const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 2) : test.frames;
@@ -138,7 +140,8 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
     Playback<S> playback(test.scene);
     playback.seek(frames.front());
     Counting count;
-    Collision collision(view, ClipMotion<S>(playback), build_topologies(view, playback, builder), count);
+    Collision collision(view, ClipMotion<S>(playback), build_topologies(view, playback, builder), count,
+                        look_ahead);
     collision.reset(frames.front());
     count.table = {};
     Auditor<S, Collision> auditor(collision, view);
@@ -200,8 +203,11 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
 class SeparationLists : public testing::TestWithParam<std::string> {};
 
 TEST_P(SeparationLists, EqualATraversalBetweenEvents) {
-  play<float, AvlEventQueue>(GetParam(), {.width = 2, .leaf_size = 1}, 40);
+  const Kinds kinds = play<float, AvlEventQueue>(GetParam(), {.width = 2, .leaf_size = 1}, 40);
   play<double, BinaryHeapEventQueue>(GetParam(), {.width = 4, .leaf_size = 3}, 20);
+  // Who looks less far ahead sees the same.
+  for (const int look_ahead : {1, 2})
+    EXPECT_EQ(kinds, (play<float, AvlEventQueue>(GetParam(), {.width = 2, .leaf_size = 1}, 20, look_ahead)));
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, SeparationLists, testing::ValuesIn(synthetic_scene_names()),
                          [](const auto& param_info) { return param_info.param; });

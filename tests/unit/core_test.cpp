@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 #include <cmath>
+#include <fstream>
 #include <limits>
 
 #include "core/hierarchy/audit.hpp"
@@ -121,9 +122,31 @@ TEST(Oracle, CacheOnDiskIsUsedAndDamageIsIgnored) {
   ASSERT_FALSE(truth.empty());
   ASSERT_FALSE(std::filesystem::is_empty(folder));
   const auto file = std::filesystem::directory_iterator(folder)->path();
-  EXPECT_EQ(Oracle<float>(test.scene, folder).pairs(playback), truth);
-  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
-  EXPECT_EQ(Oracle<float>(test.scene, folder).pairs(playback), truth);
+  const auto size = std::filesystem::file_size(file);
+  const auto expect = [&](bool damaged) {
+    Oracle<float> oracle(test.scene, folder);
+    EXPECT_EQ(oracle.problem().empty(), !damaged) << oracle.problem();
+    EXPECT_EQ(oracle.pairs(playback), truth);
+  };  // writes a sound file in the end
+  expect(false);
+  std::filesystem::resize_file(file, size / 2);
+  expect(true);
+  for (std::uintmax_t place = 0; place < size; place += 1 + size / 50) {
+    std::fstream bytes(file, std::ios::binary | std::ios::in | std::ios::out);
+    bytes.seekg(std::streamoff(place));
+    const char other = char(bytes.get() ^ 1);
+    bytes.seekp(std::streamoff(place));
+    bytes.put(other);
+    bytes.close();
+    expect(true);
+  }
+  expect(false);
+  std::filesystem::remove_all(folder);
+  std::ofstream(folder) << "a file where the folder should be";
+  Oracle<float> homeless(test.scene, folder);
+  EXPECT_EQ(homeless.pairs(playback), truth);
+  homeless.keep();
+  EXPECT_NE(homeless.problem(), "");
   std::filesystem::remove_all(folder);
 }
 
