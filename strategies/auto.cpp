@@ -205,7 +205,7 @@ class Auto final : public Strategy<S> {
   };
   /// Frames after which the choice is thought over within one segment, and if there is a new one.
   static constexpr int longest_stay = 64, shortest_stay = 8;
-  static constexpr std::uint32_t samples = 16;
+  static constexpr std::uint32_t samples = 24;
 
   static void add(Counters& sum, const Counters& other) {
     for (const Counter peak : {Counter::list_peak, Counter::queue_peak}) {
@@ -287,7 +287,9 @@ class Auto final : public Strategy<S> {
     const std::uint32_t taken = std::min(samples, count);
     double sum = 0, together[3] = {};
     for (std::uint32_t i = 0; i < taken; ++i) {
-      const auto vertex = std::uint32_t(std::uint64_t(i) * count / taken);
+      // Spread by the golden ratio: even steps may meet the same place in every row of a grid.
+      const std::uint32_t share = 0x9e3779b9u * i;  // of 2^32
+      const auto vertex = std::uint32_t(std::uint64_t(share) * count >> 32);
       double square = 0;
       for (int axis = 0; axis < 3; ++axis) {
         const Piece<S> piece = motion_.piece(body, vertex, axis);

@@ -325,7 +325,7 @@ class DriftStrategy : public Strategy<S> {
     } else if (period_ == 0) {
       plain_left_ = std::max(plain_left_, 1);
     }
-    if (lists_ == Lists::never) plain_left_ = 1 << 20;
+    if (lists_ == Lists::never) plain_left_ = std::numeric_limits<int>::max();
     for (const Body& body : bodies_)
       for (int axis = 0; axis < 3; ++axis)
         if (!(std::abs(body.rate_low[axis]) + std::abs(body.rate_high[axis]) <
