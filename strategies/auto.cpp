@@ -20,8 +20,8 @@ struct Seen {
   double changes_per_frame = 0;   // frames with changes of plans, as a share of the last ones
   double candidates = 0;          // pairs whose boxes overlap in a frame
   double reads = 0;               // vertices that a refit reads
-  double step = 0;                // mean way of a vertex in a frame, against the mean side of a leaf's box
-  double spread = 1;              // how different the ways of one body's vertices are: 0: all the same; to 1
+  double step = 0;    // mean way of a vertex in a frame past another body, against the mean side of a leaf
+  double spread = 1;  // how different these ways are among one body's vertices: 0: all the same; to 1
 };
 
 // Predicted nanoseconds per frame, fitted to tablecloth 16k, waving_sheet 8k, passing_spheres 5k and
@@ -35,9 +35,9 @@ double refit_cost(const Seen& seen) {
 /// pairs come near in those frames than a query takes to find.
 double drift_cost(const Seen& seen) {
   const double watching = 0.1 * seen.reads;
-  if (seen.candidates == 0) return seen.step < 0.1 ? 0.5 * watching : 1.2 * refit_cost(seen);
+  if (seen.candidates == 0) return seen.step < 0.2 ? 0.5 * watching : 1.2 * refit_cost(seen);
   if (seen.spread > 0.1) return 1.2 * refit_cost(seen);
-  const double frames = seen.step > 0 ? std::min(0.2 / seen.step, 24.0) : 24;
+  const double frames = seen.step > 0 ? std::min(0.4 / seen.step, 24.0) : 24;
   if (frames < 3) return 1.2 * refit_cost(seen);
   const double search = 0.35 * seen.reads + 45 * seen.candidates;
   return watching + search / frames + 15 * seen.candidates;
@@ -48,7 +48,8 @@ double drift_cost(const Seen& seen) {
 double join_cost(const Seen& seen) {
   const double l = seen.frames_per_segment, moves = seen.step * l;
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
-  return refit_cost(seen) * (8 / (l + 4) * (1 + 0.3 * moves) + (0.7 - 0.6 * seen.spread) * moves);
+  const double alike = 1 - seen.spread;
+  return refit_cost(seen) * (8 / (l + 4) * (1 + 0.3 * moves) + 0.55 * alike * alike * moves);
 }
 
 /// A strategy to choose, the parameters that differ from its defaults, and what it would cost. To offer
@@ -86,6 +87,7 @@ class Auto final : public Strategy<S> {
       runners_.push_back({&candidate, found->info.positions == PositionUse::all,
                           NestedStrategies<S>::create(*found, scene, motion, topologies, own, policy)});
     }
+    velocities_.resize(scene.body_count());
     if (runners_.empty()) throw ConfigError("auto has nothing to choose from");
   }
 
@@ -250,13 +252,17 @@ class Auto final : public Strategy<S> {
     chosen_at_ = frame_;
     chosen_for_contact_ = seen_.candidates > 0;
     double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
-    double largest = 0, spread = 0;
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
       if (seen_.changes_per_frame == 0) {  // else it takes long to find out, and nobody can rely on it
         begin = std::max(begin, motion_.lines_begin(body));
         end = std::min(end, motion_.lines_end(body));
       }
-      if (leaf_size_[body] > 0) largest = std::max(largest, way(body, spread) / leaf_size_[body]);
+      sample(body);
+    }
+    seen_.step = seen_.spread = 0;
+    for (const BodyPair& pair : this->scene_.pairs()) {
+      pass(pair.first, pair.second);
+      pass(pair.second, pair.first);
     }
     segment_end_ = end > t ? end : t;
     const bool known =
@@ -265,8 +271,6 @@ class Auto final : public Strategy<S> {
       seen_.frames_per_segment = std::max(1.0, (end - begin) / step_);
     else if (frame_ == 1 || seen_.changes_per_frame > 0)
       seen_.frames_per_segment = std::numeric_limits<double>::infinity();
-    seen_.step = largest;
-    seen_.spread = spread;
     std::size_t best = active_;
     double least = runners_[active_].candidate->cost(seen_);
     for (std::size_t i = 0; i < runners_.size(); ++i) {
@@ -279,38 +283,50 @@ class Auto final : public Strategy<S> {
     active_ = best;
   }
 
-  /// The mean way of a body's vertices in one frame, from some of them, as they move now; and how much less
-  /// of it they have in common, as a share, if that is more than `spread`.
-  double way(std::uint32_t body, double& spread) const {
+  /// Velocities of some of a body's vertices, as they move now.
+  void sample(std::uint32_t body) {
+    Velocities& seen = velocities_[body];
     const std::uint32_t count = this->scene_.vertex_count(body);
-    if (count == 0 || (!this->scene_.moving(body) && seen_.changes_per_frame == 0)) return 0;
-    const std::uint32_t taken = std::min(samples, count);
-    double sum = 0, together[3] = {};
-    for (std::uint32_t i = 0; i < taken; ++i) {
+    seen = {};
+    if (count == 0 || (!this->scene_.moving(body) && seen_.changes_per_frame == 0)) return;
+    seen.count = std::min(samples, count);
+    for (std::uint32_t i = 0; i < seen.count; ++i) {
       // Spread by the golden ratio: even steps may meet the same place in every row of a grid.
       const std::uint32_t share = 0x9e3779b9u * i;  // of 2^32
       const auto vertex = std::uint32_t(std::uint64_t(share) * count >> 32);
-      double square = 0;
       for (int axis = 0; axis < 3; ++axis) {
         const Piece<S> piece = motion_.piece(body, vertex, axis);
-        const double speed = piece.kind == PieceKind::ray
-                                 ? double(piece.x1)
-                                 : (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
-        square += speed * speed;
-        together[axis] += speed;
+        seen.of[i][axis] = piece.kind == PieceKind::ray
+                               ? double(piece.x1)
+                               : (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
+        seen.mean[axis] += seen.of[i][axis] / seen.count;
       }
-      sum += std::sqrt(square);
     }
-    const double common =
-        std::sqrt(together[0] * together[0] + together[1] * together[1] + together[2] * together[2]);
-    if (sum > 0) spread = std::max(spread, 1 - common / sum);
-    return sum / taken * step_;
+  }
+  /// How a body's vertices move past another body, which counts as a whole. What goes along with the other is
+  /// no motion: bounds that move contain it.
+  void pass(std::uint32_t body, std::uint32_t other) {
+    const Velocities &own = velocities_[body], &others = velocities_[other];
+    if (own.count == 0 || leaf_size_[body] <= 0) return;
+    double sum = 0, common = 0;
+    for (std::uint32_t i = 0; i < own.count; ++i)
+      sum += std::hypot(own.of[i][0] - others.mean[0], own.of[i][1] - others.mean[1],
+                        own.of[i][2] - others.mean[2]);
+    common = own.count * std::hypot(own.mean[0] - others.mean[0], own.mean[1] - others.mean[1],
+                                    own.mean[2] - others.mean[2]);
+    seen_.step = std::max(seen_.step, sum / own.count * step_ / leaf_size_[body]);
+    if (sum > 0) seen_.spread = std::max(seen_.spread, 1 - common / sum);
   }
 
+  struct Velocities {
+    std::uint32_t count = 0;  ///< none: it rests
+    double of[samples][3] = {}, mean[3] = {};
+  };
   SegmentMotion<S> motion_;
   double gain_;
   std::vector<Runner> runners_;
   std::vector<double> leaf_size_, reads_;  ///< by body
+  std::vector<Velocities> velocities_;     ///< by body, per second
   Counters retired_;                       ///< of what was counted before an instance started anew
   std::size_t active_ = 0;
   std::uint64_t first_fetch_ = 0;
