@@ -225,6 +225,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "tightness": record.text("strategy.tightness", ""),
         "foresight": record.text("strategy.foresight", ""),
         "citation": record.text("strategy.citation", ""),
+        "choice": record.text("choice", ""),
         "own_scalar": record.text("strategy.own_scalar", ""),
         "params": params,
         "builder": builder,

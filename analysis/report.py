@@ -6,7 +6,6 @@ usage: report.py RESULTS_DIR [--title TEXT] [--figures main|all|none] [--print]
 from __future__ import annotations
 
 import argparse
-import base64
 import re
 import sys
 from dataclasses import dataclass, field
@@ -17,11 +16,13 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+import choices
 import claims as paper_claims
 import figures
 import paper_figures
 import ratios
 import robustness
+import scene_cards
 import scene_pictures
 import tables
 import targets_table
@@ -137,6 +138,7 @@ def write(
         own_sections=[section for section in sections if section.own],
         every_section=sections,
         strategies=_strategies(study),
+        choices=choices.choices(study),
         stress=robustness.stress(folder),
         ccd=robustness.ccd(folder),
         limits=limits(study),
@@ -212,11 +214,11 @@ def _sections(
         smaller = sorted(rows["primitives"].unique())[:-1]
         sizes = text.listing([text.size(value) for value in smaller])
         own = bool((rows["origin"] == "files").any())
-        card, view = _card(rows), None
+        card, view = scene_cards.card(rows), None
         if (shown := scene_pictures.exported(folder.parent, list(rows.sort_values("primitives")["scene_name"]))) is not None:
-            card += _violence(shown)
-            view = _view(shown, folder, str(scene)) if which != "none" else None
-        section = Section(str(scene), f"scene-{number + 1}", _bodies(rows), card, view, own, sizes, mine)
+            card += scene_cards.violence(shown)
+            view = scene_cards.view(shown, folder, str(scene)) if which != "none" else None
+        section = Section(str(scene), f"scene-{number + 1}", scene_cards.bodies(rows), card, view, own, sizes, mine)
         timed = rows[rows["refused"] == ""]
         slug = re.sub(r"[^a-z0-9]+", "-", str(scene).lower()).strip("-") or f"scene-{number + 1}"
         if len(timed) and which != "none":
@@ -370,74 +372,6 @@ def _most(rows: pd.DataFrame, column: str, counted: str, usual: float) -> float:
     numbers = rows.groupby(column)[counted].nunique()
     best = numbers[numbers == numbers.max()].index
     return usual if usual in best else float(best.max())
-
-
-def _bodies(rows: pd.DataFrame) -> list[dict[str, str]]:
-    """Facts on the bodies of a scene, at its largest size."""
-    largest = rows.loc[rows["primitives"].idxmax()]
-    return [
-        {
-            "name": str(body.get("name", "?")),
-            "primitives": text.count(body.get("primitives")),
-            "vertices": text.count(body.get("vertices")),
-            "keyframes": text.count(body.get("keyframes")),
-            "motion": "moves" if body.get("moving") else "rests",
-            "degenerate": text.count(body.get("degenerate") or 0),
-        }
-        for body in largest["bodies"]
-        if isinstance(body, dict)
-    ]
-
-
-def _card(rows: pd.DataFrame) -> list[tuple[str, str]]:
-    """Facts on a scene as it was measured: at its largest size, and over its sizes."""
-    largest = rows.loc[rows["primitives"].idxmax()]
-    mine = rows[rows["primitives"] == largest["primitives"]]
-    sampled = mine[mine["pairs"].notna() & (mine["verified_frames"] > 0)]
-    origins = {"built_in": "built into kbvh", "files": "read from files", "shapes": "made by formula"}
-    sizes = text.listing([text.size(value) for value in sorted(rows["moving"].unique())])
-    frames = text.listing([text.count(value) for value in sorted(mine["frames"].dropna().unique())])
-    facts = [
-        ("From", origins.get(str(largest["origin"]), "")),
-        ("Moving primitives", sizes),
-        ("Interpolated frames, l", text.listing([f"{value:g}" for value in sorted(rows["l"].unique())])),
-        ("Frames of a clip", frames),
-        ("Scalars", text.listing(sorted(rows["scalar"].unique()))),
-        ("Seeds", text.listing(sorted(seed for seed in rows["seed"].unique() if seed))),
-    ]
-    if len(sampled):
-        pairs = sampled["pairs"] / sampled["verified_frames"]
-        facts.append(("Pairs that meet", f"{text.significant(float(pairs.median()))} in a frame, on average"))
-    if len(largest["changes"]):
-        facts.append(("Changes at run time", largest["changes"]))
-    return [(name, value) for name, value in facts if value]
-
-
-def _violence(folder: Path) -> list[tuple[str, str]]:
-    """How much the moving bodies of a scene that was written out move, from its card."""
-    facts = []
-    for body in scene_pictures.card(folder):
-        if body["keyframes"] > 1:
-            facts.append((
-                f"How violent: {body['name']}",
-                f"{100 * body['sides_changed_per_keyframe']:.2g} % of the sides of its {text.size(body['nodes'])} nodes have "
-                f"another realising vertex at the next keyframe (at most {100 * body['sides_changed_at_most']:.2g} %); a vertex "
-                f"moves by {body['mean_step_in_edges']:.2g} edges (at most {body['largest_step_in_edges']:.2g})",
-            ))  # fmt: skip
-    return facts
-
-
-def _view(folder: Path, figures_folder: Path, scene: str) -> Picture:
-    """The scene at a few keyframes."""
-    slug = re.sub(r"[^a-z0-9]+", "-", scene.lower()).strip("-") or "scene"
-    file = figures_folder / f"{slug}-scene.png"
-    width, height = scene_pictures.write(folder, file)
-    uri = "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode("ascii")
-    reading = (
-        "Some keyframes from the first to the last, seen with z upwards; each body has its colour. "
-        f"Drawn from the meshes in scenes/{folder.name}, which other programs can open, too."
-    )
-    return Picture(file.stem, f"What it looks like: {scene}", reading, uri, width // 2, height // 2)
 
 
 def _values(column: pd.Series, shorten: Optional[int] = None) -> str:

@@ -1,0 +1,47 @@
+"""Automatic choices in the report: who is compared with whom."""
+
+from __future__ import annotations
+
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Any
+
+import paths  # noqa: F401  (finds the modules under test)
+
+import choices
+import synthetic
+from load import load
+
+
+def line(title: str, update: float, **changes: Any) -> dict[str, Any]:
+    """A run that takes `update` ms for everything."""
+    contestant = dict(id=title, title=title, family="refit", update=1.0, query=1.0, builder=(8, 4), **changes)
+    record = synthetic.record(contestant, "cloth", 4000, "float", 10)
+    for repetition in record["times"]["repetitions"]:
+        repetition.update(motion=9.0, update=update, traversal=0.0, triangle_tests=0.0)
+    return record
+
+
+class TestChoices(unittest.TestCase):
+    def found(self, lines: list[dict[str, Any]]) -> list[choices.Choice]:
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
+            synthetic.write(Path(name), lines)
+            return choices.choices(load(Path(name)))
+
+    def test_is_held_against_the_best_other_of_one_thread_that_is_exact(self) -> None:
+        chooser = line("chooser", 2.0)
+        chooser["choice"] = "refit for 190 frames, join for 11 frames (last seen: nothing)"
+        lines = [chooser, line("slow", 3.0), line("good", 1.5), line("threaded", 0.1, params={"threads": "2"}),
+                 line("wrong", 0.1, guarantee="approximate")]  # fmt: skip
+        (row,) = self.found(lines)
+        self.assertIn("good", row.best)
+        self.assertAlmostEqual(row.ratio, 0.75)
+        self.assertEqual((row.chosen, row.seen), ("refit for 190 frames, join for 11 frames", "last seen: nothing"))
+
+    def test_without_a_choice_there_is_nothing_to_show(self) -> None:
+        self.assertEqual(self.found([line("slow", 3.0)]), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
