@@ -95,7 +95,7 @@ FIGURES: tuple[PaperFigure, ...] = (
         "22", "incremental collision detection",
         (
             Panel("left", "dress", "polygons", ("total",), "total", "dress: total (ms per frame)"),
-            Panel("middle", "dress", "l", ("total",), "total", "dress: total over l (ms per frame)"),
+            Panel("middle", "dress", "l", ("total",), "total", "dress: total over l (ms)"),
             Panel("right", "tablecloth", "polygons", ("total",), "total", "tablecloth: total (ms per frame)"),
         ),
         ON_SIZE + "The separation list never searches from the roots, so its line holds all that it does for collisions; the "
