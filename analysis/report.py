@@ -18,6 +18,7 @@ from markupsafe import Markup
 
 import choices
 import claims as paper_claims
+import exactness
 import figures
 import paper_figures
 import ratios
@@ -114,6 +115,7 @@ def write(
     sections = _sections(study, groups, all_looks, folder / "figures", which)
     theory = _theory(folder, which)
     paper = _paper(study, claims, all_looks, folder / "figures", which)
+    exactness_rows = exactness.comparisons(study)
     drawn = {one.name for one in theory} | {paper_figures.anchor(figure.number) for figure, *_ in paper}
     page = render(
         title=title,
@@ -139,6 +141,9 @@ def write(
         every_section=sections,
         strategies=_strategies(study),
         choices=choices.choices(study),
+        exactness=exactness_rows,
+        exactness_says=exactness.paragraph(exactness_rows),
+        significant=text.significant,
         stress=robustness.stress(folder),
         ccd=robustness.ccd(folder),
         limits=limits(study),
