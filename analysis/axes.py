@@ -92,7 +92,7 @@ def zero_log_axis(axes: Axes, values: Sequence[float], tick: FormatTick) -> None
     threshold = 10.0**first
     axes.set_xscale("symlog", linthresh=threshold, linscale=max(0.45, (last - first) * 0.22))
     axes.set_xlim(-threshold * 0.45, max(positive) * max(2.2, 10 ** (0.12 * (last - first))))
-    step = max(1, math.ceil((last - first) / 5))
+    step = max(1, math.ceil((last - first) / 4))
     places = [0.0] + [10.0**power for power in range(first, last + 1, step)]
     axes.xaxis.set_major_locator(FixedLocator([p for p in places if p <= axes.get_xlim()[1]]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))

@@ -114,8 +114,10 @@ def time_against_error(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
 
     Contestants are numbered by speed. In a crowd only the fastest configuration of each strategy and those on a
     front have a number; the others are small marks. None where nobody differs from the others in any error.
+    Boxes that are too small are not less than tight: their error is the protrusion.
     """
     rows = without_oracles(group[group["total_motion"] > 0]).sort_values("total_motion").reset_index(drop=True)
+    rows["looseness"] = rows["looseness"].clip(lower=0)
     panels: list[tuple[str, str]] = []
     if rows["looseness"].nunique() > 1:
         panels.append(("looseness", "looseness of the boxes"))
