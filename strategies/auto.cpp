@@ -48,6 +48,7 @@ double drift_cost(const Seen& seen) {
 double join_cost(const Seen& seen) {
   const double l = seen.frames_per_segment, moves = seen.step * l;
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
+  if (seen.candidates == 0) return 1.5 / l * refit_cost(seen);  // bodies apart: a box at each end
   const double alike = 1 - seen.spread;
   return refit_cost(seen) * (8 / (l + 4) * (1 + 0.3 * moves) + 0.55 * alike * alike * moves);
 }
@@ -142,8 +143,9 @@ class Auto final : public Strategy<S> {
   QueryStatus candidates_at(double t, PairBuffer& out, const Budget& budget) override {
     const std::size_t before = out.size();
     const QueryStatus status = runners_[active_].strategy->candidates_at(t, out, budget);
-    // Other strategies leave out what they know to be apart: then the last count stays the best there is.
-    if (runners_[active_].all_positions) seen_.candidates = double(out.size() - before);
+    // Other strategies leave out what they know to be apart: they show no more than that bodies meet.
+    if (runners_[active_].all_positions || seen_.candidates == 0)
+      seen_.candidates = double(out.size() - before);
     return status;
   }
 
