@@ -157,6 +157,15 @@ def study() -> list[dict[str, Any]]:
     return lines
 
 
+def line(identity: str, total: float, scene: str = "cloth", **changes: Any) -> dict[str, Any]:
+    """A run that takes `total` ms for everything, all of it update."""
+    contestant = dict(id=identity, title=identity, family="refit", update=1.0, query=1.0, builder=(8, 4), **changes)
+    made = record(contestant, scene, 4000, "float", 10)
+    for repetition in made["times"]["repetitions"]:
+        repetition.update(motion=0.0, update=total, traversal=0.0, triangle_tests=0.0)
+    return made
+
+
 def write(folder: Path, lines: list[dict[str, Any]], tail: Optional[str] = None) -> Path:
     """Writes results.jsonl, with `tail` as an unfinished last line."""
     folder.mkdir(parents=True, exist_ok=True)

@@ -12,15 +12,7 @@ import paths  # noqa: F401  (finds the modules under test)
 import choices
 import synthetic
 from load import load
-
-
-def line(title: str, update: float, **changes: Any) -> dict[str, Any]:
-    """A run that takes `update` ms for everything."""
-    contestant = dict(id=title, title=title, family="refit", update=1.0, query=1.0, builder=(8, 4), **changes)
-    record = synthetic.record(contestant, "cloth", 4000, "float", 10)
-    for repetition in record["times"]["repetitions"]:
-        repetition.update(motion=9.0, update=update, traversal=0.0, triangle_tests=0.0)
-    return record
+from synthetic import line
 
 
 class TestChoices(unittest.TestCase):
