@@ -24,7 +24,7 @@
 // Denormals. Embree flushes them. Denormal bounds are widened to the smallest normal number, so that this
 // cannot lose a pair; bounds beyond 1.8e18, which Embree takes for invalid, are clamped. Both are monotone,
 // as is flushing: what touches still does. kbvh's own test follows after the floating-point state is
-// restored.
+// restored. Upper bounds are an ulp or two larger: Embree's builder asserts that the box of all is no point.
 //
 // The hierarchy cannot be seen, so there is no audit. Float scenes only.
 #include <embree3/rtcore.h>
@@ -318,8 +318,10 @@ class EmbreeRefit final : public Strategy<S> {
   /// Half of a refit's time is spent here and above: whole registers are stored, with Embree's own padding.
   static void hand_over(const Bounds& tight, RTCBounds& box) {
     constexpr float twice_smallest = 2 * std::numeric_limits<float>::min();
-    const Lanes sides[2] = {(tight.lower - twice_smallest).max(-largest).min(largest),
-                            (tight.upper + twice_smallest).max(-largest).min(largest)};
+    constexpr float ulp = std::numeric_limits<float>::epsilon();
+    const Lanes sides[2] = {
+        (tight.lower - twice_smallest).max(-largest).min(largest),
+        (tight.upper + (tight.upper.abs() * ulp + twice_smallest)).max(-largest).min(largest)};
     static_assert(sizeof(RTCBounds) == sizeof(sides));
     std::memcpy(&box, sides, sizeof(box));
   }
