@@ -12,30 +12,62 @@ namespace {
 constexpr std::size_t leaf_pair_room = 2048;
 /// Room for pairs of primitives that is made at least.
 constexpr std::size_t chunk_room = 2048;
+
+/// Of pairs in columns, keeps those that are pairs within a body, from one on.
+void keep_self_columns(const Primitives* neighbours, LeavesOf leaves, JoinColumns& pairs, std::size_t from) {
+  std::size_t kept = from;
+  for (std::size_t i = from; i < pairs.found; ++i) {
+    std::uint32_t a = pairs.primitive_a[i], b = pairs.primitive_b[i];
+    if (!keep_self_pair(neighbours, leaves, a, b)) continue;
+    pairs.primitive_a[kept] = a;
+    pairs.primitive_b[kept] = b;
+    if (pairs.begin != nullptr) {
+      pairs.begin[kept] = pairs.begin[i];
+      pairs.end[kept] = pairs.end[i];
+    }
+    ++kept;
+  }
+  pairs.found = kept;
+}
 }  // namespace
+
+template <class S>
+JoinColumns IntervalJoin<S>::Columns::view(std::size_t found, bool timed) {
+  if (primitive_a.size() < found + chunk_room) {
+    const std::size_t room = 2 * found + chunk_room;
+    for (auto* column : {&primitive_a, &primitive_b}) column->resize(room);
+    if (timed)
+      for (auto* column : {&begin, &end}) column->resize(room);
+  }
+  return {primitive_a.data(),
+          primitive_b.data(),
+          timed ? begin.data() : nullptr,
+          timed ? end.data() : nullptr,
+          found,
+          primitive_a.size()};
+}
+
+template <class S>
+std::size_t IntervalJoin<S>::Columns::bytes() const {
+  return (primitive_a.capacity() + primitive_b.capacity()) * sizeof(std::uint32_t) +
+         (begin.capacity() + end.capacity()) * sizeof(float);
+}
 
 template <class S>
 WideLinearLeaves<S> IntervalJoin<S>::leaves(typename LinearBounds<S>::Side& side, std::uint32_t which) {
   Leaves& own = leaves_[which];
-  const std::size_t size =
-      side.hierarchy.leaf_count() * lane_scalars(std::max(4u, side.hierarchy.padded_leaf_size()));
-  // Rows of a body that stays at rest where it was are those of the last segment.
-  const bool same = own.at_rest && side.at_rest && own.positions[0] == side.positions[0] && own.stamp != 0;
-  if (own.stamps.size() != side.hierarchy.leaf_count()) {
-    own.stamps.assign(side.hierarchy.leaf_count(), 0);
-    own.stamp = 1;
-  } else if (!same && ++own.stamp == 0) {
-    std::fill(own.stamps.begin(), own.stamps.end(), 0);
-    own.stamp = 1;
+  const std::size_t count = side.hierarchy.leaf_count();
+  for (std::uint32_t end = 0; end < 2; ++end) {
+    const std::uint32_t array = side.array(end);
+    own.rows[array].resize(count * lane_scalars(std::max(4u, side.hierarchy.padded_leaf_size())));
+    own.stamps[array].resize(count, 0);
   }
-  own.at_rest = side.at_rest;
-  for (std::uint32_t end = 0; end < (side.at_rest ? 1u : 2u); ++end) own.rows[end].resize(size);
-  for (std::uint32_t end = 0; end < 2; ++end) own.positions[end] = side.positions[end];
+  const std::uint32_t first = side.array(0), last = side.array(1);
   return {side.hierarchy.leaf_lists(),
-          {own.rows[0].data(), own.rows[side.at_rest ? 0 : 1].data()},
-          own.stamps.data(),
-          own.stamp,
-          {own.positions[0], own.positions[1]}};
+          {own.rows[first].data(), own.rows[last].data()},
+          {own.stamps[first].data(), own.stamps[last].data()},
+          {side.made[first], side.made[last]},
+          {side.positions[0], side.positions[1]}};
 }
 
 template <class S>
@@ -44,9 +76,8 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
   body_a_ = body_a;
   body_b_ = body_b;
   const bool self = body_a == body_b;
-  std::size_t found = 0;
-  if (bounds.side(body_a).apart || bounds.side(body_b).apart)  // rows are made anew when they meet again
-    leaves_[0].at_rest = leaves_[1].at_rest = false;
+  std::size_t partly = 0;
+  throughout_ = 0;
   auto &a = bounds.side(body_a), &b = bounds.side(body_b);
   if (!a.hierarchy.empty() && !b.hierarchy.empty() && !a.apart && !b.apart) {
     const std::uint32_t width = a.hierarchy.topology().width;
@@ -62,31 +93,29 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
                               a.ends(),
                               b.ends(),
                               leaves(a, 0),
-                              leaves(b, 1),
+                              leaves(b, self ? 0 : 1),
                               leaf_pairs_.data(),
                               0,
                               0,
-                              nullptr,
-                              0,
-                              0,
+                              found_throughout_.view(0, false),
+                              found_partly_.view(0, true),
                               0};
     const auto pairs_of_leaves = kernels.leaf_join(
         width, std::max(4u, std::max(a.hierarchy.padded_leaf_size(), b.hierarchy.padded_leaf_size())));
     const auto take_leaves = [&](std::size_t end) {
       leaf_join.count = end;
       while (leaf_join.next < leaf_join.count) {
-        if (found_.size() < leaf_join.found + chunk_room) found_.resize(2 * leaf_join.found + chunk_room);
-        leaf_join.out = found_.data();
-        leaf_join.out_room = found_.size();
+        leaf_join.throughout = found_throughout_.view(leaf_join.throughout.found, false);
+        leaf_join.partly = found_partly_.view(leaf_join.partly.found, true);
         pairs_of_leaves(leaf_join);
       }
     };
     const auto take_self_leaves = [&](std::size_t end, LeavesOf leaves) {
-      const std::size_t before = leaf_join.found;
+      const std::size_t old_throughout = leaf_join.throughout.found, old_partly = leaf_join.partly.found;
       take_leaves(end);
       const Primitives* neighbours = with_neighbours_ ? nullptr : &bounds.scene().primitives(body_a);
-      leaf_join.found =
-          before + keep_self_pairs(neighbours, leaves, found_.data() + before, leaf_join.found - before);
+      keep_self_columns(neighbours, leaves, leaf_join.throughout, old_throughout);
+      keep_self_columns(neighbours, leaves, leaf_join.partly, old_partly);
     };
     const auto traverse = self ? kernels.self(width) : kernels.join(width);
     while (state.depth > 0) {
@@ -106,34 +135,47 @@ void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::u
       }
     }
     tests += state.tests + leaf_join.tests;
-    found = leaf_join.found;
+    throughout_ = leaf_join.throughout.found;
+    partly = leaf_join.partly.found;
   }
-  sort_by_begin({found_.data(), found});
+  sort_by_begin(partly);
 }
 
 template <class S>
-void IntervalJoin<S>::sort_by_begin(std::span<const JoinedPair> found) {
-  const auto bucket = [](const JoinedPair& pair) { return FractionBuckets::of(pair.begin); };
+void IntervalJoin<S>::sort_by_begin(std::size_t partly) {
   std::uint32_t place[FractionBuckets::count] = {};
-  for (const JoinedPair& pair : found) ++place[bucket(pair)];
-  std::uint32_t sum = 0;
+  for (std::size_t i = 0; i < partly; ++i) ++place[FractionBuckets::of(found_partly_.begin[i])];
+  std::uint32_t sum = std::uint32_t(throughout_);
   for (std::uint32_t k = 0; k < FractionBuckets::count; ++k) {
     const std::uint32_t count = place[k];
     place[k] = sum;
     sum += count;
     bucket_end_[k] = sum;
   }
-  sorted_.resize(found.size());
-  for (const JoinedPair& pair : found) sorted_[place[bucket(pair)]++] = pair;
-  next_ = 0;
-  waiting_.clear();
-  alive_count_ = 0;
-  if (alive_.size() < sorted_.size()) {
-    alive_.resize(sorted_.size());
-    alive_places_.resize(sorted_.size());
+  count_ = throughout_ + partly;
+  if (sorted_.size() < count_) sorted_.resize(count_);
+  for (std::size_t i = 0; i < throughout_; ++i)
+    sorted_[i] = {found_throughout_.primitive_a[i], found_throughout_.primitive_b[i], 0, 1};
+  for (std::size_t i = 0; i < partly; ++i)
+    sorted_[place[FractionBuckets::of(found_partly_.begin[i])]++] = {
+        found_partly_.primitive_a[i], found_partly_.primitive_b[i], found_partly_.begin[i],
+        found_partly_.end[i]};
+  reading_ = false;
+}
+
+template <class S>
+void IntervalJoin<S>::start_reading() {
+  reading_ = true;
+  if (alive_.size() < count_) {
+    alive_.resize(count_);
+    alive_places_.resize(count_);
+    next_ending_.resize(count_);
+    place_.resize(count_);
   }
-  next_ending_.resize(sorted_.size());
-  place_.resize(sorted_.size());
+  for (std::size_t i = 0; i < throughout_; ++i)
+    alive_[i] = {body_a_, sorted_[i].primitive_a, body_b_, sorted_[i].primitive_b};
+  next_ = alive_count_ = std::uint32_t(throughout_);
+  waiting_.clear();
   std::fill(std::begin(ending_), std::end(ending_), none);
   present_ = 0;
 }
@@ -159,6 +201,7 @@ void IntervalJoin<S>::end_pair(std::uint32_t index) {
 
 template <class S>
 void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
+  if (!reading_) start_reading();
   const std::uint32_t bucket = FractionBuckets::of(fraction);
   // What begins: all of earlier buckets, some of the present one.
   std::size_t kept = 0;
@@ -195,10 +238,10 @@ template <class S>
 std::size_t IntervalJoin<S>::bytes() const {
   std::size_t total = 0;
   for (const Leaves& own : leaves_)
-    total +=
-        (own.rows[0].size() + own.rows[1].size()) * sizeof(S) + own.stamps.size() * sizeof(std::uint32_t);
+    for (int end = 0; end < 2; ++end)
+      total += own.rows[end].size() * sizeof(S) + own.stamps[end].size() * sizeof(std::uint32_t);
   return total + stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
-         (found_.capacity() + sorted_.capacity()) * sizeof(JoinedPair) +
+         found_throughout_.bytes() + found_partly_.bytes() + sorted_.capacity() * sizeof(JoinedPair) +
          alive_.capacity() * sizeof(PrimitivePair) +
          (waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() + place_.capacity()) *
              sizeof(std::uint32_t);

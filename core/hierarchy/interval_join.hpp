@@ -34,8 +34,9 @@ class IntervalJoin {
   /// O(pairs that begin or end since the last call), and one copy of those that overlap.
   void read(float fraction, PairBuffer& out);
 
-  /// All pairs of the segment, in the order in which they begin, roughly.
-  std::span<const JoinedPair> pairs() const { return {sorted_.data(), sorted_.size()}; }
+  /// All pairs of the segment: first those that overlap from its begin to its end, then the others in the
+  /// order in which they begin, roughly.
+  std::span<const JoinedPair> pairs() const { return {sorted_.data(), count_}; }
   std::uint32_t body_a() const { return body_a_; }
   std::uint32_t body_b() const { return body_b_; }
 
@@ -43,29 +44,40 @@ class IntervalJoin {
 
  private:
   static constexpr std::uint32_t none = ~std::uint32_t(0);
-  void sort_by_begin(std::span<const JoinedPair> found);
+  /// What a join found, in columns; there is room for more than was found.
+  struct Columns {
+    std::vector<std::uint32_t> primitive_a, primitive_b;
+    std::vector<float> begin, end;
+
+    JoinColumns view(std::size_t found, bool timed);
+    std::size_t bytes() const;
+  };
+  void sort_by_begin(std::size_t partly);
+  void start_reading();
   void begin_pair(std::uint32_t index);
   void end_pair(std::uint32_t index);
   WideLinearLeaves<S> leaves(typename LinearBounds<S>::Side& side, std::uint32_t which);
 
-  /// Rows of one body's primitives at both ends, made where the join comes.
+  /// Rows of one body's primitives, by its arrays of ends: made where the join comes, and still there when
+  /// the end of a segment is the begin of the next.
   struct Leaves {
     AlignedArray<S> rows[2];
-    std::vector<std::uint32_t> stamps;
-    std::uint32_t stamp = 0;
-    const S* positions[2] = {nullptr, nullptr};
-    bool at_rest = false;
+    std::vector<std::uint32_t> stamps[2];
   };
   std::uint32_t body_a_ = 0, body_b_ = 0;
   bool with_neighbours_ = false;
   Leaves leaves_[2];
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
-  std::vector<JoinedPair> found_, sorted_;
+  Columns found_throughout_, found_partly_;
+  std::vector<JoinedPair> sorted_;          ///< there may be more than there are pairs
+  std::size_t throughout_ = 0, count_ = 0;  ///< in sorted_: from begin to end, and all
+  bool reading_ = false;
   std::uint32_t bucket_end_[FractionBuckets::count] = {};  ///< in sorted_
   std::uint32_t next_ = 0;              ///< in sorted_: those before it have begun, or are in `waiting_`
   std::vector<std::uint32_t> waiting_;  ///< of the present bucket
-  PairBuffer alive_;                    ///< the first `alive_count_` of them, at the last `read`
+  /// The first `alive_count_` of them at the last `read`, and first of all those that overlap throughout.
+  PairBuffer alive_;
   std::uint32_t alive_count_ = 0;
   std::vector<std::uint32_t> alive_places_, place_;  ///< their places in sorted_, and back
   /// Pairs that are alive, in lists by the bucket in which they end.

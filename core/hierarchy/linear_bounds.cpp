@@ -76,6 +76,7 @@ bool LinearBounds<S>::make_end(std::uint32_t body, std::uint32_t end, double t) 
   Side& side = sides_[body];
   const std::uint32_t array = side.array(end);
   side.positions[end] = motion_.positions_on_lines(body, t, side.room[array]);
+  side.made[array] = std::max(side.made[0], side.made[1]) + 1;
   if (side.hierarchy.empty()) return true;
   S* own = side.own[array].data();
   if (side.apart) {

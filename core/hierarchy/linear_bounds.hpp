@@ -25,7 +25,8 @@ class LinearBounds {
     AlignedArray<S> lanes[2], own[2];
     std::vector<S> room[2];
     const S* positions[2] = {nullptr, nullptr};  ///< by end
-    std::uint32_t first = 0;                     ///< which array holds the begin
+    std::uint32_t made[2] = {0, 0};  ///< how often each array's positions were made, both counted as one
+    std::uint32_t first = 0;         ///< which array holds the begin
     bool at_rest = false, current = false;
     /// It met no other body's box over this segment: of its boxes there is the root's and no other.
     bool apart = false;

@@ -23,22 +23,25 @@ enum class LeavesOf : std::uint8_t {
   one,  ///< in one leaf with itself: each pair twice, and every primitive with itself
 };
 
+/// Is it a pair within one body? Puts it into canonical order. Pairs of primitives with a common vertex are
+/// none, unless `primitives` is null.
+inline bool keep_self_pair(const Primitives* primitives, LeavesOf leaves, std::uint32_t& a,
+                           std::uint32_t& b) {
+  if (a >= b) {
+    if (leaves == LeavesOf::one) return false;
+    std::swap(a, b);
+  }
+  return primitives == nullptr || !share_vertex((*primitives)[a], (*primitives)[b]);
+}
+
 /// Of pairs within one body, keeps those that are pairs, canonical and once; returns how many these are.
-/// Pairs of primitives with a common vertex go, unless `primitives` is null. `Pair` has primitive_a and
-/// primitive_b.
+/// `Pair` has primitive_a and primitive_b.
 template <class Pair>
 std::size_t keep_self_pairs(const Primitives* primitives, LeavesOf leaves, Pair* pairs, std::size_t count) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < count; ++i) {
     Pair pair = pairs[i];
-    if (pair.primitive_a >= pair.primitive_b) {
-      if (leaves == LeavesOf::one) continue;
-      std::swap(pair.primitive_a, pair.primitive_b);
-    }
-    if (primitives != nullptr &&
-        share_vertex((*primitives)[pair.primitive_a], (*primitives)[pair.primitive_b]))
-      continue;
-    pairs[kept++] = pair;
+    if (keep_self_pair(primitives, leaves, pair.primitive_a, pair.primitive_b)) pairs[kept++] = pair;
   }
   return kept;
 }

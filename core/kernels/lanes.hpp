@@ -92,5 +92,21 @@ template <class V>
 }
 #endif
 
+/// Copies those of at most 16 numbers whose bits are set, in their order, and returns how many they are. May
+/// write to 16 places.
+template <class T>
+[[gnu::always_inline]] inline unsigned pack_lanes(unsigned bits, const T* from, T* to) {
+  static_assert(sizeof(T) == 4);
+#if defined(KBVH_KERNELS_avx512)
+  const auto mask = __mmask16(bits);
+  _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(mask, _mm512_maskz_loadu_epi32(mask, from)));
+  return unsigned(__builtin_popcount(bits));
+#else
+  unsigned count = 0;
+  for (; bits != 0; bits &= bits - 1) to[count++] = from[__builtin_ctz(bits)];
+  return count;
+#endif
+}
+
 }  // namespace
 }  // namespace kbvh

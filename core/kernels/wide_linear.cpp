@@ -104,13 +104,16 @@ template <class S, class V>
   return mask_bits(first <= zero) | mask_bits(last <= zero);
 }
 
-/// Bit i: lane i of the rows overlaps the box at some time. With `times`, their fractions go to begin and
-/// end.
-template <class S, std::size_t width, bool times>
-[[gnu::always_inline]] inline unsigned meeting(const S* first, const S* last, const Reach<S>& reach, S* begin,
-                                               S* end) {
+template <class S, std::size_t width>
+constexpr std::size_t register_lanes = [] {
   constexpr std::size_t fit = native_lanes<S> < width ? native_lanes<S> : width;
-  constexpr std::size_t lanes = fit * sizeof(S) < 16 ? 1 : fit;  // there are no shorter registers
+  return fit * sizeof(S) < 16 ? std::size_t(1) : fit;  // there are no shorter registers
+}();
+
+/// Bit i: lane i of the rows overlaps the box at some time.
+template <class S, std::size_t width>
+[[gnu::always_inline]] inline unsigned meeting(const S* first, const S* last, const Reach<S>& reach) {
+  constexpr std::size_t lanes = register_lanes<S, width>;
   using V = Vector<S, lanes>;
   unsigned bits = 0;
   for (std::size_t i = 0; i < width; i += lanes) {
@@ -125,14 +128,10 @@ template <class S, std::size_t width, bool times>
     }
     const V zero = V{} + S(0);
     unsigned hit = mask_bits(apart <= zero);
-    if (times ? hit != 0 : (hit & ~together_at_an_end(gaps)) != 0) {
+    if ((hit & ~together_at_an_end(gaps)) != 0) {
       V from, to;
       together<S, V>(gaps, from, to);
       hit &= ~mask_bits(from > to + 2 * S(fraction_slack));
-      if constexpr (times) {
-        store_lanes(begin + i, from);
-        store_lanes(end + i, to);
-      }
     }
     bits |= hit << i;
   }
@@ -168,8 +167,7 @@ struct SegmentView {
   }
   [[gnu::always_inline]] static unsigned meeting_of(const WideEnds<S>& ends, std::uint32_t node,
                                                     const Reach<S>& box) {
-    return meeting<S, width, false>(ends.lanes[0] + node * row_scalars, ends.lanes[1] + node * row_scalars,
-                                    box, nullptr, nullptr);
+    return meeting<S, width>(ends.lanes[0] + node * row_scalars, ends.lanes[1] + node * row_scalars, box);
   }
   [[gnu::always_inline]] unsigned meeting_a(std::uint32_t node, const Reach<S>& box) const {
     return meeting_of(a, node, box);
@@ -185,54 +183,228 @@ void join(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends
   traverse_pairs(a, b, view, state);
 }
 
-/// Makes the rows of a leaf at both ends, unless they are those of this segment.
+/// Pairs of leaves whose rows are made before they are compared.
+constexpr std::size_t rows_ahead = 32;
+
+/// Makes the rows of leaves where they are not there already: several at a time, so that their memory comes
+/// while others are made.
 template <class S, std::size_t padded>
-[[gnu::always_inline]] inline void make_rows(const WideLinearLeaves<S>& leaves, std::uint32_t leaf) {
-  if (leaves.stamps[leaf] == leaves.stamp) return;
-  const std::size_t place = std::size_t(leaf) * 6 * padded;
-  fit_leaf<S, padded>(leaves.lists, leaf, leaves.positions[0], leaves.rows[0] + place);
-  if (leaves.rows[0] != leaves.rows[1])
-    fit_leaf<S, padded>(leaves.lists, leaf, leaves.positions[1], leaves.rows[1] + place);
-  leaves.stamps[leaf] = leaves.stamp;
+class RowMaker {
+ public:
+  [[gnu::always_inline]] void want(const WideLinearLeaves<S>& leaves, std::uint32_t leaf) {
+    for (int end = 0; end < 2; ++end) {
+      std::uint32_t& stamp = leaves.stamps[end][leaf];
+      if (stamp == leaves.stamp[end]) continue;
+      stamp = leaves.stamp[end];
+      wanted_[count_++] = {&leaves, leaf, end};
+      const std::uint32_t corner = leaves.lists.first_corner[leaves.lists.first_entry[leaf]];
+      for (std::size_t i = 0; i < 3 * padded; i += 16) __builtin_prefetch(leaves.lists.corners + corner + i);
+      if (count_ == room) make();
+    }
+  }
+  void make() {
+    for (std::size_t w = 0; w < count_; ++w) {
+      const Wanted& wanted = wanted_[w];
+      const WideLeafLists& lists = wanted.leaves->lists;
+      for (std::uint32_t entry = lists.first_entry[wanted.leaf]; entry < lists.first_entry[wanted.leaf + 1];
+           ++entry)
+        __builtin_prefetch(wanted.leaves->positions[wanted.end] + lists.corners[lists.first_corner[entry]]);
+    }
+    for (std::size_t w = 0; w < count_; ++w) {
+      const auto [leaves, leaf, end] = wanted_[w];
+      fit_leaf<S, padded>(leaves->lists, leaf, leaves->positions[end],
+                          leaves->rows[end] + std::size_t(leaf) * 6 * padded);
+    }
+    count_ = 0;
+  }
+
+ private:
+  struct Wanted {
+    const WideLinearLeaves<S>* leaves;
+    std::uint32_t leaf;
+    int end;
+  };
+  static constexpr std::size_t room = 16;
+  Wanted wanted_[room];
+  std::size_t count_ = 0;
+};
+
+/// One leaf of a pair: its rows at both ends, and its primitives.
+template <class S>
+struct LeafRows {
+  const S *first, *last;
+  const std::uint32_t* primitives;
+  std::uint32_t count;
+};
+
+/// What primitives of a leaf are compared with, as `Reach`.
+template <class S, std::size_t padded>
+struct LeafReach {
+  alignas(64) S bound[2][6][padded];  ///< by end, side and primitive
+
+  [[gnu::always_inline]] void make(const LeafRows<S>& leaf, S margin) {
+    for (std::size_t side = 0; side < 6; ++side) {
+      const std::size_t opposite = (side < 3 ? side + 3 : side - 3) * padded;
+      for (std::size_t i = 0; i < padded; ++i) {
+        bound[0][side][i] = margin - leaf.first[opposite + i];
+        bound[1][side][i] = margin - leaf.last[opposite + i];
+      }
+    }
+  }
+};
+
+/// Lanes of a leaf that may overlap primitive i of another at some time, and those that do from begin to end.
+struct LaneBits {
+  unsigned hit, throughout;
+};
+template <class S, std::size_t padded>
+[[gnu::always_inline]] inline LaneBits compare(const LeafRows<S>& leaf, const LeafReach<S, padded>& reach,
+                                               std::size_t i) {
+  constexpr std::size_t lanes = register_lanes<S, padded>;
+  using V = Vector<S, lanes>;
+  LaneBits bits{0, 0};
+  for (std::size_t lane = 0; lane < padded; lane += lanes) {
+    V apart, open;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const V d0 = load_lanes<V>(leaf.first + k * padded + lane) - reach.bound[0][k][i];
+      const V d1 = load_lanes<V>(leaf.last + k * padded + lane) - reach.bound[1][k][i];
+      apart = k == 0 ? smaller(d0, d1) : larger(apart, smaller(d0, d1));
+      open = k == 0 ? larger(d0, d1) : larger(open, larger(d0, d1));
+    }
+    const V zero = V{} + S(0);
+    const unsigned hit = mask_bits(apart <= zero);
+    bits.hit |= hit << lane;
+    bits.throughout |= (hit & mask_bits(open <= zero)) << lane;
+  }
+  return bits;
+}
+
+/// Pairs that overlap in a part of the segment perhaps, a register of them at a time: divisions cost more
+/// than all the rest, so that no lane of one is to be idle.
+template <class S>
+struct PartlyBatch {
+  static constexpr std::uint32_t room = 16;
+  alignas(64) S first[6][room] = {}, last[6][room] = {};  ///< gaps
+  alignas(64) std::uint32_t primitive_a[room] = {}, primitive_b[room] = {};
+  std::uint32_t count = 0;
+
+  /// Appends those that do overlap, and from when to when, rounded outwards.
+  [[gnu::noinline]] void flush(JoinColumns& to) {
+    constexpr std::size_t lanes = register_lanes<S, room>;
+    using V = Vector<S, lanes>;
+    alignas(64) S froms[room], tos[room];
+    alignas(64) float begin[room], end[room];
+    unsigned bits = 0;
+    for (std::size_t lane = 0; lane < room; lane += lanes) {
+      Gaps<S, V> gaps;
+      for (std::size_t k = 0; k < 6; ++k) {
+        gaps.first[k] = load_lanes<V>(first[k] + lane);
+        gaps.last[k] = load_lanes<V>(last[k] + lane);
+      }
+      V from, until;
+      together<S, V>(gaps, from, until);
+      bits |= mask_bits(from <= until + 2 * S(fraction_slack)) << lane;
+      store_lanes(froms + lane, from);
+      store_lanes(tos + lane, until);
+    }
+    for (std::size_t lane = 0; lane < room; ++lane) {
+      const float from = float(froms[lane]) - fraction_slack, until = float(tos[lane]) + fraction_slack;
+      begin[lane] = from > 0 ? from : 0;
+      end[lane] = until < 1 ? until : 1;
+    }
+    bits &= (1U << count) - 1;
+    pack_lanes(bits, primitive_a, to.primitive_a + to.found);
+    pack_lanes(bits, primitive_b, to.primitive_b + to.found);
+    pack_lanes(bits, begin, to.begin + to.found);
+    to.found += pack_lanes(bits, end, to.end + to.found);
+    count = 0;
+  }
+};
+
+/// Pairs of the primitives of two leaves, of which those of `outer` with a bit are looked at. Branches that
+/// depend on what overlaps cost as much as the comparisons: there are none but the ends of loops.
+template <class S, std::size_t padded>
+[[gnu::always_inline]] inline void leaf_pairs(const LeafRows<S>& outer, unsigned bits,
+                                              const LeafRows<S>& inner, S margin, bool swapped,
+                                              WideLeafJoin<S>& state, PartlyBatch<S>& batch) {
+  LeafReach<S, padded> reach;
+  reach.make(outer, margin);
+  JoinColumns& all = state.throughout;
+  std::uint32_t* const column_outer = swapped ? all.primitive_b : all.primitive_a;
+  std::uint32_t* const column_inner = swapped ? all.primitive_a : all.primitive_b;
+  alignas(64) static constexpr std::uint32_t numbers[16] = {0, 1, 2,  3,  4,  5,  6,  7,
+                                                            8, 9, 10, 11, 12, 13, 14, 15};
+  alignas(64) std::uint32_t part_outer[padded * padded + 16], part_inner[padded * padded + 16];
+  std::uint32_t parts = 0;
+  const auto fill = [](std::uint32_t* to, std::uint32_t value) {
+    for (std::size_t i = 0; i < 16; ++i) to[i] = value;
+  };
+  for (; bits != 0; bits &= bits - 1) {
+    const std::uint32_t i = lowest(bits);
+    const LaneBits found = compare<S, padded>(inner, reach, i);
+    fill(column_outer + all.found, outer.primitives[i]);
+    all.found += pack_lanes(found.throughout, inner.primitives, column_inner + all.found);
+    fill(part_outer + parts, i);
+    parts += pack_lanes(found.hit & ~found.throughout, numbers, part_inner + parts);
+  }
+  for (std::uint32_t p = 0; p < parts; ++p) {
+    const std::uint32_t i = part_outer[p], j = part_inner[p], place = batch.count++;
+    for (std::size_t k = 0; k < 6; ++k) {
+      batch.first[k][place] = inner.first[k * padded + j] - reach.bound[0][k][i];
+      batch.last[k][place] = inner.last[k * padded + j] - reach.bound[1][k][i];
+    }
+    batch.primitive_a[place] = swapped ? inner.primitives[j] : outer.primitives[i];
+    batch.primitive_b[place] = swapped ? outer.primitives[i] : inner.primitives[j];
+    if (batch.count == batch.room) batch.flush(state.partly);
+  }
 }
 
 template <class S, std::uint32_t width, std::size_t padded>
 void leaf_join(WideLeafJoin<S>& shared) {
   WideLeafJoin<S> state = shared;
   const S margin = state.ends_a.margin + state.ends_b.margin;
-  const WideLeafLists &lists_a = state.leaves_a.lists, &lists_b = state.leaves_b.lists;
   const auto number = [](const WideArrays<S>& h, LeafSlot slot) {
     return h.nodes[slot.node()].first_leaf + slot.lane();
   };
-  alignas(64) S begin[padded], end[padded];
-  for (; state.next < state.count && state.found + leaf_pair_step <= state.out_room; ++state.next) {
-    const LeafSlot slot_a = state.pairs[2 * state.next], slot_b = state.pairs[2 * state.next + 1];
-    const std::uint32_t leaf_a = number(state.a, slot_a), leaf_b = number(state.b, slot_b);
-    make_rows<S, padded>(state.leaves_a, leaf_a);
-    make_rows<S, padded>(state.leaves_b, leaf_b);
-    const std::size_t place_a = std::size_t(leaf_a) * 6 * padded, place_b = std::size_t(leaf_b) * 6 * padded;
-    const S *first_a = state.leaves_a.rows[0] + place_a, *last_a = state.leaves_a.rows[1] + place_a;
-    const S *first_b = state.leaves_b.rows[0] + place_b, *last_b = state.leaves_b.rows[1] + place_b;
-    const std::uint32_t begin_a = lists_a.first_entry[leaf_a], begin_b = lists_b.first_entry[leaf_b];
-    const std::uint32_t count_a = lists_a.first_entry[leaf_a + 1] - begin_a;
-    const std::uint32_t count_b = lists_b.first_entry[leaf_b + 1] - begin_b;
-    const std::size_t rows_b = slot_b.node() * std::size_t(6) * width;
-    const Reach<S> box_b = reach_of(lane_box(state.ends_b.lanes[0] + rows_b, width, slot_b.lane()),
-                                    lane_box(state.ends_b.lanes[1] + rows_b, width, slot_b.lane()), margin);
-    unsigned first = meeting<S, padded, false>(first_a, last_a, box_b, nullptr, nullptr);
-    state.tests += count_a + std::uint64_t(unsigned(__builtin_popcount(first))) * count_b;
-    for (; first != 0; first &= first - 1) {
-      const std::uint32_t i = lowest(first), primitive_a = lists_a.primitives[begin_a + i];
-      const Reach<S> box_a = reach_of(lane_box(first_a, padded, i), lane_box(last_a, padded, i), margin);
-      unsigned second = meeting<S, padded, true>(first_b, last_b, box_a, begin, end);
-      for (; second != 0; second &= second - 1) {
-        const std::uint32_t j = lowest(second);
-        const float from = float(begin[j]) - fraction_slack, to = float(end[j]) + fraction_slack;
-        state.out[state.found++] = {primitive_a, lists_b.primitives[begin_b + j], from > 0 ? from : 0,
-                                    to < 1 ? to : 1};
+  const auto rows_of = [](const WideLinearLeaves<S>& leaves, std::uint32_t leaf) {
+    const std::size_t place = std::size_t(leaf) * 6 * padded;
+    const std::uint32_t begin = leaves.lists.first_entry[leaf], end = leaves.lists.first_entry[leaf + 1];
+    return LeafRows<S>{leaves.rows[0] + place, leaves.rows[1] + place, leaves.lists.primitives + begin,
+                       end - begin};
+  };
+  const auto box_of = [margin](const WideEnds<S>& ends, LeafSlot slot) {
+    const std::size_t place = slot.node() * std::size_t(6) * width;
+    return reach_of(lane_box(ends.lanes[0] + place, width, slot.lane()),
+                    lane_box(ends.lanes[1] + place, width, slot.lane()), margin);
+  };
+  PartlyBatch<S> batch;
+  std::size_t made = state.next;
+  for (; state.next < state.count && state.throughout.has_room() && state.partly.has_room(); ++state.next) {
+    if (state.next == made) {
+      RowMaker<S, padded> maker;
+      for (; made < state.count && made < state.next + rows_ahead; ++made) {
+        maker.want(state.leaves_a, number(state.a, state.pairs[2 * made]));
+        maker.want(state.leaves_b, number(state.b, state.pairs[2 * made + 1]));
       }
+      maker.make();
+    }
+    const LeafSlot slot_a = state.pairs[2 * state.next], slot_b = state.pairs[2 * state.next + 1];
+    const LeafRows<S> a = rows_of(state.leaves_a, number(state.a, slot_a));
+    const LeafRows<S> b = rows_of(state.leaves_b, number(state.b, slot_b));
+    const unsigned near_a = meeting<S, padded>(a.first, a.last, box_of(state.ends_b, slot_b));
+    const unsigned near_b = meeting<S, padded>(b.first, b.last, box_of(state.ends_a, slot_a));
+    const auto count_a = unsigned(__builtin_popcount(near_a)), count_b = unsigned(__builtin_popcount(near_b));
+    state.tests += a.count + b.count;
+    if (count_a == 0 || count_b == 0) continue;
+    if (count_a <= count_b) {
+      state.tests += std::uint64_t(count_a) * b.count;
+      leaf_pairs<S, padded>(a, near_a, b, margin, false, state, batch);
+    } else {
+      state.tests += std::uint64_t(count_b) * a.count;
+      leaf_pairs<S, padded>(b, near_b, a, margin, true, state, batch);
     }
   }
+  if (batch.count > 0) batch.flush(state.partly);
   shared = state;
 }
 

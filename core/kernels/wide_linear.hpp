@@ -38,10 +38,23 @@ static_assert(sizeof(JoinedPair) == 16);
 template <class S>
 struct WideLinearLeaves {
   WideLeafLists lists;
-  S* rows[2];             ///< [leaf][6][padded leaf size]; both the same for a body at rest
-  std::uint32_t* stamps;  ///< [leaf]: the rows are those of this segment
-  std::uint32_t stamp;
+  /// By end; both the same for a body at rest.
+  S* rows[2];                ///< [leaf][6][padded leaf size]
+  std::uint32_t* stamps[2];  ///< [leaf]: which positions the rows are of
+  std::uint32_t stamp[2];    ///< of these positions
   const S* positions[2];
+};
+
+/// Pairs of primitives in columns, and where they go. `begin` and `end` are null for pairs that overlap
+/// throughout.
+struct JoinColumns {
+  std::uint32_t *primitive_a, *primitive_b;
+  float *begin, *end;
+  std::size_t found, room;
+
+  /// A pair of leaves finds room: what it can give, what waits in a register and that register, since
+  /// registers are written whole.
+  bool has_room() const { return found + leaf_pair_step + 32 <= room; }
 };
 
 /// Turns pairs of leaves into pairs of primitives whose linear boxes overlap at some time.
@@ -52,8 +65,8 @@ struct WideLeafJoin {
   WideLinearLeaves<S> leaves_a, leaves_b;
   const LeafSlot* pairs;  ///< first, second, ...
   std::size_t next, count;
-  JoinedPair* out;
-  std::size_t found, out_room;
+  JoinColumns throughout;  ///< overlap from the begin of the segment to its end
+  JoinColumns partly;      ///< the others
   std::uint64_t tests;
 };
 
@@ -64,7 +77,7 @@ struct WideLinearKernels {
   /// The same for boxes that overlap at any time of the segment.
   using Join = void (*)(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b,
                         WideTraversal& state);
-  /// Goes on until all pairs of leaves are done or the next might not find room (`leaf_pair_step`).
+  /// Goes on until all pairs of leaves are done or the next might not find room (`JoinColumns::has_room`).
   using LeafJoin = void (*)(WideLeafJoin<S>& state);
   /// Boxes of one node at a fraction.
   using Make = void (*)(const WideMoment<S>& moment, std::uint32_t node);
