@@ -21,41 +21,43 @@ struct Seen {
   double candidates = 0;          // pairs whose boxes overlap in a frame
   double reads = 0;               // vertices that a refit reads
   double step = 0;    // mean way of a vertex in a frame past another body, against the mean side of a leaf
+  double slide = 0;   // the same of primitives past those they are candidates with
   double spread = 1;  // how different these ways are among one body's vertices: 0: all the same; to 1
 };
 
-// Predicted nanoseconds per frame, fitted to tablecloth 16k, waving_sheet 8k, passing_spheres 5k and
-// expanding_sphere 5k at l = 1, 3, 10, 30 (Zen 5, float): only their order counts.
+// Predicted nanoseconds per frame, fitted to tablecloth 16k, waving_sheet 8k, passing_spheres 5k,
+// expanding_sphere 5k, turning_box 8k and random_soups 4k at l = 1 to 30 (Zen 5, float): only their order
+// counts.
 
 double refit_cost(const Seen& seen) {
   return 0.27 * seen.reads + 28 * seen.candidates;
 }
 
-/// One search serves as many frames as a leaf takes to move by a part of its size. Where bodies deform, more
-/// pairs come near in those frames than a query takes to find.
+/// One search serves as many frames as a leaf takes to move by a part of its size. Where bodies deform, or
+/// lie upon each other, more pairs come near in those frames than a query takes to find.
 double drift_cost(const Seen& seen) {
   const double watching = 0.1 * seen.reads;
   if (seen.candidates == 0) return seen.step < 0.2 ? 0.5 * watching : 1.2 * refit_cost(seen);
-  if (seen.spread > 0.1) return 1.2 * refit_cost(seen);
+  if (seen.spread > 0.02) return 1.2 * refit_cost(seen);
   const double frames = seen.step > 0 ? std::min(0.4 / seen.step, 24.0) : 24;
   if (frames < 3) return 1.2 * refit_cost(seen);
   const double search = 0.35 * seen.reads + 45 * seen.candidates;
   return watching + search / frames + 15 * seen.candidates;
 }
 
-/// One join serves a segment; what lies between its ends costs the more, the further vertices move there.
-/// What moves as a whole passes by others; what deforms is held where it touches them.
+/// One join serves a segment; what lies between its ends costs the more, the further primitives move past
+/// each other there. What moves as a whole passes by others; what deforms is held where it touches them.
 double join_cost(const Seen& seen) {
-  const double l = seen.frames_per_segment, moves = seen.step * l;
+  const double l = seen.frames_per_segment, moves = seen.slide * l;
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
   if (seen.candidates == 0) return 1.5 / l * refit_cost(seen);  // bodies apart: a box at each end
   const double alike = 1 - seen.spread;
-  return refit_cost(seen) * (8 / (l + 4) * (1 + 0.3 * moves) + 0.55 * alike * alike * moves);
+  return refit_cost(seen) * (0.06 + 5.2 / (l + 3) * (1 + 1.4 * moves) + 0.55 * alike * alike * moves);
 }
 
 /// A strategy to choose, the parameters that differ from its defaults, and what it would cost. To offer
-/// another one, add a line: any registered strategy that follows plan changes and
-/// knows no more than the next keyframe will do.
+/// another one, add a line: any registered strategy that follows plan changes and knows no more than the next
+/// keyframe will do.
 struct Candidate {
   const char* id;
   std::map<std::string, std::string> params;
@@ -88,8 +90,8 @@ class Auto final : public Strategy<S> {
       runners_.push_back({&candidate, found->info.positions == PositionUse::all,
                           NestedStrategies<S>::create(*found, scene, motion, topologies, own, policy)});
     }
-    velocities_.resize(scene.body_count());
     if (runners_.empty()) throw ConfigError("auto has nothing to choose from");
+    velocities_.resize(scene.body_count());
   }
 
   void reset(double t) override {
@@ -105,7 +107,9 @@ class Auto final : public Strategy<S> {
     frame_ = chosen_at_ = 0;
     step_ = 0;
     segment_end_ = t;
-    changes_ = chosen_for_contact_ = false;
+    changes_ = false;
+    chosen_candidates_ = 0;
+    touching_.clear();
     changed_.clear();
     body_changed_.assign(this->scene_.body_count(), 0);
     seen_ = {};
@@ -123,7 +127,7 @@ class Auto final : public Strategy<S> {
     const int stayed = frame_ - chosen_at_;
     const bool due = frame_ == 1 || stayed >= (t >= segment_end_ ? shortest_stay : longest_stay) ||
                      (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
-                     (seen_.candidates > 0) != chosen_for_contact_;
+                     seen_.candidates > 2 * chosen_candidates_ || 2 * seen_.candidates < chosen_candidates_;
     if (step_ > 0 && due) choose(t);
     Runner& runner = runners_[active_];
     if (runner.all_positions) fetch_all();
@@ -146,6 +150,10 @@ class Auto final : public Strategy<S> {
     // Other strategies leave out what they know to be apart: they show no more than that bodies meet.
     if (runners_[active_].all_positions || seen_.candidates == 0)
       seen_.candidates = double(out.size() - before);
+    const std::size_t count = out.size() - before;
+    touching_.clear();
+    for (std::size_t i = 0; i < std::min<std::size_t>(samples, count); ++i)
+      touching_.push_back(out[before + i * count / samples]);
     return status;
   }
 
@@ -252,7 +260,7 @@ class Auto final : public Strategy<S> {
   /// Looks at the plans, and takes what is predicted to be faster by `gain_` at least than what is in use.
   void choose(double t) {
     chosen_at_ = frame_;
-    chosen_for_contact_ = seen_.candidates > 0;
+    chosen_candidates_ = seen_.candidates;
     double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
       if (seen_.changes_per_frame == 0) {  // else it takes long to find out, and nobody can rely on it
@@ -266,6 +274,7 @@ class Auto final : public Strategy<S> {
       pass(pair.first, pair.second);
       pass(pair.second, pair.first);
     }
+    seen_.slide = slide();
     segment_end_ = end > t ? end : t;
     const bool known =
         begin > -std::numeric_limits<double>::infinity() && end < std::numeric_limits<double>::infinity();
@@ -297,25 +306,42 @@ class Auto final : public Strategy<S> {
       const std::uint32_t share = 0x9e3779b9u * i;  // of 2^32
       const auto vertex = std::uint32_t(std::uint64_t(share) * count >> 32);
       for (int axis = 0; axis < 3; ++axis) {
-        const Piece<S> piece = motion_.piece(body, vertex, axis);
-        seen.of[i][axis] = piece.kind == PieceKind::ray
-                               ? double(piece.x1)
-                               : (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
+        seen.of[i][axis] = velocity(body, vertex, axis);
         seen.mean[axis] += seen.of[i][axis] / seen.count;
       }
     }
+  }
+  double velocity(std::uint32_t body, std::uint32_t vertex, int axis) const {
+    if (!this->scene_.moving(body) && seen_.changes_per_frame == 0) return 0;
+    const Piece<S> piece = motion_.piece(body, vertex, axis);
+    return piece.kind == PieceKind::ray ? double(piece.x1)
+                                        : (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
+  }
+  /// How far primitives move past those they were candidates with in the last frame.
+  double slide() const {
+    double sum = 0;
+    for (const PrimitivePair& pair : touching_) {
+      const std::uint32_t a = this->scene_.primitives(pair.body_a)[pair.primitive_a][0];
+      const std::uint32_t b = this->scene_.primitives(pair.body_b)[pair.primitive_b][0];
+      double way[3];
+      for (int axis = 0; axis < 3; ++axis)
+        way[axis] = velocity(pair.body_a, a, axis) - velocity(pair.body_b, b, axis);
+      const double leaf = std::max(leaf_size_[pair.body_a], leaf_size_[pair.body_b]);
+      if (leaf > 0) sum += std::hypot(way[0], way[1], way[2]) * step_ / leaf;
+    }
+    return touching_.empty() ? seen_.step : sum / double(touching_.size());
   }
   /// How a body's vertices move past another body, which counts as a whole. What goes along with the other is
   /// no motion: bounds that move contain it.
   void pass(std::uint32_t body, std::uint32_t other) {
     const Velocities &own = velocities_[body], &others = velocities_[other];
     if (own.count == 0 || leaf_size_[body] <= 0) return;
-    double sum = 0, common = 0;
+    double sum = 0;
     for (std::uint32_t i = 0; i < own.count; ++i)
       sum += std::hypot(own.of[i][0] - others.mean[0], own.of[i][1] - others.mean[1],
                         own.of[i][2] - others.mean[2]);
-    common = own.count * std::hypot(own.mean[0] - others.mean[0], own.mean[1] - others.mean[1],
-                                    own.mean[2] - others.mean[2]);
+    const double common = own.count * std::hypot(own.mean[0] - others.mean[0], own.mean[1] - others.mean[1],
+                                                 own.mean[2] - others.mean[2]);
     seen_.step = std::max(seen_.step, sum / own.count * step_ / leaf_size_[body]);
     if (sum > 0) seen_.spread = std::max(seen_.spread, 1 - common / sum);
   }
@@ -334,10 +360,11 @@ class Auto final : public Strategy<S> {
   std::uint64_t first_fetch_ = 0;
   int frame_ = 0, chosen_at_ = 0;
   double step_ = 0, segment_end_ = 0;   ///< seconds
-  bool chosen_for_contact_ = false;     ///< there were candidates when the choice was made
+  double chosen_candidates_ = 0;        ///< that were there when the choice was made
   bool changes_ = false;                ///< of plans, since the last frame
   std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first one of each body
   std::vector<std::uint8_t> body_changed_;
+  PairBuffer touching_;  ///< some candidates of the last frame
   Seen seen_;
 };
 
