@@ -11,18 +11,28 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Optional
 
 import text
-from claim_points import ClaimError, Looked, Looker, Point, Table
+from claim_points import SLACK, ClaimError, Looked, Looker, Point, Table
 from load import ResultError, Study, load, read_json
 
 SCHEMA = "kbvh-claims-1"
 THEORY_SCHEMA = "kbvh-theory-1"
 FILE = Path(__file__).resolve().parent / "claims.json"
 HOLDS, CONDITION, FAILS, OPEN = "holds", "holds with a condition", "does not hold", "not decided here"
+
+
+@dataclass
+class Apart:
+    """A claim on some of its scenes: those that it is decided on, or one that was made elsewhere."""
+
+    scenes: list[str]
+    l: list[float]
+    verdict: str
+    condition: str
 
 
 @dataclass
@@ -41,6 +51,8 @@ class Row:
     note: str = ""
     figures: list[str] = field(default_factory=list)  #: panels of the paper, "18-left"
     groups: list[str] = field(default_factory=list)  #: tables that it is from
+    apart: list[Apart] = field(default_factory=list)  #: generated scenes and others, each for itself
+    differ: str = ""  #: by what these differ, where they do
     checks: list[dict[str, Any]] = field(default_factory=list)  #: for the data file
 
 
@@ -105,6 +117,7 @@ def experiment_row(claim: dict[str, Any], looker: Looker, baselines: list[dict[s
         so_far = "Measured so far: " if sentences else ""
         sentences = [f"Missing: {text.listing(missing)}.", so_far + " ".join(sentences)]
     sentences += [shown(one, looker.table, claim) for one in claim.get("shown", [])]
+    separate = apart(looked, names)
     return Row(
         id=claim["id"],
         claim=claim["claim"],
@@ -118,6 +131,8 @@ def experiment_row(claim: dict[str, Any], looker: Looker, baselines: list[dict[s
         note=claim.get("note", ""),
         figures=claim["figures"],
         groups=list(dict.fromkeys(group for one in looked for point in one.points for group in point.groups)),
+        apart=separate,
+        differ=differences(separate, looker.table, claim),
         checks=[_check_record(one) for one in looked],
     )
 
@@ -129,6 +144,50 @@ def verdict_of(looked: list[Looked]) -> str:
     if any(not any(point.met for point in one.points) for one in looked):
         return FAILS
     return HOLDS if all(point.met for one in looked for point in one.points) else CONDITION
+
+
+def apart(looked: list[Looked], names: dict[str, str]) -> list[Apart]:
+    """The claim on the scenes that it is decided on, and on each optional one, at the l that all of them have; nothing
+    where there is no optional one."""
+    optional = list(dict.fromkeys(scene for one in looked for scene in one.check.get("optional_scenes", [])))
+    depths: dict[str, set[float]] = {}
+    for one in looked:
+        for point in one.points:
+            depths.setdefault(point.scene, set()).add(point.l)
+    own = [scene for scene in depths if scene not in optional]
+    others = [scene for scene in optional if scene in depths]
+    if not own or not others:
+        return []
+    parts = [own, *([scene] for scene in others)]
+    common = set.intersection(*(set().union(*(depths[scene] for scene in part)) for part in parts))
+    found = []
+    for scenes in parts:
+        part = [Looked(one.check, [p for p in one.points if p.scene in scenes and p.l in common]) for one in looked]
+        verdict = verdict_of(part)
+        found.append(Apart(scenes, sorted(common), verdict, condition(part, names) if verdict == CONDITION else ""))
+    return found
+
+
+def differences(separate: list[Apart], table: Table, claim: dict[str, Any]) -> str:
+    """What was counted on each of the scenes, if their verdicts or conditions are not the same."""
+    if len({(one.verdict, one.condition) for one in separate}) < 2 or "apart_shown" not in claim:
+        return ""
+    one, check = claim["apart_shown"], claim["checks"][0]
+    low, high = check["size"]
+    counted: dict[str, dict[float, float]] = {}
+    for scene in [scene for part in separate for scene in part.scenes]:
+        for size, l, rows in table.places(scene):
+            run = table.chosen(rows, one["of"], one["quantity"])
+            if run is not None and low / SLACK <= size <= high * SLACK and len(table.values(run, one["quantity"])):
+                counted.setdefault(scene, {})[l] = float(table.values(run, one["quantity"])[0])  # the largest is last
+    if not counted:
+        return ""
+    common = sorted(set.intersection(*(set(by_l) for by_l in counted.values())))
+    told = "; ".join(
+        f"{scene} " + ", ".join(f"{text.significant(by_l[l])} at l = {l:g}" for l in common)
+        for scene, by_l in counted.items()
+    )
+    return f"{one['what'][0].upper()}{one['what'][1:]}: {told}." if common else ""
 
 
 def ours(looked: list[Looked]) -> dict[str, str]:
@@ -249,7 +308,7 @@ def shown(one: dict[str, Any], table: Table, claim: dict[str, Any]) -> str:
     found = []
     for size, l, rows in table.places(check["scenes"][0]):
         run = table.chosen(rows, one["of"], one["quantity"])
-        if run is not None and low / 1.25 <= size <= high * 1.25 and len(table.values(run, one["quantity"])):
+        if run is not None and low / SLACK <= size <= high * SLACK and len(table.values(run, one["quantity"])):
             found.append((size, l, float(table.values(run, one["quantity"])[0])))
     if not found:
         return ""
@@ -280,7 +339,8 @@ def write(claims: Claims, folder: Path) -> Path:
         {
             "id": row.id, "claim": row.claim, "citation": row.citation, "paper": row.paper, "ours": row.ours,
             "verdict": row.verdict, "condition": row.condition, "why": row.why, "missing": row.missing,
-            "note": row.note, "figures": row.figures, "checks": row.checks,
+            "note": row.note, "figures": row.figures, "apart": [asdict(one) for one in row.apart], "differ": row.differ,
+            "checks": row.checks,
         }
         for row in claims.rows
     ]  # fmt: skip
@@ -296,6 +356,8 @@ def plain(claims: Claims) -> str:
         lines.append(f"{row.id:<4} {row.verdict:<23} {row.claim}")
         if row.condition:
             lines.append(f"     if: {row.condition}")
+        for one in row.apart:
+            lines.append(f"     on {text.listing(one.scenes)}: {one.verdict}")
         lines.append(f"     {row.why}")
     return "\n".join(lines)
 

@@ -52,7 +52,7 @@ double join_cost(const Seen& seen) {
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
   if (seen.candidates == 0) return 1.5 / l * refit_cost(seen);  // bodies apart: a box at each end
   const double alike = 1 - seen.spread;
-  return refit_cost(seen) * (0.06 + 5.2 / (l + 3) * (1 + 1.4 * moves) + 0.55 * alike * alike * moves);
+  return refit_cost(seen) * (0.06 + 4.7 / (l + 3) * (1 + 1.4 * moves) + 0.55 * alike * alike * moves);
 }
 
 /// A strategy to choose, the parameters that differ from its defaults, and what it would cost. To offer

@@ -180,6 +180,31 @@ class TestVerdicts(ClaimsCase):
         self.assertEqual(row.verdict, claims.CONDITION, row.why)
         self.assertIn("met from l = 10 on", row.condition)
 
+    def with_another_tablecloth(self, change: Callable[[list[Line]], None] = lambda _: None) -> claims.Row:
+        """E1 with a tablecloth from a file beside ours, on l = 1 and 10 only; `change` is done to that one's results."""
+        lines = world()
+        others = [copy.deepcopy(one) for one in lines if one["scene"]["name"].startswith("tablecloth-16") and l_of(one) < 100]
+        for one in others:
+            one["scene"].update(name="blender/tablecloth-16k", hash="b1e4de4", origin="files")
+            one["key"] += " blender"
+        change(others)
+        return self.rows(lines + others)["E1"]
+
+    def test_scenes_made_elsewhere_have_their_own_verdict(self) -> None:
+        row = self.with_another_tablecloth()
+        told = [(one.scenes, one.l, one.verdict) for one in row.apart]
+        self.assertEqual(
+            told, [(["tablecloth"], [1, 10], claims.HOLDS), (["blender/tablecloth-16k"], [1, 10], claims.HOLDS)]
+        )
+        self.assertEqual(row.differ, "")
+
+    def test_where_scenes_differ_their_counts_are_told(self) -> None:
+        row = self.with_another_tablecloth(counts(of("kinetic_aabb"), "values_written", lambda _: 1e4))
+        self.assertEqual([one.verdict for one in row.apart], [claims.HOLDS, claims.FAILS])
+        self.assertIn("blender/tablecloth-16k", row.differ)
+        self.assertIn("at l = 10", row.differ)
+        self.assertNotIn("l = 100", row.differ)
+
     def test_thresholds_are_those_of_the_data_file(self) -> None:
         synthetic.write(self.folder, world())
         said = claims.read_claims()
