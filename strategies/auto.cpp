@@ -105,6 +105,7 @@ class Auto final : public Strategy<S> {
     retired_ = {};
     active_ = 0;
     frame_ = chosen_at_ = 0;
+    stay_ = shortest_stay;
     step_ = 0;
     segment_end_ = t;
     changes_ = false;
@@ -125,7 +126,7 @@ class Auto final : public Strategy<S> {
     if (t > before) step_ = t - before;
     const std::size_t last = active_;
     const int stayed = frame_ - chosen_at_;
-    const bool due = frame_ == 1 || stayed >= (t >= segment_end_ ? shortest_stay : longest_stay) ||
+    const bool due = frame_ == 1 || stayed >= (t >= segment_end_ ? stay_ : longest_stay) ||
                      (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
                      seen_.candidates > 2 * chosen_candidates_ || 2 * seen_.candidates < chosen_candidates_;
     if (step_ > 0 && due) choose(t);
@@ -150,10 +151,10 @@ class Auto final : public Strategy<S> {
     // Other strategies leave out what they know to be apart: they show no more than that bodies meet.
     if (runners_[active_].all_positions || seen_.candidates == 0)
       seen_.candidates = double(out.size() - before);
-    const std::size_t count = out.size() - before;
+    const std::size_t count = out.size() - before, stride = std::max<std::size_t>(1, count / samples);
     touching_.clear();
-    for (std::size_t i = 0; i < std::min<std::size_t>(samples, count); ++i)
-      touching_.push_back(out[before + i * count / samples]);
+    for (std::size_t i = 0; i < count && touching_.size() < samples; i += stride)
+      touching_.push_back(out[before + i]);
     return status;
   }
 
@@ -215,7 +216,8 @@ class Auto final : public Strategy<S> {
     bool fresh = false;  ///< as `reset` left it
     int frames = 0;      ///< that it answered
   };
-  /// Frames after which the choice is thought over within one segment, and if there is a new one.
+  /// Frames after which the choice is thought over within one segment, and if there is a new one: the latter
+  /// twice as many each time that it was confirmed.
   static constexpr int longest_stay = 64, shortest_stay = 8;
   static constexpr std::uint32_t samples = 24;
 
@@ -291,6 +293,7 @@ class Auto final : public Strategy<S> {
         best = i;
       }
     }
+    stay_ = best == active_ ? std::min(2 * stay_, longest_stay) : shortest_stay;
     active_ = best;
   }
 
@@ -358,7 +361,7 @@ class Auto final : public Strategy<S> {
   Counters retired_;                       ///< of what was counted before an instance started anew
   std::size_t active_ = 0;
   std::uint64_t first_fetch_ = 0;
-  int frame_ = 0, chosen_at_ = 0;
+  int frame_ = 0, chosen_at_ = 0, stay_ = shortest_stay;
   double step_ = 0, segment_end_ = 0;   ///< seconds
   double chosen_candidates_ = 0;        ///< that were there when the choice was made
   bool changes_ = false;                ///< of plans, since the last frame

@@ -18,7 +18,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
   IntervalJoinStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
                        const Params& params)
       : Strategy<S>(scene, motion),
-        bounds_(scene, motion, std::move(topologies), active_kernel_set(), segment_pieces(params)),
+        bounds_(scene, motion, std::move(topologies), active_kernel_set(), segment_cuts(params)),
         joins_(scene.pairs().size()),
         answers_(scene.pairs().size()),
         by_spans_(scene.pairs().size(), params.word("triangle_tests") == "spans") {
@@ -166,6 +166,15 @@ class IntervalJoinStrategy final : public Strategy<S> {
   std::uint64_t first_fetch_ = 0;
 };
 
+std::vector<Parameter> join_parameters() {
+  std::vector<Parameter> list = segment_cut_parameters();
+  list.push_back({"triangle_tests",
+                  "spans",
+                  {"spans", "frames"},
+                  "decide pairs of triangles for spans of time where that can be proved, or at every frame"});
+  return list;
+}
+
 }  // namespace
 }  // namespace kbvh
 
@@ -180,11 +189,6 @@ KBVH_STRATEGY(interval_join) {
       .positions = PositionUse::fetched,
       .can = {.continuous = true, .plan_changes = true, .self_pairs = true, .contacts = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {segment_pieces_parameter(),
-           {"triangle_tests",
-            "spans",
-            {"spans", "frames"},
-            "decide pairs of triangles for spans of time where that can be proved, or at every frame"}},
+      .parameters = join_parameters(),
   })};
 }

@@ -16,7 +16,7 @@ class LinearBoundsStrategy final : public Strategy<S> {
   LinearBoundsStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
                        const Params& params)
       : Strategy<S>(scene, motion),
-        bounds_(scene, motion, std::move(topologies), active_kernel_set(), segment_pieces(params)),
+        bounds_(scene, motion, std::move(topologies), active_kernel_set(), segment_cuts(params)),
         stale_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       stale_[body].resize(bounds_.side(body).hierarchy.node_count());
@@ -111,6 +111,6 @@ KBVH_STRATEGY(linear_bounds) {
       .positions = PositionUse::fetched,
       .can = {.continuous = true, .plan_changes = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = {segment_pieces_parameter()},
+      .parameters = segment_cut_parameters(),
   })};
 }

@@ -16,11 +16,11 @@ constexpr double none = -std::numeric_limits<double>::infinity();
 
 template <class S>
 LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>& motion,
-                              Topologies topologies, KernelSet kernels, std::uint32_t pieces)
+                              Topologies topologies, KernelSet kernels, const SegmentCuts& cuts)
     : scene_(scene),
       motion_(motion),
-      pieces_(pieces),
-      wanted_pieces_(pieces),
+      cuts_(cuts),
+      pieces_(cuts.pieces),
       sides_(scene.body_count()),
       refits_(scene.body_count(), 0),
       skipped_(scene.body_count()),
@@ -55,11 +55,11 @@ void LinearBounds<S>::choose_segment(double t) {
     begin = std::max(begin, t);
     end = t + 1.01 * foreseen_ * (step_ > 0 ? step_ : 1.0 / 64);
     begin_ = begin;
-    end_ = end;
+    end_ = knot_ = end;
     return;
   }
   begin_ = begin;
-  end_ = end;
+  end_ = knot_ = end;
   if (pieces_ == 1 || rest) return;
   const auto cut = [&](std::uint32_t k) {
     return k == pieces_ ? end : begin + (end - begin) * (double(k) / double(pieces_));
@@ -103,7 +103,7 @@ void LinearBounds<S>::make_margin(Side& side) const {
 
 template <class S>
 void LinearBounds<S>::start() {
-  pieces_ = wanted_pieces_;
+  whole_ = false;
   last_ = motion_.time();
   step_ = 0;
   foreseen_ = 1;
@@ -142,8 +142,9 @@ bool LinearBounds<S>::advance() {
 template <class S>
 void LinearBounds<S>::enter() {
   note_time();
-  if (pieces_ != 1) {
-    pieces_ = 1;
+  const bool cut = pieces_ != 1;
+  whole_ = true;
+  if (cut) {
     restart();
   } else if (end_ == none || motion_.time() >= end_) {
     go_on();
@@ -155,6 +156,8 @@ void LinearBounds<S>::go_on() {
   const double t = motion_.time(), before = end_;
   const bool anew = end_ == none;
   if (!anew) foreseen_ = std::min(16.0, 2 * foreseen_);
+  const bool next = anew || before >= knot_;
+  if (next) pieces_ = whole_ ? 1 : cuts_.pieces;
   choose_segment(t);
   const bool goes_on = !anew && begin_ == before;
   for (std::uint32_t body = 0; body < body_count(); ++body) {
@@ -184,8 +187,63 @@ void LinearBounds<S>::go_on() {
       }
     }
   }
+  if (next && cuts_.max_looseness > 0 && !whole_) cut_while_loose(t);
   for (Side& side : sides_) make_margin(side);
   part_bodies();
+}
+
+/// Cuts the segment that has just begun into twice as many pieces until the present one is tight enough.
+template <class S>
+void LinearBounds<S>::cut_while_loose(double t) {
+  while (pieces_ < SegmentCuts::most && std::isfinite(end_) && end_ > begin_ &&
+         looseness_in_the_middle() > cuts_.max_looseness) {
+    pieces_ *= 2;
+    const double begin = begin_, end = end_;
+    choose_segment(t);
+    if (begin_ == begin && end_ == end) return;  // as short as doubles can be
+    for (std::uint32_t body = 0; body < body_count(); ++body) {
+      if (sides_[body].at_rest) continue;
+      if (begin_ != begin) make_end(body, 0, begin_);
+      make_end(body, 1, end_);
+    }
+  }
+}
+
+template <class S>
+double LinearBounds<S>::looseness_in_the_middle() {
+  const auto area = [](const Box<S>& box) {
+    const double x = double(box.upper[0]) - double(box.lower[0]);
+    const double y = double(box.upper[1]) - double(box.lower[1]);
+    const double z = double(box.upper[2]) - double(box.lower[2]);
+    return x * y + y * z + z * x;
+  };
+  const double t = begin_ + (end_ - begin_) / 2;
+  double tight = 0, linear = 0;
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    const Side& side = sides_[body];
+    if (side.at_rest || side.apart || side.hierarchy.empty()) continue;
+    middle_lanes_.resize(std::max(middle_lanes_.size(), side.lanes[0].size()));
+    middle_own_.resize(std::max(middle_own_.size(), side.own[0].size()));
+    std::copy_n(side.lanes[0].data(), side.lanes[0].size(), middle_lanes_.data());  // empty lanes
+    side.hierarchy.refit_into(middle_lanes_.data(), middle_own_.data(),
+                              motion_.positions_on_lines(body, t, middle_room_));
+    ++refits_[body];
+    for (std::uint32_t node = 0; node < side.hierarchy.topology().size(); ++node) {
+      const Box<S> middle = side.hierarchy.box_in(middle_lanes_.data(), middle_own_.data(), node);
+      const Box<S> first =
+          side.hierarchy.box_in(side.lanes[side.array(0)].data(), side.own[side.array(0)].data(), node);
+      const Box<S> last =
+          side.hierarchy.box_in(side.lanes[side.array(1)].data(), side.own[side.array(1)].data(), node);
+      Box<S> between;
+      for (int axis = 0; axis < 3; ++axis) {
+        between.lower[axis] = first.lower[axis] / 2 + last.lower[axis] / 2;
+        between.upper[axis] = first.upper[axis] / 2 + last.upper[axis] / 2;
+      }
+      tight += area(middle);
+      linear += area(between);
+    }
+  }
+  return tight > 0 ? linear / tight - 1 : 0;
 }
 
 template <class S>
@@ -263,7 +321,7 @@ AuditView LinearBounds<S>::audit_view(std::uint32_t body, double t) const {
 
 template <class S>
 std::size_t LinearBounds<S>::bytes() const {
-  std::size_t total = 0;
+  std::size_t total = (middle_lanes_.size() + middle_own_.size() + middle_room_.capacity()) * sizeof(S);
   for (const Side& side : sides_) {
     total += side.hierarchy.bytes();
     for (int end = 0; end < 2; ++end)
@@ -272,16 +330,28 @@ std::size_t LinearBounds<S>::bytes() const {
   return total;
 }
 
-Parameter segment_pieces_parameter() {
+std::vector<Parameter> segment_cut_parameters() {
   return {
-      "pieces", "1", {}, "each segment between keyframes is cut into so many, for tighter boxes; 1 to 64", 1};
+      {"pieces",
+       "1",
+       {},
+       "each segment between keyframes is cut into so many, for tighter boxes; 1 to 64",
+       1},
+      {"max_looseness",
+       "0",
+       {},
+       "a segment is cut into twice as many pieces while boxes in the middle of its first have more surface "
+       "than tight ones by this share; 0: nobody looks",
+       0}};
 }
 
-std::uint32_t segment_pieces(const Params& params) {
-  const double wanted = params.number("pieces");
-  if (!(wanted >= 1 && wanted <= 64) || wanted != std::floor(wanted))
+SegmentCuts segment_cuts(const Params& params) {
+  const double wanted = params.number("pieces"), looseness = params.number("max_looseness");
+  if (!(wanted >= 1 && wanted <= SegmentCuts::most) || wanted != std::floor(wanted))
     throw ConfigError("pieces must be a whole number from 1 to 64, got " + params.word("pieces"));
-  return std::uint32_t(wanted);
+  if (!(looseness >= 0))
+    throw ConfigError("max_looseness must not be negative, got " + params.word("max_looseness"));
+  return {std::uint32_t(wanted), looseness};
 }
 
 template class LinearBounds<float>;

@@ -8,6 +8,16 @@
 
 namespace kbvh {
 
+/// How segments between knots are cut: into pieces of one length, or, where boxes are looser than a bound,
+/// into more.
+struct SegmentCuts {
+  static constexpr std::uint32_t most = 64;
+  std::uint32_t pieces = 1;  ///< 1 to `most`
+  /// Summed surface of boxes over that of tight ones, minus one, in the middle of a piece, for all bodies
+  /// that move; twice as many pieces until it is kept. 0: nobody looks.
+  double max_looseness = 0;
+};
+
 /// Bounds of all bodies of a scene over a segment in which every vertex of every body keeps to one line:
 /// boxes at its begin and at its end, linear in between. A maximum of linear functions is convex and lies
 /// below its chord, so they hold every vertex throughout; they are tight at the ends. Nothing is updated
@@ -42,7 +52,7 @@ class LinearBounds {
 
   /// Needs topologies of one width and leaf size for all bodies of a pair: throws std::invalid_argument.
   LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
-               KernelSet kernels, std::uint32_t pieces);
+               KernelSet kernels, const SegmentCuts& cuts);
 
   /// Makes the bounds of a segment with the motion's present time in it, as if there had been none before.
   void start();
@@ -89,6 +99,8 @@ class LinearBounds {
   void note_time();
   void go_on();
   void choose_segment(double t);
+  void cut_while_loose(double t);
+  double looseness_in_the_middle();
   bool make_end(std::uint32_t body, std::uint32_t end, double t);
   void part_bodies();
   Box<S> swept(const Side& side) const;
@@ -96,8 +108,12 @@ class LinearBounds {
 
   SceneView<S> scene_;
   SegmentMotion<S> motion_;
-  std::uint32_t pieces_, wanted_pieces_;
-  double begin_ = 0, end_ = 0;
+  SegmentCuts cuts_;
+  std::uint32_t pieces_;
+  bool whole_ = false;                         ///< segments are not to be cut
+  double begin_ = 0, end_ = 0, knot_ = 0;      ///< of the piece; end of the whole segment
+  AlignedArray<S> middle_lanes_, middle_own_;  ///< tight boxes in the middle of a piece, if somebody looks
+  std::vector<S> middle_room_;
   double last_ = 0, step_ = 0;  ///< time of the last frame, and from the one before
   double foreseen_ = 1;         ///< frames that a segment without an end is made for
   std::vector<Side> sides_;
@@ -106,9 +122,10 @@ class LinearBounds {
   std::vector<std::uint8_t> near_;  ///< by body: to another one, over the segment
 };
 
-/// The parameter `pieces` of strategies with linear bounds, and its value: 1 to 64. Throws ConfigError.
-Parameter segment_pieces_parameter();
-std::uint32_t segment_pieces(const Params& params);
+/// The parameters `pieces` and `max_looseness` of strategies with linear bounds, and what they say. Throws
+/// ConfigError.
+std::vector<Parameter> segment_cut_parameters();
+SegmentCuts segment_cuts(const Params& params);
 
 /// Counts the ends that were made since `bounds` was asked last, as updates.
 template <class S, class Count>
