@@ -230,7 +230,7 @@ KBVH_STRATEGY(kinetic_separation_list) {
                       "event queue: the paper's AVL tree, or an indexed binary heap"},
                      {"look_ahead",
                       "32",
-                      {"1", "8", "32", "1000000"},
+                      {"1", "32", "1000000"},
                       "linear pieces up to which the next event of a pair is looked for at once"}},
   })};
 }
