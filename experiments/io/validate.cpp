@@ -91,6 +91,9 @@ void check_structure(const AnimatedMesh& mesh, const std::filesystem::path& file
     if (offsets[p + 1] < offsets[p] || offsets[p + 1] - offsets[p] < least) {
       fail(file, place, polygons ? "has fewer than 3 vertices" : "has no vertex");
     }
+    if (offsets[p + 1] > mesh.primitive_vertices.size()) {  // and a later one would go back
+      fail(file, place, "ends beyond the last corner");
+    }
     for (std::size_t c = offsets[p]; c < offsets[p + 1]; ++c) {
       if (mesh.primitive_vertices[c] >= mesh.vertex_count) {
         fail(file, place,
