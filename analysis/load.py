@@ -23,7 +23,7 @@ COUNTERS = (
     "certificates_failed", "certificates_discarded", "internal_events", "overlap_events",
     "fathers_apart_events", "leaves_apart_events", "bound_change_events", "list_peak", "queue_operations", "queue_steps",
     "queue_peak", "box_tests", "triangle_tests", "triangle_tests_exact", "span_tests", "span_verdicts",
-    "bodies_skipped", "nodes_skipped",
+    "bodies_skipped", "nodes_skipped", "bodies_translated", "bodies_remembered",
 )  # fmt: skip
 #: Counters that are a level, not a sum over the clip.
 LEVELS = ("queue_peak", "list_peak")

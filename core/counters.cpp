@@ -50,6 +50,10 @@ const char* name(Counter counter) {
       return "bodies_skipped";
     case Counter::nodes_skipped:
       return "nodes_skipped";
+    case Counter::bodies_translated:
+      return "bodies_translated";
+    case Counter::bodies_remembered:
+      return "bodies_remembered";
     case Counter::bytes:
       return "bytes";
     case Counter::count:

@@ -31,6 +31,8 @@ enum class Counter : std::uint8_t {
   span_verdicts,           ///< pairs that a frame found decided for a span already
   bodies_skipped,          ///< bodies of which a frame looked at nothing, or at nothing but one box
   nodes_skipped,           ///< nodes that an update left alone, since no query of the frame could read them
+  bodies_translated,       ///< bodies whose boxes were moved as they were: so they go over the whole segment
+  bodies_remembered,       ///< bodies whose boxes were those of the last time that the clip came by
   bytes,                   ///< memory held by the strategy's own structures, in bytes (a level, not a sum)
   count
 };

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/geometry/predicates.hpp"
+#include "core/motion/error_free.hpp"
 
 namespace kbvh {
 
@@ -195,6 +196,21 @@ template <class S>
 bool FlightPlans<S>::at_rest(double t) const {
   const auto& times = keyframes_->times;
   return own_.empty() && (t < times.front() || t >= times.back());
+}
+
+template <class S>
+std::optional<std::array<S, 3>> FlightPlans<S>::translation(double t) const {
+  const auto& times = keyframes_->times;
+  if (!own_.empty() || keyframed_count_ == 0 || t < times.front() || t >= times.back()) return {};
+  const std::size_t k = segment_at(t);
+  const S *from = keyframe(k), *to = keyframe(k + 1);
+  std::array<S, 3> all{};
+  for (std::size_t i = 0; i < std::size_t(3) * keyframed_count_; ++i) {
+    const TwoPart<S> step = two_diff(to[i], from[i]);
+    if (i < 3) all[i] = step.hi;
+    if (step.hi != all[i % 3] || step.lo != 0) return {};
+  }
+  return all;
 }
 
 template <class S>

@@ -1,7 +1,9 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -66,6 +68,11 @@ class FlightPlans {
   double lines_end(double t) const;
   /// Nothing moves at t, and not before `lines_end(t)`. False if there are plans of their own.
   bool at_rest(double t) const;
+  /// The one vector by which every vertex moves over the keyframes' segment that t is in, to the last bit:
+  /// adding it to a position at the begin gives that at the end without rounding. Nothing if there is no such
+  /// vector, no segment, or a plan of its own. O(vertices) where there is one; else it stops at the first
+  /// vertex that moves in another way.
+  std::optional<std::array<S, 3>> translation(double t) const;
 
   /// No vertex is faster than this on the segment that holds at t (units per second, rounded up); own plans
   /// included. O(vertices) the first time a segment is asked for; O(own plans) after a change, or a knot of

@@ -1,4 +1,6 @@
 #pragma once
+#include <array>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -70,26 +72,33 @@ template <class S>
 class SegmentMotion : public SteppedMotion<S> {
  public:
   using SteppedMotion<S>::SteppedMotion;
+  /// The time whose segment is seen: the present, unless it is a view from a later one (ClipMotion::from).
+  double time() const { return from_.value_or(this->playback_->time()); }
   /// The linear piece a coordinate is on now; it ends at `t1`.
   Piece<S> piece(std::uint32_t body, std::uint32_t vertex, int axis) const {
-    return this->playback_->plans(body).piece_after(vertex, axis, this->time());
+    return this->playback_->plans(body).piece_after(vertex, axis, time());
   }
   /// From when on, and until when, every vertex of the body is on the line that it is on now; infinite where
   /// that is for ever.
-  double lines_begin(std::uint32_t body) const {
-    return this->playback_->plans(body).lines_begin(this->time());
-  }
-  double lines_end(std::uint32_t body) const { return this->playback_->plans(body).lines_end(this->time()); }
+  double lines_begin(std::uint32_t body) const { return this->playback_->plans(body).lines_begin(time()); }
+  double lines_end(std::uint32_t body) const { return this->playback_->plans(body).lines_end(time()); }
   /// The body does not move before `lines_end`.
-  bool at_rest(std::uint32_t body) const { return this->playback_->plans(body).at_rest(this->time()); }
+  bool at_rest(std::uint32_t body) const { return this->playback_->plans(body).at_rest(time()); }
+  /// The vector by which the body moves as a whole between `lines_begin` and `lines_end`, exactly; nothing if
+  /// it does not (FlightPlans::translation). O(vertices), or as many as move alike.
+  std::optional<std::array<S, 3>> translation(std::uint32_t body) const {
+    return this->playback_->plans(body).translation(time());
+  }
+  /// No vertex of the body has a plan of its own: what is seen of a segment is the same whenever it comes by.
+  bool as_in_the_scene(std::uint32_t body) const { return !this->playback_->plans(body).has_own_plans(); }
   /// Positions [vertex][3] at a time from `lines_begin` to `lines_end`, truth B, one scalar past the end
   /// readable: the keyframe itself where there is one, else evaluated into `room`. Throws
   /// std::invalid_argument for other times. O(vertices), or O(1).
   const S* positions_on_lines(std::uint32_t body, double t, std::vector<S>& room) const {
     const FlightPlans<S>& plans = this->playback_->plans(body);
-    if (!(t >= plans.lines_begin(this->time()) && t <= plans.lines_end(this->time())))
+    if (!(t >= plans.lines_begin(time()) && t <= plans.lines_end(time())))
       throw std::invalid_argument("positions at t = " + std::to_string(t) +
-                                  " are not foreseen at t = " + std::to_string(this->time()));
+                                  " are not foreseen at t = " + std::to_string(time()));
     if (!plans.has_own_plans()) {
       const std::size_t k = plans.segment_at(t);
       const auto times = plans.keyframe_times();
@@ -99,6 +108,9 @@ class SegmentMotion : public SteppedMotion<S> {
     plans.evaluate(t, room.data());
     return room.data();
   }
+
+ protected:
+  std::optional<double> from_;
 };
 
 /// Foresight::whole_clip.
@@ -107,6 +119,12 @@ class ClipMotion : public SegmentMotion<S> {
  public:
   using SegmentMotion<S>::SegmentMotion;
   const FlightPlans<S>& plans(std::uint32_t body) const { return this->playback_->plans(body); }
+  /// What will be seen of segments at a later time, as long as no plan changes: for work ahead of time.
+  SegmentMotion<S> from(double t) const {
+    ClipMotion view = *this;
+    view.from_ = t;
+    return view;
+  }
 };
 
 template <Foresight F, class S>

@@ -212,6 +212,27 @@ TEST(FlightPlans, HoldNoNegativeZero) {
     for (float x : positions_at(plans, t)) EXPECT_FALSE(x == 0 && std::signbit(x)) << "at " << t;
 }
 
+TEST(FlightPlans, SeeATranslationOnlyWhereItIsOneToTheLastBit) {
+  // Two vertices: by (1, 0, -0.5); by an ulp less; at rest; and a step that no float holds.
+  const float less = std::nextafter(3.0f, 0.0f), tiny = 0x1p-30f;
+  FlightPlans<float> plans(2, {0, 1, 2, 3, 4}, {0,    1, 2,   2,    1, 2,    //
+                                                1,    1, 1.5, 3,    1, 1.5,  //
+                                                1,    1, 1.5, less, 1, 1.5,  //
+                                                1,    1, 1.5, less, 1, 1.5,  //
+                                                tiny, 1, 1.5, tiny, 1, 1.5});
+  const std::array<float, 3> whole{1, 0, -0.5f}, none{0, 0, 0};
+  EXPECT_EQ(plans.translation(0), whole);
+  EXPECT_EQ(plans.translation(0.7), whole);
+  EXPECT_EQ(plans.translation(1), std::nullopt);
+  EXPECT_EQ(plans.translation(2), none);
+  EXPECT_EQ(plans.translation(3), std::nullopt);
+  EXPECT_EQ(plans.translation(-1), std::nullopt) << "before the first keyframe there is no segment";
+  EXPECT_EQ(plans.translation(4), std::nullopt) << "nor after the last one";
+  const float at[] = {0, 1, 2};
+  plans.change(0, {.vertex = 0, .times = {}, .positions = {}, .velocity = {1, 0, -0.5f}}, at);
+  EXPECT_EQ(plans.translation(0), std::nullopt) << "a plan of its own";
+}
+
 TEST(Playback, LazyPositionsEqualEagerOnes) {
   const Scene<double> scene = synthetic_scene<double>("soups").scene;
   Playback<double> lazy(scene), eager(scene);
