@@ -2,25 +2,59 @@
 // gives the pairs of primitives that come near each other in it and when; frames are read from that.
 
 #include <algorithm>
+#include <limits>
+#include <type_traits>
 
 #include "core/hierarchy/interval_join.hpp"
+#include "core/hierarchy/linear_bounds.hpp"
 #include "core/hierarchy/span_answers.hpp"
 #include "core/registry.hpp"
 
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class IntervalJoinStrategy final : public Strategy<S> {
- public:
-  static constexpr Foresight foresight = Foresight::next_keyframe;
+/// The joins of one segment, one for each pair of bodies, and what is known of their pairs of triangles.
+template <class S>
+struct Joins {
+  std::vector<IntervalJoin<S>> joins;
+  std::vector<SpanAnswers<S>> answers;
 
-  IntervalJoinStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
+  explicit Joins(std::size_t pairs) : joins(pairs), answers(pairs) {}
+  std::size_t bytes() const {
+    std::size_t total = 0;
+    for (const auto& join : joins) total += join.bytes();
+    for (const auto& one : answers) total += one.bytes();
+    return total;
+  }
+};
+
+/// What comes next for the segment ahead, and how much of it was done. All work is in the same unit: what a
+/// box test costs.
+struct WorkAhead {
+  enum class Stage : std::uint8_t { nothing, bounds, joins, answers, done };
+  Stage stage = Stage::nothing;
+  std::size_t pair = 0;  ///< of bodies
+  bool begun = false;    ///< with that pair
+  bool joins_begun = false;
+  double done = 0;
+};
+
+/// With foresight of the whole clip the next segment's answer is made during the present one, a part at each
+/// frame; else all of it at the first frame that asks.
+template <class S, class Count, bool works_ahead>
+class IntervalJoinStrategy : public Strategy<S> {
+  using Motion = std::conditional_t<works_ahead, ClipMotion<S>, SegmentMotion<S>>;
+
+ public:
+  static constexpr Foresight foresight = works_ahead ? Foresight::whole_clip : Foresight::next_keyframe;
+
+  IntervalJoinStrategy(const SceneView<S>& scene, const Motion& motion, Topologies topologies,
                        const Params& params)
       : Strategy<S>(scene, motion),
-        bounds_(scene, motion, std::move(topologies), active_kernel_set(), segment_cuts(params)),
-        joins_(scene.pairs().size()),
-        answers_(scene.pairs().size()),
+        motion_(motion),
+        bounds_(scene, motion, std::move(topologies), active_kernel_set(), linear_settings(params)),
+        now_(scene.pairs().size()),
+        next_(scene.pairs().size()),
         by_spans_(scene.pairs().size(), params.word("triangle_tests") == "spans") {
     for (std::size_t i = 0; i < scene.pairs().size(); ++i)
       for (const std::uint32_t body : {scene.pairs()[i].first, scene.pairs()[i].second})
@@ -32,14 +66,18 @@ class IntervalJoinStrategy final : public Strategy<S> {
     this->start_at(t);
     count_.table = {};
     first_fetch_ = this->sampled_.fetched();
-    for (auto& answers : answers_) answers.clear_counts();
+    for (Joins<S>* one : {&now_, &next_})
+      for (auto& answers : one->answers) answers.clear_counts();
     bounds_.start();
     new_segment();
+    before_ = t;
   }
 
   void advance(double t) override {
+    before_ = this->time();
     this->move_to(t);
     if (bounds_.advance()) new_segment();
+    if constexpr (works_ahead) make_bounds_ahead();
   }
 
   /// With span tests these are no candidates that are apart for certain, and first those that intersect.
@@ -48,18 +86,19 @@ class IntervalJoinStrategy final : public Strategy<S> {
     const float fraction = float(bounds_.fraction(t));
     const std::size_t before = out.size();
     blocks_.clear();
-    for (std::size_t i = 0; i < joins_.size(); ++i) {
+    for (std::size_t i = 0; i < now_.joins.size(); ++i) {
       const std::size_t begin = out.size();
       std::size_t open = 0;
       if (by_spans_[i]) {
-        open = answers_[i].read(bounds_, this->scene_, joins_[i], fraction, out);
+        open = now_.answers[i].read(bounds_.segment(), this->scene_, now_.joins[i], fraction, out);
       } else {
-        joins_[i].read(fraction, out);
+        now_.joins[i].read(fraction, out);
         open = out.size() - begin;
       }
       blocks_.push_back({out.size() - begin - open, open});
     }
     if (any_by_spans_) answered_.assign(out.begin() + std::ptrdiff_t(before), out.end());
+    if constexpr (works_ahead) join_ahead(bounds_.ahead(), share_due());
     return {};
   }
 
@@ -84,9 +123,10 @@ class IntervalJoinStrategy final : public Strategy<S> {
   void start_sweep(double t) override {
     this->stand_at(t);
     bounds_.enter();
+    ahead_ = {};
     joined_ = false;
     if (!sweeps_.empty()) return;
-    sweeps_.resize(joins_.size());
+    sweeps_.resize(now_.joins.size());
     for (auto& sweep : sweeps_) sweep.keep_neighbours();
   }
 
@@ -96,14 +136,13 @@ class IntervalJoinStrategy final : public Strategy<S> {
     this->move_to(t1);
     if (!(bounds_.begin() <= t0 && t1 <= bounds_.end()))
       throw std::invalid_argument("contacts are asked for across a knot of a plan");
-    std::uint64_t tests = 0;
     for (std::size_t i = 0; i < sweeps_.size(); ++i) {
       const BodyPair& pair = this->scene_.pairs()[i];
-      sweeps_[i].join(bounds_, pair.first, pair.second, tests);
+      sweeps_[i].join(bounds_.segment(), this->scene_, pair.first, pair.second);
+      count_.add(Counter::box_tests, sweeps_[i].tests());
       for (const JoinedPair& found : sweeps_[i].pairs())
         out.push_back({pair.first, found.primitive_a, pair.second, found.primitive_b});
     }
-    count_.add(Counter::box_tests, tests);
   }
 
   void flight_plans_changed(double t, std::span<const PlanChange<S>> /*changes*/) override {
@@ -117,9 +156,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
   }
 
   std::size_t bytes() const override {
-    std::size_t total = bounds_.bytes();
-    for (const auto& join : joins_) total += join.bytes();
-    for (const auto& answers : answers_) total += answers.bytes();
+    std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes();
     for (const auto& sweep : sweeps_) total += sweep.bytes();
     return total;
   }
@@ -128,31 +165,98 @@ class IntervalJoinStrategy final : public Strategy<S> {
   Counters counted() const override {
     Counters table = count_.table;
     if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
-    for (const auto& answers : answers_) {
-      table[Counter::span_tests] += answers.attempts();
-      table[Counter::span_verdicts] += answers.decided();
-    }
+    for (const Joins<S>* one : {&now_, &next_})
+      for (const auto& answers : one->answers) {
+        table[Counter::span_tests] += answers.attempts();
+        table[Counter::span_verdicts] += answers.decided();
+      }
     return table;
   }
 
  private:
+  using Stage = WorkAhead::Stage;
+  /// What the parts of the work cost, in box tests of the join: measured once, and only for evenness.
+  static constexpr double node_cost = 35, answer_cost = 5;
+
   void new_segment() {
     if constexpr (Count::enabled) count_linear_update(bounds_, count_);
     joined_ = false;
+    if (bounds_.came_ahead() && ahead_.joins_begun) {
+      join_ahead(bounds_.segment(), 1);
+      std::swap(now_, next_);
+      joined_ = true;
+    }
+    ahead_ = {};
+    if constexpr (works_ahead)
+      if (bounds_.start_ahead(motion_.from(bounds_.end()))) ahead_.stage = Stage::bounds;
   }
   void join() {
-    std::uint64_t tests = 0;
-    for (std::size_t i = 0; i < joins_.size(); ++i)
-      joins_[i].join(bounds_, this->scene_.pairs()[i].first, this->scene_.pairs()[i].second, tests);
-    for (std::size_t i = 0; i < joins_.size(); ++i)
-      if (by_spans_[i]) answers_[i].start(joins_[i]);
-    count_.add(Counter::box_tests, tests);
+    for (std::size_t i = 0; i < now_.joins.size(); ++i) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      now_.joins[i].join(bounds_.segment(), this->scene_, pair.first, pair.second);
+      if (by_spans_[i]) now_.answers[i].start(now_.joins[i]);
+      count_.add(Counter::box_tests, now_.joins[i].tests());
+    }
     joined_ = true;
   }
 
+  /// The share of the work ahead that is to be done by now: all of it at the last frame before the next
+  /// segment, if frames follow each other at the distance of the last two.
+  double share_due() const {
+    const double next_frame = this->time() + (this->time() - before_);
+    return (next_frame - bounds_.begin()) / (bounds_.end() - bounds_.begin());
+  }
+  /// As if the next segment were like the present one.
+  double all_work() const {
+    double work = node_cost * double(bounds_.nodes_of_segment());
+    for (std::size_t i = 0; joined_ && i < now_.joins.size(); ++i) {
+      work += double(now_.joins[i].tests());
+      if (by_spans_[i]) work += answer_cost * double(now_.joins[i].from_begin());
+    }
+    return work;
+  }
+  void make_bounds_ahead() {
+    if (ahead_.stage != Stage::bounds) return;
+    const double share = share_due(), wanted = share * all_work() - ahead_.done;
+    if (wanted <= 0) return;
+    const double most = share >= 1 ? 1e15 : wanted / node_cost;
+    if (bounds_.go_ahead(std::uint64_t(most) + 1)) ahead_.stage = Stage::joins;
+    ahead_.done += std::min(wanted, node_cost * double(bounds_.nodes_of_segment()));
+  }
+  /// Brings the work on joins and answers ahead to a share of it; all of it from 1 on.
+  void join_ahead(const LinearSegment<S>& segment, double share) {
+    constexpr std::size_t leaf_pairs = 128, answers_at_once = 256;
+    const double wanted = share >= 1 ? std::numeric_limits<double>::infinity() : share * all_work();
+    while (ahead_.done < wanted && (ahead_.stage == Stage::joins || ahead_.stage == Stage::answers)) {
+      if (ahead_.pair == next_.joins.size()) {
+        ahead_.pair = 0;
+        ahead_.stage = ahead_.stage == Stage::joins ? Stage::answers : Stage::done;
+        continue;
+      }
+      const std::size_t i = ahead_.pair;
+      IntervalJoin<S>& join = next_.joins[i];
+      if (ahead_.stage == Stage::joins) {
+        const BodyPair& pair = this->scene_.pairs()[i];
+        ahead_.joins_begun = true;
+        if (!ahead_.begun) join.start(segment, this->scene_, pair.first, pair.second, leaf_pairs);
+        const std::uint64_t before = ahead_.begun ? join.tests() : 0;
+        ahead_.begun = !join.go_on(1);
+        ahead_.done += double(join.tests() - before);
+        count_.add(Counter::box_tests, join.tests() - before);
+      } else {
+        if (by_spans_[i] && !ahead_.begun) next_.answers[i].start_ahead(join);
+        ahead_.begun = by_spans_[i] && !next_.answers[i].go_on(segment, this->scene_, join, answers_at_once);
+        if (by_spans_[i]) ahead_.done += answer_cost * answers_at_once;
+      }
+      if (!ahead_.begun) ++ahead_.pair;
+    }
+  }
+
+  Motion motion_;
   LinearBounds<S> bounds_;
-  std::vector<IntervalJoin<S>> joins_;  ///< one for each pair of bodies
-  std::vector<SpanAnswers<S>> answers_;
+  Joins<S> now_, next_;
+  WorkAhead ahead_;
+  double before_ = 0;                    ///< time of the frame before
   std::vector<IntervalJoin<S>> sweeps_;  ///< the same for contacts, once they are asked for
   std::vector<bool> by_spans_;
   bool any_by_spans_ = false, joined_ = false;
@@ -166,8 +270,19 @@ class IntervalJoinStrategy final : public Strategy<S> {
   std::uint64_t first_fetch_ = 0;
 };
 
+template <class S, class Count>
+class AtOnce final : public IntervalJoinStrategy<S, Count, false> {
+ public:
+  using IntervalJoinStrategy<S, Count, false>::IntervalJoinStrategy;
+};
+template <class S, class Count>
+class MadeAhead final : public IntervalJoinStrategy<S, Count, true> {
+ public:
+  using IntervalJoinStrategy<S, Count, true>::IntervalJoinStrategy;
+};
+
 std::vector<Parameter> join_parameters() {
-  std::vector<Parameter> list = segment_cut_parameters();
+  std::vector<Parameter> list = linear_parameters();
   list.push_back({"triangle_tests",
                   "spans",
                   {"spans", "frames"},
@@ -180,15 +295,19 @@ std::vector<Parameter> join_parameters() {
 
 KBVH_STRATEGY(interval_join) {
   using namespace kbvh;
-  return {make_entry<IntervalJoinStrategy>({
-      .id = "interval_join",
-      .title = "interval join",
-      .family = "linear",
-      .citation = "kbvh",
-      .tightness = Tightness::conservative,
-      .positions = PositionUse::fetched,
-      .can = {.continuous = true, .plan_changes = true, .self_pairs = true, .contacts = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = join_parameters(),
-  })};
+  const auto info = [](const char* id, const char* title) {
+    return Info{
+        .id = id,
+        .title = title,
+        .family = "linear",
+        .citation = "kbvh",
+        .tightness = Tightness::conservative,
+        .positions = PositionUse::fetched,
+        .can = {.continuous = true, .plan_changes = true, .self_pairs = true, .contacts = true},
+        .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+        .parameters = join_parameters(),
+    };
+  };
+  return {make_entry<AtOnce>(info("interval_join", "interval join")),
+          make_entry<MadeAhead>(info("interval_join_ahead", "interval join, made ahead"))};
 }

@@ -16,10 +16,10 @@ class LinearBoundsStrategy final : public Strategy<S> {
   LinearBoundsStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
                        const Params& params)
       : Strategy<S>(scene, motion),
-        bounds_(scene, motion, std::move(topologies), active_kernel_set(), segment_cuts(params)),
+        bounds_(scene, motion, std::move(topologies), active_kernel_set(), linear_settings(params)),
         stale_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-      stale_[body].resize(bounds_.side(body).hierarchy.node_count());
+      stale_[body].resize(bounds_.hierarchy(body).node_count());
   }
 
   void reset(double t) override {
@@ -42,8 +42,8 @@ class LinearBoundsStrategy final : public Strategy<S> {
     std::uint64_t tests = 0;
     for (const BodyPair& pair : this->scene_.pairs())
       status.pending += query_
-                            .run_at(bounds_.side(pair.first).hierarchy, moment(pair.first, t), pair.first,
-                                    bounds_.side(pair.second).hierarchy, moment(pair.second, t), pair.second,
+                            .run_at(bounds_.hierarchy(pair.first), moment(pair.first, t), pair.first,
+                                    bounds_.hierarchy(pair.second), moment(pair.second, t), pair.second,
                                     this->scene_, this->sampled_, budget, out, tests)
                             .pending;
     count_.add(Counter::box_tests, tests);
@@ -77,13 +77,13 @@ class LinearBoundsStrategy final : public Strategy<S> {
  private:
   void new_frame() {
     for (std::uint32_t body = 0; body < bounds_.body_count(); ++body) {
-      bounds_.side(body).hierarchy.positions_changed();
+      bounds_.hierarchy(body).positions_changed();
       std::fill(stale_[body].begin(), stale_[body].end(), 1);
     }
   }
   WideMoment<S> moment(std::uint32_t body, double t) {
-    auto& side = bounds_.side(body);
-    return {side.hierarchy.arrays(), side.ends(), stale_[body].data(), bounds_.fraction(t)};
+    return {bounds_.hierarchy(body).arrays(), bounds_.side(body).ends(), stale_[body].data(),
+            bounds_.fraction(t)};
   }
   void count_update() {
     if constexpr (Count::enabled) count_linear_update(bounds_, count_);
@@ -111,6 +111,6 @@ KBVH_STRATEGY(linear_bounds) {
       .positions = PositionUse::fetched,
       .can = {.continuous = true, .plan_changes = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = segment_cut_parameters(),
+      .parameters = linear_parameters(),
   })};
 }

@@ -2,14 +2,9 @@
 
 #include <algorithm>
 
-#include "core/hierarchy/self_pairs.hpp"
-
 namespace kbvh {
 
 namespace {
-/// Leaf pairs that are collected before they are turned into pairs of primitives: few enough to stay in the
-/// cache.
-constexpr std::size_t leaf_pair_room = 2048;
 /// Room for pairs of primitives that is made at least.
 constexpr std::size_t chunk_room = 2048;
 
@@ -54,95 +49,91 @@ std::size_t IntervalJoin<S>::Columns::bytes() const {
 }
 
 template <class S>
-WideLinearLeaves<S> IntervalJoin<S>::leaves(typename LinearBounds<S>::Side& side, std::uint32_t which) {
-  Leaves& own = leaves_[which];
-  const std::size_t count = side.hierarchy.leaf_count();
-  for (std::uint32_t end = 0; end < 2; ++end) {
-    const std::uint32_t array = side.array(end);
-    own.rows[array].resize(count * lane_scalars(std::max(4u, side.hierarchy.padded_leaf_size())));
-    own.stamps[array].resize(count, 0);
-  }
-  const std::uint32_t first = side.array(0), last = side.array(1);
-  return {side.hierarchy.leaf_lists(),
-          {own.rows[first].data(), own.rows[last].data()},
-          {own.stamps[first].data(), own.stamps[last].data()},
-          {side.made[first], side.made[last]},
-          {side.positions[0], side.positions[1]}};
-}
-
-template <class S>
-void IntervalJoin<S>::join(LinearBounds<S>& bounds, std::uint32_t body_a, std::uint32_t body_b,
-                           std::uint64_t& tests) {
+void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>& scene, std::uint32_t body_a,
+                            std::uint32_t body_b, std::size_t leaf_pairs) {
   body_a_ = body_a;
   body_b_ = body_b;
+  reading_ = false;
+  throughout_ = count_ = 0;
+  traversal_ = {};
+  leaf_join_ = {};
+  const LinearSide<S>&a = segment.sides[body_a], &b = segment.sides[body_b];
+  done_ = a.hierarchy().empty() || b.hierarchy().empty() || a.apart || b.apart;
+  if (done_) return sort_by_begin();
   const bool self = body_a == body_b;
-  std::size_t partly = 0;
-  throughout_ = 0;
-  auto &a = bounds.side(body_a), &b = bounds.side(body_b);
-  if (!a.hierarchy.empty() && !b.hierarchy.empty() && !a.apart && !b.apart) {
-    const std::uint32_t width = a.hierarchy.topology().width;
-    const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(a.hierarchy.kernels());
-    stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
-    leaf_pairs_.resize(2 * leaf_pair_room);
-    const auto no_limit = Budget{}.box_tests;
-    WideTraversal state{stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pair_room, 1, no_limit};
-    // A root that is a leaf lies in a node's only lane, so that the roots are compared with each other there.
-    state.stack[state.depth++] = {0, 0};
-    WideLeafJoin<S> leaf_join{a.hierarchy.arrays(),
-                              b.hierarchy.arrays(),
-                              a.ends(),
-                              b.ends(),
-                              leaves(a, 0),
-                              leaves(b, self ? 0 : 1),
-                              leaf_pairs_.data(),
-                              0,
-                              0,
-                              found_throughout_.view(0, false),
-                              found_partly_.view(0, true),
-                              0};
-    const auto pairs_of_leaves = kernels.leaf_join(
-        width, std::max(4u, std::max(a.hierarchy.padded_leaf_size(), b.hierarchy.padded_leaf_size())));
-    const auto take_leaves = [&](std::size_t end) {
-      leaf_join.count = end;
-      while (leaf_join.next < leaf_join.count) {
-        leaf_join.throughout = found_throughout_.view(leaf_join.throughout.found, false);
-        leaf_join.partly = found_partly_.view(leaf_join.partly.found, true);
-        pairs_of_leaves(leaf_join);
-      }
-    };
-    const auto take_self_leaves = [&](std::size_t end, LeavesOf leaves) {
-      const std::size_t old_throughout = leaf_join.throughout.found, old_partly = leaf_join.partly.found;
-      take_leaves(end);
-      const Primitives* neighbours = with_neighbours_ ? nullptr : &bounds.scene().primitives(body_a);
-      keep_self_columns(neighbours, leaves, leaf_join.throughout, old_throughout);
-      keep_self_columns(neighbours, leaves, leaf_join.partly, old_partly);
-    };
-    const auto traverse = self ? kernels.self(width) : kernels.join(width);
-    while (state.depth > 0) {
-      traverse(leaf_join.a, leaf_join.ends_a, leaf_join.b, leaf_join.ends_b, state);
-      leaf_join.next = 0;
-      if (self) {
-        take_self_leaves(different_leaves_first(leaf_pairs_.data(), state.found), LeavesOf::two);
-        take_self_leaves(state.found, LeavesOf::one);
-      } else {
-        take_leaves(state.found);
-      }
-      state.found = 0;
-      if (state.depth + wide_step >= state.stack_room) {
-        stack_.resize(2 * stack_.size());
-        state.stack = stack_.data();
-        state.stack_room = stack_.size();
-      }
-    }
-    tests += state.tests + leaf_join.tests;
-    throughout_ = leaf_join.throughout.found;
-    partly = leaf_join.partly.found;
-  }
-  sort_by_begin(partly);
+  const std::uint32_t width = a.hierarchy().topology().width;
+  const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(a.hierarchy().kernels());
+  traverse_ = self ? kernels.self(width) : kernels.join(width);
+  join_leaves_ = kernels.leaf_join(
+      width, std::max({4u, a.hierarchy().padded_leaf_size(), b.hierarchy().padded_leaf_size()}));
+  neighbours_ = self && !with_neighbours_ ? &scene.primitives(body_a) : nullptr;
+  stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
+  leaf_pairs_.resize(std::max(leaf_pairs_.size(), 2 * leaf_pairs));
+  traversal_ = {stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pairs, 1, Budget{}.box_tests};
+  // A root that is a leaf lies in a node's only lane, so that the roots are compared with each other there.
+  traversal_.stack[traversal_.depth++] = {0, 0};
+  leaf_join_ = {a.hierarchy().arrays(),
+                b.hierarchy().arrays(),
+                a.ends(),
+                b.ends(),
+                a.leaves(),
+                b.leaves(),
+                leaf_pairs_.data(),
+                0,
+                0,
+                found_throughout_.view(0, false),
+                found_partly_.view(0, true),
+                0};
 }
 
 template <class S>
-void IntervalJoin<S>::sort_by_begin(std::size_t partly) {
+bool IntervalJoin<S>::go_on(std::uint64_t box_tests) {
+  if (done_) return true;
+  const std::uint64_t before = tests();
+  while (traversal_.depth > 0) {
+    if (tests() - before >= box_tests) return false;
+    traverse_(leaf_join_.a, leaf_join_.ends_a, leaf_join_.b, leaf_join_.ends_b, traversal_);
+    leaf_join_.next = 0;
+    if (body_a_ == body_b_) {
+      take_self_leaves(different_leaves_first(leaf_pairs_.data(), traversal_.found), LeavesOf::two);
+      take_self_leaves(traversal_.found, LeavesOf::one);
+    } else {
+      take_leaves(traversal_.found);
+    }
+    traversal_.found = 0;
+    if (traversal_.depth + wide_step >= traversal_.stack_room) {
+      stack_.resize(2 * stack_.size());
+      traversal_.stack = stack_.data();
+      traversal_.stack_room = stack_.size();
+    }
+  }
+  done_ = true;
+  sort_by_begin();
+  return true;
+}
+
+template <class S>
+void IntervalJoin<S>::take_leaves(std::size_t end) {
+  leaf_join_.count = end;
+  while (leaf_join_.next < leaf_join_.count) {
+    leaf_join_.throughout = found_throughout_.view(leaf_join_.throughout.found, false);
+    leaf_join_.partly = found_partly_.view(leaf_join_.partly.found, true);
+    join_leaves_(leaf_join_);
+  }
+}
+
+template <class S>
+void IntervalJoin<S>::take_self_leaves(std::size_t end, LeavesOf leaves) {
+  const std::size_t old_throughout = leaf_join_.throughout.found, old_partly = leaf_join_.partly.found;
+  take_leaves(end);
+  keep_self_columns(neighbours_, leaves, leaf_join_.throughout, old_throughout);
+  keep_self_columns(neighbours_, leaves, leaf_join_.partly, old_partly);
+}
+
+template <class S>
+void IntervalJoin<S>::sort_by_begin() {
+  throughout_ = leaf_join_.throughout.found;
+  const std::size_t partly = leaf_join_.partly.found;
   std::uint32_t place[FractionBuckets::count] = {};
   for (std::size_t i = 0; i < partly; ++i) ++place[FractionBuckets::of(found_partly_.begin[i])];
   std::uint32_t sum = std::uint32_t(throughout_);
@@ -160,7 +151,6 @@ void IntervalJoin<S>::sort_by_begin(std::size_t partly) {
     sorted_[place[FractionBuckets::of(found_partly_.begin[i])]++] = {
         found_partly_.primitive_a[i], found_partly_.primitive_b[i], found_partly_.begin[i],
         found_partly_.end[i]};
-  reading_ = false;
 }
 
 template <class S>
@@ -236,11 +226,7 @@ void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
 
 template <class S>
 std::size_t IntervalJoin<S>::bytes() const {
-  std::size_t total = 0;
-  for (const Leaves& own : leaves_)
-    for (int end = 0; end < 2; ++end)
-      total += own.rows[end].size() * sizeof(S) + own.stamps[end].size() * sizeof(std::uint32_t);
-  return total + stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
+  return stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
          found_throughout_.bytes() + found_partly_.bytes() + sorted_.capacity() * sizeof(JoinedPair) +
          alive_.capacity() * sizeof(PrimitivePair) +
          (waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() + place_.capacity()) *

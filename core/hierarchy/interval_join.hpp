@@ -1,9 +1,12 @@
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
-#include "core/hierarchy/linear_bounds.hpp"
+#include "core/hierarchy/linear_segment.hpp"
+#include "core/hierarchy/self_pairs.hpp"
+#include "core/pairs.hpp"
 
 namespace kbvh {
 
@@ -22,10 +25,24 @@ struct FractionBuckets {
 template <class S>
 class IntervalJoin {
  public:
-  /// Joins anew for the bounds' present segment; within one body if both are the same, and then without pairs
-  /// that share a vertex, unless `keep_neighbours` was called. Adds the box tests made to `tests`. Allocates
-  /// only where there are more pairs than ever before.
-  void join(LinearBounds<S>& bounds, std::uint32_t body_a, std::uint32_t body_b, std::uint64_t& tests);
+  /// Joins anew for a segment; within one body if both are the same, and then without pairs that share a
+  /// vertex, unless `keep_neighbours` was called. Allocates only where there are more pairs than ever before.
+  void join(const LinearSegment<S>& segment, const SceneView<S>& scene, std::uint32_t body_a,
+            std::uint32_t body_b) {
+    start(segment, scene, body_a, body_b, leaf_pairs_at_once);
+    go_on(std::numeric_limits<std::uint64_t>::max());
+  }
+  /// The same in parts: `go_on` works until it has made so many box tests, about, and returns whether all is
+  /// done. The segment's boxes and positions stay in use until then. A part is that of so many pairs of
+  /// leaves at least.
+  void start(const LinearSegment<S>& segment, const SceneView<S>& scene, std::uint32_t body_a,
+             std::uint32_t body_b, std::size_t leaf_pairs);
+  bool go_on(std::uint64_t box_tests);
+  /// Box tests that the join has made so far.
+  std::uint64_t tests() const { return traversal_.tests + leaf_join_.tests; }
+  /// Pairs of leaves that are collected before they are turned into pairs of primitives: few enough to stay
+  /// in the cache.
+  static constexpr std::size_t leaf_pairs_at_once = 2048;
 
   /// From now on pairs within one body that share a vertex are kept.
   void keep_neighbours() { with_neighbours_ = true; }
@@ -37,6 +54,10 @@ class IntervalJoin {
   /// All pairs of the segment: first those that overlap from its begin to its end, then the others in the
   /// order in which they begin, roughly.
   std::span<const JoinedPair> pairs() const { return {sorted_.data(), count_}; }
+  /// All that overlap at the begin are among so many first ones, and all that overlap throughout are the
+  /// first of those.
+  std::size_t from_begin() const { return bucket_end_[0]; }
+  std::size_t throughout() const { return throughout_; }
   std::uint32_t body_a() const { return body_a_; }
   std::uint32_t body_b() const { return body_b_; }
 
@@ -52,21 +73,20 @@ class IntervalJoin {
     JoinColumns view(std::size_t found, bool timed);
     std::size_t bytes() const;
   };
-  void sort_by_begin(std::size_t partly);
+  void take_leaves(std::size_t end);
+  void take_self_leaves(std::size_t end, LeavesOf leaves);
+  void sort_by_begin();
   void start_reading();
   void begin_pair(std::uint32_t index);
   void end_pair(std::uint32_t index);
-  WideLinearLeaves<S> leaves(typename LinearBounds<S>::Side& side, std::uint32_t which);
 
-  /// Rows of one body's primitives, by its arrays of ends: made where the join comes, and still there when
-  /// the end of a segment is the begin of the next.
-  struct Leaves {
-    AlignedArray<S> rows[2];
-    std::vector<std::uint32_t> stamps[2];
-  };
   std::uint32_t body_a_ = 0, body_b_ = 0;
-  bool with_neighbours_ = false;
-  Leaves leaves_[2];
+  bool with_neighbours_ = false, done_ = true;
+  WideTraversal traversal_{};
+  WideLeafJoin<S> leaf_join_{};
+  typename WideLinearKernels<S>::Join traverse_ = nullptr;
+  typename WideLinearKernels<S>::LeafJoin join_leaves_ = nullptr;
+  const Primitives* neighbours_ = nullptr;
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
   Columns found_throughout_, found_partly_;

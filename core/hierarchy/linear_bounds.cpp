@@ -10,94 +10,166 @@
 namespace kbvh {
 
 namespace {
-/// The end of no segment.
-constexpr double none = -std::numeric_limits<double>::infinity();
+template <class S>
+Box<S> swept(const LinearSide<S>& side) {
+  Box<S> box;
+  for (const LinearEnd<S>& end : side.at)
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lower[axis] = std::min(box.lower[axis], end.own[axis] - 2 * side.margin);
+      box.upper[axis] = std::max(box.upper[axis], end.own[axis + 4] + 2 * side.margin);
+    }
+  return box;
+}
+
+/// All boxes of a body, moved as a whole.
+template <class S>
+void move_boxes(const WideHierarchy<S>& hierarchy, const LinearEnd<S>& from, const std::array<S, 3>& step,
+                S* lanes, S* own) {
+  const std::size_t width = hierarchy.topology().width, row_size = lane_scalars(width);
+  for (std::size_t node = 0; node < hierarchy.node_count(); ++node) {
+    for (std::size_t row = 0; row < 6; ++row) {
+      const S by = row < 3 ? step[row] : -step[row - 3];
+      for (std::size_t i = row * width; i < (row + 1) * width; ++i)
+        lanes[node * row_size + i] = from.lanes[node * row_size + i] + by;
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      own[8 * node + axis] = from.own[8 * node + axis] + step[axis];
+      own[8 * node + axis + 4] = from.own[8 * node + axis + 4] + step[axis];
+    }
+  }
+}
 }  // namespace
 
 template <class S>
 LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>& motion,
-                              Topologies topologies, KernelSet kernels, const SegmentCuts& cuts)
+                              Topologies topologies, KernelSet kernels, const LinearSettings& settings)
     : scene_(scene),
       motion_(motion),
-      cuts_(cuts),
-      pieces_(cuts.pieces),
-      sides_(scene.body_count()),
-      refits_(scene.body_count(), 0),
-      skipped_(scene.body_count()),
+      cuts_(settings.cuts),
+      memory_(scene.body_count(), settings.remembered_bytes),
+      bodies_(scene.body_count()),
+      counts_(scene.body_count()),
       near_(scene.body_count(), 0) {
+  for (Segment& segment : segments_) segment.sides.resize(body_count());
   for (std::uint32_t body = 0; body < body_count(); ++body) {
-    Side& side = sides_[body];
-    side.hierarchy.assign(std::move(topologies[body]), scene.primitives(body), kernels);
-    const std::size_t nodes = side.hierarchy.node_count();
-    for (int end = 0; end < 2; ++end) {
-      side.lanes[end].assign(nodes * lane_scalars(side.hierarchy.topology().width),
-                             std::numeric_limits<S>::infinity());
-      side.own[end].assign(nodes * 8, S(0));
-    }
+    hierarchy(body).assign(std::move(topologies[body]), scene.primitives(body), kernels);
+    for (Segment& segment : segments_) segment.sides[body].body = &bodies_[body];
   }
   for (const BodyPair& pair : scene.pairs())
-    if (!sides_[pair.first].hierarchy.suits(sides_[pair.second].hierarchy))
+    if (!hierarchy(pair.first).suits(hierarchy(pair.second)))
       throw std::invalid_argument("topologies of all bodies need one width and leaf size");
 }
 
 template <class S>
-void LinearBounds<S>::choose_segment(double t) {
+void LinearBounds<S>::choose_segment(Segment& segment, const SegmentMotion<S>& motion, double t) const {
   double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
   bool rest = true;
   for (std::uint32_t body = 0; body < body_count(); ++body) {
-    begin = std::max(begin, motion_.lines_begin(body));
-    end = std::min(end, motion_.lines_end(body));
-    rest = rest && motion_.at_rest(body);
+    begin = std::max(begin, motion.lines_begin(body));
+    end = std::min(end, motion.lines_end(body));
+    rest = rest && motion.at_rest(body);
   }
   if (rest || begin == -std::numeric_limits<double>::infinity()) begin = t;
   // Plans without an end: as many frames ahead as they have lasted lately, as far as can be told.
   if (!rest && end == std::numeric_limits<double>::infinity()) {
-    begin = std::max(begin, t);
-    end = t + 1.01 * foreseen_ * (step_ > 0 ? step_ : 1.0 / 64);
-    begin_ = begin;
-    end_ = knot_ = end;
+    segment.begin = std::max(begin, t);
+    segment.end = segment.knot = t + 1.01 * foreseen_ * (step_ > 0 ? step_ : 1.0 / 64);
     return;
   }
-  begin_ = begin;
-  end_ = knot_ = end;
-  if (pieces_ == 1 || rest) return;
+  segment.begin = begin;
+  segment.end = segment.knot = end;
+  const std::uint32_t pieces = segment.pieces;
+  if (pieces == 1 || rest) return;
   const auto cut = [&](std::uint32_t k) {
-    return k == pieces_ ? end : begin + (end - begin) * (double(k) / double(pieces_));
+    return k == pieces ? end : begin + (end - begin) * (double(k) / double(pieces));
   };
   std::uint32_t k = 0;
-  while (k + 1 < pieces_ && t >= cut(k + 1)) ++k;
+  while (k + 1 < pieces && t >= cut(k + 1)) ++k;
   if (!(cut(k) < cut(k + 1))) return;  // so short that the doubles between are all used up
-  begin_ = cut(k);
-  end_ = cut(k + 1);
+  segment.begin = cut(k);
+  segment.end = cut(k + 1);
+}
+
+/// Sets out to make the boxes of one end, which has its slot: returns what is left to do.
+template <class S>
+auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t index,
+                                std::uint32_t end, double t) -> Refit {
+  LinearBody<S>& body = bodies_[index];
+  LinearSide<S>& side = segment.sides[index];
+  LinearEnd<S>& at = side.at[end];
+  const std::size_t nodes = body.hierarchy.node_count();
+  AlignedArray<S>&lanes = body.lanes[at.slot], &own = body.own[at.slot];
+  if (own.size() != 8 * nodes) {
+    lanes.assign(nodes * lane_scalars(body.hierarchy.topology().width), std::numeric_limits<S>::infinity());
+    own.assign(8 * nodes, S(0));
+  }
+  at.lanes = lanes.data();
+  at.own = own.data();
+  at.positions = motion.positions_on_lines(index, t, body.room[at.slot]);
+  at.made = ++body.made;
+  if (body.hierarchy.empty()) return {};
+  if (side.apart) {
+    const VertexRun all{0, scene_.vertex_count(index)};
+    bounds_kernels<S>(body.hierarchy.kernels()).of_runs(&all, 1, at.positions, own.data());
+    ++counts_[index].apart;
+    return {};
+  }
+  Refit refit{lanes.data(), own.data(), at.positions, std::uint32_t(nodes), nullptr};
+  if (memory_.is_used() && motion.as_in_the_scene(index)) {
+    const auto* known = memory_.find(index, t);
+    auto* target = known == nullptr ? memory_.add(index, t, lanes.size(), own.size()) : nullptr;
+    if (known != nullptr) {
+      at.lanes = known->lanes.data();
+      at.own = known->own.data();
+      ++counts_[index].remembered;
+      return {};
+    }
+    if (target != nullptr) {
+      at.lanes = refit.lanes = target->lanes.data();
+      at.own = refit.own = target->own.data();
+      refit.remembered = target;
+    }
+  }
+  if (end == 1 && segment.begin == motion.lines_begin(index) && segment.end == motion.lines_end(index)) {
+    if (const auto step = motion.translation(index)) {
+      move_boxes(body.hierarchy, side.at[0], *step, refit.lanes, refit.own);
+      if (refit.remembered != nullptr) refit.remembered->complete = true;
+      ++counts_[index].translated;
+      return {};
+    }
+  }
+  ++counts_[index].refits;
+  return refit;
 }
 
 template <class S>
-bool LinearBounds<S>::make_end(std::uint32_t body, std::uint32_t end, double t) {
-  Side& side = sides_[body];
-  const std::uint32_t array = side.array(end);
-  side.positions[end] = motion_.positions_on_lines(body, t, side.room[array]);
-  side.made[array] = std::max(side.made[0], side.made[1]) + 1;
-  if (side.hierarchy.empty()) return true;
-  S* own = side.own[array].data();
-  if (side.apart) {
-    const VertexRun all{0, scene_.vertex_count(body)};
-    bounds_kernels<S>(side.hierarchy.kernels()).of_runs(&all, 1, side.positions[end], own);
-    ++skipped_[body].apart;
-  } else {
-    side.hierarchy.refit_into(side.lanes[array].data(), own, side.positions[end]);
-    ++refits_[body];
-  }
+void LinearBounds<S>::proceed(std::uint32_t body, Refit& refit, std::uint64_t nodes) const {
+  if (refit.left == 0) return;
+  const std::uint32_t begin = refit.left - std::uint32_t(std::min<std::uint64_t>(refit.left, nodes));
+  bodies_[body].hierarchy.refit_into(refit.lanes, refit.own, refit.positions, begin, refit.left);
+  refit.left = begin;
+  if (begin == 0 && refit.remembered != nullptr) refit.remembered->complete = true;
+}
+
+/// Returns whether the boxes are finite: a line without end may leave the range of numbers.
+template <class S>
+bool LinearBounds<S>::make_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body,
+                               std::uint32_t end, double t) {
+  Refit refit = begin_end(segment, motion, body, end, t);
+  proceed(body, refit, refit.left);
+  if (hierarchy(body).empty()) return true;
+  const S* own = segment.sides[body].at[end].own;
   return std::all_of(own, own + 3, [](S x) { return std::isfinite(x); }) &&
          std::all_of(own + 4, own + 7, [](S x) { return std::isfinite(x); });
 }
 
 template <class S>
-void LinearBounds<S>::make_margin(Side& side) const {
+void LinearBounds<S>::make_margin(LinearSide<S>& side) const {
   S largest = 0;
-  if (!side.hierarchy.empty())
-    for (std::uint32_t end = 0; end < 2; ++end)
+  if (!side.hierarchy().empty())
+    for (const LinearEnd<S>& end : side.at)
       for (std::size_t i = 0; i < 8; ++i)
-        if (i % 4 != 3) largest = std::max(largest, std::abs(side.own[side.array(end)][i]));
+        if (i % 4 != 3) largest = std::max(largest, std::abs(end.own[i]));
   side.margin = 8 * std::numeric_limits<S>::epsilon() * largest + 8 * std::numeric_limits<S>::denorm_min();
 }
 
@@ -107,8 +179,7 @@ void LinearBounds<S>::start() {
   last_ = motion_.time();
   step_ = 0;
   foreseen_ = 1;
-  std::fill(refits_.begin(), refits_.end(), 0);
-  std::fill(skipped_.begin(), skipped_.end(), Skipped{});
+  std::fill(counts_.begin(), counts_.end(), Counts{});
   restart();
 }
 
@@ -120,8 +191,10 @@ void LinearBounds<S>::plans_changed() {
 
 template <class S>
 void LinearBounds<S>::restart() {
-  for (Side& side : sides_) side.current = side.apart = false;
-  end_ = none;
+  for (Segment& segment : segments_)
+    for (LinearSide<S>& side : segment.sides) side.current = side.apart = false;
+  segments_[present_].end = none;
+  forget_ahead();
   advance();
 }
 
@@ -134,175 +207,233 @@ void LinearBounds<S>::note_time() {
 template <class S>
 bool LinearBounds<S>::advance() {
   note_time();
-  if (end_ != none && motion_.time() <= end_) return false;
-  go_on();
+  came_ahead_ = false;
+  if (end() != none && motion_.time() <= end()) return false;
+  if (ahead_exists_ && motion_.time() <= ahead().end) {
+    go_ahead(std::numeric_limits<std::uint64_t>::max());
+    present_ = 1 - present_;
+    forget_ahead();
+    came_ahead_ = true;
+  } else {
+    go_on();
+  }
   return true;
 }
 
 template <class S>
 void LinearBounds<S>::enter() {
   note_time();
-  const bool cut = pieces_ != 1;
+  forget_ahead();
+  const bool cut = segments_[present_].pieces != 1;
   whole_ = true;
   if (cut) {
     restart();
-  } else if (end_ == none || motion_.time() >= end_) {
+  } else if (end() == none || motion_.time() >= end()) {
     go_on();
   }
 }
 
+/// Gives a body's ends over a segment their slots, and makes what is at its begin. Returns whether the other
+/// end is to be made. `before` is the segment before, whose ends stay as they are if `keep_before`.
+template <class S>
+bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion,
+                                 std::uint32_t body, double t, bool keep_before) {
+  LinearSide<S>& side = segment.sides[body];
+  const LinearSide<S>& old = before.sides[body];
+  side.apart = old.apart;
+  side.at_rest = motion.at_rest(body);
+  side.current = true;
+  const auto free_slot = [&](bool beside_begin) {
+    std::uint32_t slot = 0;
+    const auto is_used = [&] {
+      return (beside_begin && side.at[0].slot == slot) ||
+             (keep_before && (old.at[0].slot == slot || old.at[1].slot == slot));
+    };
+    while (is_used()) ++slot;
+    return slot;
+  };
+  if (old.current && old.at_rest && side.at_rest) {  // where it was
+    side.at[0] = side.at[1] = old.at[1];
+    ++counts_[body].at_rest;
+    return false;
+  }
+  if (old.current && !old.at_rest && before.end == segment.begin) {
+    side.at[0] = old.at[1];
+  } else {
+    side.at[0].slot = free_slot(false);
+    make_end(segment, motion, body, 0, side.at_rest ? t : segment.begin);
+  }
+  if (side.at_rest) {
+    side.at[1] = side.at[0];
+    return false;
+  }
+  side.at[1].slot = free_slot(true);
+  return true;
+}
+
 template <class S>
 void LinearBounds<S>::go_on() {
-  const double t = motion_.time(), before = end_;
-  const bool anew = end_ == none;
+  forget_ahead();
+  const double t = motion_.time();
+  const Segment& before = segments_[present_];
+  Segment& segment = segments_[1 - present_];
+  const bool anew = before.end == none, new_knot = anew || before.end >= before.knot;
   if (!anew) foreseen_ = std::min(16.0, 2 * foreseen_);
-  const bool next = anew || before >= knot_;
-  if (next) pieces_ = whole_ ? 1 : cuts_.pieces;
-  choose_segment(t);
-  const bool goes_on = !anew && begin_ == before;
+  segment.pieces = whole_ ? 1 : new_knot ? cuts_.pieces : before.pieces;
+  choose_segment(segment, motion_, t);
   for (std::uint32_t body = 0; body < body_count(); ++body) {
-    Side& side = sides_[body];
-    const bool rests = motion_.at_rest(body);
-    if (rests && side.current && side.at_rest) {  // where it was
-      ++skipped_[body].at_rest;
-      continue;
-    }
-    if (goes_on && !side.at_rest) {
-      side.first = 1 - side.first;
-      side.positions[0] = side.positions[1];
-      side.at_rest = rests;
-    } else {
-      side.at_rest = rests;
-      make_end(body, 0, rests ? t : begin_);
-    }
-    side.current = true;
-    if (rests) {
-      side.positions[1] = side.positions[0];
-    } else {
-      // A line without end may leave the range of numbers: then less of it.
-      while (!make_end(body, 1, end_) && end_ > begin_) {
-        end_ = begin_ + (end_ - begin_) / 2;
-        for (std::uint32_t other = 0; other < body; ++other)
-          if (!sides_[other].at_rest) make_end(other, 1, end_);
-      }
+    if (!begin_side(segment, before, motion_, body, t, false)) continue;
+    // A line without end may leave the range of numbers: then less of it.
+    while (!make_end(segment, motion_, body, 1, segment.end) && segment.end > segment.begin) {
+      segment.end = segment.begin + (segment.end - segment.begin) / 2;
+      for (std::uint32_t other = 0; other < body; ++other)
+        if (!segment.sides[other].at_rest) make_end(segment, motion_, other, 1, segment.end);
     }
   }
-  if (next && cuts_.max_looseness > 0 && !whole_) cut_while_loose(t);
-  for (Side& side : sides_) make_margin(side);
-  part_bodies();
+  present_ = 1 - present_;
+  if (new_knot && cuts_.max_looseness > 0 && !whole_) cut_while_loose(t);
+  finish(segment, motion_);
+}
+
+template <class S>
+void LinearBounds<S>::forget_ahead() {
+  ahead_exists_ = false;
+  ahead_ = {};
+}
+
+template <class S>
+bool LinearBounds<S>::start_ahead(const SegmentMotion<S>& motion) {
+  forget_ahead();
+  const Segment& before = segments_[present_];
+  Segment& segment = segments_[1 - present_];
+  // How a segment is to be cut is seen when it is there.
+  if (whole_ || cuts_.max_looseness > 0 || motion.time() != before.end) return false;
+  bool ends = false;
+  for (std::uint32_t body = 0; body < body_count(); ++body)
+    ends = ends || motion.lines_end(body) != std::numeric_limits<double>::infinity();
+  if (!ends) return false;
+  segment.pieces = before.end >= before.knot ? cuts_.pieces : before.pieces;
+  choose_segment(segment, motion, before.end);
+  if (segment.begin != before.end) return false;
+  ahead_.motion = motion;
+  ahead_exists_ = true;
+  return true;
+}
+
+template <class S>
+bool LinearBounds<S>::go_ahead(std::uint64_t nodes) {
+  constexpr std::uint64_t step = 64;
+  const Segment& before = segments_[present_];
+  Segment& segment = segments_[1 - present_];
+  for (std::uint64_t done = 0; done < nodes;) {
+    if (ahead_.refit.left > 0) {
+      proceed(ahead_.body - 1, ahead_.refit, step);
+      done += step;
+    } else if (ahead_.body < body_count()) {
+      const std::uint32_t body = ahead_.body++;
+      if (begin_side(segment, before, *ahead_.motion, body, before.end, true))
+        ahead_.refit = begin_end(segment, *ahead_.motion, body, 1, segment.end);
+    } else {
+      if (!ahead_.finished) finish(segment, *ahead_.motion);
+      ahead_.finished = true;
+      return true;
+    }
+  }
+  return false;
+}
+
+template <class S>
+std::uint64_t LinearBounds<S>::nodes_of_segment() const {
+  std::uint64_t nodes = 0;
+  for (const LinearSide<S>& side : segment().sides)
+    if (!side.at_rest && !side.apart) nodes += side.hierarchy().node_count();
+  return nodes;
 }
 
 /// Cuts the segment that has just begun into twice as many pieces until the present one is tight enough.
 template <class S>
 void LinearBounds<S>::cut_while_loose(double t) {
-  while (pieces_ < SegmentCuts::most && std::isfinite(end_) && end_ > begin_ &&
+  Segment& segment = segments_[present_];
+  while (segment.pieces < SegmentCuts::most && std::isfinite(segment.end) && segment.end > segment.begin &&
          looseness_in_the_middle() > cuts_.max_looseness) {
-    pieces_ *= 2;
-    const double begin = begin_, end = end_;
-    choose_segment(t);
-    if (begin_ == begin && end_ == end) return;  // as short as doubles can be
+    segment.pieces *= 2;
+    const double begin = segment.begin, end = segment.end;
+    choose_segment(segment, motion_, t);
+    if (segment.begin == begin && segment.end == end) return;  // as short as doubles can be
     for (std::uint32_t body = 0; body < body_count(); ++body) {
-      if (sides_[body].at_rest) continue;
-      if (begin_ != begin) make_end(body, 0, begin_);
-      make_end(body, 1, end_);
+      if (segment.sides[body].at_rest) continue;
+      if (segment.begin != begin) make_end(segment, motion_, body, 0, segment.begin);
+      make_end(segment, motion_, body, 1, segment.end);
     }
   }
 }
 
 template <class S>
 double LinearBounds<S>::looseness_in_the_middle() {
-  const auto area = [](const Box<S>& box) {
+  const auto area = [](const auto& box) {
     const double x = double(box.upper[0]) - double(box.lower[0]);
     const double y = double(box.upper[1]) - double(box.lower[1]);
     const double z = double(box.upper[2]) - double(box.lower[2]);
     return x * y + y * z + z * x;
   };
-  const double t = begin_ + (end_ - begin_) / 2;
+  const double t = begin() + (end() - begin()) / 2;
   double tight = 0, linear = 0;
   for (std::uint32_t body = 0; body < body_count(); ++body) {
-    const Side& side = sides_[body];
-    if (side.at_rest || side.apart || side.hierarchy.empty()) continue;
-    middle_lanes_.resize(std::max(middle_lanes_.size(), side.lanes[0].size()));
-    middle_own_.resize(std::max(middle_own_.size(), side.own[0].size()));
-    std::copy_n(side.lanes[0].data(), side.lanes[0].size(), middle_lanes_.data());  // empty lanes
-    side.hierarchy.refit_into(middle_lanes_.data(), middle_own_.data(),
-                              motion_.positions_on_lines(body, t, middle_room_));
-    ++refits_[body];
-    for (std::uint32_t node = 0; node < side.hierarchy.topology().size(); ++node) {
-      const Box<S> middle = side.hierarchy.box_in(middle_lanes_.data(), middle_own_.data(), node);
-      const Box<S> first =
-          side.hierarchy.box_in(side.lanes[side.array(0)].data(), side.own[side.array(0)].data(), node);
-      const Box<S> last =
-          side.hierarchy.box_in(side.lanes[side.array(1)].data(), side.own[side.array(1)].data(), node);
-      Box<S> between;
-      for (int axis = 0; axis < 3; ++axis) {
-        between.lower[axis] = first.lower[axis] / 2 + last.lower[axis] / 2;
-        between.upper[axis] = first.upper[axis] / 2 + last.upper[axis] / 2;
-      }
-      tight += area(middle);
-      linear += area(between);
+    const LinearSide<S>& one = side(body);
+    if (one.at_rest || one.apart || hierarchy(body).empty()) continue;
+    const std::size_t nodes = hierarchy(body).node_count(),
+                      scalars = nodes * lane_scalars(hierarchy(body).topology().width);
+    middle_lanes_.resize(std::max(middle_lanes_.size(), scalars));
+    middle_own_.resize(std::max(middle_own_.size(), 8 * nodes));
+    std::copy_n(one.at[0].lanes, scalars, middle_lanes_.data());  // empty lanes
+    hierarchy(body).refit_into(middle_lanes_.data(), middle_own_.data(),
+                               motion_.positions_on_lines(body, t, middle_room_));
+    ++counts_[body].refits;
+    for (std::uint32_t node = 0; node < hierarchy(body).topology().size(); ++node) {
+      tight += area(hierarchy(body).box_in(middle_lanes_.data(), middle_own_.data(), node));
+      linear += area(one.box_between(node, 0.5));
     }
   }
   return tight > 0 ? linear / tight - 1 : 0;
 }
 
+/// Margins, and which bodies meet another's box over the segment. Those that come near again get all their
+/// boxes; those that are apart get one from the next segment on, and keep those they have until then.
 template <class S>
-Box<S> LinearBounds<S>::swept(const Side& side) const {
-  Box<S> box;
-  for (std::uint32_t end = 0; end < 2; ++end) {
-    const S* own = side.own[side.array(end)].data();
-    for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] = std::min(box.lower[axis], own[axis] - 2 * side.margin);
-      box.upper[axis] = std::max(box.upper[axis], own[axis + 4] + 2 * side.margin);
-    }
-  }
-  return box;
-}
-
-/// Which bodies meet another's box over the segment. Those that come near again get all their boxes; those
-/// that are apart get one from the next segment on, and keep those they have until then.
-template <class S>
-void LinearBounds<S>::part_bodies() {
-  for (std::uint32_t body = 0; body < body_count(); ++body) near_[body] = 0;
+void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
+  for (LinearSide<S>& side : segment.sides) make_margin(side);
+  std::fill(near_.begin(), near_.end(), 0);
   for (const BodyPair& pair : scene_.pairs()) {
-    const Side &a = sides_[pair.first], &b = sides_[pair.second];
-    if (a.hierarchy.empty() || b.hierarchy.empty() || !overlap(swept(a), swept(b))) continue;
+    const LinearSide<S>&a = segment.sides[pair.first], &b = segment.sides[pair.second];
+    if (a.hierarchy().empty() || b.hierarchy().empty() || !overlap(swept(a), swept(b))) continue;
     near_[pair.first] = near_[pair.second] = 1;
   }
   for (std::uint32_t body = 0; body < body_count(); ++body) {
-    Side& side = sides_[body];
+    LinearSide<S>& side = segment.sides[body];
     if (near_[body] == 0) {
       // What rests has its boxes already; a root that is a leaf lies where those of others do.
-      side.apart = side.apart || (!side.at_rest && side.hierarchy.topology().size() > 1);
+      side.apart = side.apart || (!side.at_rest && side.hierarchy().topology().size() > 1);
     } else if (side.apart) {
       side.apart = false;
-      make_end(body, 0, side.at_rest ? motion_.time() : begin_);
-      if (!side.at_rest) make_end(body, 1, end_);
+      make_end(segment, motion, body, 0, side.at_rest ? motion.time() : segment.begin);
+      if (side.at_rest)
+        side.at[1] = side.at[0];
+      else
+        make_end(segment, motion, body, 1, segment.end);
     }
   }
-}
-
-template <class S>
-S LinearBounds<S>::fraction(double t) const {
-  if (!(end_ > begin_) || end_ == std::numeric_limits<double>::infinity()) return 0;
-  return std::clamp(S((t - begin_) / (end_ - begin_)), S(0), S(1));
 }
 
 template <class S>
 std::vector<Box<double>> LinearBounds<S>::boxes_at(std::uint32_t body, double t) const {
-  const Side& side = sides_[body];
-  const double s = double(fraction(t)), margin = double(side.margin);
+  const LinearSide<S>& one = side(body);
+  const double s = double(fraction(t)), margin = double(one.margin);
   std::vector<Box<double>> boxes;
-  for (std::uint32_t node = 0; node < side.hierarchy.topology().size(); ++node) {
-    const Box<S> first =
-        side.hierarchy.box_in(side.lanes[side.array(0)].data(), side.own[side.array(0)].data(), node);
-    const Box<S> last =
-        side.hierarchy.box_in(side.lanes[side.array(1)].data(), side.own[side.array(1)].data(), node);
-    Box<double> box;
+  for (std::uint32_t node = 0; node < one.hierarchy().topology().size(); ++node) {
+    Box<double> box = one.box_between(node, s);
     for (int axis = 0; axis < 3; ++axis) {
-      const double low = double(first.lower[axis]), high = double(first.upper[axis]);
-      box.lower[axis] = low + s * (double(last.lower[axis]) - low) - margin;
-      box.upper[axis] = high + s * (double(last.upper[axis]) - high) + margin;
+      box.lower[axis] -= margin;
+      box.upper[axis] += margin;
     }
     boxes.push_back(box);
   }
@@ -311,9 +442,8 @@ std::vector<Box<double>> LinearBounds<S>::boxes_at(std::uint32_t body, double t)
 
 template <class S>
 AuditView LinearBounds<S>::audit_view(std::uint32_t body, double t) const {
-  const Side& side = sides_[body];
-  AuditView view{side.hierarchy.topology(), boxes_at(body, t), {}};
-  if (!side.apart || view.boxes.empty()) return view;
+  AuditView view{side(body).hierarchy().topology(), boxes_at(body, t), {}};
+  if (!side(body).apart || view.boxes.empty()) return view;
   view.stale.assign(view.boxes.size(), 1);
   view.stale[0] = 0;
   return view;
@@ -321,16 +451,13 @@ AuditView LinearBounds<S>::audit_view(std::uint32_t body, double t) const {
 
 template <class S>
 std::size_t LinearBounds<S>::bytes() const {
-  std::size_t total = (middle_lanes_.size() + middle_own_.size() + middle_room_.capacity()) * sizeof(S);
-  for (const Side& side : sides_) {
-    total += side.hierarchy.bytes();
-    for (int end = 0; end < 2; ++end)
-      total += (side.lanes[end].size() + side.own[end].size() + side.room[end].capacity()) * sizeof(S);
-  }
+  std::size_t total =
+      memory_.bytes() + (middle_lanes_.size() + middle_own_.size() + middle_room_.capacity()) * sizeof(S);
+  for (const LinearBody<S>& body : bodies_) total += body.bytes();
   return total;
 }
 
-std::vector<Parameter> segment_cut_parameters() {
+std::vector<Parameter> linear_parameters() {
   return {
       {"pieces",
        "1",
@@ -342,16 +469,26 @@ std::vector<Parameter> segment_cut_parameters() {
        {},
        "a segment is cut into twice as many pieces while boxes in the middle of its first have more surface "
        "than tight ones by this share; 0: nobody looks",
+       0},
+      {"remember_mb",
+       "0",
+       {},
+       "megabytes for boxes at knots that are used again when the clip plays again; a study plays it again "
+       "for "
+       "each repetition, so that its times are then those of a loop and not of a first time",
        0}};
 }
 
-SegmentCuts segment_cuts(const Params& params) {
+LinearSettings linear_settings(const Params& params) {
   const double wanted = params.number("pieces"), looseness = params.number("max_looseness");
   if (!(wanted >= 1 && wanted <= SegmentCuts::most) || wanted != std::floor(wanted))
     throw ConfigError("pieces must be a whole number from 1 to 64, got " + params.word("pieces"));
   if (!(looseness >= 0))
     throw ConfigError("max_looseness must not be negative, got " + params.word("max_looseness"));
-  return {std::uint32_t(wanted), looseness};
+  const double remembered = params.number("remember_mb");
+  if (!(remembered >= 0 && remembered < 1e6))
+    throw ConfigError("remember_mb must be from 0 to a million, got " + params.word("remember_mb"));
+  return {{std::uint32_t(wanted), looseness}, std::size_t(remembered * 1e6)};
 }
 
 template class LinearBounds<float>;

@@ -9,17 +9,42 @@ namespace {
 constexpr float fraction_slack = 0x1p-21F;
 }  // namespace
 
+/// All pairs wait for their begin; ahead of time those that overlap then are asked about otherwise.
 template <class S>
-void SpanAnswers<S>::start(const IntervalJoin<S>& join) {
+void SpanAnswers<S>::begin(const IntervalJoin<S>& join, bool ahead) {
   intersecting_.clear();
   open_.clear();
   const auto pairs = join.pairs();
-  next_.resize(pairs.size());
-  time_.resize(pairs.size());
+  next_.resize(std::max(next_.size(), pairs.size()));
+  time_.resize(next_.size());
   std::fill(std::begin(head_), std::end(head_), none);
   bucket_ = 0;
   last_ = -1;
-  for (std::uint32_t i = std::uint32_t(pairs.size()); i-- > 0;) wait(i, pairs[i].begin);
+  const std::size_t first = ahead ? join.throughout() : 0;
+  for (std::size_t i = pairs.size(); i-- > first;)
+    if (!ahead || pairs[i].begin > 0) wait(std::uint32_t(i), pairs[i].begin);
+}
+
+template <class S>
+void SpanAnswers<S>::start(const IntervalJoin<S>& join) {
+  begin(join, false);
+}
+
+template <class S>
+void SpanAnswers<S>::start_ahead(const IntervalJoin<S>& join) {
+  begin(join, true);
+  asked_ = 0;
+}
+
+template <class S>
+bool SpanAnswers<S>::go_on(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                           const IntervalJoin<S>& join, std::size_t pairs) {
+  const std::size_t all = join.from_begin(), end = asked_ + std::min(pairs, all - asked_);
+  due_.clear();
+  for (; asked_ < end; ++asked_)
+    if (join.pairs()[asked_].begin == 0) due_.push_back(std::uint32_t(asked_));
+  attempt_all(segment, scene, join, 0);
+  return end == all;
 }
 
 template <class S>
@@ -60,10 +85,10 @@ void SpanAnswers<S>::collect_due(const IntervalJoin<S>& join, float fraction) {
 }
 
 template <class S>
-void SpanAnswers<S>::attempt(const LinearBounds<S>& bounds, const SceneView<S>& scene,
+void SpanAnswers<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>& scene,
                              const IntervalJoin<S>& join, float fraction, float share) {
   if (due_.empty()) return;
-  const auto &a = bounds.side(join.body_a()), &b = bounds.side(join.body_b());
+  const LinearSide<S>&a = segment.sides[join.body_a()], &b = segment.sides[join.body_b()];
   const std::uint32_t* const corners_a = scene.primitives(join.body_a()).vertices.data();
   const std::uint32_t* const corners_b = scene.primitives(join.body_b()).vertices.data();
   const auto pairs = join.pairs();
@@ -76,8 +101,8 @@ void SpanAnswers<S>::attempt(const LinearBounds<S>& bounds, const SceneView<S>& 
       const std::size_t va = std::size_t(3) * corners_a[std::size_t(3) * pair.primitive_a + c];
       const std::size_t vb = std::size_t(3) * corners_b[std::size_t(3) * pair.primitive_b + c];
       for (int end = 0; end < 2; ++end) {
-        span.corner[end][c] = a.positions[end] + va;
-        span.corner[end][c + 3] = b.positions[end] + vb;
+        span.corner[end][c] = a.at[end].positions + va;
+        span.corner[end][c + 3] = b.at[end].positions + vb;
       }
     }
     // Lines go on beyond the span: a little more of it holds the frame's time, which the fraction is not.
@@ -88,7 +113,7 @@ void SpanAnswers<S>::attempt(const LinearBounds<S>& bounds, const SceneView<S>& 
   // the ends that are read here, by half an ulp each; interpolation in S adds two and a half at each of two
   // corners, their difference another one, products some more.
   const S margin = a.margin + b.margin;
-  span_test_kernels<S>(a.hierarchy.kernels())
+  span_test_kernels<S>(a.hierarchy().kernels())
       .decide(tries_.data(), tries_.size(), {.gap = 2 * margin, .component = margin}, verdicts_.data());
   attempts_ += tries_.size();
   std::size_t left = 0;
@@ -105,8 +130,18 @@ void SpanAnswers<S>::attempt(const LinearBounds<S>& bounds, const SceneView<S>& 
   due_.resize(left);
 }
 
+/// Of what is due first the rest of its span, then a quarter of that.
 template <class S>
-std::size_t SpanAnswers<S>::read(const LinearBounds<S>& bounds, const SceneView<S>& scene,
+void SpanAnswers<S>::attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                 const IntervalJoin<S>& join, float fraction) {
+  attempt(segment, scene, join, fraction, 1);
+  attempt(segment, scene, join, fraction, 0.25F);
+  for (const std::uint32_t pair : due_)
+    open_.push_back({pair, fraction + (join.pairs()[pair].end - fraction) / 4});
+}
+
+template <class S>
+std::size_t SpanAnswers<S>::read(const LinearSegment<S>& segment, const SceneView<S>& scene,
                                  const IntervalJoin<S>& join, float fraction, PairBuffer& out) {
   if (fraction > last_) step_ = fraction - std::max(last_, 0.0F);
   last_ = fraction;
@@ -120,9 +155,7 @@ std::size_t SpanAnswers<S>::read(const LinearBounds<S>& bounds, const SceneView<
     else
       open_.push_back({pair, fraction});
   due_.resize(worth);
-  attempt(bounds, scene, join, fraction, 1);
-  attempt(bounds, scene, join, fraction, 0.25F);
-  for (const std::uint32_t pair : due_) open_.push_back({pair, fraction + (pairs[pair].end - fraction) / 4});
+  attempt_all(segment, scene, join, fraction);
   decided_ += intersecting_.size();
   const std::size_t before = out.size();
   out.resize(before + intersecting_.size() + open_.size());

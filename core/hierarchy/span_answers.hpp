@@ -20,10 +20,15 @@ class SpanAnswers {
  public:
   /// The join is that of a new segment.
   void start(const IntervalJoin<S>& join);
+  /// The same ahead of time: `go_on` asks about so many more of the pairs that overlap at the begin of the
+  /// segment. Returns whether there are no more of them; only then it may be read.
+  void start_ahead(const IntervalJoin<S>& join);
+  bool go_on(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
+             std::size_t pairs);
 
   /// Appends the pairs that intersect at a fraction of the segment for certain, and after them those that
   /// may; returns how many these are. Fractions never decrease within a segment.
-  std::size_t read(const LinearBounds<S>& bounds, const SceneView<S>& scene, const IntervalJoin<S>& join,
+  std::size_t read(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                    float fraction, PairBuffer& out);
 
   /// Since they were cleared: attempts to decide a pair for a span, and pairs that frames read as decided.
@@ -41,9 +46,13 @@ class SpanAnswers {
   };
   void wait(std::uint32_t pair, float until);
   void collect_due(const IntervalJoin<S>& join, float fraction);
-  void attempt(const LinearBounds<S>& bounds, const SceneView<S>& scene, const IntervalJoin<S>& join,
+  void begin(const IntervalJoin<S>& join, bool ahead);
+  void attempt(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                float fraction, float share);
+  void attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
+                   float fraction);
 
+  std::size_t asked_ = 0;  ///< pairs, ahead of time
   std::vector<Item> intersecting_, open_;
   /// Pairs that wait for their time: lists by bucket of it.
   std::vector<std::uint32_t> next_;

@@ -41,7 +41,10 @@ class WideHierarchy {
   }
   /// The same into rows and own boxes that lie elsewhere, in the layout of `arrays`.
   void refit_into(S* lanes, S* own, const S* positions) const {
-    refit_({nodes_.data(), lanes, own, vertices_.data()}, positions, 0, node_count());
+    refit_into(lanes, own, positions, 0, node_count());
+  }
+  void refit_into(S* lanes, S* own, const S* positions, std::uint32_t begin, std::uint32_t end) const {
+    refit_({nodes_.data(), lanes, own, vertices_.data()}, positions, begin, end);
   }
   std::uint32_t node_count() const { return std::uint32_t(nodes_.size()); }
   /// Ranges of wide nodes that do not depend on each other, and the nodes above them, children first: what

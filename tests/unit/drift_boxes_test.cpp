@@ -136,40 +136,5 @@ TEST(DriftBoxes, WhatMovesTogetherStaysListed) {
   EXPECT_LT(searches, 12);
 }
 
-// ---- Bounds over segments
-
-TEST(LinearBounds, BodiesFarApartGetOneBoxASegment) {
-  const Scene<float> scene = grids<float>(40, 50, lifted);
-  for (const char* id : {"linear_bounds", "interval_join"}) {
-    Play<float> play(scene, id, {});
-    EXPECT_EQ(play.frame(0.5)[Counter::vertex_reads], 0u) << id;
-    const Counters next = play.frame(1.5);  // the second segment
-    EXPECT_EQ(next[Counter::vertex_reads], scene.bodies[0].plans.vertex_count()) << id;
-    EXPECT_EQ(next[Counter::values_written], 0u) << id;
-    EXPECT_EQ(next[Counter::bodies_skipped], 2u) << id;
-    EXPECT_EQ(next[Counter::nodes_visited], 0u) << id;
-  }
-}
-
-TEST(LinearBounds, BodiesThatComeNearAgainGetAllTheirBoxes) {
-  // Apart for two segments, through each other in the third, apart again.
-  Scene<double> scene = grids<double>(10, 3, [](std::uint32_t) { return 0.0; });
-  std::vector<double> positions;
-  for (const double x : {0.0, 0.1, 0.2, 5.0, 5.1, 5.2})
-    for (std::uint32_t v = 0; v < 121; ++v)
-      for (const double c : {x + (v % 11) / 10.0, (v / 11) / 10.0, 0.02 * x}) positions.push_back(c);
-  scene.bodies[0].plans = FlightPlans<double>(121, {0, 1, 2, 3, 4, 5}, std::move(positions));
-  for (const char* id : {"linear_bounds", "interval_join", "drift_boxes", "drift_boxes_bounded", "auto"}) {
-    const StrategyEntry& entry = find_strategy(id);
-    Session<double> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
-    Oracle<double> oracle(scene);
-    const std::vector<double> frames = frame_times(scene, 13);
-    const Verification result = verify(session, std::span<const double>(frames), oracle);
-    EXPECT_EQ(result.first_violation, "") << id;
-    EXPECT_EQ(result.audit.protrusion, 0) << id;
-    EXPECT_GT(session.strategy().counters()[Counter::bodies_skipped], 0u) << id;
-  }
-}
-
 }  // namespace
 }  // namespace kbvh::test

@@ -1,0 +1,260 @@
+// What the conformance suite cannot see of bounds over segments: what they leave out, what they remember, and
+// that work ahead of time is spread.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/verify.hpp"
+#include "tests/support/moving_grids.hpp"
+
+namespace kbvh::test {
+namespace {
+
+constexpr std::array<const char*, 3> all_linear{"linear_bounds", "interval_join", "interval_join_ahead"};
+
+template <class S>
+Verification verified(Session<S>& session, const Scene<S>& scene, const std::vector<double>& frames) {
+  Oracle<S> oracle(scene);
+  return verify(session, std::span<const double>(frames), oracle);
+}
+
+// ---- What is left out
+
+TEST(LinearBounds, BodiesFarApartGetOneBoxASegment) {
+  const Scene<float> scene = grids<float>(40, 50, lifted);
+  for (const char* id : {"linear_bounds", "interval_join"}) {
+    Play<float> play(scene, id, {});
+    EXPECT_EQ(play.frame(0.5)[Counter::vertex_reads], 0u) << id;
+    const Counters next = play.frame(1.5);  // the second segment
+    EXPECT_EQ(next[Counter::vertex_reads], scene.bodies[0].plans.vertex_count()) << id;
+    EXPECT_EQ(next[Counter::values_written], 0u) << id;
+    EXPECT_EQ(next[Counter::bodies_skipped], 2u) << id;
+    EXPECT_EQ(next[Counter::nodes_visited], 0u) << id;
+  }
+}
+
+TEST(LinearBounds, BodiesThatComeNearAgainGetAllTheirBoxes) {
+  // Apart for two segments, through each other in the third, apart again.
+  Scene<double> scene = grids<double>(10, 3, [](std::uint32_t) { return 0.0; });
+  std::vector<double> positions;
+  for (const double x : {0.0, 0.1, 0.2, 5.0, 5.1, 5.2})
+    for (std::uint32_t v = 0; v < 121; ++v)
+      for (const double c : {x + (v % 11) / 10.0, (v / 11) / 10.0, 0.02 * x}) positions.push_back(c);
+  scene.bodies[0].plans = FlightPlans<double>(121, {0, 1, 2, 3, 4, 5}, std::move(positions));
+  for (const char* id : {"linear_bounds", "interval_join", "drift_boxes", "drift_boxes_bounded", "auto"}) {
+    const StrategyEntry& entry = find_strategy(id);
+    Session<double> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+    Oracle<double> oracle(scene);
+    const std::vector<double> frames = frame_times(scene, 13);
+    const Verification result = verify(session, std::span<const double>(frames), oracle);
+    EXPECT_EQ(result.first_violation, "") << id;
+    EXPECT_EQ(result.audit.protrusion, 0) << id;
+    EXPECT_GT(session.strategy().counters()[Counter::bodies_skipped], 0u) << id;
+  }
+}
+
+// ---- Translation
+
+/// Two grids that cross: the first one moves by (1/16, 1/64, 0) from keyframe to keyframe, all
+/// coordinates being multiples of 1/1024, but for one vertex that is `wrong` of the last keyframe.
+Scene<float> crossing(float wrong) {
+  constexpr std::uint32_t n = 16, keyframes = 9;
+  Scene<float> scene = grids<float>(n, 0.5, lifted);
+  std::vector<float> positions;
+  for (std::uint32_t k = 0; k < keyframes; ++k)
+    for (std::uint32_t v = 0; v < (n + 1) * (n + 1); ++v)
+      for (const float c : {float(v % (n + 1)) / n + float(k) / 16, float(v / (n + 1)) / n + float(k) / 64,
+                            float(int(v % 3) - 1) / 1024})
+        positions.push_back(c);
+  positions.back() += wrong;
+  std::vector<double> times;
+  for (std::uint32_t k = 0; k < keyframes; ++k) times.push_back(k);
+  scene.bodies[0].plans = FlightPlans<float>((n + 1) * (n + 1), times, std::move(positions));
+  return scene;
+}
+
+TEST(LinearBounds, BodiesThatAreOnlyTranslatedHaveTheirBoxesMoved) {
+  const Scene<float> scene = crossing(0), bent = crossing(0x1p-20f);
+  for (const char* id : all_linear) {
+    Play<float> play(scene, id, {}), other(bent, id, {});
+    std::uint64_t moved = play.last[Counter::bodies_translated], pairs = 0;
+    for (int f = 1; f <= 32; ++f) {
+      const Counters frame = play.frame(f / 4.0);
+      other.frame(f / 4.0);
+      moved += frame[Counter::bodies_translated];
+      EXPECT_EQ(frame[Counter::vertex_reads], 0u) << id << ", frame " << f;
+      pairs += play.pairs.size();
+    }
+    EXPECT_EQ(moved, 8u) << id;
+    EXPECT_EQ(other.last[Counter::bodies_translated], 7u) << id << ": all segments but the last";
+    EXPECT_GT(pairs, 0u);
+
+    Session<float> session(scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred},
+                           CountingPolicy::silent);
+    const Verification result = verified(session, scene, frame_times(scene, 5));
+    EXPECT_EQ(result.first_violation, "") << id;
+    EXPECT_LT(result.audit.looseness(), 1e-4) << id << ": moved boxes are as tight as new ones";
+  }
+}
+
+// ---- Clips that play again
+
+TEST(LinearBounds, AClipThatPlaysAgainFindsItsBoxes) {
+  const Scene<float> scene = grids<float>(24, 0.2, [](std::uint32_t i) { return 0.1 * std::sin(0.3 * i); });
+  const std::vector<double> frames = frame_times(scene, 5);
+  for (const char* id : all_linear) {
+    const StrategyEntry& entry = find_strategy(id);
+    Session<float> session(scene, {&entry, {{"remember_mb", "10"}}, entry.info.topology.preferred},
+                           CountingPolicy::counting);
+    EXPECT_EQ(verified(session, scene, frames).first_violation, "") << id;
+    Counters counters = session.strategy().counters();
+    EXPECT_EQ(counters[Counter::bodies_remembered], 0u) << id;
+    EXPECT_GT(counters[Counter::vertex_reads], 0u) << id;
+    std::size_t bytes = 0;
+    for (int again = 0; again < 3; ++again) {
+      EXPECT_EQ(verified(session, scene, frames).first_violation, "") << id;
+      counters = session.strategy().counters();
+      EXPECT_EQ(counters[Counter::bodies_remembered], 4u)
+          << id << ": three knots of one body, one of the other";
+      EXPECT_EQ(counters[Counter::vertex_reads], 0u) << id;
+      EXPECT_EQ(counters[Counter::nodes_visited], 0u) << id;
+      // Once more: the two joins that work ahead have changed places.
+      if (again == 0) bytes = session.strategy().bytes();
+      EXPECT_EQ(session.strategy().bytes(), bytes) << id;
+    }
+  }
+}
+
+TEST(LinearBounds, WhatFindsNoRoomIsMadeAgain) {
+  const Scene<float> scene = grids<float>(24, 0.2, [](std::uint32_t i) { return 0.1 * std::sin(0.3 * i); });
+  const StrategyEntry& entry = find_strategy("linear_bounds");
+  // Room for two of four.
+  Session<float> session(scene, {&entry, {{"remember_mb", "0.009"}}, entry.info.topology.preferred},
+                         CountingPolicy::counting);
+  const std::vector<double> frames = frame_times(scene, 5);
+  for (int play = 0; play < 3; ++play) EXPECT_EQ(verified(session, scene, frames).first_violation, "");
+  const Counters counters = session.strategy().counters();
+  EXPECT_GT(counters[Counter::bodies_remembered], 0u);
+  EXPECT_LT(counters[Counter::bodies_remembered], 4u);
+  EXPECT_GT(counters[Counter::vertex_reads], 0u);
+}
+
+TEST(LinearBounds, NothingIsRememberedOfPlansThatChanged) {
+  const Scene<double> scene = grids<double>(8, 0.2, [](std::uint32_t i) { return 0.1 * std::sin(0.3 * i); });
+  const std::vector<double> frames = frame_times(scene, 6);
+  PlanScript<double> script;
+  PlanChange<double> up{.body = 0, .vertex = 40, .times = {}, .positions = {}, .velocity = {0, 0, 1}};
+  script.steps.push_back({frames[3], {up}, {}});
+  for (const char* id : all_linear) {
+    const StrategyEntry& entry = find_strategy(id);
+    Session<double> session(scene, {&entry, {{"remember_mb", "10"}}, entry.info.topology.preferred},
+                            CountingPolicy::silent);
+    for (const PlanScript<double>* with : {&script, (PlanScript<double>*)nullptr, &script}) {
+      Oracle<double> oracle(scene);
+      EXPECT_EQ(verify(session, std::span<const double>(frames), oracle, with).first_violation, "") << id;
+    }
+  }
+}
+
+// ---- Ahead of time
+
+/// Two waving sheets that lie in each other, with so many keyframes.
+Scene<float> waves(std::uint32_t n, std::uint32_t keyframes) {
+  Scene<float> scene;
+  for (const double phase : {0.0, 1.0}) {
+    Body<float> body = grid<float>(n, 0.01 * phase, 0.02 * phase, 1, lifted);
+    std::vector<float> positions;
+    std::vector<double> times;
+    for (std::uint32_t k = 0; k < keyframes; ++k) {
+      times.push_back(k);
+      for (std::uint32_t v = 0; v < (n + 1) * (n + 1); ++v) {
+        const double x = v % (n + 1) / double(n), y = v / (n + 1) / double(n);
+        for (const double c : {x + 0.01 * phase, y, 0.01 * std::sin(40 * x + 30 * y + 0.2 * k + phase)})
+          positions.push_back(float(c));
+      }
+    }
+    body.plans = FlightPlans<float>((n + 1) * (n + 1), times, std::move(positions));
+    scene.bodies.push_back(std::move(body));
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  return scene;
+}
+
+TEST(IntervalJoinAhead, SpreadsTheWorkOfASegment) {
+  const Scene<float> scene = waves(48, 5);
+  constexpr int l = 20;
+  Play<float> ahead(scene, "interval_join_ahead", {}), at_once(scene, "interval_join", {});
+  for (int segment = 0; segment < 4; ++segment) {
+    std::uint64_t tests = 0, attempts = 0, most_tests = 0, most_attempts = 0, at_once_tests = 0;
+    for (int f = 1; f <= l; ++f) {
+      const double t = segment + f / double(l);
+      const Counters frame = ahead.frame(t);
+      at_once_tests = std::max(at_once_tests, at_once.frame(t)[Counter::box_tests]);
+      EXPECT_EQ(ahead.pairs.size(), at_once.pairs.size()) << t;
+      std::sort(ahead.pairs.begin(), ahead.pairs.end());
+      std::sort(at_once.pairs.begin(), at_once.pairs.end());
+      EXPECT_EQ(ahead.pairs, at_once.pairs) << t;
+      tests += frame[Counter::box_tests];
+      attempts += frame[Counter::span_tests];
+      most_tests = std::max(most_tests, frame[Counter::box_tests]);
+      most_attempts = std::max(most_attempts, frame[Counter::span_tests]);
+    }
+    if (segment == 3) {
+      EXPECT_EQ(tests, 0u) << "nothing comes after the last segment";
+    } else {
+      EXPECT_GT(tests, 0u);
+      EXPECT_LT(most_tests, tests / 4) << segment;
+      EXPECT_LT(most_attempts, attempts / 3) << segment;
+    }
+    EXPECT_EQ(at_once_tests > 0, segment > 0) << "the first segment was asked about at t = 0";
+  }
+}
+
+std::vector<double> coordinates(Session<float>& session, std::uint32_t body) {
+  std::vector<double> all;
+  const std::optional<AuditView> view = session.strategy().audit_view(body);
+  for (const Box<double>& box : view->boxes)
+    for (int axis = 0; axis < 3; ++axis) {
+      all.push_back(box.lower[axis]);
+      all.push_back(box.upper[axis]);
+    }
+  return all;
+}
+
+TEST(IntervalJoinAhead, EqualsTheJoinAtOnceWhateverFramesThereAre) {
+  const Scene<float> scene = waves(12, 8);
+  Session<float> ahead(scene, {&find_strategy("interval_join_ahead"), {}, {.width = 8, .leaf_size = 4}},
+                       CountingPolicy::silent);
+  Session<float> at_once(scene, {&find_strategy("interval_join"), {}, {.width = 8, .leaf_size = 4}},
+                         CountingPolicy::silent);
+  PairBuffer pairs, expected;
+  PhaseTimes times;
+  // Knots met and missed, segments left out, some of them begun ahead; before the clip and after it; frames
+  // without a query; and all over again from its middle.
+  const std::vector<std::vector<double>> plays{
+      {-1, -0.5, 0, 0.1, 0.2, 1, 1.5, 1.9, 2.5, 3.1, 3.2, 5.7, 6.9, 7, 8},
+      {0.5, 0.6, 1.1, 4, 4.5, 5, 5, 5.5, 9},
+      {3.3, 3.4, 3.9, 4.1, 4.2, 6.5}};
+  for (const std::vector<double>& play : plays)
+    for (const std::size_t every : {std::size_t(1), std::size_t(3)}) {
+      ahead.reset(play[0]);
+      at_once.reset(play[0]);
+      for (std::size_t f = 0; f < play.size(); ++f) {
+        if (f > 0) ahead.advance(play[f], times), at_once.advance(play[f], times);
+        if (f % every != 0) continue;
+        ahead.query(pairs, times);
+        at_once.query(expected, times);
+        std::sort(pairs.begin(), pairs.end());
+        std::sort(expected.begin(), expected.end());
+        EXPECT_EQ(pairs, expected) << "t = " << play[f] << ", every " << every;
+        for (std::uint32_t body = 0; body < 2; ++body)
+          EXPECT_EQ(coordinates(ahead, body), coordinates(at_once, body)) << "t = " << play[f];
+      }
+    }
+}
+
+}  // namespace
+}  // namespace kbvh::test
