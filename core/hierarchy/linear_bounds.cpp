@@ -21,23 +21,51 @@ Box<S> swept(const LinearSide<S>& side) {
   return box;
 }
 
-/// All boxes of a body, moved as a whole.
 template <class S>
-void move_boxes(const WideHierarchy<S>& hierarchy, const LinearEnd<S>& from, const std::array<S, 3>& step,
-                S* lanes, S* own) {
-  const std::size_t width = hierarchy.topology().width, row_size = lane_scalars(width);
-  for (std::size_t node = 0; node < hierarchy.node_count(); ++node) {
-    for (std::size_t row = 0; row < 6; ++row) {
-      const S by = row < 3 ? step[row] : -step[row - 3];
-      for (std::size_t i = row * width; i < (row + 1) * width; ++i)
-        lanes[node * row_size + i] = from.lanes[node * row_size + i] + by;
-    }
+S largest_coordinate(const LinearEnd<S>& end) {
+  S largest = 0;
+  for (std::size_t i = 0; i < 8; ++i)
+    if (i % 4 != 3) largest = std::max(largest, std::abs(end.own[i]));
+  return largest;
+}
+
+/// Boxes of a body that moves as a whole, all of them or only the root's, from those before.
+template <class S>
+struct MovedBoxes {
+  S lower[3], upper[3];  ///< what is added
+  S excess;              ///< of the result
+
+  MovedBoxes(const LinearEnd<S>& from, const Translation<S>& step) : excess(from.excess) {
+    S largest = largest_coordinate(from);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      largest += std::max(std::abs(step.lower[axis]), std::abs(step.upper[axis]));
+    // More than the rounding of two additions.
+    const S rounding = step.exact ? S(0) : std::numeric_limits<S>::epsilon() * largest;
+    S width = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      own[8 * node + axis] = from.own[8 * node + axis] + step[axis];
-      own[8 * node + axis + 4] = from.own[8 * node + axis + 4] + step[axis];
+      lower[axis] = step.lower[axis] - rounding;
+      upper[axis] = step.upper[axis] + rounding;
+      width = std::max(width, upper[axis] - lower[axis]);
+    }
+    excess += width + (step.exact ? S(0) : rounding);
+  }
+  void move(const S* from_lanes, const S* from_own, std::size_t width, std::size_t nodes, S* lanes,
+            S* own) const {
+    for (std::size_t node = 0; node < nodes; ++node)
+      for (std::size_t row = 0; row < 6; ++row) {
+        const S by = row < 3 ? lower[row] : -upper[row - 3];  // rows have -upper
+        const std::size_t first = node * lane_scalars(std::uint32_t(width)) + row * width;
+        for (std::size_t i = first; i < first + width; ++i) lanes[i] = from_lanes[i] + by;
+      }
+    for (std::size_t node = 0; node < nodes; ++node) move_own(from_own + 8 * node, own + 8 * node);
+  }
+  void move_own(const S* from, S* to) const {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      to[axis] = from[axis] + lower[axis];
+      to[axis + 4] = from[axis + 4] + upper[axis];
     }
   }
-}
+};
 }  // namespace
 
 template <class S>
@@ -108,7 +136,23 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   at.positions = motion.positions_on_lines(index, t, body.room[at.slot]);
   at.made = ++body.made;
   if (body.hierarchy.empty()) return {};
+  at.excess = 0;
+  // Over the whole of a segment of its own a body may be moved, as long as its boxes become no larger than
+  // by their margin.
+  const bool whole =
+      end == 1 && segment.begin == motion.lines_begin(index) && segment.end == motion.lines_end(index);
+  const auto step = whole ? motion.translation(index) : std::optional<Translation<S>>{};
+  std::optional<MovedBoxes<S>> moved;
+  if (step) moved.emplace(side.at[0], *step);
+  if (moved && moved->excess > 8 * std::numeric_limits<S>::epsilon() * largest_coordinate(side.at[0]))
+    moved.reset();
   if (side.apart) {
+    if (moved) {
+      moved->move_own(side.at[0].own, own.data());
+      at.excess = moved->excess;
+      ++counts_[index].translated_apart;
+      return {};
+    }
     const VertexRun all{0, scene_.vertex_count(index)};
     bounds_kernels<S>(body.hierarchy.kernels()).of_runs(&all, 1, at.positions, own.data());
     ++counts_[index].apart;
@@ -116,26 +160,25 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   }
   Refit refit{lanes.data(), own.data(), at.positions, std::uint32_t(nodes), nullptr};
   if (memory_.is_used() && motion.as_in_the_scene(index)) {
-    const auto* known = memory_.find(index, t);
-    auto* target = known == nullptr ? memory_.add(index, t, lanes.size(), own.size()) : nullptr;
-    if (known != nullptr) {
+    if (const auto* known = memory_.find(index, t)) {
       at.lanes = known->lanes.data();
       at.own = known->own.data();
       ++counts_[index].remembered;
       return {};
     }
-    if (target != nullptr) {
+  }
+  if (moved) {
+    moved->move(side.at[0].lanes, side.at[0].own, body.hierarchy.topology().width, nodes, lanes.data(),
+                own.data());
+    at.excess = moved->excess;
+    ++counts_[index].translated;
+    return {};
+  }
+  if (memory_.is_used() && motion.as_in_the_scene(index)) {
+    if (auto* target = memory_.add(index, t, lanes.size(), own.size())) {
       at.lanes = refit.lanes = target->lanes.data();
       at.own = refit.own = target->own.data();
       refit.remembered = target;
-    }
-  }
-  if (end == 1 && segment.begin == motion.lines_begin(index) && segment.end == motion.lines_end(index)) {
-    if (const auto step = motion.translation(index)) {
-      move_boxes(body.hierarchy, side.at[0], *step, refit.lanes, refit.own);
-      if (refit.remembered != nullptr) refit.remembered->complete = true;
-      ++counts_[index].translated;
-      return {};
     }
   }
   ++counts_[index].refits;
@@ -167,9 +210,7 @@ template <class S>
 void LinearBounds<S>::make_margin(LinearSide<S>& side) const {
   S largest = 0;
   if (!side.hierarchy().empty())
-    for (const LinearEnd<S>& end : side.at)
-      for (std::size_t i = 0; i < 8; ++i)
-        if (i % 4 != 3) largest = std::max(largest, std::abs(end.own[i]));
+    largest = std::max(largest_coordinate(side.at[0]), largest_coordinate(side.at[1]));
   side.margin = 8 * std::numeric_limits<S>::epsilon() * largest + 8 * std::numeric_limits<S>::denorm_min();
 }
 

@@ -34,7 +34,8 @@ struct LinearSettings {
 /// `SegmentCuts` says. Every box is larger by a margin of 8 ulps of the largest coordinate of its body, which
 /// is more than all roundings between the flight plans and the positions of frames.
 ///
-/// A body that is only translated over a segment, to the last bit, has its boxes moved and not made anew.
+/// A body that moves as a whole over a segment has its boxes moved and not made anew, as long as what they
+/// gain by rounding is less than the margin.
 template <class S>
 class LinearBounds {
  public:
@@ -87,7 +88,7 @@ class LinearBounds {
   /// How often boxes of a body were made at an end of a segment, and how often it was left alone when one
   /// began: at rest, apart and but for one box, moved as it was, or remembered.
   struct Counts {
-    std::uint64_t refits = 0, at_rest = 0, apart = 0, translated = 0, remembered = 0;
+    std::uint64_t refits = 0, at_rest = 0, apart = 0, translated = 0, translated_apart = 0, remembered = 0;
   };
   /// Since it was asked last.
   Counts take_counts(std::uint32_t body) { return std::exchange(counts_[body], {}); }
@@ -165,10 +166,11 @@ void count_linear_update(LinearBounds<S>& bounds, Count& count) {
     count.add(Counter::values_written, 6 * (counts.refits + counts.translated) * nodes);
     count.add(Counter::vertex_reads,
               counts.refits * hierarchy.leaf_vertex_count() + counts.apart * bounds.vertex_count(body));
-    count.add(Counter::bodies_translated, counts.translated);
+    count.add(Counter::bodies_translated, counts.translated + counts.translated_apart);
     count.add(Counter::bodies_remembered, counts.remembered);
-    count.add(Counter::bodies_skipped, counts.at_rest + counts.apart);
-    count.add(Counter::nodes_skipped, (counts.at_rest + counts.apart) * nodes);
+    const std::uint64_t skipped = counts.at_rest + counts.apart + counts.translated_apart;
+    count.add(Counter::bodies_skipped, skipped);
+    count.add(Counter::nodes_skipped, skipped * nodes);
   }
 }
 

@@ -16,6 +16,7 @@ struct LinearEnd {
   const S* positions = nullptr;              ///< [vertex][3]
   std::uint32_t slot = 0;                    ///< place in LinearBody::rows of what is made from positions
   std::uint32_t made = 0;                    ///< one number for one set of positions
+  S excess = 0;  ///< at most so much larger is a box than a tight one, on each side
 };
 
 /// A body with linear bounds: its topology, and room for three ends, those of the present segment and the

@@ -199,16 +199,45 @@ bool FlightPlans<S>::at_rest(double t) const {
 }
 
 template <class S>
-std::optional<std::array<S, 3>> FlightPlans<S>::translation(double t) const {
+std::optional<Translation<S>> FlightPlans<S>::translation(double t) const {
   const auto& times = keyframes_->times;
   if (!own_.empty() || keyframed_count_ == 0 || t < times.front() || t >= times.back()) return {};
-  const std::size_t k = segment_at(t);
-  const S *from = keyframe(k), *to = keyframe(k + 1);
-  std::array<S, 3> all{};
-  for (std::size_t i = 0; i < std::size_t(3) * keyframed_count_; ++i) {
-    const TwoPart<S> step = two_diff(to[i], from[i]);
-    if (i < 3) all[i] = step.hi;
-    if (step.hi != all[i % 3] || step.lo != 0) return {};
+  if (translations_.empty()) translations_.resize(times.size());
+  auto& known = translations_[segment_at(t)];
+  if (!known) known = find_translation(segment_at(t));
+  return *known;
+}
+
+template <class S>
+std::optional<Translation<S>> FlightPlans<S>::find_translation(std::size_t segment) const {
+  constexpr std::size_t block = 3 * 256;
+  const S eps = std::numeric_limits<S>::epsilon();
+  const std::size_t scalars = std::size_t(3) * keyframed_count_;
+  const S *from = keyframe(segment), *to = keyframe(segment + 1);
+  Translation<S> all{{to[0] - from[0], to[1] - from[1], to[2] - from[2]}, {}, true};
+  all.upper = all.lower;
+  S largest = 0, rest = 0;
+  const auto differs_by_more_than = [&](S ulps) {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (all.upper[axis] - all.lower[axis] > ulps * eps * largest) return true;
+    return false;
+  };
+  for (std::size_t begin = 0; begin < scalars; begin += block) {
+    for (std::size_t i = begin; i < std::min(begin + block, scalars); i += 3)
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const TwoPart<S> step = two_diff(to[i + axis], from[i + axis]);
+        all.lower[axis] = std::min(all.lower[axis], step.hi);
+        all.upper[axis] = std::max(all.upper[axis], step.hi);
+        rest = std::max(rest, std::abs(step.lo));
+        largest = std::max({largest, std::abs(to[i + axis]), std::abs(from[i + axis])});
+      }
+    if (differs_by_more_than(64)) return {};
+  }
+  if (differs_by_more_than(4)) return {};
+  all.exact = all.lower == all.upper && rest == 0;
+  for (std::size_t axis = 0; rest != 0 && axis < 3; ++axis) {
+    all.lower[axis] = std::nextafter(all.lower[axis], -std::numeric_limits<S>::infinity());
+    all.upper[axis] = std::nextafter(all.upper[axis], std::numeric_limits<S>::infinity());
   }
   return all;
 }

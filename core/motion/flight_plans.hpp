@@ -23,6 +23,13 @@ struct PlanChange {
   S velocity[3] = {0, 0, 0};  ///< units per second, after the last knot
 };
 
+/// Between which vectors, per axis, the steps of a body's vertices over a segment lie.
+template <class S>
+struct Translation {
+  std::array<S, 3> lower, upper;
+  bool exact;  ///< one vector: adding it to a position at the begin gives that at the end without rounding
+};
+
 /// The flight plans of one body's vertices: exact piecewise-linear functions of the stored numbers (truth A)
 /// over keyframes at arbitrary times, with exceptions for vertices whose plan changed at run time.
 /// Before its first and after its last keyframe a body rests. Positions are A rounded correctly (truth B).
@@ -68,11 +75,11 @@ class FlightPlans {
   double lines_end(double t) const;
   /// Nothing moves at t, and not before `lines_end(t)`. False if there are plans of their own.
   bool at_rest(double t) const;
-  /// The one vector by which every vertex moves over the keyframes' segment that t is in, to the last bit:
-  /// adding it to a position at the begin gives that at the end without rounding. Nothing if there is no such
-  /// vector, no segment, or a plan of its own. O(vertices) where there is one; else it stops at the first
-  /// vertex that moves in another way.
-  std::optional<std::array<S, 3>> translation(double t) const;
+  /// How the body moves as a whole over the keyframes' segment that t is in: the steps of all its vertices,
+  /// which differ by no more than the rounding of stored coordinates (4 ulps of the largest). Nothing if they
+  /// differ by more, or if there is no segment or a plan of its own. O(vertices) the first time a segment is
+  /// asked for, or as many as move alike.
+  std::optional<Translation<S>> translation(double t) const;
 
   /// No vertex is faster than this on the segment that holds at t (units per second, rounded up); own plans
   /// included. O(vertices) the first time a segment is asked for; O(own plans) after a change, or a knot of
@@ -125,6 +132,7 @@ class FlightPlans {
   void evaluate_rays(double t, S* out, RoundingStats* stats) const;
   Piece<S> own_piece(const OwnPlan& plan, int axis, double t) const;
   double longest_step(std::size_t segment) const;
+  std::optional<Translation<S>> find_translation(std::size_t segment) const;
   double own_speed(const OwnPlan& plan, double t) const;
   double own_speed_bound(double t) const;
   static void check_plan(double t, const PlanChange<S>& change, std::uint32_t vertex, const S* position);
@@ -138,7 +146,8 @@ class FlightPlans {
   std::vector<OwnPlan> own_;
   std::vector<Rays> rays_;                     ///< none is empty
   mutable std::vector<double> longest_steps_;  // by segment; negative until it is asked for
-  mutable double own_speed_ = 0, own_speed_from_ = 0, own_speed_until_ = 0;  // holds in [from, until)
+  mutable std::vector<std::optional<std::optional<Translation<S>>>> translations_;  // likewise
+  mutable double own_speed_ = 0, own_speed_from_ = 0, own_speed_until_ = 0;         // holds in [from, until)
 };
 
 extern template class FlightPlans<float>;

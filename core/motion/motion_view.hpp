@@ -84,9 +84,9 @@ class SegmentMotion : public SteppedMotion<S> {
   double lines_end(std::uint32_t body) const { return this->playback_->plans(body).lines_end(time()); }
   /// The body does not move before `lines_end`.
   bool at_rest(std::uint32_t body) const { return this->playback_->plans(body).at_rest(time()); }
-  /// The vector by which the body moves as a whole between `lines_begin` and `lines_end`, exactly; nothing if
-  /// it does not (FlightPlans::translation). O(vertices), or as many as move alike.
-  std::optional<std::array<S, 3>> translation(std::uint32_t body) const {
+  /// How the body moves as a whole between `lines_begin` and `lines_end`; nothing if it does not
+  /// (FlightPlans::translation).
+  std::optional<Translation<S>> translation(std::uint32_t body) const {
     return this->playback_->plans(body).translation(time());
   }
   /// No vertex of the body has a plan of its own: what is seen of a segment is the same whenever it comes by.

@@ -212,22 +212,34 @@ TEST(FlightPlans, HoldNoNegativeZero) {
     for (float x : positions_at(plans, t)) EXPECT_FALSE(x == 0 && std::signbit(x)) << "at " << t;
 }
 
-TEST(FlightPlans, SeeATranslationOnlyWhereItIsOneToTheLastBit) {
-  // Two vertices: by (1, 0, -0.5); by an ulp less; at rest; and a step that no float holds.
+TEST(FlightPlans, SeeATranslationWhereStepsDifferByRoundingOnly) {
+  // Two vertices: by (1, 0, -0.5); one of them by an ulp of the other; at rest; by what no float holds; by
+  // different ways.
   const float less = std::nextafter(3.0f, 0.0f), tiny = 0x1p-30f;
-  FlightPlans<float> plans(2, {0, 1, 2, 3, 4}, {0,    1, 2,   2,    1, 2,    //
-                                                1,    1, 1.5, 3,    1, 1.5,  //
-                                                1,    1, 1.5, less, 1, 1.5,  //
-                                                1,    1, 1.5, less, 1, 1.5,  //
-                                                tiny, 1, 1.5, tiny, 1, 1.5});
+  FlightPlans<float> plans(2, {0, 1, 2, 3, 4, 5}, {0,    1, 2,   2,        1, 2,    //
+                                                   1,    1, 1.5, 3,        1, 1.5,  //
+                                                   1,    1, 1.5, less,     1, 1.5,  //
+                                                   1,    1, 1.5, less,     1, 1.5,  //
+                                                   tiny, 1, 1.5, less - 1, 1, 1.5,  //
+                                                   1,    1, 1.5, 5,        1, 1.5});
   const std::array<float, 3> whole{1, 0, -0.5f}, none{0, 0, 0};
-  EXPECT_EQ(plans.translation(0), whole);
-  EXPECT_EQ(plans.translation(0.7), whole);
-  EXPECT_EQ(plans.translation(1), std::nullopt);
-  EXPECT_EQ(plans.translation(2), none);
-  EXPECT_EQ(plans.translation(3), std::nullopt);
+  const auto first = plans.translation(0), almost = plans.translation(1), rest = plans.translation(2.5),
+             rounded = plans.translation(3);
+  ASSERT_TRUE(first && almost && rest && rounded);
+  EXPECT_TRUE(first->exact);
+  EXPECT_EQ(first->lower, whole);
+  EXPECT_EQ(first->upper, whole);
+  EXPECT_FALSE(almost->exact);
+  EXPECT_EQ(almost->lower[0], less - 3);
+  EXPECT_EQ(almost->upper[0], 0);
+  EXPECT_TRUE(rest->exact);
+  EXPECT_EQ(rest->lower, none);
+  EXPECT_FALSE(rounded->exact);
+  EXPECT_LE(rounded->lower[0], -1);
+  EXPECT_GT(rounded->upper[0], -1) << "above the exact step";
+  EXPECT_EQ(plans.translation(4), std::nullopt);
   EXPECT_EQ(plans.translation(-1), std::nullopt) << "before the first keyframe there is no segment";
-  EXPECT_EQ(plans.translation(4), std::nullopt) << "nor after the last one";
+  EXPECT_EQ(plans.translation(5), std::nullopt) << "nor after the last one";
   const float at[] = {0, 1, 2};
   plans.change(0, {.vertex = 0, .times = {}, .positions = {}, .velocity = {1, 0, -0.5f}}, at);
   EXPECT_EQ(plans.translation(0), std::nullopt) << "a plan of its own";
