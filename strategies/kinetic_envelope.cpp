@@ -29,6 +29,7 @@ template <class S, class Count, Foresight F>
 class Envelopes final : public RealiserStrategy<S, Count> {
   using Base = RealiserStrategy<S, Count>;
   static constexpr bool ahead = F == Foresight::whole_clip;
+  static constexpr std::uint32_t slices = 64;  ///< of segments of small bodies
 
  public:
   static constexpr Foresight foresight = F;
@@ -38,7 +39,7 @@ class Envelopes final : public RealiserStrategy<S, Count> {
       : Base(scene, motion, std::move(topologies)), view_(motion), states_(scene.body_count()) {
     for (std::uint32_t index = 0; index < scene.body_count(); ++index) {
       const auto& hierarchy = this->bodies_[index].hierarchy;
-      states_[index].envelope.assign(hierarchy);
+      states_[index].envelope.assign(hierarchy, ahead ? slices : 1);
       if (ahead)
         states_[index].at_end.assign(hierarchy.node_count() * lane_scalars(hierarchy.topology().width), 0);
     }

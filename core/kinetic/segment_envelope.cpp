@@ -11,8 +11,9 @@ namespace kbvh {
 
 namespace {
 
-/// Nodes that are checked before their active sides are looked at: few enough to stay in the cache.
-constexpr std::uint32_t block = 128;
+/// Nodes that are checked before their active sides are looked at: few enough to stay in the cache. Fewer
+/// cost several percent more.
+constexpr std::uint32_t largest_block = 128, smallest_block = 4;
 /// Stores of a bucket, on average.
 constexpr std::size_t bucket_stores = 32;
 /// A computed fraction of the segment at which two lines meet is off by less: two differences, their sum, and
@@ -56,9 +57,10 @@ void find_realisers(WideHierarchy<S>& hierarchy, const S* positions, WideRealise
 }
 
 template <class S>
-void SegmentEnvelope<S>::assign(const WideHierarchy<S>& hierarchy) {
+void SegmentEnvelope<S>::assign(const WideHierarchy<S>& hierarchy, std::uint32_t slices) {
   width_ = hierarchy.topology().width;
   const std::size_t nodes = hierarchy.node_count();
+  block_ = std::clamp(hierarchy.node_count() / slices, smallest_block, largest_block);
   own_.assign(8 * nodes, S(0));
   lost_.assign(nodes, 0);
   first_store_.assign(nodes * lane_scalars(width_), 0);
@@ -140,7 +142,7 @@ void SegmentEnvelope<S>::take_next() {
 
 template <class S>
 std::uint32_t SegmentEnvelope<S>::next_block() const {
-  return nodes_left_ > block ? nodes_left_ - block : 0;
+  return nodes_left_ > block_ ? nodes_left_ - block_ : 0;
 }
 
 /// Nodes after those of this block have been made.

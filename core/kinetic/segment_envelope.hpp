@@ -45,8 +45,9 @@ class SegmentEnvelope {
     std::uint32_t key, slot, realiser;
     bool operator==(const Store&) const = default;
   };
-  /// Takes the shape of a hierarchy. Allocates.
-  void assign(const WideHierarchy<S>& hierarchy);
+  /// Takes the shape of a hierarchy. Segments can be made in as many slices as that, if there are nodes
+  /// enough; in more where it costs nothing. Allocates.
+  void assign(const WideHierarchy<S>& hierarchy, std::uint32_t slices = 1);
 
   /// Makes the envelopes of the segment from t0 to t1 > t0, in which vertices move from p0 to p1, both
   /// [vertex][3] with one readable number behind, and both stored numbers. `realisers` are those at t0.
@@ -117,6 +118,7 @@ class SegmentEnvelope {
   void fill_buckets(std::size_t steps);
 
   std::uint32_t width_ = 8;
+  std::uint32_t block_ = 1;                 ///< nodes that are made together
   Segment segments_[2];                     ///< the present one; the next one, where it is made ahead
   std::uint32_t now_ = 0, making_ = 0;      ///< in segments_
   std::uint32_t nodes_left_ = 0;            ///< of the segment being made

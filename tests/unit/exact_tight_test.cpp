@@ -157,8 +157,8 @@ void check_slices(const Body<S>& body, const BuilderConfig& builder, double slic
   WideHierarchy<S> hierarchy = hierarchy_of(body, builder);
   WideRealisers at_once, present;
   SegmentEnvelope<S> whole, sliced;
-  whole.assign(hierarchy);
-  sliced.assign(hierarchy);
+  whole.assign(hierarchy, 64);
+  sliced.assign(hierarchy, 64);
   find_realisers(hierarchy, body.plans.keyframe(0), at_once);
   present = at_once;
   WideRealisers at_end(present.size(), 0);
