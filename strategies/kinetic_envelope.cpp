@@ -1,6 +1,7 @@
 // The exact tight AABB tree without a queue, for keyframed motion: at the begin of each segment one pass
 // finds the sides whose realiser will change in it, and the upper envelopes of these few give a list of
-// stores, sorted by time, that frames carry out (core/kinetic/segment_envelope.hpp).
+// stores, sorted by time, that frames carry out (core/kinetic/segment_envelope.hpp). Where the whole clip is
+// known, the frames of a segment can share the pass for the next one among them.
 
 #include "core/kinetic/realiser_strategy.hpp"
 #include "core/kinetic/segment_envelope.hpp"
@@ -17,18 +18,31 @@ enum class Known : std::uint8_t {
   refitted,  ///< vertices have plans of their own: boxes are refitted at every frame instead
 };
 
-template <class S, class Count>
-class KineticEnvelope final : public RealiserStrategy<S, Count> {
+/// What is known of the segment after the present one.
+enum class Next : std::uint8_t {
+  nothing,     ///< it will be made when it begins
+  translated,  ///< nobody overtakes anybody
+  envelope,    ///< its envelope is being made
+};
+
+template <class S, class Count, Foresight F>
+class Envelopes final : public RealiserStrategy<S, Count> {
   using Base = RealiserStrategy<S, Count>;
+  static constexpr bool ahead = F == Foresight::whole_clip;
+  static constexpr std::uint32_t slices = 64;  ///< of segments of small bodies
 
  public:
-  static constexpr Foresight foresight = Foresight::next_keyframe;
+  static constexpr Foresight foresight = F;
 
-  KineticEnvelope(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
-                  const Params& /*params*/)
-      : Base(scene, motion, std::move(topologies)), states_(scene.body_count()) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-      states_[body].envelope.assign(this->bodies_[body].hierarchy);
+  Envelopes(const SceneView<S>& scene, const MotionView<F, S>& motion, Topologies topologies,
+            const Params& /*params*/)
+      : Base(scene, motion, std::move(topologies)), view_(motion), states_(scene.body_count()) {
+    for (std::uint32_t index = 0; index < scene.body_count(); ++index) {
+      const auto& hierarchy = this->bodies_[index].hierarchy;
+      states_[index].envelope.assign(hierarchy, ahead ? slices : 1);
+      if (ahead)
+        states_[index].at_end.assign(hierarchy.node_count() * lane_scalars(hierarchy.topology().width), 0);
+    }
   }
 
   void reset(double t) override {
@@ -43,16 +57,19 @@ class KineticEnvelope final : public RealiserStrategy<S, Count> {
   }
 
   void advance(double t) override {
+    const double step = t - this->time();
     this->move_to(t);
     for (std::uint32_t body = 0; body < states_.size(); ++body) {
       State& state = states_[body];
       if (state.known == Known::refitted) {
         refit(body);
       } else if (!(t < state.end)) {
-        begin_segment(body);
+        // A frame that had to make the whole envelope of its own segment leaves the next one to others.
+        if (begin_segment(body)) go_on(body, step);
       } else if (state.known == Known::envelope) {
         state.envelope.advance(t, this->bodies_[body].realisers);
         this->new_frame(body);
+        go_on(body, step);
       }
     }
   }
@@ -62,6 +79,7 @@ class KineticEnvelope final : public RealiserStrategy<S, Count> {
     for (const PlanChange<S>& change : changes) {
       if (states_[change.body].known == Known::refitted) continue;
       states_[change.body].known = Known::refitted;
+      states_[change.body].next = Next::nothing;
       this->bodies_[change.body].line_ends[0] = nullptr;
       refit(change.body);
     }
@@ -70,7 +88,8 @@ class KineticEnvelope final : public RealiserStrategy<S, Count> {
   std::size_t bytes() const override {
     std::size_t total = Base::bytes();
     for (const State& state : states_)
-      total += state.envelope.bytes() + (state.room[0].capacity() + state.room[1].capacity()) * sizeof(S);
+      total += state.envelope.bytes() + state.at_end.size() * sizeof(std::uint32_t) +
+               (state.room[0].capacity() + state.room[1].capacity()) * sizeof(S);
     return total;
   }
 
@@ -95,6 +114,9 @@ class KineticEnvelope final : public RealiserStrategy<S, Count> {
     Known known = Known::nothing;
     double end = 0;          ///< of the segment
     std::vector<S> room[2];  ///< for positions at its ends that are not stored as they are
+    Next next = Next::nothing;
+    double next_since = 0;  ///< when the next segment's envelope was begun
+    WideRealisers at_end;   ///< of the present segment, as far as the next one's envelope is made
   };
 
   void refit(std::uint32_t body) {
@@ -105,16 +127,19 @@ class KineticEnvelope final : public RealiserStrategy<S, Count> {
     this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
   }
 
-  /// The present time is in a segment that was not looked at before.
-  void begin_segment(std::uint32_t index) {
+  /// The present time is in a segment that was not looked at before. False if all its envelope had to be
+  /// made now.
+  bool begin_segment(std::uint32_t index) {
     State& state = states_[index];
     auto& body = this->bodies_[index];
     const auto& motion = this->motion_;
     const double t = this->time();
     this->new_frame(index);
+    const Next foreseen = state.next;
+    state.next = Next::nothing;
     if (body.hierarchy.empty()) {
       state.end = std::numeric_limits<double>::infinity();
-      return;
+      return true;
     }
     const bool rests = motion.at_rest(index);
     const double begin = rests ? t : motion.lines_begin(index);
@@ -122,6 +147,7 @@ class KineticEnvelope final : public RealiserStrategy<S, Count> {
     // Who realises a side at the end of one segment does so at the begin of the next.
     const bool goes_on =
         state.known != Known::nothing && (rests ? motion.lines_begin(index) : begin) == state.end;
+    if (goes_on && foreseen == Next::envelope) make_next(index, 1);
     if (!goes_on)
       find_realisers(body.hierarchy, first, body.realisers);
     else if (state.known == Known::envelope)
@@ -131,40 +157,106 @@ class KineticEnvelope final : public RealiserStrategy<S, Count> {
     if (rests) {
       state.known = Known::at_rest;
       body.line_ends[0] = nullptr;
-      return;
+      return goes_on;
     }
     const S* last = motion.positions_on_lines(index, state.end, state.room[1]);
     state.known = Known::envelope;
-    state.envelope.make(body.hierarchy, body.realisers, first, last, begin, state.end);
-    count_pass(index);
+    bool made = true;
+    if (goes_on && foreseen == Next::envelope) {
+      state.envelope.take_next();
+    } else if ((goes_on && foreseen == Next::translated) || motion.translation(index)) {
+      // The same is added to all, exactly; and rounding is monotone.
+      state.envelope.make_empty(begin, state.end);
+      this->count_.add(Counter::bodies_translated);
+    } else {
+      state.envelope.make(body.hierarchy, body.realisers, first, last, begin, state.end);
+      count_pass(index);
+      made = false;
+    }
     state.envelope.advance(t, body.realisers);
     body.line_ends[0] = first;
     body.line_ends[1] = last;
     body.line_times[0] = begin;
     body.line_times[1] = state.end;
-  }
-  void count_pass(std::uint32_t index) {
-    const auto& hierarchy = this->bodies_[index].hierarchy;
-    this->count_.add(Counter::nodes_visited, hierarchy.topology().size());
-    this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
+    if constexpr (ahead) foresee(index);
+    return made && goes_on;
   }
 
+  /// Begins with the envelope of the segment after the present one, if there will be work for it.
+  void foresee(std::uint32_t index) {
+    State& state = states_[index];
+    if (!(state.end < std::numeric_limits<double>::infinity()) || !view_.as_in_the_scene(index)) return;
+    const SegmentMotion<S> later = view_.from(state.end);
+    if (later.at_rest(index)) return;
+    if (later.translation(index)) {
+      state.next = Next::translated;
+      return;
+    }
+    state.next = Next::envelope;
+    state.next_since = this->time();
+    const double next_end = later.lines_end(index);
+    // These are keyframes, which need no room.
+    state.envelope.start_next(this->bodies_[index].hierarchy,
+                              later.positions_on_lines(index, state.end, state.room[0]),
+                              later.positions_on_lines(index, next_end, state.room[1]), next_end);
+  }
+  /// Does as much for the next segment as leaves the same for each frame until then, if they come at equal
+  /// steps.
+  void go_on(std::uint32_t index, double step) {
+    const State& state = states_[index];
+    if (state.next == Next::envelope)
+      make_next(index,
+                std::min(1.0, (this->time() + step - state.next_since) / (state.end - state.next_since)));
+  }
+  void make_next(std::uint32_t index, double share) {
+    State& state = states_[index];
+    auto& body = this->bodies_[index];
+    const std::uint32_t before = state.envelope.nodes_left();
+    state.envelope.go_on(body.hierarchy, body.realisers, state.at_end, share);
+    count_part(index, before, state.envelope.nodes_left());
+  }
+
+  void count_pass(std::uint32_t index) { count_part(index, this->bodies_[index].hierarchy.node_count(), 0); }
+  /// The part of a pass that leaves `after` wide nodes of `before`; parts add up to a pass.
+  void count_part(std::uint32_t index, std::uint32_t before, std::uint32_t after) {
+    const auto& hierarchy = this->bodies_[index].hierarchy;
+    const auto part = [&](std::uint64_t all) {
+      return all * before / hierarchy.node_count() - all * after / hierarchy.node_count();
+    };
+    this->count_.add(Counter::nodes_visited, part(hierarchy.topology().size()));
+    this->count_.add(Counter::vertex_reads, part(hierarchy.leaf_vertex_count()));
+  }
+
+  MotionView<F, S> view_;
   std::vector<State> states_;
   std::uint64_t first_fetch_ = 0;
 };
+
+template <class S, class Count>
+using KineticEnvelope = Envelopes<S, Count, Foresight::next_keyframe>;
+template <class S, class Count>
+using KineticEnvelopeAhead = Envelopes<S, Count, Foresight::whole_clip>;
+
+Info info_of(std::string id, std::string title) {
+  return {
+      .id = std::move(id),
+      .title = std::move(title),
+      .family = "kinetic",
+      .citation = "kbvh; upper envelopes of lines instead of the event queue of Zachmann & Weller 2006, s.4",
+      .positions = PositionUse::fetched,
+      .can = {.event_driven = true, .continuous = true, .plan_changes = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4}},
+  };
+}
 
 }  // namespace
 }  // namespace kbvh
 
 KBVH_STRATEGY(kinetic_envelope) {
   using namespace kbvh;
-  return {make_entry<KineticEnvelope>({
-      .id = "kinetic_envelope",
-      .title = "kinetic AABB tree, envelopes",
-      .family = "kinetic",
-      .citation = "kbvh; upper envelopes of lines instead of the event queue of Zachmann & Weller 2006, s.4",
-      .positions = PositionUse::fetched,
-      .can = {.event_driven = true, .continuous = true, .plan_changes = true, .time_budget = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4}},
-  })};
+  return {
+      make_entry<KineticEnvelope>(info_of("kinetic_envelope", "kinetic AABB tree, envelopes")),
+      make_entry<KineticEnvelopeAhead>(
+          info_of("kinetic_envelope_ahead", "kinetic AABB tree, envelopes made ahead")),
+  };
 }

@@ -43,24 +43,42 @@ class SegmentEnvelope {
   /// 2^-32, rounded down.
   struct Store {
     std::uint32_t key, slot, realiser;
+    bool operator==(const Store&) const = default;
   };
-  /// Takes the shape of a hierarchy. Allocates.
-  void assign(const WideHierarchy<S>& hierarchy);
+  /// Takes the shape of a hierarchy. Segments can be made in as many slices as that, if there are nodes
+  /// enough; in more where it costs nothing. Allocates.
+  void assign(const WideHierarchy<S>& hierarchy, std::uint32_t slices = 1);
 
   /// Makes the envelopes of the segment from t0 to t1 > t0, in which vertices move from p0 to p1, both
   /// [vertex][3] with one readable number behind, and both stored numbers. `realisers` are those at t0.
   /// O(nodes + vertices of leaves), and O(lines of a side) for each store.
   void make(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, const S* p0, const S* p1, double t0,
             double t1);
+  /// The segment from t0 to t1 > t0 if nobody overtakes anybody in it.
+  void make_empty(double t0, double t1);
+
+  /// Makes the envelopes of the segment from `end()` to t1, otherwise as `make` does, but in slices, while
+  /// `advance` goes on with the present one: first `start_next`, then `go_on` as often as wanted, then
+  /// `take_next`. Any other segment that is made meanwhile ends that.
+  void start_next(const WideHierarchy<S>& hierarchy, const S* p0, const S* p1, double t1);
+  /// Does a share of the whole work of this, what was done before included: 1 is all. `realisers` are those
+  /// of the present, `at_end`, as large and the same at each call, becomes those at its end.
+  void go_on(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, WideRealisers& at_end,
+             double share);
+  /// Wide nodes of which the sides have not been looked at.
+  std::uint32_t nodes_left() const { return nodes_left_; }
+  /// The next segment, made to the end, is the present one; realisers have been brought to its begin.
+  void take_next();
+
   /// Brings the realisers from the last time asked for (first: t0) to t, t0 <= t <= t1. O(stores that are
   /// due).
   void advance(double t, WideRealisers& realisers);
 
   /// The stores of the segment, those of one side in the order of time.
-  const std::vector<Store>& stores() const { return made_; }
+  const std::vector<Store>& stores() const { return segments_[now_].made; }
 
-  double begin() const { return t0_; }
-  double end() const { return t1_; }
+  double begin() const { return segments_[now_].t0; }
+  double end() const { return segments_[now_].t1; }
   const EnvelopeCounts& counts() const { return counts_; }
   void clear_counts() { counts_ = {}; }
   std::size_t bytes() const;
@@ -73,6 +91,20 @@ class SegmentEnvelope {
   struct Walk {
     std::uint32_t slot, realiser, count;  ///< of its lines
   };
+  struct Segment {
+    const S *p0 = nullptr, *p1 = nullptr;
+    double t0 = 0, t1 = 0;
+    std::vector<Store> made, stores;          ///< as they were made; in buckets
+    std::vector<std::uint32_t> bucket{0, 0};  ///< [bucket]: where it begins in `stores`
+    std::uint32_t bucket_shift = 0;           ///< key >> shift is its bucket
+    std::size_t next = 0, ordered = 0;        ///< first store not carried out; stores before are in order
+    Piece<S> piece(std::uint32_t place) const { return {t0, t1, p0[place], p1[place], PieceKind::chord}; }
+  };
+  void start(std::uint32_t which, const WideHierarchy<S>& hierarchy, const S* p0, const S* p1, double t0,
+             double t1);
+  void make_block(WideHierarchy<S>& hierarchy, const WideRealisers& realisers);
+  void carry_over(const WideRealisers& realisers, WideRealisers& at_end);
+  std::uint32_t next_block() const;
   void walk_leaves(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, std::uint32_t begin,
                    std::uint32_t end);
   void walk_above(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, std::uint32_t node);
@@ -81,21 +113,20 @@ class SegmentEnvelope {
   static double meeting(const Line& now, const Line& later);
   std::size_t first_exactly(const Line& now, const Line* lines, std::size_t count);
   bool comes_first(const Line& x, const Line& y, const Line& winner) const;
-  Piece<S> piece(std::uint32_t place) const;
   bool is_lower(std::uint32_t slot) const { return slot % lane_scalars(width_) < 3 * width_; }
   bool is_due(const Store& store, std::uint32_t before, double t);
-  void fill_buckets();
+  void fill_buckets(std::size_t steps);
 
-  const S *p0_ = nullptr, *p1_ = nullptr;
-  double t0_ = 0, t1_ = 0;
   std::uint32_t width_ = 8;
+  std::uint32_t block_ = 1;                 ///< nodes that are made together
+  Segment segments_[2];                     ///< the present one; the next one, where it is made ahead
+  std::uint32_t now_ = 0, making_ = 0;      ///< in segments_
+  std::uint32_t nodes_left_ = 0;            ///< of the segment being made
+  std::size_t sorted_ = 0;                  ///< steps done of its sorting, two for each store
+  std::size_t carried_ = 0;                 ///< stores of the present segment that its end has
   AlignedArray<S> own_;                     ///< boxes at the end
   std::vector<std::uint64_t> lost_;         ///< by node: active sides
   std::vector<std::uint32_t> first_store_;  ///< by slot, of active sides
-  std::vector<Store> made_, stores_;        ///< as they were made; in buckets
-  std::vector<std::uint32_t> bucket_;       ///< [bucket]: where it begins in stores_
-  std::uint32_t bucket_shift_ = 0;          ///< key >> shift is its bucket
-  std::size_t next_ = 0, ordered_ = 0;      ///< first store not carried out; stores before are in order
   std::vector<Line> lines_;
   std::vector<Walk> walks_;
   EnvelopeCounts counts_;

@@ -132,6 +132,108 @@ TEST(SegmentEnvelope, NothingIsActiveWhereOrderDoesNotChange) {
   EXPECT_TRUE(envelope.stores().empty());
 }
 
+/// Triangles that fly about at random, more than fit into a few of the blocks that envelopes are made in.
+template <class S>
+Body<S> crowd(std::uint32_t triangles, std::uint32_t keyframes) {
+  Body<S> body;
+  Random random(11);
+  std::vector<S> positions;
+  std::vector<double> times;
+  for (std::uint32_t k = 0; k < keyframes; ++k) {
+    times.push_back(k);
+    for (std::uint32_t i = 0; i < 9 * triangles; ++i)
+      positions.push_back(k == 0 ? S(random.unit())
+                                 : positions[positions.size() - 9 * triangles] + S(0.05 * random.unit()));
+  }
+  for (std::uint32_t p = 0; p < triangles; ++p)
+    body.primitives.add(std::vector<std::uint32_t>{3 * p, 3 * p + 1, 3 * p + 2});
+  body.plans = FlightPlans<S>(3 * triangles, std::move(times), std::move(positions));
+  return body;
+}
+
+// The next segment's envelope, made in slices while the present one goes on, is the one that is made at once.
+template <class S>
+void check_slices(const Body<S>& body, const BuilderConfig& builder, double slice) {
+  WideHierarchy<S> hierarchy = hierarchy_of(body, builder);
+  WideRealisers at_once, present;
+  SegmentEnvelope<S> whole, sliced;
+  whole.assign(hierarchy, 64);
+  sliced.assign(hierarchy, 64);
+  find_realisers(hierarchy, body.plans.keyframe(0), at_once);
+  present = at_once;
+  WideRealisers at_end(present.size(), 0);
+  const auto times = body.plans.keyframe_times();
+  const auto p = [&](std::size_t k) { return body.plans.keyframe(k); };
+  sliced.make(hierarchy, present, p(0), p(1), times[0], times[1]);
+  for (std::size_t k = 0; k + 1 < times.size(); ++k) {
+    whole.make(hierarchy, at_once, p(k), p(k + 1), times[k], times[k + 1]);
+    ASSERT_EQ(whole.stores(), sliced.stores()) << "segment " << k << ", slices of " << slice;
+    const bool last = k + 2 == times.size();
+    if (!last) sliced.start_next(hierarchy, p(k + 1), p(k + 2), times[k + 2]);
+    for (double share = 0; share < 1; share += slice) {
+      const double t = times[k] + share * (times[k + 1] - times[k]);
+      whole.advance(t, at_once);
+      sliced.advance(t, present);
+      ASSERT_EQ(at_once, present) << "at t = " << t << ", slices of " << slice;
+      if (!last) sliced.go_on(hierarchy, present, at_end, share);
+    }
+    if (!last) sliced.go_on(hierarchy, present, at_end, 1);
+    whole.advance(times[k + 1], at_once);
+    sliced.advance(times[k + 1], present);
+    ASSERT_EQ(at_once, present);
+    if (last) break;
+    EXPECT_EQ(at_once, at_end);
+    EXPECT_EQ(sliced.nodes_left(), 0u);
+    sliced.take_next();
+    EXPECT_EQ(sliced.begin(), times[k + 1]);
+    EXPECT_EQ(sliced.end(), times[k + 2]);
+  }
+  EXPECT_EQ(whole.counts().stores, sliced.counts().stores);
+  EXPECT_EQ(whole.counts().active_sides, sliced.counts().active_sides);
+  EXPECT_EQ(whole.counts().crossings, sliced.counts().crossings);
+}
+
+TEST(SegmentEnvelope, MadeInSlicesIsTheSame) {
+  for (const BuilderConfig& builder : builders())
+    for (const double slice : {2.0, 0.5, 0.301, 1.0 / 30, 0.001}) {
+      for (const char* name : {"soups", "integer_ties", "coincident_intervals", "zero_motion"})
+        check_slices(synthetic_scene<float>(name).scene.bodies[0], builder, slice);
+      check_slices(crowd<float>(6000, 5), builder, slice);
+      check_slices(crowd<double>(1500, 4), builder, slice);
+    }
+}
+
+TEST(SegmentEnvelope, WhatIsMadeAtOnceEndsWhatWasBegun) {
+  const Body<float> body = crowd<float>(3000, 5);
+  WideHierarchy<float> hierarchy = hierarchy_of(body, builders()[1]);
+  const auto p = [&](std::size_t k) { return body.plans.keyframe(k); };
+  WideRealisers first, third;
+  find_realisers(hierarchy, p(0), first);
+  find_realisers(hierarchy, p(2), third);
+  WideRealisers at_end(first.size(), 0);
+  SegmentEnvelope<float> envelope, fresh;
+  envelope.assign(hierarchy);
+  fresh.assign(hierarchy);
+  for (const double share : {0.0, 0.4, 0.99, 1.0}) {
+    WideRealisers realisers = first;
+    envelope.make(hierarchy, realisers, p(0), p(1), 0, 1);
+    envelope.start_next(hierarchy, p(1), p(2), 2);
+    envelope.go_on(hierarchy, realisers, at_end, share);
+    WideRealisers jumped = third, expected = third;
+    envelope.make(hierarchy, jumped, p(2), p(3), 2, 3);
+    fresh.make(hierarchy, expected, p(2), p(3), 2, 3);
+    ASSERT_EQ(envelope.stores(), fresh.stores()) << share;
+    envelope.advance(2.5, jumped);
+    fresh.advance(2.5, expected);
+    ASSERT_EQ(jumped, expected);
+    envelope.make_empty(3, 4);
+    EXPECT_TRUE(envelope.stores().empty());
+    EXPECT_EQ(envelope.end(), 4);
+    envelope.advance(3.5, jumped);
+    ASSERT_EQ(jumped, expected);
+  }
+}
+
 // Frames as they come: some close together, some far apart; changes of plans at some of them.
 template <class S>
 void check_calendar(const std::string& name) {
