@@ -119,6 +119,12 @@ class Envelopes final : public RealiserStrategy<S, Count> {
     WideRealisers at_end;   ///< of the present segment, as far as the next one's envelope is made
   };
 
+  /// To the last bit: nobody overtakes anybody then.
+  static bool translates(const SegmentMotion<S>& motion, std::uint32_t body) {
+    const std::optional<Translation<S>> step = motion.translation(body);
+    return step && step->exact;
+  }
+
   void refit(std::uint32_t body) {
     Base::refit(body);
     const auto& hierarchy = this->bodies_[body].hierarchy;
@@ -164,7 +170,7 @@ class Envelopes final : public RealiserStrategy<S, Count> {
     bool made = true;
     if (goes_on && foreseen == Next::envelope) {
       state.envelope.take_next();
-    } else if ((goes_on && foreseen == Next::translated) || motion.translation(index)) {
+    } else if ((goes_on && foreseen == Next::translated) || translates(motion, index)) {
       // The same is added to all, exactly; and rounding is monotone.
       state.envelope.make_empty(begin, state.end);
       this->count_.add(Counter::bodies_translated);
@@ -188,7 +194,7 @@ class Envelopes final : public RealiserStrategy<S, Count> {
     if (!(state.end < std::numeric_limits<double>::infinity()) || !view_.as_in_the_scene(index)) return;
     const SegmentMotion<S> later = view_.from(state.end);
     if (later.at_rest(index)) return;
-    if (later.translation(index)) {
+    if (translates(later, index)) {
       state.next = Next::translated;
       return;
     }
