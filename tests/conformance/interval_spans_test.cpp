@@ -247,8 +247,10 @@ TEST_P(IntervalSpans, EncloseTheExactPlanAndLittleMoreInDouble) {
   check_scene<double>(GetParam(), {.width = 4, .leaf_size = 7}, {});
 }
 // Pieces begin and end where no position is stored, so that the ends are rounded.
-TEST_P(IntervalSpans, EncloseItInPiecesOfSegments) {
+TEST_P(IntervalSpans, EncloseItInPiecesOfSegmentsInFloat) {
   check_scene<float>(GetParam(), {.width = 2, .leaf_size = 1}, {.pieces = 3});
+}
+TEST_P(IntervalSpans, EncloseItInPiecesOfSegmentsInDouble) {
   check_scene<double>(GetParam(), {.width = 8, .leaf_size = 16}, {.pieces = 2});
 }
 

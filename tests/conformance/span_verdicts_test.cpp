@@ -13,8 +13,8 @@
 namespace kbvh::test {
 namespace {
 
-/// Pairs of one segment that are looked at, at most.
-constexpr std::size_t most_pairs = 24;
+/// About as many pairs of a segment are looked at.
+constexpr std::size_t looked_at = 24;
 
 struct Tally {
   std::size_t apart = 0, intersect = 0;
@@ -63,7 +63,7 @@ void check_verdicts(const Play<S>& play, Tally& tally) {
     const BodyPair bodies = play.scene.pairs[i];
     const auto all = play.joiners.front()->joins[i].pairs();
     std::vector<JoinedPair> pairs;
-    const std::size_t stride = std::max<std::size_t>(1, all.size() / most_pairs);
+    const std::size_t stride = std::max<std::size_t>(1, all.size() * play.scene.pairs.size() / looked_at);
     for (std::size_t k = 0; k < all.size(); k += stride) {
       pairs.push_back(all[k]);
       pairs.push_back(all[k]);
