@@ -90,10 +90,11 @@ const json* best_refit(const std::vector<json>& records) {
 std::string results_table(const std::vector<json>& records) {
   if (records.empty()) return {};
   const json& scene = records[0].at("scene");
+  const char* const step = scene.value("continuous", false) ? "interval" : "frame";
   std::string text =
       fmt::format("{}, l = {}, {}: {}, {}\n", scene.at("name").get<std::string>(),
                   scene.at("per_keyframe").get<std::uint64_t>(), scene.at("scalar").get<std::string>(),
-                  counted(scene.at("frames").get<std::uint64_t>(), "frame"),
+                  counted(scene.at("frames").get<std::uint64_t>(), step),
                   counted(scene.at("primitives").get<std::uint64_t>(), "primitive"));
   const json* refit = best_refit(records);
   std::vector<const char*> phases{"motion", "update", "query"};

@@ -20,9 +20,9 @@ struct Seen {
   double changes_per_frame = 0;   // frames with changes of plans, as a share of the last ones
   double candidates = 0;          // pairs whose boxes overlap in a frame
   double reads = 0;               // vertices that a refit reads
-  double step = 0;    // mean way of a vertex in a frame past another body, against the mean side of a leaf
-  double slide = 0;   // the same of primitives past those they are candidates with
-  double spread = 1;  // how different these ways are among one body's vertices: 0: all the same; to 1
+  double step = 0;                // mean way of a vertex in a frame past another body, in mean leaf sides
+  double slide = 0;               // the same of primitives past those they are candidates with
+  double spread = 1;              // how different these are among a body's vertices, from 0: all the same
 };
 
 // Predicted nanoseconds per frame, fitted to tablecloth 16k, waving_sheet 8k, passing_spheres 5k,
@@ -33,8 +33,8 @@ double refit_cost(const Seen& seen) {
   return 0.27 * seen.reads + 28 * seen.candidates;
 }
 
-/// One search serves as many frames as a leaf takes to move by a part of its size. Where bodies deform, or
-/// lie upon each other, more pairs come near in those frames than a query takes to find.
+/// One search serves as many frames as a leaf takes to move by a part of its size. Where bodies deform, more
+/// pairs come near in those frames than a query takes to find.
 double drift_cost(const Seen& seen) {
   const double watching = 0.1 * seen.reads;
   if (seen.candidates == 0) return seen.step < 0.2 ? 0.5 * watching : 1.2 * refit_cost(seen);

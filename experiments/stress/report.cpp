@@ -48,19 +48,7 @@ std::vector<StressRow> over_families(const std::vector<StressRow>& rows) {
       sums.back().family = "all";
       continue;
     }
-    sum->scenes += row.scenes;
-    sum->refused += row.refused;
-    sum->missed += row.missed;
-    sum->extra += row.extra;
-    sum->events += row.events;
-    sum->broken += row.broken;
-    sum->threw += row.threw;
-    sum->crashes += row.crashes;
-    sum->hangs += row.hangs;
-    sum->protrusion = std::max(sum->protrusion, row.protrusion);
-    sum->relative_protrusion = std::max(sum->relative_protrusion, row.relative_protrusion);
-    sum->log_looseness += row.log_looseness;
-    sum->audited += row.audited;
+    sum->add(row);
   }
   return sums;
 }

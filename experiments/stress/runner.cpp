@@ -171,33 +171,55 @@ std::vector<CaseResult> run_scene(const StressScene& scene, const std::string& s
 }
 
 void StressRow::add(const CaseResult& result) {
+  StressRow one;
   if (result.outcome == Outcome::refused) {
-    ++refused;
-    return;
+    one.refused = 1;
+  } else if (result.outcome == Outcome::unsuitable) {
+    one.unsuitable = 1;
+  } else {
+    one.scenes = 1;
+    one.broken = result.outcome == Outcome::broken;
+    one.threw = result.outcome == Outcome::threw;
+    one.crashes = result.outcome == Outcome::crashed;
+    one.hangs = result.outcome == Outcome::hung;
+    one.frames = result.frames;
+    one.pairs = result.pairs;
+    one.missed = result.missed;
+    one.extra = result.extra;
+    one.events = result.events;
+    one.seconds = result.seconds;
+    one.protrusion = result.protrusion;
+    if (result.protrusion > 0 && result.extent > 0)
+      one.relative_protrusion = result.protrusion / result.extent;
+    if (result.audited) {
+      one.audited = 1;
+      // Boxes that hold nothing have an area of zero, and a looseness of minus one.
+      one.log_looseness = std::log1p(std::max(result.looseness, -0.999999));
+      one.looseness_worst = result.looseness;
+    }
   }
-  if (result.outcome == Outcome::unsuitable) {
-    ++unsuitable;
-    return;
-  }
-  ++scenes;
-  broken += result.outcome == Outcome::broken;
-  threw += result.outcome == Outcome::threw;
-  crashes += result.outcome == Outcome::crashed;
-  hangs += result.outcome == Outcome::hung;
-  frames += result.frames;
-  pairs += result.pairs;
-  missed += result.missed;
-  extra += result.extra;
-  events += result.events;
-  seconds += result.seconds;
-  protrusion = std::max(protrusion, result.protrusion);
-  if (result.protrusion > 0 && result.extent > 0)
-    relative_protrusion = std::max(relative_protrusion, result.protrusion / result.extent);
-  if (!result.audited) return;
-  ++audited;
-  // Boxes that hold nothing have an area of zero, and a looseness of minus one.
-  log_looseness += std::log1p(std::max(result.looseness, -0.999999));
-  looseness_worst = std::max(looseness_worst, result.looseness);
+  add(one);
+}
+
+void StressRow::add(const StressRow& other) {
+  scenes += other.scenes;
+  refused += other.refused;
+  unsuitable += other.unsuitable;
+  frames += other.frames;
+  pairs += other.pairs;
+  missed += other.missed;
+  extra += other.extra;
+  events += other.events;
+  broken += other.broken;
+  threw += other.threw;
+  crashes += other.crashes;
+  hangs += other.hangs;
+  protrusion = std::max(protrusion, other.protrusion);
+  relative_protrusion = std::max(relative_protrusion, other.relative_protrusion);
+  log_looseness += other.log_looseness;
+  looseness_worst = std::max(looseness_worst, other.looseness_worst);
+  audited += other.audited;
+  seconds += other.seconds;
 }
 
 std::string builder_text(const BuilderConfig& builder) {

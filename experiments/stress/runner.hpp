@@ -64,6 +64,8 @@ struct StressRow {
   double seconds = 0;  ///< processor time
 
   void add(const CaseResult& result);
+  /// What was counted for another row; names stay.
+  void add(const StressRow& other);
   std::uint64_t failures() const { return broken + threw + crashes + hangs; }
   /// Geometric mean over scenes, of the factor that it stands for: scales differ too much for any other.
   double looseness() const { return audited > 0 ? std::expm1(log_looseness / double(audited)) : 0; }

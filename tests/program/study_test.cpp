@@ -1,0 +1,334 @@
+// Small studies by the kbvh binary, from end to end: what is measured, recorded, refused and not measured
+// again.
+#include <algorithm>
+#include <map>
+
+#include "binary.hpp"
+#include "core/kernels/kernel_set.hpp"
+
+namespace kbvh::experiments {
+namespace {
+
+TEST_F(Binary, RunsRecordsAndResumes) {
+  const std::string run = "run " + tiny + "--strategies all --out out";
+  const Outcome first = kbvh(run);
+  ASSERT_EQ(first.code, 0) << first.err << first.out;
+  EXPECT_NE(first.out.find("bottom_up"), std::string::npos);
+  const auto list = records();
+  ASSERT_FALSE(list.empty());
+  for (const json& record : list) {
+    SCOPED_TRACE(record.at("strategy").at("id"));
+    EXPECT_EQ(record.at("schema"), 1);
+    EXPECT_EQ(record.at("kind"), "run");
+    EXPECT_EQ(record.at("scene").at("frames"), 5);
+    EXPECT_TRUE(record.at("verified").at("holds"));
+    EXPECT_EQ(record.at("times").at("repetitions").size(), 2u);
+    EXPECT_EQ(record.at("times").at("frames"), 4u);
+    EXPECT_GT(record.at("verified").at("pairs"), 0u);
+    EXPECT_EQ(record.at("bytes"), record.at("counters").at("bytes"));
+  }
+  const std::string before = text_of_file(folder_ / "out/results.jsonl");
+  const Outcome second = kbvh(run);
+  EXPECT_EQ(second.code, 0);
+  EXPECT_NE(second.err.find("already"), std::string::npos) << second.err;
+  EXPECT_EQ(text_of_file(folder_ / "out/results.jsonl"), before);
+  EXPECT_EQ(second.out, first.out);
+  // As if killed in the middle of the last record: that one alone is made again.
+  write_text(folder_ / "out/results.jsonl", before.substr(0, before.size() - 20));
+  const Outcome third = kbvh(run);
+  EXPECT_EQ(third.code, 0);
+  EXPECT_NE(third.err.find("1 configuration measured"), std::string::npos) << third.err;
+}
+
+TEST_F(Binary, BenchKeepsEveryRepetition) {
+  const Outcome bench =
+      kbvh("bench " + tiny + "--strategies bottom_up --leaf-size 1,4 --scalar float,double --out out");
+  ASSERT_EQ(bench.code, 0) << bench.err;
+  EXPECT_EQ(records().size(), 4u);
+  const json google = json::parse(text_of_file(folder_ / "out/benchmark.json"));
+  std::size_t iterations = 0;
+  for (const json& one : google.at("benchmarks"))
+    if (one.at("run_type") == "iteration") {
+      ++iterations;
+      EXPECT_EQ(one.at("iterations"), 1);
+      EXPECT_GT(one.at("real_time"), 0);
+      EXPECT_TRUE(one.contains("update_ms"));
+    }
+  EXPECT_EQ(iterations, 8u);
+}
+
+TEST_F(Binary, BenchTakesEveryContestant) {
+  // Some have no motion time at all, of which Google Benchmark makes statistics that are not numbers.
+  const Outcome bench = kbvh("bench " + tiny + "--strategies all --out out");
+  ASSERT_EQ(bench.code, 0) << bench.err;
+  EXPECT_GT(json::parse(text_of_file(folder_ / "out/benchmark.json")).at("benchmarks").size(), 0u);
+}
+
+TEST_F(Binary, ContactsBetweenKeyframesAreMeasuredAndKept) {
+  const std::string command =
+      "run --scene waving_sheet --triangles 200 --keyframes 4 --repetitions 2 --continuous "
+      "--self --out out";
+  const Outcome first = kbvh(command);
+  EXPECT_EQ(first.code, 0) << first.err;
+  EXPECT_NE(first.out.find("3 intervals,"), std::string::npos) << first.out;
+  const auto found = records();
+  ASSERT_GE(found.size(), 3u);
+  for (const json& record : found) {
+    EXPECT_EQ(record.at("scene").at("continuous"), true);
+    EXPECT_EQ(record.at("scene").at("frames"), 3);
+    EXPECT_TRUE(record.at("verified").at("holds"));
+    EXPECT_EQ(record.at("verified").at("pairs"), found[0].at("verified").at("pairs"));
+    EXPECT_GT(record.at("verified").at("pairs"), 0);
+    EXPECT_EQ(record.at("times").at("repetitions").size(), 2u);
+    const json& impacts = record.at("impacts");
+    EXPECT_EQ(impacts.at("tests").get<int>(),
+              impacts.at("filtered").get<int>() + impacts.at("exact").get<int>());
+    EXPECT_GT(impacts.at("tests"), 0);
+  }
+  // Not measured again; and frames are another thing.
+  EXPECT_EQ(kbvh(command).code, 0);
+  EXPECT_EQ(records().size(), found.size());
+  EXPECT_EQ(kbvh("run " + tiny + "--strategies bottom_up --out out").code, 0);
+  EXPECT_EQ(records().size(), found.size() + 1);
+}
+
+TEST_F(Binary, PairsWithinBodiesAreCountedWhereTheyAreAskedFor) {
+  // Two squares of one body, as a tent of which each side goes through the other.
+  write_text(folder_ / "tent.obj",
+             "v 0 0 0\nv 1 0 1\nv 0 1 0\nv 1 0 0\nv 0 0 1\nv 1 1 0\nf 1 2 3\nf 4 5 6\n");
+  const std::string bodies =
+      "--body tent.obj,translate=0:0:9 --l 1 --repetitions 1 --strategies bottom_up,linear_bounds ";
+  const auto pairs = [&](const std::string& more, const std::string& out) {
+    const Outcome run = kbvh("run " + bodies + more + "--out " + out);
+    EXPECT_EQ(run.code, 0) << run.err;
+    const auto found = records(out + "/results.jsonl");
+    EXPECT_FALSE(found.empty()) << run.err;
+    return found.empty() ? json() : found[0];
+  };
+  const json without = pairs("--body sphere:triangles=100 ", "without");
+  EXPECT_EQ(without.at("verified").at("pairs"), 0);
+  const json with = pairs("--body sphere:triangles=100 --self ", "with");
+  EXPECT_GT(with.at("verified").at("pairs"), 0);
+  EXPECT_EQ(with.at("scene").at("bodies").at(0).at("self"), true);
+  EXPECT_NE(with.at("key"), without.at("key"));
+  // Who cannot is left out.
+  EXPECT_EQ(records("with/results.jsonl").size(), 1u);
+  EXPECT_EQ(records("without/results.jsonl").size(), 2u);
+  const json one = pairs("--body sphere:triangles=100,self=true ", "one");
+  EXPECT_EQ(one.at("verified").at("pairs"), 0);
+  EXPECT_EQ(one.at("scene").at("bodies").at(0).at("self"), false);
+  EXPECT_EQ(one.at("scene").at("bodies").at(1).at("self"), true);
+}
+
+/// The middle of the times that a record has for a phase.
+double middle(const json& record, const std::string& phase) {
+  std::vector<double> values;
+  for (const json& repetition : record.at("times").at("repetitions"))
+    values.push_back(phase == "query" ? repetition.at("traversal").get<double>() +
+                                            repetition.at("triangle_tests").get<double>()
+                                      : repetition.at(phase).get<double>());
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+TEST_F(Binary, TargetsFollowFromTheRecords) {
+  const json sides = {{"numerator", {{"strategy", "bottom_up_period"}, {"phase", "update"}}},
+                      {"denominator", {{"strategy", "bottom_up"}, {"phase", "update"}}},
+                      {"scenes", {"small", "large"}},
+                      {"scalar", "float"},
+                      {"l", 2}};
+  json first = sides, second = sides, third = sides;
+  first.update({{"what", "update"}, {"at_least", 1e-6}, {"aim", 1e9}});
+  second.update({{"what", "query"}, {"at_least", 1e9}, {"aim", 1e9}, {"scenes", "small-shuffled"}});
+  for (const char* side : {"numerator", "denominator"}) second[side]["phase"] = "query";
+  second["denominator"]["builder"] = {{"leaf_size", 4}};
+  third.update({{"what", "peer"}, {"at_least", 1}, {"aim", 1}});
+  third["numerator"]["strategy"] = "peer";
+  const json plan{{"name", "tiny"},
+                  {"scenes",
+                   {{{"name", "small"},
+                     {"builtin", "waving_sheet"},
+                     {"triangles", 50},
+                     {"keyframes", 2},
+                     {"order", {"given", "shuffled"}}},
+                    {{"name", "large"}, {"builtin", "waving_sheet"}, {"triangles", 98}, {"keyframes", 2}}}},
+                  {"strategies",
+                   {"bottom_up_period",
+                    {{"id", "bottom_up"}, {"builder", {{"leaf_size", {1, 4}}}}},
+                    {{"id", "peer"}, {"optional", true}}}},
+                  {"l", 2},
+                  {"repetitions", 3},
+                  {"targets", {first, second, third}}};
+  write_text(folder_ / "plan.json", plan.dump());
+  for (const std::string command : {"run", "bench", "bench"}) {
+    SCOPED_TRACE(command);
+    const Outcome run = kbvh(command + " --plan plan.json --out out");
+    ASSERT_EQ(run.code, 0) << run.err;  // a missed target is no error
+    EXPECT_NE(run.out.find("Targets"), std::string::npos);
+    EXPECT_NE(run.out.find("peer: not measured: small: this program was built without peer"),
+              std::string::npos)
+        << run.out;
+    const json rows = json::parse(text_of_file(folder_ / "out/targets.json"));
+    ASSERT_TRUE(rows.is_array());
+    ASSERT_EQ(rows.size(), 3u);
+    // The same, from the records; those of the last command are the last of each scene and label.
+    std::map<std::string, std::map<std::string, json>> known;
+    for (const json& record : records())
+      if (record.at("kind") == command)
+        known[record.at("scene").at("name")][record.at("strategy").at("label")] = record;
+    ASSERT_EQ(known.size(), 3u);
+    const auto ratio = [&](const std::string& scene, const std::string& phase, bool any_leaf_size) {
+      double above = 0, below = 1e300;
+      for (const auto& [label, record] : known.at(scene)) {
+        const json& strategy = record.at("strategy");
+        if (strategy.at("id") == "bottom_up_period") above = middle(record, phase);
+        if (strategy.at("id") == "bottom_up" &&
+            (any_leaf_size || strategy.at("builder").at("leaf_size") == 4))
+          below = std::min(below, middle(record, phase));
+      }
+      return above / below;
+    };
+    EXPECT_DOUBLE_EQ(rows[0].at("measured"),
+                     std::min(ratio("small", "update", true), ratio("large", "update", true)));
+    EXPECT_EQ(rows[0].at("verdict"), "reached");
+    EXPECT_EQ(rows[0].at("per_scene").size(), 3u);
+    EXPECT_DOUBLE_EQ(rows[1].at("measured"), ratio("small-shuffled", "query", false));
+    EXPECT_EQ(rows[1].at("verdict"), "missed");
+    EXPECT_EQ(rows[1].at("scene"), "small-shuffled");
+    EXPECT_EQ(rows[2].at("verdict"), "unmeasured");
+    for (const json& row : {rows[0], rows[1]}) {
+      EXPECT_LE(row.at("confidence_interval")[0], row.at("measured"));
+      EXPECT_GE(row.at("confidence_interval")[1], row.at("measured"));
+      EXPECT_EQ(row.at("machine"), records()[0].at("machine"));
+      EXPECT_EQ(row.at("commit"), records()[0].at("commit"));
+    }
+  }
+  // Without a folder the table is all there is; a wrong target ends it before anything is measured.
+  EXPECT_NE(kbvh("run --plan plan.json").out.find("Targets"), std::string::npos);
+  json wrong = plan;
+  wrong["targets"][0]["scenes"] = "nowhere";
+  write_text(folder_ / "plan.json", wrong.dump());
+  const Outcome refused = kbvh("run --plan plan.json --out other");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("plan.json: targets[0]: scenes: no study has a scene of the name 'nowhere'"),
+            std::string::npos)
+      << refused.err;
+  EXPECT_EQ(refused.out, "");
+}
+
+TEST_F(Binary, APlanSaysWhatTheCommandLineSays) {
+  const std::string arguments =
+      "--body waving_sheet:triangles=50,keyframes=3 --body "
+      "sphere:triangles=80,centre=0:0:0.1,radius=0.4,scale=0.9 "
+      "--name pair --strategies bottom_up --l 1,2 --scalar double --leaf-size 2 --repetitions 1 --order "
+      "shuffled ";
+  const Outcome plan = kbvh("run " + arguments + "--print-plan");
+  ASSERT_EQ(plan.code, 0) << plan.err;
+  write_text(folder_ / "plan.json", plan.out);
+  ASSERT_EQ(kbvh("run " + arguments + "--out out").code, 0);
+  const Outcome same = kbvh("run --plan plan.json --out out");
+  EXPECT_EQ(same.code, 0);
+  EXPECT_NE(same.err.find("0 configurations measured, 2 were in"), std::string::npos) << same.err;
+  EXPECT_EQ(records()[0].at("scene").at("name"), "pair-shuffled");
+}
+
+TEST_F(Binary, StudiesOfAPlanCanBeRunOneByOne) {
+  write_text(folder_ / "ball.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  write_text(folder_ / "plan.json", R"({"name": "whole", "strategies": "bottom_up", "repetitions": 1, "l": 1,
+      "scenes": [{"builtin": "waving_sheet", "triangles": 50, "keyframes": 2}],
+      "studies": [{"name": "small"}, {"name": "large", "l": 2}, {"name": "large", "l": 3}, {"scenes": [
+        {"name": "mine", "bodies": [{"file": "ball.obj"}, "waving_sheet:triangles=50,keyframes=2"]},
+        {"name": "shape", "bodies": ["box", "waving_sheet:triangles=50,keyframes=2"]}]}],
+      "targets": [{"what": "t", "scenes": "mine", "scalar": "float", "l": 1, "at_least": 1, "aim": 2,
+        "numerator": {"strategy": "bottom_up", "phase": "update"},
+        "denominator": {"strategy": "bottom_up", "phase": "update"}}]})");
+  const Outcome large = kbvh("run --plan plan.json --study large --out out");
+  ASSERT_EQ(large.code, 0) << large.err;
+  auto list = records();
+  ASSERT_EQ(list.size(), 2u);
+  EXPECT_EQ(list[0].at("scene").at("per_keyframe"), 2);
+  EXPECT_EQ(list[1].at("scene").at("per_keyframe"), 3);
+  EXPECT_EQ(large.out.find("Targets"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/targets.json"));
+  // A study without a name has the plan's; what is there already is not measured again.
+  const Outcome two = kbvh("run --plan plan.json --study whole --study large --out out");
+  ASSERT_EQ(two.code, 0) << two.err;
+  EXPECT_NE(two.err.find("2 configurations measured, 2 were in"), std::string::npos) << two.err;
+  list = records();
+  ASSERT_EQ(list.size(), 4u);
+  EXPECT_EQ(list[0].at("scene").at("origin"), "built_in");
+  EXPECT_EQ(list[2].at("scene").at("origin"), "files");
+  EXPECT_EQ(list[3].at("scene").at("origin"), "shapes");
+  const Outcome wrong = kbvh("run --plan plan.json --study huge");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_NE(wrong.err.find("plan.json: there is no study 'huge'; known are small, large, whole"),
+            std::string::npos)
+      << wrong.err;
+  EXPECT_EQ(kbvh("run --study small").code, 2) << "--study is about a plan";
+}
+
+TEST_F(Binary, OrdersAreDifferentScenesOfTheSameGeometry) {
+  const Outcome run =
+      kbvh("run " + tiny + "--strategies bottom_up --order given,shuffled,renumbered --out out");
+  ASSERT_EQ(run.code, 0) << run.err;
+  const auto list = records();
+  ASSERT_EQ(list.size(), 3u);
+  EXPECT_EQ(list[2].at("scene").at("name"), "waving_sheet-98-renumbered");
+  for (const json& record : list) {
+    EXPECT_EQ(record.at("verified").at("pairs"), list[0].at("verified").at("pairs"));
+  }
+  EXPECT_NE(list[1].at("scene").at("hash"), list[0].at("scene").at("hash"));
+  EXPECT_NE(list[2].at("scene").at("hash"), list[0].at("scene").at("hash"));
+}
+
+TEST_F(Binary, OptionalScenesMayBeAbsent) {
+  write_text(folder_ / "plan.json", R"({"strategies": "bottom_up", "repetitions": 1, "scenes": [
+      {"name": "away", "optional": true, "bodies": [{"file": "away.obj"}, "box"]},
+      {"builtin": "waving_sheet", "triangles": 50, "keyframes": 2}]})");
+  const Outcome run = kbvh("run --plan plan.json");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.err.find("'away' is left out"), std::string::npos) << run.err;
+}
+
+TEST_F(Binary, BrokenGuaranteesAreRefusedATime) {
+  for (const char* command : {"run ", "bench "}) {
+    const std::string out = std::string(1, command[0]) + "-out";
+    const Outcome run = kbvh(command + tiny + "--strategies all --out " + out, "", KBVH_FAULTY_PROGRAM);
+    EXPECT_EQ(run.code, 1) << run.err;
+    EXPECT_NE(run.err.find("3 configurations in which"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("only_small is left out"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("only_double is left out"), std::string::npos) << run.err;
+    EXPECT_NE(run.out.find("throws is refused a time: it threw: out of luck"), std::string::npos) << run.out;
+    std::map<std::string, json> by_id;
+    for (const json& record : records(out + "/results.jsonl")) by_id[record.at("strategy").at("id")] = record;
+    ASSERT_EQ(by_id.size(), 5u);
+    for (const char* id : {"loses", "repeats", "throws"}) {
+      EXPECT_TRUE(by_id.at(id).at("times").is_null()) << id;
+      EXPECT_FALSE(by_id.at(id).at("verified").at("holds")) << id;
+      EXPECT_EQ(by_id.at(id).at("refused"), by_id.at(id).at("verified").at("first_violation")) << id;
+    }
+    for (const char* id : {"honest", "admits_to_lose"})
+      EXPECT_TRUE(by_id.at(id).at("times").is_object()) << id;
+    EXPECT_GT(by_id.at("admits_to_lose").at("verified").at("missed"), 0u);
+    EXPECT_GT(by_id.at("repeats").at("verified").at("repeated"), 0u);
+    // Known failures still are failures when nothing is measured again.
+    EXPECT_EQ(kbvh(command + tiny + "--strategies all --out " + out, "", KBVH_FAULTY_PROGRAM).code, 1);
+  }
+}
+
+TEST_F(Binary, ForcedKernelsAreAnotherConfiguration) {
+  const std::string run = "run " + tiny + "--strategies bottom_up --out out";
+  const std::string widest = name(supported_kernel_sets().back());
+  EXPECT_EQ(kbvh(run, "KBVH_KERNELS=" + widest).code, 0);
+  EXPECT_EQ(kbvh(run, "KBVH_KERNELS=portable").code, 0);
+  const auto list = records();
+  ASSERT_EQ(list.size(), supported_kernel_sets().size() > 1 ? 2u : 1u);
+  EXPECT_EQ(list.front().at("machine").at("kernels"), widest);
+  EXPECT_EQ(list.back().at("machine").at("kernels"), "portable");
+  const Outcome wrong = kbvh(run, "KBVH_KERNELS=mmx");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_EQ(wrong.err, "kbvh: KBVH_KERNELS: unknown kernels 'mmx'; known are portable, sse, avx2, avx512\n");
+}
+
+}  // namespace
+}  // namespace kbvh::experiments
