@@ -6,6 +6,7 @@
 
 #include "core/hierarchy/builders.hpp"
 #include "core/hierarchy/interval_join.hpp"
+#include "core/hierarchy/linear_bounds.hpp"
 #include "core/hierarchy/span_answers.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "tests/support/rational_geometry.hpp"
@@ -120,12 +121,11 @@ struct Joiner {
   LinearBounds<S> bounds;
   std::vector<IntervalJoin<S>> joins;
   std::vector<SpanAnswers<S>> answers;
-  std::uint64_t tests = 0;
 
   Joiner(const Scene<S>& scene, const SegmentMotion<S>& motion, const Topologies& topologies, KernelSet set,
          const SegmentCuts& cuts)
       : kernels(set),
-        bounds(SceneView<S>(scene), motion, topologies, set, cuts),
+        bounds(SceneView<S>(scene), motion, topologies, set, {cuts}),
         joins(scene.pairs.size()),
         answers(scene.pairs.size()) {
     bounds.start();
@@ -138,7 +138,7 @@ struct Joiner {
   }
   void join(const Scene<S>& scene) {
     for (std::size_t i = 0; i < joins.size(); ++i) {
-      joins[i].join(bounds, scene.pairs[i].first, scene.pairs[i].second, tests);
+      joins[i].join(bounds.segment(), SceneView<S>(scene), scene.pairs[i].first, scene.pairs[i].second);
       answers[i].start(joins[i]);
     }
   }

@@ -44,8 +44,8 @@ std::vector<SpanVerdict> decide(const Joiner<S>& joiner, const Scene<S>& scene, 
       for (int end = 0; end < 2; ++end) {
         const std::size_t va = scene.bodies[bodies.first].primitives[pair.primitive_a][c];
         const std::size_t vb = scene.bodies[bodies.second].primitives[pair.primitive_b][c];
-        span.corner[end][c] = a.positions[end] + 3 * va;
-        span.corner[end][c + 3] = b.positions[end] + 3 * vb;
+        span.corner[end][c] = a.at[end].positions + 3 * va;
+        span.corner[end][c + 3] = b.at[end].positions + 3 * vb;
       }
   }
   const S margin = a.margin + b.margin;  // and the slack that SpanAnswers makes of it
@@ -96,8 +96,9 @@ void check_frame(Play<S>& play) {
     PairBuffer all;
     for (std::size_t i = 0; i < joiner->joins.size(); ++i) {
       PairBuffer read;
-      const std::size_t open = joiner->answers[i].read(
-          joiner->bounds, view, joiner->joins[i], float(joiner->bounds.fraction(play.playback.time())), read);
+      const std::size_t open =
+          joiner->answers[i].read(joiner->bounds.segment(), view, joiner->joins[i],
+                                  float(joiner->bounds.fraction(play.playback.time())), read);
       PairBuffer to_test(read.end() - std::ptrdiff_t(open), read.end());
       TriangleTestStats stats;
       confirm_pairs(view, play.motion, to_test, stats);
