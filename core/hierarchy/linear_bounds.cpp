@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/hierarchy/moved_boxes.hpp"
 #include "core/kernels/bounds.hpp"
 
 namespace kbvh {
@@ -20,52 +21,6 @@ Box<S> swept(const LinearSide<S>& side) {
     }
   return box;
 }
-
-template <class S>
-S largest_coordinate(const LinearEnd<S>& end) {
-  S largest = 0;
-  for (std::size_t i = 0; i < 8; ++i)
-    if (i % 4 != 3) largest = std::max(largest, std::abs(end.own[i]));
-  return largest;
-}
-
-/// Boxes of a body that moves as a whole, all of them or only the root's, from those before.
-template <class S>
-struct MovedBoxes {
-  S lower[3], upper[3];  ///< what is added
-  S excess;              ///< of the result
-
-  MovedBoxes(const LinearEnd<S>& from, const Translation<S>& step) : excess(from.excess) {
-    S largest = largest_coordinate(from);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      largest += std::max(std::abs(step.lower[axis]), std::abs(step.upper[axis]));
-    // More than the rounding of two additions.
-    const S rounding = step.exact ? S(0) : std::numeric_limits<S>::epsilon() * largest;
-    S width = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      lower[axis] = step.lower[axis] - rounding;
-      upper[axis] = step.upper[axis] + rounding;
-      width = std::max(width, upper[axis] - lower[axis]);
-    }
-    excess += width + (step.exact ? S(0) : rounding);
-  }
-  void move(const S* from_lanes, const S* from_own, std::size_t width, std::size_t nodes, S* lanes,
-            S* own) const {
-    for (std::size_t node = 0; node < nodes; ++node)
-      for (std::size_t row = 0; row < 6; ++row) {
-        const S by = row < 3 ? lower[row] : -upper[row - 3];  // rows have -upper
-        const std::size_t first = node * lane_scalars(std::uint32_t(width)) + row * width;
-        for (std::size_t i = first; i < first + width; ++i) lanes[i] = from_lanes[i] + by;
-      }
-    for (std::size_t node = 0; node < nodes; ++node) move_own(from_own + 8 * node, own + 8 * node);
-  }
-  void move_own(const S* from, S* to) const {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      to[axis] = from[axis] + lower[axis];
-      to[axis + 4] = from[axis + 4] + upper[axis];
-    }
-  }
-};
 }  // namespace
 
 template <class S>
