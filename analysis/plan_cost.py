@@ -21,8 +21,8 @@ COSTS: dict[str, tuple[float, float]] = {
     "inflated_lazy": (0.02, 0), "top_down": (0.07, 0), "rebuild": (0.25, 0), "kinetic_aabb": (0.06, 1.5),
     "kinetic_boxtree": (1.1, 0.8), "kinetic_separation_list": (0.02, 3.3), "fcl_float_bottom_up": (0.12, 0),
     "fcl_float_own_verdict": (0.12, 0), "bullet_bvh": (0.07, 0), "embree_refit": (0.05, 0), "linear_bounds": (0.03, 0.1),
-    "interval_join": (0.02, 0.3), "interval_join_ahead": (0.02, 0.3), "auto": (0.03, 0.3), "kinetic_envelope": (0.04, 0.2), "kinetic_calendar": (0.1, 1),
-    "drift_boxes": (0.03, 0), "kinetic_envelope_ahead": (0.04, 0.2),
+    "interval_join": (0.02, 0.3), "interval_join_ahead": (0.02, 0.3), "auto": (0.03, 0.3), "drift_boxes": (0.03, 0),
+    "kinetic_envelope": (0.04, 0.2), "kinetic_envelope_ahead": (0.04, 0.2), "kinetic_calendar": (0.1, 1),
 }  # fmt: skip
 UNKNOWN = (0.3, 1.5)  #: of strategies that are not listed
 MOTION = 0.006  #: per frame, for 1000 polygons

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <type_traits>
 
 #include "core/hierarchy/interval_join.hpp"
 #include "core/hierarchy/linear_bounds.hpp"
@@ -36,17 +35,19 @@ struct WorkAhead {
   std::size_t pair = 0;  ///< of bodies
   bool begun = false;    ///< with that pair
   bool joins_begun = false;
+  double since = 0;  ///< time at which it was begun
   double done = 0;
 };
 
 /// With foresight of the whole clip the next segment's answer is made during the present one, a part at each
 /// frame; else all of it at the first frame that asks.
-template <class S, class Count, bool works_ahead>
-class IntervalJoinStrategy : public Strategy<S> {
-  using Motion = std::conditional_t<works_ahead, ClipMotion<S>, SegmentMotion<S>>;
+template <class S, class Count, Foresight F>
+class IntervalJoinStrategy final : public Strategy<S> {
+  static constexpr bool works_ahead = F == Foresight::whole_clip;
+  using Motion = MotionView<F, S>;
 
  public:
-  static constexpr Foresight foresight = works_ahead ? Foresight::whole_clip : Foresight::next_keyframe;
+  static constexpr Foresight foresight = F;
 
   IntervalJoinStrategy(const SceneView<S>& scene, const Motion& motion, Topologies topologies,
                        const Params& params)
@@ -187,6 +188,7 @@ class IntervalJoinStrategy : public Strategy<S> {
       joined_ = true;
     }
     ahead_ = {};
+    ahead_.since = this->time();
     if constexpr (works_ahead)
       if (bounds_.start_ahead(motion_.from(bounds_.end()))) ahead_.stage = Stage::bounds;
   }
@@ -204,28 +206,33 @@ class IntervalJoinStrategy : public Strategy<S> {
   /// segment, if frames follow each other at the distance of the last two.
   double share_due() const {
     const double next_frame = this->time() + (this->time() - before_);
-    return (next_frame - bounds_.begin()) / (bounds_.end() - bounds_.begin());
+    return (next_frame - ahead_.since) / (bounds_.end() - ahead_.since);
   }
-  /// As if the next segment were like the present one.
+  /// As if the next segment were like the present one, or, where that has little to do, like many others.
   double all_work() const {
-    double work = node_cost * double(bounds_.nodes_of_segment());
+    const double boxes = node_cost * double(bounds_.nodes_of_segment());
+    double known = 0;
     for (std::size_t i = 0; joined_ && i < now_.joins.size(); ++i) {
-      work += double(now_.joins[i].tests());
-      if (by_spans_[i]) work += answer_cost * double(now_.joins[i].from_begin());
+      known += double(now_.joins[i].tests());
+      if (by_spans_[i]) known += answer_cost * double(now_.joins[i].from_begin());
     }
-    return work;
+    return boxes + std::max(2 * boxes, known);
   }
   void make_bounds_ahead() {
     if (ahead_.stage != Stage::bounds) return;
     const double share = share_due(), wanted = share * all_work() - ahead_.done;
-    if (wanted <= 0) return;
-    const double most = share >= 1 ? 1e15 : wanted / node_cost;
-    if (bounds_.go_ahead(std::uint64_t(most) + 1)) ahead_.stage = Stage::joins;
-    ahead_.done += std::min(wanted, node_cost * double(bounds_.nodes_of_segment()));
+    if (share < 1 && !(wanted > 0)) return;
+    const double most = share < 1 ? wanted / node_cost : 1e15;
+    if (bounds_.go_ahead(std::uint64_t(most) + 1))
+      ahead_.stage = Stage::joins;
+    else if (!bounds_.has_ahead())
+      ahead_.stage = Stage::nothing;
+    if constexpr (Count::enabled) count_linear_update(bounds_, count_);
+    ahead_.done += std::clamp(wanted, 0.0, node_cost * double(bounds_.nodes_of_segment()));
   }
   /// Brings the work on joins and answers ahead to a share of it; all of it from 1 on.
   void join_ahead(const LinearSegment<S>& segment, double share) {
-    constexpr std::size_t leaf_pairs = 128, answers_at_once = 256;
+    constexpr std::size_t leaf_pairs = 128, tests_at_once = 4096, answers_at_once = 256;
     const double wanted = share >= 1 ? std::numeric_limits<double>::infinity() : share * all_work();
     while (ahead_.done < wanted && (ahead_.stage == Stage::joins || ahead_.stage == Stage::answers)) {
       if (ahead_.pair == next_.joins.size()) {
@@ -240,7 +247,7 @@ class IntervalJoinStrategy : public Strategy<S> {
         ahead_.joins_begun = true;
         if (!ahead_.begun) join.start(segment, this->scene_, pair.first, pair.second, leaf_pairs);
         const std::uint64_t before = ahead_.begun ? join.tests() : 0;
-        ahead_.begun = !join.go_on(1);
+        ahead_.begun = !join.go_on(tests_at_once);
         ahead_.done += double(join.tests() - before);
         count_.add(Counter::box_tests, join.tests() - before);
       } else {
@@ -271,15 +278,9 @@ class IntervalJoinStrategy : public Strategy<S> {
 };
 
 template <class S, class Count>
-class AtOnce final : public IntervalJoinStrategy<S, Count, false> {
- public:
-  using IntervalJoinStrategy<S, Count, false>::IntervalJoinStrategy;
-};
+using AtOnce = IntervalJoinStrategy<S, Count, Foresight::next_keyframe>;
 template <class S, class Count>
-class MadeAhead final : public IntervalJoinStrategy<S, Count, true> {
- public:
-  using IntervalJoinStrategy<S, Count, true>::IntervalJoinStrategy;
-};
+using MadeAhead = IntervalJoinStrategy<S, Count, Foresight::whole_clip>;
 
 std::vector<Parameter> join_parameters() {
   std::vector<Parameter> list = linear_parameters();

@@ -8,8 +8,8 @@
 
 namespace kbvh {
 
-/// Boxes of bodies at knots of a clip, kept to be used again when it plays again. What came first stays:
-/// where not all finds room, a clip that loops would otherwise push out each box before it is wanted.
+/// Boxes of bodies at ends of a clip's segments, kept to be used again when it plays again. What came first
+/// stays: where not all finds room, a clip that loops would otherwise push out each box before it is wanted.
 template <class S>
 class BoundsMemory {
  public:

@@ -91,7 +91,10 @@ bool IntervalJoin<S>::go_on(std::uint64_t box_tests) {
   if (done_) return true;
   const std::uint64_t before = tests();
   while (traversal_.depth > 0) {
-    if (tests() - before >= box_tests) return false;
+    const std::uint64_t made = tests() - before;
+    if (made >= box_tests) return false;
+    const std::uint64_t left = box_tests - made, most = Budget{}.box_tests;
+    traversal_.test_limit = left < most - traversal_.tests ? traversal_.tests + left : most;
     traverse_(leaf_join_.a, leaf_join_.ends_a, leaf_join_.b, leaf_join_.ends_b, traversal_);
     leaf_join_.next = 0;
     if (body_a_ == body_b_) {

@@ -32,9 +32,9 @@ class IntervalJoin {
     start(segment, scene, body_a, body_b, leaf_pairs_at_once);
     go_on(std::numeric_limits<std::uint64_t>::max());
   }
-  /// The same in parts: `go_on` works until it has made so many box tests, about, and returns whether all is
-  /// done. The segment's boxes and positions stay in use until then. A part is that of so many pairs of
-  /// leaves at least.
+  /// The same in parts: `go_on` works until it has made so many box tests, or somewhat more, and returns
+  /// whether all is done. The segment's boxes and positions stay in use until then. Pairs of leaves are
+  /// looked at when there are `leaf_pairs` of them.
   void start(const LinearSegment<S>& segment, const SceneView<S>& scene, std::uint32_t body_a,
              std::uint32_t body_b, std::size_t leaf_pairs);
   bool go_on(std::uint64_t box_tests);

@@ -21,6 +21,14 @@ Box<S> swept(const LinearSide<S>& side) {
     }
   return box;
 }
+
+template <class S>
+bool finite_root(const LinearEnd<S>& end) {
+  return std::all_of(end.own, end.own + 3, [](S x) { return std::isfinite(x); }) &&
+         std::all_of(end.own + 4, end.own + 7, [](S x) { return std::isfinite(x); });
+}
+
+constexpr std::uint32_t none_used = ~std::uint32_t(0);
 }  // namespace
 
 template <class S>
@@ -114,8 +122,13 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
     return {};
   }
   Refit refit{lanes.data(), own.data(), at.positions, std::uint32_t(nodes), nullptr};
-  if (memory_.is_used() && motion.as_in_the_scene(index)) {
-    if (const auto* known = memory_.find(index, t)) {
+  const bool remembers = memory_.is_used() && motion.as_in_the_scene(index);
+  // A body at rest is at a keyframe, whenever it is looked at.
+  const double knot = !side.at_rest                              ? t
+                      : std::isfinite(motion.lines_begin(index)) ? motion.lines_begin(index)
+                                                                 : motion.lines_end(index);
+  if (remembers) {
+    if (const auto* known = memory_.find(index, knot)) {
       at.lanes = known->lanes.data();
       at.own = known->own.data();
       ++counts_[index].remembered;
@@ -129,8 +142,8 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
     ++counts_[index].translated;
     return {};
   }
-  if (memory_.is_used() && motion.as_in_the_scene(index)) {
-    if (auto* target = memory_.add(index, t, lanes.size(), own.size())) {
+  if (remembers) {
+    if (auto* target = memory_.add(index, knot, lanes.size(), own.size())) {
       at.lanes = refit.lanes = target->lanes.data();
       at.own = refit.own = target->own.data();
       refit.remembered = target;
@@ -156,9 +169,7 @@ bool LinearBounds<S>::make_end(Segment& segment, const SegmentMotion<S>& motion,
   Refit refit = begin_end(segment, motion, body, end, t);
   proceed(body, refit, refit.left);
   if (hierarchy(body).empty()) return true;
-  const S* own = segment.sides[body].at[end].own;
-  return std::all_of(own, own + 3, [](S x) { return std::isfinite(x); }) &&
-         std::all_of(own + 4, own + 7, [](S x) { return std::isfinite(x); });
+  return finite_root(segment.sides[body].at[end]);
 }
 
 template <class S>
@@ -206,10 +217,11 @@ bool LinearBounds<S>::advance() {
   came_ahead_ = false;
   if (end() != none && motion_.time() <= end()) return false;
   if (ahead_exists_ && motion_.time() <= ahead().end) {
-    go_ahead(std::numeric_limits<std::uint64_t>::max());
+    came_ahead_ = go_ahead(std::numeric_limits<std::uint64_t>::max());
+  }
+  if (came_ahead_) {
     present_ = 1 - present_;
     forget_ahead();
-    came_ahead_ = true;
   } else {
     go_on();
   }
@@ -233,22 +245,22 @@ void LinearBounds<S>::enter() {
 /// end is to be made. `before` is the segment before, whose ends stay as they are if `keep_before`.
 template <class S>
 bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion,
-                                 std::uint32_t body, double t, bool keep_before) {
+                                 std::uint32_t body, double t, Before what) {
   LinearSide<S>& side = segment.sides[body];
   const LinearSide<S>& old = before.sides[body];
   side.apart = old.apart;
   side.at_rest = motion.at_rest(body);
   side.current = true;
-  const auto free_slot = [&](bool beside_begin) {
+  std::array<std::uint32_t, 3> used{none_used, none_used, none_used};
+  if (what == Before::stays) used = {old.at[0].slot, old.at[1].slot, none_used};
+  const auto free_slot = [&used] {
     std::uint32_t slot = 0;
-    const auto is_used = [&] {
-      return (beside_begin && side.at[0].slot == slot) ||
-             (keep_before && (old.at[0].slot == slot || old.at[1].slot == slot));
-    };
-    while (is_used()) ++slot;
+    while (std::find(used.begin(), used.end(), slot) != used.end()) ++slot;
     return slot;
   };
-  if (old.current && old.at_rest && side.at_rest) {  // where it was
+  // Where it was, and not at rest behind the clip after it was before it.
+  if (old.current && old.at_rest && side.at_rest &&
+      old.at[1].positions == motion.positions_on_lines(body, t, bodies_[body].room[old.at[1].slot])) {
     side.at[0] = side.at[1] = old.at[1];
     ++counts_[body].at_rest;
     return false;
@@ -256,14 +268,15 @@ bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const 
   if (old.current && !old.at_rest && before.end == segment.begin) {
     side.at[0] = old.at[1];
   } else {
-    side.at[0].slot = free_slot(false);
+    side.at[0].slot = free_slot();
     make_end(segment, motion, body, 0, side.at_rest ? t : segment.begin);
   }
   if (side.at_rest) {
     side.at[1] = side.at[0];
     return false;
   }
-  side.at[1].slot = free_slot(true);
+  used[2] = side.at[0].slot;
+  side.at[1].slot = free_slot();
   return true;
 }
 
@@ -278,7 +291,7 @@ void LinearBounds<S>::go_on() {
   segment.pieces = whole_ ? 1 : new_knot ? cuts_.pieces : before.pieces;
   choose_segment(segment, motion_, t);
   for (std::uint32_t body = 0; body < body_count(); ++body) {
-    if (!begin_side(segment, before, motion_, body, t, false)) continue;
+    if (!begin_side(segment, before, motion_, body, t, Before::ends)) continue;
     // A line without end may leave the range of numbers: then less of it.
     while (!make_end(segment, motion_, body, 1, segment.end) && segment.end > segment.begin) {
       segment.end = segment.begin + (segment.end - segment.begin) / 2;
@@ -327,12 +340,22 @@ bool LinearBounds<S>::go_ahead(std::uint64_t nodes) {
       done += step;
     } else if (ahead_.body < body_count()) {
       const std::uint32_t body = ahead_.body++;
-      if (begin_side(segment, before, *ahead_.motion, body, before.end, true))
+      if (begin_side(segment, before, *ahead_.motion, body, before.end, Before::stays))
         ahead_.refit = begin_end(segment, *ahead_.motion, body, 1, segment.end);
-    } else {
-      if (!ahead_.finished) finish(segment, *ahead_.motion);
-      ahead_.finished = true;
+      // What is done at once costs a part of a refit.
+      if (ahead_.refit.left == 0) done += hierarchy(body).node_count() / 4;
+    } else if (ahead_.finished) {
       return true;
+    } else {
+      ahead_.finished = true;
+      const auto is_finite = [&](const LinearSide<S>& side) {
+        return side.hierarchy().empty() || finite_root(side.at[1]);
+      };
+      if (!std::all_of(segment.sides.begin(), segment.sides.end(), is_finite)) {
+        forget_ahead();  // less of it is to be taken, as `go_on` does
+        return false;
+      }
+      finish(segment, *ahead_.motion);
     }
   }
   return false;
@@ -342,7 +365,7 @@ template <class S>
 std::uint64_t LinearBounds<S>::nodes_of_segment() const {
   std::uint64_t nodes = 0;
   for (const LinearSide<S>& side : segment().sides)
-    if (!side.at_rest && !side.apart) nodes += side.hierarchy().node_count();
+    if (!side.at_rest) nodes += side.hierarchy().node_count();
   return nodes;
 }
 

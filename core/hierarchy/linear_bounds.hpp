@@ -27,7 +27,7 @@ struct LinearSettings {
 
 /// Bounds of all bodies of a scene over a segment in which every vertex of every body keeps to one line:
 /// boxes at its begin and at its end, linear in between. A maximum of linear functions is convex and lies
-/// below its chord, so they hold every vertex throughout; they are tight at the ends. Nothing is updated
+/// below its chord, so they hold every vertex throughout; at the ends they are tight. Nothing is updated
 /// within a segment, and the boxes at its end are those at the begin of the next one.
 ///
 /// Segments are those of all bodies overlaid: from the latest knot of any plan to the next one, cut as
@@ -55,7 +55,9 @@ class LinearBounds {
   void plans_changed();
 
   /// Begins with the segment after the present one, of which `motion` says what is seen from its begin on.
-  /// Returns whether there is one. It is forgotten if plans change or `advance` does not come into it.
+  /// Returns whether that can be: not where none follows, where segments are cut by looseness, and from
+  /// `enter` to `start`. It is forgotten if plans change, or `advance` does not come into it, or it leaves
+  /// the range of numbers.
   bool start_ahead(const SegmentMotion<S>& motion);
   /// Makes more of its bounds, as long as less than so many nodes were done by this call. Returns whether all
   /// are there.
@@ -65,7 +67,7 @@ class LinearBounds {
   const LinearSegment<S>& ahead() const { return segments_[1 - present_]; }
   /// Did the last `advance` come into a segment that had been begun ahead?
   bool came_ahead() const { return came_ahead_; }
-  /// Nodes of which boxes are made for a segment.
+  /// Nodes of all bodies that move in the present segment.
   std::uint64_t nodes_of_segment() const;
 
   const LinearSegment<S>& segment() const { return segments_[present_]; }
@@ -75,7 +77,6 @@ class LinearBounds {
   const LinearSide<S>& side(std::uint32_t body) const { return segment().sides[body]; }
   WideHierarchy<S>& hierarchy(std::uint32_t body) { return bodies_[body].hierarchy; }
 
-  const SceneView<S>& scene() const { return scene_; }
   std::uint32_t body_count() const { return std::uint32_t(bodies_.size()); }
   std::uint32_t vertex_count(std::uint32_t body) const { return scene_.vertex_count(body); }
 
@@ -114,6 +115,8 @@ class LinearBounds {
     Refit refit;             ///< of the one before
     bool finished = false;
   };
+  /// What becomes of the segment before the one that is made.
+  enum class Before : std::uint8_t { ends, stays };
   static constexpr double none = -std::numeric_limits<double>::infinity();  ///< the end of no segment
 
   void restart();
@@ -122,7 +125,7 @@ class LinearBounds {
   void forget_ahead();
   void choose_segment(Segment& segment, const SegmentMotion<S>& motion, double t) const;
   bool begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion, std::uint32_t body,
-                  double t, bool keep_before);
+                  double t, Before what);
   void cut_while_loose(double t);
   double looseness_in_the_middle();
   Refit begin_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body, std::uint32_t end,

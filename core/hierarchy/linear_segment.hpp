@@ -60,7 +60,7 @@ struct LinearSide {
   LinearBody<S>* body = nullptr;
   LinearEnd<S> at[2];  ///< the same at both ends for a body at rest
   bool at_rest = false, current = false;
-  /// It meets no other body's box over this segment: of its boxes there is the root's and no other.
+  /// It meets no other body's box over this segment: of its boxes nobody reads any but the root's.
   bool apart = false;
   S margin = 0;  ///< by which every box is larger
 

@@ -11,7 +11,7 @@ constexpr float fraction_slack = 0x1p-21F;
 
 /// All pairs wait for their begin; ahead of time those that overlap then are asked about otherwise.
 template <class S>
-void SpanAnswers<S>::begin(const IntervalJoin<S>& join, bool ahead) {
+void SpanAnswers<S>::begin(const IntervalJoin<S>& join, When when) {
   intersecting_.clear();
   open_.clear();
   const auto pairs = join.pairs();
@@ -20,6 +20,7 @@ void SpanAnswers<S>::begin(const IntervalJoin<S>& join, bool ahead) {
   std::fill(std::begin(head_), std::end(head_), none);
   bucket_ = 0;
   last_ = -1;
+  const bool ahead = when == When::ahead;
   const std::size_t first = ahead ? join.throughout() : 0;
   for (std::size_t i = pairs.size(); i-- > first;)
     if (!ahead || pairs[i].begin > 0) wait(std::uint32_t(i), pairs[i].begin);
@@ -27,12 +28,12 @@ void SpanAnswers<S>::begin(const IntervalJoin<S>& join, bool ahead) {
 
 template <class S>
 void SpanAnswers<S>::start(const IntervalJoin<S>& join) {
-  begin(join, false);
+  begin(join, When::now);
 }
 
 template <class S>
 void SpanAnswers<S>::start_ahead(const IntervalJoin<S>& join) {
-  begin(join, true);
+  begin(join, When::ahead);
   asked_ = 0;
 }
 

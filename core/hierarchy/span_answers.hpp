@@ -46,7 +46,8 @@ class SpanAnswers {
   };
   void wait(std::uint32_t pair, float until);
   void collect_due(const IntervalJoin<S>& join, float fraction);
-  void begin(const IntervalJoin<S>& join, bool ahead);
+  enum class When : std::uint8_t { now, ahead };
+  void begin(const IntervalJoin<S>& join, When when);
   void attempt(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                float fraction, float share);
   void attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,

@@ -112,8 +112,8 @@ template <class S>
 void SegmentEnvelope<S>::go_on(WideHierarchy<S>& hierarchy, const WideRealisers& realisers,
                                WideRealisers& at_end, double share) {
   const std::uint32_t nodes = hierarchy.node_count();
-  const auto made = std::uint32_t(std::min(1.0, share / nodes_part) * nodes);
-  while (nodes_left_ > nodes - made) {
+  const auto nodes_due = std::uint32_t(std::min(1.0, share / nodes_part) * nodes);
+  while (nodes_left_ > nodes - nodes_due) {
     carry_over(realisers, at_end);
     make_block(hierarchy, at_end);
   }

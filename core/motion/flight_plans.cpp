@@ -432,8 +432,9 @@ double FlightPlans<S>::displacement_bound(double t0, double t1) const {
 template <class S>
 std::size_t FlightPlans<S>::bytes() const {
   std::size_t total = keyframes_->times.size() * sizeof(double) + keyframes_->positions.size() * sizeof(S) +
-                      longest_steps_.size() * sizeof(double) + own_of_vertex_.size() * sizeof(std::uint32_t) +
-                      own_.size() * sizeof(OwnPlan);
+                      longest_steps_.size() * sizeof(double) +
+                      translations_.size() * sizeof(translations_[0]) +
+                      own_of_vertex_.size() * sizeof(std::uint32_t) + own_.size() * sizeof(OwnPlan);
   for (const OwnPlan& plan : own_) total += plan.times.size() * (sizeof(double) + 3 * sizeof(S));
   for (const Rays& rays : rays_)
     total += sizeof(Rays) + rays.vertices.size() * (sizeof(std::uint32_t) + 6 * sizeof(S));
