@@ -77,8 +77,8 @@ class FlightPlans {
   bool at_rest(double t) const;
   /// How the body moves as a whole over the keyframes' segment that t is in: the steps of all its vertices,
   /// which differ by no more than the rounding of stored coordinates (4 ulps of the largest). Nothing if they
-  /// differ by more (or the first by much more), without a segment, or with a plan of its own. O(vertices) once,
-  /// for each segment that is asked for, or as many as move alike.
+  /// differ by more (the first by much more), without a segment, or with plans of its own. O(vertices) the
+  /// first time a segment is asked for, or as many as move alike.
   std::optional<Translation<S>> translation(double t) const;
 
   /// No vertex is faster than this on the segment that holds at t (units per second, rounded up); own plans
