@@ -6,24 +6,10 @@
 
 #include "core/hierarchy/bounds_memory.hpp"
 #include "core/hierarchy/linear_segment.hpp"
+#include "core/hierarchy/linear_settings.hpp"
 #include "core/strategy.hpp"
 
 namespace kbvh {
-
-/// How segments between knots are cut: into pieces of one length, or, where boxes are looser than a bound,
-/// into more.
-struct SegmentCuts {
-  static constexpr std::uint32_t most = 64;
-  std::uint32_t pieces = 1;  ///< 1 to `most`
-  /// Summed surface of boxes over that of tight ones, minus one, in the middle of a piece, for all bodies
-  /// that move; twice as many pieces until it is kept. 0: nobody looks.
-  double max_looseness = 0;
-};
-
-struct LinearSettings {
-  SegmentCuts cuts;
-  std::size_t remembered_bytes = 0;  ///< for boxes that are used again when the clip plays again
-};
 
 /// Bounds of all bodies of a scene over a segment in which every vertex of every body keeps to one line:
 /// boxes at its begin and at its end, linear in between. A maximum of linear functions is convex and lies
@@ -153,10 +139,6 @@ class LinearBounds {
   std::vector<Counts> counts_;
   std::vector<std::uint8_t> near_;  ///< by body: to another one, over the segment
 };
-
-/// The parameters of strategies with linear bounds, and what they say. Throws ConfigError.
-std::vector<Parameter> linear_parameters();
-LinearSettings linear_settings(const Params& params);
 
 /// Counts the ends that were made since `bounds` was asked last, as updates.
 template <class S, class Count>

@@ -1,9 +1,7 @@
 #pragma once
-#include <map>
-#include <string>
 #include <vector>
 
-#include "core/session.hpp"
+#include "tests/support/play.hpp"
 
 namespace kbvh::test {
 
@@ -39,31 +37,6 @@ Scene<S> grids(std::uint32_t n, double apart, Step&& step) {
   scene.pairs = all_pairs(scene.bodies);
   return scene;
 }
-
-/// Plays a clip, query included, and tells what each frame added to a counter.
-template <class S>
-struct Play {
-  Play(const Scene<S>& scene, const char* id, std::map<std::string, std::string> params)
-      : session(scene, {&find_strategy(id), std::move(params), find_strategy(id).info.topology.preferred},
-                CountingPolicy::counting) {
-    session.reset(0);
-    session.query(pairs, times);
-    last = session.strategy().counters();
-  }
-  Counters frame(double t) {
-    session.advance(t, times);
-    session.query(pairs, times);
-    const Counters now = session.strategy().counters();
-    Counters added;
-    for (std::size_t c = 0; c < added.values.size(); ++c) added.values[c] = now.values[c] - last.values[c];
-    last = now;
-    return added;
-  }
-  Session<S> session;
-  PairBuffer pairs;
-  PhaseTimes times;
-  Counters last;
-};
 
 /// Steps: all vertices move, or those on the left side only.
 inline constexpr auto lifted = [](std::uint32_t) { return 1.0; };

@@ -6,44 +6,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/session.hpp"
+#include "tests/support/play.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
 namespace {
 
 constexpr const char* both[] = {"kinetic_envelope", "kinetic_envelope_ahead"};
-
-template <class S>
-struct Player {
-  Player(const Scene<S>& scene, const char* id, const BuilderConfig& builder)
-      : session(scene, {&find_strategy(id), {}, builder}, CountingPolicy::counting) {}
-  void reset(double t) {
-    session.reset(t);
-    session.query(pairs, times);
-    last = session.strategy().counters();
-  }
-  Counters frame(double t, const typename PlanScript<S>::Step* step = nullptr) {
-    session.advance(t, times);
-    session.follow(step, times);
-    session.query(pairs, times);
-    const Counters now = session.strategy().counters();
-    Counters added;
-    for (std::size_t c = 0; c < added.values.size(); ++c) added.values[c] = now.values[c] - last.values[c];
-    last = now;
-    return added;
-  }
-  std::vector<std::vector<Box<double>>> boxes() {
-    std::vector<std::vector<Box<double>>> list;
-    for (std::uint32_t body = 0; body < session.scene().bodies.size(); ++body)
-      list.push_back(session.strategy().audit_view(body)->boxes);
-    return list;
-  }
-  Session<S> session;
-  PairBuffer pairs;
-  PhaseTimes times;
-  Counters last;
-};
 
 /// A frame, or the clip starts over at its time.
 struct Event {
@@ -81,14 +50,14 @@ void check_same(const TestScene<S>& test, const std::string& name, const Builder
   frames.push_back(keyframes.back() + 0.5);
   std::sort(frames.begin(), frames.end());
   frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
-  Player<S> refit(test.scene, "bottom_up", builder);
-  Player<S> present(test.scene, both[0], builder), ahead(test.scene, both[1], builder);
+  Play<S> refit(test.scene, "bottom_up", {}, builder);
+  Play<S> present(test.scene, both[0], {}, builder), ahead(test.scene, both[1], {}, builder);
   for (const auto& way : ways_to_play(frames, keyframes)) {
-    for (Player<S>* player : {&refit, &present, &ahead}) player->reset(way.front().time);
+    for (Play<S>* player : {&refit, &present, &ahead}) player->reset(way.front().time);
     for (const Event& event : way) {
       const auto step = std::find_if(test.script.steps.begin(), test.script.steps.end(),
                                      [&](const auto& one) { return one.time == event.time; });
-      for (Player<S>* player : {&refit, &present, &ahead})
+      for (Play<S>* player : {&refit, &present, &ahead})
         if (event.reset)
           player->reset(event.time);
         else
@@ -152,7 +121,7 @@ TEST(EnvelopesAhead, NoFrameDoesTheWorkOfAWholeSegment) {
   for (const std::uint32_t width : {2u, 8u})
     for (const std::uint32_t l : {4u, 10u, 30u}) {
       const BuilderConfig builder{.width = width, .leaf_size = 1};
-      Player<float> present(scene, both[0], builder), ahead(scene, both[1], builder);
+      Play<float> present(scene, both[0], {}, builder), ahead(scene, both[1], {}, builder);
       present.reset(0);
       ahead.reset(0);
       const std::uint64_t size = ahead.session.strategy().audit_view(0)->topology.size();
@@ -181,7 +150,7 @@ TEST(EnvelopesAhead, BodiesThatTranslateNeedNoPass) {
   for (const char* id : both) {
     const Scene<float> scene = made_of("dtdttd", 200);
     const BuilderConfig builder{.width = 8, .leaf_size = 1};
-    Player<float> player(scene, id, builder);
+    Play<float> player(scene, id, {}, builder);
     player.reset(0);
     for (std::uint32_t f = 1; f <= 60; ++f) {
       player.frame(0.1 * f + 1e-9);
@@ -193,7 +162,7 @@ TEST(EnvelopesAhead, BodiesThatTranslateNeedNoPass) {
     EXPECT_EQ(player.last[Counter::nodes_visited], 2 * size) << id;
 
     const Scene<float> translated = made_of("ttt", 200);
-    Player<float> nothing_else(translated, id, builder);
+    Play<float> nothing_else(translated, id, {}, builder);
     nothing_else.reset(0);
     for (const double t : {0.5, 1.0, 1.5, 2.25}) nothing_else.frame(t);
     EXPECT_EQ(nothing_else.last[Counter::bodies_translated], 2u);
@@ -205,7 +174,7 @@ TEST(EnvelopesAhead, BodiesThatTranslateNeedNoPass) {
 TEST(EnvelopesAhead, AScenesOwnTranslationIsSeenWhereItIsExact) {
   for (const char* id : both) {
     const auto far = synthetic_scene<float>("pure_translation_far", 5);
-    Player<float> player(far.scene, id, find_strategy(id).info.topology.preferred);
+    Play<float> player(far.scene, id, {});
     player.reset(0);
     for (const double t : frame_times(far.scene, 5)) player.frame(t);
     EXPECT_EQ(player.last[Counter::bodies_translated], 4u) << "two bodies, two segments after the first";
@@ -220,7 +189,7 @@ TEST(EnvelopesAhead, AScenesOwnTranslationIsSeenWhereItIsExact) {
   positions.back() = std::nextafter(positions.back(), 9.f);
   scene.bodies[0].plans = FlightPlans<float>(plans.vertex_count(), {0, 1, 2}, std::move(positions));
   for (const char* id : both) {
-    Player<float> player(scene, id, find_strategy(id).info.topology.preferred);
+    Play<float> player(scene, id, {});
     player.reset(0);
     for (const double t : {0.5, 1.0, 1.5}) player.frame(t);
     EXPECT_EQ(player.last[Counter::bodies_translated], 0u);

@@ -1,0 +1,50 @@
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/session.hpp"
+
+namespace kbvh::test {
+
+/// Plays a clip from 0 on, query included, and tells what each frame added to the counters.
+template <class S>
+struct Play {
+  /// With the topology that the strategy prefers.
+  Play(const Scene<S>& scene, const char* id, std::map<std::string, std::string> params)
+      : Play(scene, id, std::move(params), find_strategy(id).info.topology.preferred) {}
+  Play(const Scene<S>& scene, const char* id, std::map<std::string, std::string> params,
+       const BuilderConfig& builder)
+      : session(scene, {&find_strategy(id), std::move(params), builder}, CountingPolicy::counting) {
+    reset(0);
+  }
+  void reset(double t) {
+    session.reset(t);
+    session.query(pairs, times);
+    last = session.strategy().counters();
+  }
+  /// A frame at t, after which plans change as `step` says; null: not at all.
+  Counters frame(double t, const typename PlanScript<S>::Step* step = nullptr) {
+    session.advance(t, times);
+    session.follow(step, times);
+    session.query(pairs, times);
+    const Counters now = session.strategy().counters();
+    Counters added;
+    for (std::size_t c = 0; c < added.values.size(); ++c) added.values[c] = now.values[c] - last.values[c];
+    last = now;
+    return added;
+  }
+  /// [body][node]; for strategies that show them.
+  std::vector<std::vector<Box<double>>> boxes() {
+    std::vector<std::vector<Box<double>>> list;
+    for (std::uint32_t body = 0; body < session.scene().bodies.size(); ++body)
+      list.push_back(session.strategy().audit_view(body)->boxes);
+    return list;
+  }
+  Session<S> session;
+  PairBuffer pairs;
+  PhaseTimes times;
+  Counters last;
+};
+
+}  // namespace kbvh::test
