@@ -64,15 +64,16 @@ void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>&
   const std::uint32_t width = a.hierarchy().topology().width;
   const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(a.hierarchy().kernels());
   traverse_ = self ? kernels.self(width) : kernels.join(width);
-  join_leaves_ = kernels.leaf_join(
-      width, std::max({4u, a.hierarchy().padded_leaf_size(), b.hierarchy().padded_leaf_size()}));
+  join_leaves_ =
+      kernels.leaf_join(std::max({4u, a.hierarchy().padded_leaf_size(), b.hierarchy().padded_leaf_size()}));
   neighbours_ = self && !with_neighbours_ ? &scene.primitives(body_a) : nullptr;
   stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
   leaf_pairs_.resize(std::max(leaf_pairs_.size(), 2 * leaf_pairs));
   traversal_ = {stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pairs, 1, Budget{}.box_tests};
   // A root that is a leaf lies in a node's only lane, so that the roots are compared with each other there.
   traversal_.stack[traversal_.depth++] = {0, 0};
-  leaf_join_ = {a.hierarchy().arrays(),
+  leaf_join_ = {width,
+                a.hierarchy().arrays(),
                 b.hierarchy().arrays(),
                 a.ends(),
                 b.ends(),

@@ -359,7 +359,9 @@ template <class S, std::size_t padded>
   }
 }
 
-template <class S, std::uint32_t width, std::size_t padded>
+// The width is not known to the compiler: it is only where boxes of leaves lie, and each copy of this is
+// large.
+template <class S, std::size_t padded>
 void leaf_join(WideLeafJoin<S>& shared) {
   WideLeafJoin<S> state = shared;
   const S margin = state.ends_a.margin + state.ends_b.margin;
@@ -372,7 +374,7 @@ void leaf_join(WideLeafJoin<S>& shared) {
     return LeafRows<S>{leaves.rows[0] + place, leaves.rows[1] + place, leaves.lists.primitives + begin,
                        end - begin};
   };
-  const auto box_of = [margin](const WideEnds<S>& ends, LeafSlot slot) {
+  const auto box_of = [margin, width = state.width](const WideEnds<S>& ends, LeafSlot slot) {
     const std::size_t place = slot.node() * std::size_t(6) * width;
     return reach_of(lane_box(ends.lanes[0] + place, width, slot.lane()),
                     lane_box(ends.lanes[1] + place, width, slot.lane()), margin);
@@ -411,9 +413,7 @@ void leaf_join(WideLeafJoin<S>& shared) {
 template <class S>
 constexpr WideLinearKernels<S> table{{&at<S, 2>, &at<S, 4>, &at<S, 8>},
                                      {&join<S, 2, false>, &join<S, 4, false>, &join<S, 8, false>},
-                                     {{&leaf_join<S, 2, 4>, &leaf_join<S, 2, 8>, &leaf_join<S, 2, 16>},
-                                      {&leaf_join<S, 4, 4>, &leaf_join<S, 4, 8>, &leaf_join<S, 4, 16>},
-                                      {&leaf_join<S, 8, 4>, &leaf_join<S, 8, 8>, &leaf_join<S, 8, 16>}},
+                                     {&leaf_join<S, 4>, &leaf_join<S, 8>, &leaf_join<S, 16>},
                                      {&make<S, 2>, &make<S, 4>, &make<S, 8>},
                                      {&join<S, 2, true>, &join<S, 4, true>, &join<S, 8, true>}};
 

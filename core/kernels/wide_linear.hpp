@@ -60,6 +60,7 @@ struct JoinColumns {
 /// Turns pairs of leaves into pairs of primitives whose linear boxes overlap at some time.
 template <class S>
 struct WideLeafJoin {
+  std::uint32_t width;  ///< of both hierarchies
   WideArrays<S> a, b;
   WideEnds<S> ends_a, ends_b;
   WideLinearLeaves<S> leaves_a, leaves_b;
@@ -81,19 +82,17 @@ struct WideLinearKernels {
   using LeafJoin = void (*)(WideLeafJoin<S>& state);
   /// Boxes of one node at a fraction.
   using Make = void (*)(const WideMoment<S>& moment, std::uint32_t node);
-  At at_width[3];                   ///< [log2(width) - 1]
-  Join join_width[3];               ///< [log2(width) - 1]
-  LeafJoin leaf_join_padded[3][3];  ///< [log2(width) - 1][padded leaf size 4, 8, 16]
-  Make make_width[3];               ///< [log2(width) - 1]
-  Join self_width[3];               ///< [log2(width) - 1]; of a hierarchy with itself
+  At at_width[3];                ///< [log2(width) - 1]
+  Join join_width[3];            ///< [log2(width) - 1]
+  LeafJoin leaf_join_padded[3];  ///< [padded leaf size 4, 8, 16]
+  Make make_width[3];            ///< [log2(width) - 1]
+  Join self_width[3];            ///< [log2(width) - 1]; of a hierarchy with itself
 
   static constexpr std::size_t index(std::uint32_t width) { return width == 2 ? 0 : width == 4 ? 1 : 2; }
   At at(std::uint32_t width) const { return at_width[index(width)]; }
   Join join(std::uint32_t width) const { return join_width[index(width)]; }
   Join self(std::uint32_t width) const { return self_width[index(width)]; }
-  LeafJoin leaf_join(std::uint32_t width, std::uint32_t padded) const {
-    return leaf_join_padded[index(width)][index(padded / 2)];
-  }
+  LeafJoin leaf_join(std::uint32_t padded) const { return leaf_join_padded[index(padded / 2)]; }
   Make make(std::uint32_t width) const { return make_width[index(width)]; }
 };
 KBVH_DECLARE_KERNELS(WideLinearKernels<float>, wide_linear_float)
