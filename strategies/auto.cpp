@@ -25,9 +25,8 @@ struct Seen {
   double spread = 1;              // how different these are among a body's vertices, from 0: all the same
 };
 
-// Predicted nanoseconds per frame, fitted to tablecloth 16k, waving_sheet 8k, passing_spheres 5k,
-// expanding_sphere 5k, turning_box 8k and random_soups 4k at l = 1 to 30 (Zen 5, float): only their order
-// counts.
+// Predicted nanoseconds per frame, fitted to the scenes "tuned on" of experiments/plans/auto.json at l = 1 to
+// 30 (Zen 5, float): only their order counts.
 
 double refit_cost(const Seen& seen) {
   return 0.27 * seen.reads + 28 * seen.candidates;
@@ -50,9 +49,10 @@ double drift_cost(const Seen& seen) {
 double join_cost(const Seen& seen) {
   const double l = seen.frames_per_segment, moves = seen.slide * l;
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
-  if (seen.candidates == 0) return 1.5 / l * refit_cost(seen);  // bodies apart: a box at each end
+  // Bodies apart: a box at each end, unless they come to meet; on a long way they may fly through each other.
+  if (seen.candidates == 0) return 1.5 / l * (1 + moves * moves) * refit_cost(seen);
   const double alike = 1 - seen.spread;
-  return refit_cost(seen) * (0.06 + 4.7 / (l + 3) * (1 + 1.4 * moves) + 0.55 * alike * alike * moves);
+  return refit_cost(seen) * (0.08 + 5.5 / (l + 4.6) * (1 + moves) + 0.2 * alike * alike * moves);
 }
 
 /// A strategy to choose, the parameters that differ from its defaults, and what it would cost. To offer
