@@ -20,7 +20,7 @@ struct Contestant {
   BuilderConfig builder;  ///< ignored by strategies that build their own hierarchy
 };
 
-/// Seconds of one frame by phase (design, measuring policy).
+/// Seconds of one frame by phase.
 struct PhaseTimes {
   double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0, geometry_changes = 0;
   double query() const { return traversal + triangle_tests; }

@@ -48,7 +48,7 @@ inline Box<double> to_double(const Box<S>& box) {
   return result;
 }
 
-/// Contact counts: boxes that share a single point overlap (design, numeric policy).
+/// Contact counts: boxes that share a single point overlap.
 template <class S>
 inline bool overlap(const Box<S>& a, const Box<S>& b) {
   return (a.lower[0] <= b.upper[0]) & (b.lower[0] <= a.upper[0]) & (a.lower[1] <= b.upper[1]) &

@@ -9,7 +9,7 @@
 
 namespace kbvh {
 
-/// Do two primitives have a vertex in common? Then they are no pair (design, contract 4): they always touch.
+/// Do two primitives have a vertex in common? Then they are no pair: they always touch.
 inline bool share_vertex(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
   for (const std::uint32_t v : a)
     for (const std::uint32_t w : b)

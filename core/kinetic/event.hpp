@@ -45,7 +45,7 @@ struct Instant {
 };
 
 /// Decides everything about event times on the exact flight plans (truth A): order, whether an event is due,
-/// and failure times. Event order is exact time, then deeper node, then slot (design, numeric policy).
+/// and failure times. Event order is exact time, then deeper node, then slot.
 template <class S>
 class EventClock {
  public:

@@ -20,7 +20,7 @@ Rational exact(double x);
 /// a1). Throws std::invalid_argument if they do not, or coincide.
 Rational meeting_fraction(double a0, double a1, double b0, double b1);
 
-/// A vertex's plan of its own (design, contract 3): straight lines through the knots, the first of which is
+/// A vertex's plan of its own: straight lines through the knots, the first of which is
 /// the change itself, then a velocity for ever.
 struct OwnKnots {
   std::vector<double> times;      ///< seconds, strictly increasing
