@@ -28,7 +28,7 @@ enum class Counter : std::uint8_t {
   triangle_tests,          ///< exact triangle tests
   triangle_tests_exact,    ///< of these, the ones the filter left to exact arithmetic
   span_tests,              ///< attempts to decide a pair of triangles for a span of time
-  span_verdicts,           ///< pairs that a frame found decided for a span already
+  span_verdicts,           ///< pairs that a frame took to intersect by an earlier frame's verdict
   bodies_skipped,          ///< bodies of which a frame looked at nothing, or at nothing but one box
   nodes_skipped,           ///< nodes that an update left alone, since no query of the frame could read them
   bodies_translated,       ///< bodies whose boxes were moved as they were: so they go over the whole segment

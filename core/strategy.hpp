@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -21,7 +22,7 @@ struct MovingPoints;
 /// Does a strategy keep every box as small as it can be, or only large enough?
 enum class Tightness : std::uint8_t { tight, conservative, none };
 
-/// What `pairs_at` promises (design, measuring policy).
+/// What `pairs_at` promises.
 enum class Guarantee : std::uint8_t {
   exact,               ///< candidates contain the oracle's pairs, and confirming them yields exactly those
   candidate_superset,  ///< the same for candidates of a peer library: contained, and equal after kbvh's own
@@ -171,7 +172,8 @@ class Strategy {
   /// What a strategy that chooses has chosen since `reset`, in words; empty for all others.
   virtual std::string choice() const { return {}; }
 
-  /// Everything counted since `reset`; all zero but for triangle tests and bytes in a silent instance.
+  /// Everything counted since `reset`, which is not counted itself: what starting costs is not what running
+  /// costs. All zero but for triangle tests and bytes in a silent instance.
   Counters counters() const {
     Counters table = counted();
     table[Counter::triangle_tests] += triangle_stats_.tests;
@@ -182,14 +184,16 @@ class Strategy {
 
  protected:
   virtual Counters counted() const { return {}; }
-  /// To be called first by every `reset`.
+  /// To be called first by every `reset`. Throws std::invalid_argument if t is not finite.
   void start_at(double t) {
+    if (!std::isfinite(t)) throw std::invalid_argument("cannot start at t = " + std::to_string(t));
     triangle_stats_ = {};
     time_ = t;
   }
-  /// To be called first by every `advance`. Throws std::invalid_argument if t is before the last time.
+  /// To be called first by every `advance`. Throws std::invalid_argument if t is before the last time, or not
+  /// a number.
   void move_to(double t) {
-    if (t < time_)
+    if (!(t >= time_))
       throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
                                   std::to_string(t));
     time_ = t;

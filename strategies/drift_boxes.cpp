@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "core/geometry/predicates.hpp"
+#include "core/hierarchy/drift_body.hpp"
 #include "core/hierarchy/drift_model.hpp"
 #include "core/hierarchy/near_pairs.hpp"
 #include "core/kernels/bounds.hpp"
@@ -21,40 +22,10 @@
 namespace kbvh {
 namespace {
 
-/// What is looked at of a body at a frame.
-enum class Watch : std::uint8_t {
-  nothing,  ///< it rests
-  box,      ///< it is too far from all others: its own box
-  drift,    ///< how far its vertices moved since its boxes were made
-};
-
-double below(double value) {
-  return std::nextafter(value, -std::numeric_limits<double>::infinity());
-}
-double above(double value) {
-  return std::nextafter(value, std::numeric_limits<double>::infinity());
-}
-
-/// One body since its boxes were made, "then". Sides are lower x, y, z, upper x, y, z.
-template <class S>
-struct DriftBody {
-  AlignedArray<S> before;                      // positions then, of those whose drift is read
-  double low[3] = {}, high[3] = {};            // no vertex moved by less, or more, since then
-  double rate_low[3] = {}, rate_high[3] = {};  // the same in one frame, as was seen last
-  Box<double> box, box_then;                   // hold every vertex now, and then
-  S margin[6] = {};                            // by which its boxes are larger than the vertices were then
-  double slack = 0;                            // more than all roundings of a comparison of boxes
-  double moved = 0, rounding = 0;              // the bound on steps: the way of any vertex since then
-  double leaf_size = 0;                        // mean side of a leaf's box
-  Watch watch = Watch::nothing;
-  bool near = false;     // to another body: it takes part in searches
-  bool changed = false;  // plans of its own: it is no body at rest any more
-  bool widened = false;  // boxes hold the margin already (bodies at rest)
-};
-
 template <class S, class Count, class Motion>
 class DriftStrategy : public Strategy<S> {
   using Body = DriftBody<S>;
+  using Watch = typename Body::Watch;
   static constexpr bool bounded = std::is_same_v<Motion, SteppedMotion<S>>;
 
  public:
@@ -105,19 +76,8 @@ class DriftStrategy : public Strategy<S> {
     this->move_to(t);
     ++frames_;
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) observe(index, last, t);
-    const bool listed = period_ > 0;
-    if (listed && !search_due_ && !plans_changed_ && covered()) return;
-    plans_changed_ = false;
-    if (!listed && --plain_left_ > 0) {
-      // The frame before lists are tried again is remembered, so that there is a motion to judge by.
-      for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
-        if (!bodies_[index].near || bodies_[index].watch == Watch::nothing) continue;
-        make_boxes(index);
-        if (plain_left_ == 1) remember(index);
-      }
-      if (!meets_newly()) return;
-    }
-    begin_period();
+    bring_up_to_date();
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) count_skipped(index);
   }
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
@@ -148,11 +108,9 @@ class DriftStrategy : public Strategy<S> {
       body.widened = false;
       plans_changed_ = true;
     }
-    // The way so far stays bounded; from the stored position on, rounding starts over.
     if constexpr (bounded)
       for (Body& body : bodies_)
-        if (body.changed)  // enlarged, for so is what a change of a body far from here has been rounded by
-          body.moved = above(above(body.moved + body.rounding) + eps * body.moved);
+        if (body.changed) body.plans_changed();
   }
 
   std::optional<AuditView> audit_view(std::uint32_t index) const override {
@@ -161,12 +119,8 @@ class DriftStrategy : public Strategy<S> {
     AuditView view{hierarchy.topology(), {}, {}};
     const bool old = period_ > 0 && body.watch == Watch::drift;
     for (std::uint32_t node = 0; node < view.topology.size(); ++node) {
-      Box<double> box = to_double(hierarchy.box(node));
-      for (int axis = 0; old && axis < 3; ++axis) {
-        box.lower[axis] = below(box.lower[axis] + body.low[axis]);
-        box.upper[axis] = above(box.upper[axis] + body.high[axis]);
-      }
-      view.boxes.push_back(box);
+      const Box<double> box = to_double(hierarchy.box(node));
+      view.boxes.push_back(old ? body.moved_on(box) : box);
     }
     if (body.near || body.watch == Watch::nothing || view.boxes.empty()) return view;
     view.stale.assign(view.boxes.size(), 1);
@@ -192,7 +146,6 @@ class DriftStrategy : public Strategy<S> {
 
  private:
   enum class Lists : std::uint8_t { tuned, never };
-  static constexpr double eps = std::numeric_limits<S>::epsilon();
 
   bool may_move(std::uint32_t index) const {
     return (this->scene_.moving(index) || bodies_[index].changed) && !hierarchies_[index].empty();
@@ -202,38 +155,26 @@ class DriftStrategy : public Strategy<S> {
 
   void observe(std::uint32_t index, double last, double t) {
     Body& body = bodies_[index];
-    const std::uint32_t nodes = hierarchies_[index].topology().size();
-    if (body.watch == Watch::nothing) {
-      count_.add(Counter::bodies_skipped);
-      count_.add(Counter::nodes_skipped, nodes);
-      return;
-    }
+    body.remade = false;
+    if (body.watch == Watch::nothing) return;
     if constexpr (bounded) {
       const double way = motion_.displacement_bound(index, last, t);
-      if (way > 0) {
-        body.moved = above(body.moved + way);
-        // Both positions are the plan's, rounded.
-        const double most = above(body.moved + 2 * body.rounding + 2 * (eps * body.moved));
-        drifted(body, most, way);
-      }
-      count_.add(Counter::nodes_skipped, nodes);
-      if (!body.near) count_.add(Counter::bodies_skipped);
+      if (way > 0) body.moved_by_at_most(way);
     } else if (period_ > 0 || plain_left_ <= 1 || !body.near) {
       if (body.watch == Watch::box) {
         const Box<double> before = body.box;
         take_box(index);
-        for (int axis = 0; axis < 3; ++axis) {
-          const double lower = body.box.lower[axis] - before.lower[axis],
-                       upper = body.box.upper[axis] - before.upper[axis];
-          body.rate_low[axis] = std::min(lower, upper);
-          body.rate_high[axis] = std::max(lower, upper);
-        }
-        count_.add(Counter::bodies_skipped);
+        body.box_moved_from(before);
       } else {
         read_drift(index);
       }
-      count_.add(Counter::nodes_skipped, nodes);
     }
+  }
+  void count_skipped(std::uint32_t index) {
+    const Body& body = bodies_[index];
+    if (body.remade) return;
+    count_.add(Counter::nodes_skipped, hierarchies_[index].topology().size());
+    if (body.watch == Watch::nothing || !body.near) count_.add(Counter::bodies_skipped);
   }
 
   /// The box of all vertices now.
@@ -254,50 +195,29 @@ class DriftStrategy : public Strategy<S> {
     const std::uint32_t count = this->scene_.vertex_count(index);
     S interval[8];
     near_kernels<S>(kernels_).drift(this->sampled_.positions(index), body.before.data(), count, interval);
-    for (int axis = 0; axis < 3; ++axis) {
-      const double low = double(interval[axis]), high = double(interval[axis + 4]);
-      body.rate_low[axis] = low / frames_;
-      body.rate_high[axis] = high / frames_;
-      body.low[axis] = low - std::abs(low) * eps;
-      body.high[axis] = high + std::abs(high) * eps;
-    }
-    put_box(body);
+    body.drifted_by(interval, frames_);
     count_.add(Counter::vertex_reads, 2 * std::uint64_t(count));
-  }
-
-  static void drifted(Body& body, double most, double way) {
-    for (int axis = 0; axis < 3; ++axis) {
-      body.low[axis] = -most;
-      body.high[axis] = most;
-      body.rate_low[axis] = -way;
-      body.rate_high[axis] = way;
-    }
-    put_box(body);
-  }
-  static void put_box(Body& body) {
-    for (int axis = 0; axis < 3; ++axis) {
-      body.box.lower[axis] = below(body.box_then.lower[axis] + body.low[axis]);
-      body.box.upper[axis] = above(body.box_then.upper[axis] + body.high[axis]);
-    }
   }
 
   // ---- What a period of frames has in common --------------------------------------------------------------
 
-  /// By how much side k of the gap between two bodies (near_pairs.hpp) may have closed, and how much it may.
-  static double closing(const Body& a, const Body& b, std::size_t k) {
-    return k < 3 ? a.high[k] - b.low[k] : b.high[k - 3] - a.low[k - 3];
+  /// Where boxes of then do for this frame, too, nothing is done.
+  void bring_up_to_date() {
+    const bool listed = period_ > 0;
+    if (listed && !search_due_ && !plans_changed_ && covered()) return;
+    plans_changed_ = false;
+    if (!listed && --plain_left_ > 0) {
+      // The frame before lists are tried again is remembered, so that there is a motion to judge by.
+      for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+        if (!bodies_[index].near || bodies_[index].watch == Watch::nothing) continue;
+        make_boxes(index);
+        if (plain_left_ == 1) remember(index);
+      }
+      if (!meets_newly()) return;
+    }
+    begin_period();
   }
-  static S reach(const Body& a, const Body& b, std::size_t k) {
-    return k < 3 ? a.margin[k + 3] + b.margin[k] : b.margin[k] + a.margin[k - 3];
-  }
-  /// Which fraction of the reach the frame has used, quotients rounded up.
-  double used(const BodyPair& pair) const {
-    const Body &a = bodies_[pair.first], &b = bodies_[pair.second];
-    double most = 0;
-    for (std::size_t k = 0; k < 6; ++k)
-      most = std::max(most, closing(a, b, k) / double(reach(a, b, k)) * (1 + 0x1p-16));
-    return std::min(most, 1.0);
-  }
+
   bool covered() const {
     for (std::size_t i = 0; i < near_.size(); ++i) {
       const Body &a = bodies_[this->scene_.pairs()[i].first], &b = bodies_[this->scene_.pairs()[i].second];
@@ -305,8 +225,7 @@ class DriftStrategy : public Strategy<S> {
         if (overlap(a.box, b.box)) return false;
         continue;
       }
-      for (std::size_t k = 0; k < 6; ++k)
-        if (!(closing(a, b, k) + a.slack + b.slack <= double(reach(a, b, k)) * (1 - 0x1p-16))) return false;
+      if (!keeps_to_reach(a, b)) return false;
     }
     return true;
   }
@@ -363,7 +282,7 @@ class DriftStrategy : public Strategy<S> {
       if (!body.near || !(body.moved > 0)) continue;
       take_box(index);
       body.box_then = body.box;
-      stand(body);
+      body.stand();
       any = true;
     }
     return any;
@@ -388,33 +307,16 @@ class DriftStrategy : public Strategy<S> {
   void set_margin(std::uint32_t index) {
     Body& body = bodies_[index];
     if (body.widened) return;  // a body at rest
-    double largest = 0;
-    for (int axis = 0; axis < 3; ++axis)
-      largest = std::max({largest, std::abs(body.box.lower[axis]), std::abs(body.box.upper[axis])});
-    body.slack = 8 * eps * largest;
-    const double least = std::max(2 * body.slack, 4 * double(std::numeric_limits<S>::min()));
-    const double frames = 1.0625 * period_, moves = may_move(index) ? frames : 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      body.margin[axis] = S(least + moves * std::max(0.0, -body.rate_low[axis]));
-      body.margin[axis + 3] = S(least + moves * std::max(0.0, body.rate_high[axis]));
-    }
+    body.set_margin(may_move(index) ? 1.0625 * period_ : 0);
   }
 
   /// Bodies that may meet while they keep to their margins.
   void find_near() {
     for (Body& body : bodies_) body.near = false;
-    const auto swept = [](const Body& body) {
-      Box<double> box = body.box;
-      for (int axis = 0; axis < 3; ++axis) {
-        box.lower[axis] -= 2 * double(body.margin[axis]);
-        box.upper[axis] += 2 * double(body.margin[axis + 3]);
-      }
-      return box;
-    };
     for (std::size_t i = 0; i < near_.size(); ++i) {
       const BodyPair pair = this->scene_.pairs()[i];
       const bool near = !hierarchies_[pair.first].empty() && !hierarchies_[pair.second].empty() &&
-                        overlap(swept(bodies_[pair.first]), swept(bodies_[pair.second]));
+                        overlap(bodies_[pair.first].swept(), bodies_[pair.second].swept());
       pair_is_near_[i] = near ? 1 : 0;
       if (near) bodies_[pair.first].near = bodies_[pair.second].near = true;
     }
@@ -427,22 +329,13 @@ class DriftStrategy : public Strategy<S> {
     this->sampled_.fetch_all(index);
     hierarchy.positions_changed();
     hierarchy.refit(this->sampled_.positions(index));
+    body.remade = true;
     body.box = body.box_then = to_double(hierarchy.box(0));
-    stand(body);
+    body.stand();
     const std::uint32_t nodes = hierarchy.topology().size();
     count_.add(Counter::nodes_visited, nodes);
     count_.add(Counter::values_written, std::uint64_t(6) * nodes);
     count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
-  }
-  /// Then is now.
-  void stand(Body& body) {
-    std::fill_n(body.low, 3, 0.0);
-    std::fill_n(body.high, 3, 0.0);
-    body.moved = 0;
-    double largest = 0;
-    for (int axis = 0; axis < 3; ++axis)
-      largest = std::max({largest, std::abs(body.box.lower[axis]), std::abs(body.box.upper[axis])});
-    body.rounding = above(largest * eps / 2) + double(std::numeric_limits<S>::denorm_min());
   }
   void remember(std::uint32_t index) {
     if (bounded || !may_move(index)) return;
@@ -460,7 +353,7 @@ class DriftStrategy : public Strategy<S> {
   /// The candidates of two bodies from their list; returns the box tests made.
   std::uint64_t read(std::size_t i, const BodyPair& pair, PairBuffer& out) {
     // At the frame of the search the list begins with what overlaps, exactly.
-    const double fraction = frames_ == 0 ? 0 : used(pair);
+    const double fraction = frames_ == 0 ? 0 : used_reach(bodies_[pair.first], bodies_[pair.second]);
     if (!checks_ || frames_ == 0) {
       near_[i].read(fraction, out);
       return 0;

@@ -56,7 +56,8 @@ class IntervalJoinStrategy final : public Strategy<S> {
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), linear_settings(params)),
         now_(scene.pairs().size()),
         next_(scene.pairs().size()),
-        by_spans_(scene.pairs().size(), params.word("triangle_tests") == "spans") {
+        by_spans_(scene.pairs().size(), params.word("triangle_tests") == "spans"),
+        updates_(scene.body_count()) {
     for (std::size_t i = 0; i < scene.pairs().size(); ++i)
       for (const std::uint32_t body : {scene.pairs()[i].first, scene.pairs()[i].second})
         if (!all_triangles(scene.primitives(body))) by_spans_[i] = false;
@@ -65,13 +66,13 @@ class IntervalJoinStrategy final : public Strategy<S> {
 
   void reset(double t) override {
     this->start_at(t);
-    count_.table = {};
-    first_fetch_ = this->sampled_.fetched();
     for (Joins<S>* one : {&now_, &next_})
       for (auto& answers : one->answers) answers.clear_counts();
     bounds_.start();
     new_segment();
     before_ = t;
+    count_.table = {};
+    first_fetch_ = this->sampled_.fetched();
   }
 
   void advance(double t) override {
@@ -124,6 +125,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
   void start_sweep(double t) override {
     this->stand_at(t);
     bounds_.enter();
+    if constexpr (Count::enabled) updates_.add_to(count_, bounds_);
     ahead_ = {};
     joined_ = false;
     if (!sweeps_.empty()) return;
@@ -165,7 +167,8 @@ class IntervalJoinStrategy final : public Strategy<S> {
  protected:
   Counters counted() const override {
     Counters table = count_.table;
-    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
+    if constexpr (!Count::enabled) return table;
+    table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
     for (const Joins<S>* one : {&now_, &next_})
       for (const auto& answers : one->answers) {
         table[Counter::span_tests] += answers.attempts();
@@ -180,7 +183,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
   static constexpr double node_cost = 35, answer_cost = 5;
 
   void new_segment() {
-    if constexpr (Count::enabled) count_linear_update(bounds_, count_);
+    if constexpr (Count::enabled) updates_.add_to(count_, bounds_);
     joined_ = false;
     if (bounds_.came_ahead() && ahead_.joins_begun) {
       join_ahead(bounds_.segment(), 1);
@@ -227,7 +230,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
       ahead_.stage = Stage::joins;
     else if (!bounds_.has_ahead())
       ahead_.stage = Stage::nothing;
-    if constexpr (Count::enabled) count_linear_update(bounds_, count_);
+    if constexpr (Count::enabled) updates_.add_to(count_, bounds_);
     ahead_.done += std::clamp(wanted, 0.0, node_cost * double(bounds_.nodes_of_segment()));
   }
   /// Brings the work on joins and answers ahead to a share of it; all of it from 1 on.
@@ -273,6 +276,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
   };
   std::vector<Block> blocks_;
   PairBuffer answered_, to_test_;
+  LinearCounts<S> updates_;
   Count count_;
   std::uint64_t first_fetch_ = 0;
 };

@@ -17,18 +17,19 @@ class LinearBoundsStrategy final : public Strategy<S> {
                        const Params& params)
       : Strategy<S>(scene, motion),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), linear_settings(params)),
-        stale_(scene.body_count()) {
+        stale_(scene.body_count()),
+        updates_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       stale_[body].resize(bounds_.hierarchy(body).node_count());
   }
 
   void reset(double t) override {
     this->start_at(t);
-    count_.table = {};
     bounds_.start();
     new_frame();
+    updates_.skip(bounds_);
+    count_.table = {};
     first_fetch_ = this->sampled_.fetched();
-    count_update();
   }
 
   void advance(double t) override {
@@ -86,12 +87,13 @@ class LinearBoundsStrategy final : public Strategy<S> {
             bounds_.fraction(t)};
   }
   void count_update() {
-    if constexpr (Count::enabled) count_linear_update(bounds_, count_);
+    if constexpr (Count::enabled) updates_.add_to(count_, bounds_);
   }
 
   LinearBounds<S> bounds_;
   WideQuery<S> query_;
   std::vector<std::vector<std::uint8_t>> stale_;  ///< [body][wide node]
+  LinearCounts<S> updates_;
   Count count_;
   std::uint64_t first_fetch_ = 0;
 };

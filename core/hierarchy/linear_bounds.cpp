@@ -62,7 +62,8 @@ void LinearBounds<S>::choose_segment(Segment& segment, const SegmentMotion<S>& m
   }
   if (rest || begin == -std::numeric_limits<double>::infinity()) begin = t;
   // Plans without an end: as many frames ahead as they have lasted lately, as far as can be told.
-  if (!rest && end == std::numeric_limits<double>::infinity()) {
+  segment.endless = !rest && end == std::numeric_limits<double>::infinity();
+  if (segment.endless) {
     segment.begin = std::max(begin, t);
     segment.end = segment.knot = t + 1.01 * foreseen_ * (step_ > 0 ? step_ : 1.0 / 64);
     return;
@@ -149,15 +150,15 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
       refit.remembered = target;
     }
   }
-  ++counts_[index].refits;
   return refit;
 }
 
 template <class S>
-void LinearBounds<S>::proceed(std::uint32_t body, Refit& refit, std::uint64_t nodes) const {
+void LinearBounds<S>::proceed(std::uint32_t body, Refit& refit, std::uint64_t nodes) {
   if (refit.left == 0) return;
   const std::uint32_t begin = refit.left - std::uint32_t(std::min<std::uint64_t>(refit.left, nodes));
   bodies_[body].hierarchy.refit_into(refit.lanes, refit.own, refit.positions, begin, refit.left);
+  counts_[body].refitted += refit.left - begin;
   refit.left = begin;
   if (begin == 0 && refit.remembered != nullptr) refit.remembered->complete = true;
 }
@@ -242,7 +243,7 @@ void LinearBounds<S>::enter() {
 }
 
 /// Gives a body's ends over a segment their slots, and makes what is at its begin. Returns whether the other
-/// end is to be made. `before` is the segment before, whose ends stay as they are if `keep_before`.
+/// end is to be made. `before` is the segment before.
 template <class S>
 bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion,
                                  std::uint32_t body, double t, Before what) {
@@ -286,7 +287,7 @@ void LinearBounds<S>::go_on() {
   const double t = motion_.time();
   const Segment& before = segments_[present_];
   Segment& segment = segments_[1 - present_];
-  const bool anew = before.end == none, new_knot = anew || before.end >= before.knot;
+  const bool anew = before.end == none, new_knot = anew || t >= before.knot || before.end >= before.knot;
   if (!anew) foreseen_ = std::min(16.0, 2 * foreseen_);
   segment.pieces = whole_ ? 1 : new_knot ? cuts_.pieces : before.pieces;
   choose_segment(segment, motion_, t);
@@ -300,7 +301,7 @@ void LinearBounds<S>::go_on() {
     }
   }
   present_ = 1 - present_;
-  if (new_knot && cuts_.max_looseness > 0 && !whole_) cut_while_loose(t);
+  if (new_knot && cuts_.max_looseness > 0 && !whole_ && !segment.endless) cut_while_loose(t);
   finish(segment, motion_);
 }
 
@@ -407,7 +408,7 @@ double LinearBounds<S>::looseness_in_the_middle() {
     std::copy_n(one.at[0].lanes, scalars, middle_lanes_.data());  // empty lanes
     hierarchy(body).refit_into(middle_lanes_.data(), middle_own_.data(),
                                motion_.positions_on_lines(body, t, middle_room_));
-    ++counts_[body].refits;
+    counts_[body].refitted += nodes;
     for (std::uint32_t node = 0; node < hierarchy(body).topology().size(); ++node) {
       tight += area(hierarchy(body).box_in(middle_lanes_.data(), middle_own_.data(), node));
       linear += area(one.box_between(node, 0.5));

@@ -72,13 +72,14 @@ class LinearBounds {
   /// The same with what there is no box of marked as stale.
   AuditView audit_view(std::uint32_t body, double t) const;
 
-  /// How often boxes of a body were made at an end of a segment, and how often it was left alone when one
-  /// began: at rest, apart and but for one box, moved as it was, or remembered.
+  /// What was done for a body at ends of segments, and how often it was left alone when one began: at rest,
+  /// apart and but for one box, moved as it was, or remembered.
   struct Counts {
-    std::uint64_t refits = 0, at_rest = 0, apart = 0, translated = 0, translated_apart = 0, remembered = 0;
+    std::uint64_t refitted = 0;  ///< wide nodes
+    std::uint64_t at_rest = 0, apart = 0, translated = 0, translated_apart = 0, remembered = 0;
   };
-  /// Since it was asked last.
-  Counts take_counts(std::uint32_t body) { return std::exchange(counts_[body], {}); }
+  /// Since `start`.
+  const Counts& counts(std::uint32_t body) const { return counts_[body]; }
 
   std::size_t bytes() const;
 
@@ -86,6 +87,7 @@ class LinearBounds {
   struct Segment : LinearSegment<S> {
     double knot = 0;  ///< end of the whole segment of which it may be a piece
     std::uint32_t pieces = 1;
+    bool endless = false;  ///< of lines without an end, and as long as can be told: not to be cut
   };
   /// Boxes that are being made, from the last node to the first.
   struct Refit {
@@ -116,7 +118,7 @@ class LinearBounds {
   double looseness_in_the_middle();
   Refit begin_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body, std::uint32_t end,
                   double t);
-  void proceed(std::uint32_t body, Refit& refit, std::uint64_t nodes) const;
+  void proceed(std::uint32_t body, Refit& refit, std::uint64_t nodes);
   bool make_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body, std::uint32_t end,
                 double t);
   void finish(Segment& segment, const SegmentMotion<S>& motion);
@@ -140,26 +142,46 @@ class LinearBounds {
   std::vector<std::uint8_t> near_;  ///< by body: to another one, over the segment
 };
 
-/// Counts the ends that were made since `bounds` was asked last, as updates.
-template <class S, class Count>
-void count_linear_update(LinearBounds<S>& bounds, Count& count) {
-  for (std::uint32_t body = 0; body < bounds.body_count(); ++body) {
-    const auto& hierarchy = bounds.hierarchy(body);
-    const auto counts = bounds.take_counts(body);
-    const std::uint64_t nodes = hierarchy.topology().size();
-    count.add(Counter::nodes_visited, (counts.refits + counts.translated) * nodes);
-    count.add(Counter::values_written, 6 * (counts.refits + counts.translated) * nodes);
-    count.add(Counter::vertex_reads,
-              counts.refits * hierarchy.leaf_vertex_count() + counts.apart * bounds.vertex_count(body));
-    count.add(Counter::bodies_translated, counts.translated + counts.translated_apart);
-    count.add(Counter::bodies_remembered, counts.remembered);
-    const std::uint64_t skipped = counts.at_rest + counts.apart + counts.translated_apart;
-    count.add(Counter::bodies_skipped, skipped);
-    count.add(Counter::nodes_skipped, skipped * nodes);
-  }
-}
+/// Counts what bounds do as updates of a strategy.
+template <class S>
+class LinearCounts {
+ public:
+  explicit LinearCounts(std::uint32_t bodies) : before_(bodies) {}
 
-extern template class LinearBounds<float>;
-extern template class LinearBounds<double>;
+  /// Forgets what was done up to now.
+  void skip(const LinearBounds<S>& bounds) {
+    for (std::uint32_t body = 0; body < bounds.body_count(); ++body) before_[body] = bounds.counts(body);
+  }
+  /// Counts what was done since it was asked last.
+  template <class Count>
+  void add_to(Count& count, LinearBounds<S>& bounds) {
+    for (std::uint32_t body = 0; body < bounds.body_count(); ++body) {
+      const auto& hierarchy = bounds.hierarchy(body);
+      const auto now = bounds.counts(body), before = std::exchange(before_[body], now);
+      const std::uint64_t nodes = hierarchy.topology().size();
+      // Parts of refits, such that they add up to whole ones.
+      const auto refitted = [&](std::uint64_t all) {
+        return hierarchy.empty() ? 0
+                                 : all * now.refitted / hierarchy.node_count() -
+                                       all * before.refitted / hierarchy.node_count();
+      };
+      const std::uint64_t made = refitted(nodes) + (now.translated - before.translated) * nodes;
+      count.add(Counter::nodes_visited, made);
+      count.add(Counter::values_written, 6 * made);
+      count.add(Counter::vertex_reads, refitted(hierarchy.leaf_vertex_count()) +
+                                           (now.apart - before.apart) * bounds.vertex_count(body));
+      count.add(Counter::bodies_translated,
+                now.translated - before.translated + now.translated_apart - before.translated_apart);
+      count.add(Counter::bodies_remembered, now.remembered - before.remembered);
+      const std::uint64_t skipped = now.at_rest - before.at_rest + now.apart - before.apart +
+                                    now.translated_apart - before.translated_apart;
+      count.add(Counter::bodies_skipped, skipped);
+      count.add(Counter::nodes_skipped, skipped * nodes);
+    }
+  }
+
+ private:
+  std::vector<typename LinearBounds<S>::Counts> before_;
+};
 
 }  // namespace kbvh

@@ -156,8 +156,8 @@ std::size_t SpanAnswers<S>::read(const LinearSegment<S>& segment, const SceneVie
     else
       open_.push_back({pair, fraction});
   due_.resize(worth);
-  attempt_all(segment, scene, join, fraction);
   decided_ += intersecting_.size();
+  attempt_all(segment, scene, join, fraction);
   const std::size_t before = out.size();
   out.resize(before + intersecting_.size() + open_.size());
   PrimitivePair* to = out.data() + before;

@@ -108,6 +108,12 @@ class StoredHierarchyStrategy : public Strategy<S> {
     this->move_to(t1);
     if (!swept_) swept_.emplace(this->scene_, hierarchies_);
     swept_->refit(before, this->sampled_);
+    for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
+      const std::uint64_t nodes = hierarchies_[body].topology().size();
+      count_.add(Counter::nodes_visited, nodes);
+      count_.add(Counter::values_written, 6 * nodes);
+      count_.add(Counter::vertex_reads, 2 * hierarchies_[body].leaf_vertex_count());
+    }
     std::uint64_t tests = 0;
     swept_->pairs(query_, out, tests);
     count_.add(Counter::box_tests, tests);

@@ -199,11 +199,6 @@ TimeEstimate crossing_estimate(const Crossing<S>& crossing) {
 }
 
 template <class S>
-double crossing_hint(const Crossing<S>& crossing) {
-  return crossing_estimate(crossing).time;
-}
-
-template <class S>
 int compare_crossing_to(const Crossing<S>& c, double t) {
   // The difference loser - winner has at t the sign of its slope times the sign of t - root.
   const int slope = compare_slopes(c.loser, c.winner);
@@ -258,7 +253,6 @@ int compare_at_crossing(const Piece<S>& a, const Piece<S>& b, const Crossing<S>&
   template int compare_at(const Piece<S>&, const Piece<S>&, double);      \
   template int compare_slopes(const Piece<S>&, const Piece<S>&);          \
   template TimeEstimate crossing_estimate(const Crossing<S>&);            \
-  template double crossing_hint(const Crossing<S>&);                      \
   template int compare_crossing_to(const Crossing<S>&, double);           \
   template int compare_crossings(const Crossing<S>&, const Crossing<S>&); \
   template int compare_at_crossing(const Piece<S>&, const Piece<S>&, const Crossing<S>&);

@@ -39,10 +39,6 @@ struct TimeEstimate {
 template <class S>
 TimeEstimate crossing_estimate(const Crossing<S>& crossing);
 
-/// crossing_estimate without the bound. Only a hint; no decision may rest on it.
-template <class S>
-double crossing_hint(const Crossing<S>& crossing);
-
 /// The sign of root - t.
 template <class S>
 int compare_crossing_to(const Crossing<S>& crossing, double t);

@@ -52,29 +52,29 @@ std::size_t FlightPlans<S>::segment_at(double t) const {
 }
 
 template <class S>
-void FlightPlans<S>::evaluate(double t, S* out, RoundingStats* stats) const {
+void FlightPlans<S>::evaluate(double t, S* out) const {
   const auto& times = keyframes_->times;
   const std::size_t k = segment_at(t), scalars = std::size_t(3) * keyframed_count_;
   if (t <= times[k] || k + 1 == times.size()) {
     std::copy_n(keyframe(k), scalars, out);
   } else {
-    round_chord(keyframe(k), keyframe(k + 1), scalars, times[k], times[k + 1], t, out, stats);
+    round_chord(keyframe(k), keyframe(k + 1), scalars, times[k], times[k + 1], t, out);
   }
   for (const OwnPlan& plan : own_)
     for (int axis = 0; plan.group == none && axis < 3; ++axis)
-      out[3 * std::size_t(plan.vertex) + std::size_t(axis)] = round_piece(own_piece(plan, axis, t), t, stats);
-  evaluate_rays(t, out, stats);
+      out[3 * std::size_t(plan.vertex) + std::size_t(axis)] = round_piece(own_piece(plan, axis, t), t);
+  evaluate_rays(t, out);
 }
 
 template <class S>
-void FlightPlans<S>::evaluate_rays(double t, S* out, RoundingStats* stats) const {
+void FlightPlans<S>::evaluate_rays(double t, S* out) const {
   constexpr std::size_t block = 128;  // vertices
   S positions[3 * block];
   for (const Rays& rays : rays_)
     for (std::size_t first = 0; first < rays.vertices.size(); first += block) {
       const std::size_t count = std::min(block, rays.vertices.size() - first);
       round_ray(rays.origins.data() + 3 * first, rays.velocities.data() + 3 * first, 3 * count, rays.t0, t,
-                positions, stats);
+                positions);
       for (std::size_t i = 0; i < count; ++i)
         std::copy_n(positions + 3 * i, 3, out + std::size_t(3) * rays.vertices[first + i]);
     }
@@ -118,8 +118,7 @@ void FlightPlans<S>::leave_rays(const OwnPlan& plan) {
 }
 
 template <class S>
-void FlightPlans<S>::evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out,
-                                        RoundingStats* stats) const {
+void FlightPlans<S>::evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out) const {
   const auto& times = keyframes_->times;
   const std::size_t k = segment_at(t);
   if (t <= times[k] || k + 1 == times.size()) {
@@ -127,21 +126,20 @@ void FlightPlans<S>::evaluate_keyframed(double t, std::span<const std::uint32_t>
       std::copy_n(keyframe(k) + std::size_t(3) * v, 3, out + std::size_t(3) * v);
   } else {
     round_chord_vertices(keyframe(k), keyframe(k + 1), vertices.data(), vertices.size(), times[k],
-                         times[k + 1], t, out, stats);
+                         times[k + 1], t, out);
   }
 }
 
 template <class S>
-void FlightPlans<S>::evaluate(double t, std::span<const std::uint32_t> vertices, S* out,
-                              RoundingStats* stats) const {
+void FlightPlans<S>::evaluate(double t, std::span<const std::uint32_t> vertices, S* out) const {
   if (vertex_count_ == keyframed_count_) {
-    evaluate_keyframed(t, vertices, out, stats);
+    evaluate_keyframed(t, vertices, out);
   } else {
     // Vertices added at run time have no keyframes: only the runs between them are looked up there.
     const auto added = [this](std::uint32_t v) { return v >= keyframed_count_; };
     for (auto begin = vertices.begin(); begin != vertices.end();) {
       const auto end = std::find_if(begin, vertices.end(), added);
-      evaluate_keyframed(t, {begin, end}, out, stats);
+      evaluate_keyframed(t, {begin, end}, out);
       begin = std::find_if_not(end, vertices.end(), added);
     }
   }
@@ -175,7 +173,7 @@ template <class S>
 double FlightPlans<S>::lines_begin(double t) const {
   const auto& times = keyframes_->times;
   double begin =
-      keyframed_count_ == 0 || t < times[0] ? -std::numeric_limits<double>::infinity() : times[segment_at(t)];
+      !has_knots() || t < times[0] ? -std::numeric_limits<double>::infinity() : times[segment_at(t)];
   for (const OwnPlan& plan : own_) {
     const auto above = std::upper_bound(plan.times.begin(), plan.times.end(), t);
     if (above != plan.times.begin()) begin = std::max(begin, *(above - 1));
@@ -186,7 +184,7 @@ double FlightPlans<S>::lines_begin(double t) const {
 template <class S>
 double FlightPlans<S>::lines_end(double t) const {
   const auto& times = keyframes_->times;
-  const auto above = std::upper_bound(times.begin(), times.end(), t);
+  const auto above = has_knots() ? std::upper_bound(times.begin(), times.end(), t) : times.end();
   double end = above == times.end() ? std::numeric_limits<double>::infinity() : *above;
   for (const OwnPlan& plan : own_) end = std::min(end, piece_end(plan.vertex, t));
   return end;

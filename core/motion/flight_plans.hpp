@@ -53,14 +53,15 @@ class FlightPlans {
   /// be read.
   const S* keyframe(std::size_t k) const { return keyframes_->positions.data() + 3 * k * keyframed_count_; }
   bool moving() const { return keyframe_count() > 1 || !own_.empty(); }
+  /// Do its keyframes end lines? A single one is where the body is at all times.
+  bool has_knots() const { return keyframed_count_ > 0 && keyframe_count() > 1; }
   bool has_own_plans() const { return !own_.empty(); }
   bool has_own_plan(std::uint32_t vertex) const { return !own_.empty() && own_of_vertex_[vertex] != none; }
 
   /// Writes the position of every vertex at t: out[3 * vertex + axis]. O(vertices).
-  void evaluate(double t, S* out, RoundingStats* stats = nullptr) const;
+  void evaluate(double t, S* out) const;
   /// The same for the listed vertices only, into the same layout.
-  void evaluate(double t, std::span<const std::uint32_t> vertices, S* out,
-                RoundingStats* stats = nullptr) const;
+  void evaluate(double t, std::span<const std::uint32_t> vertices, S* out) const;
 
   /// Index k of the segment [times[k], times[k+1]) with t in it; 0 before the first, last index past the end.
   std::size_t segment_at(double t) const;
@@ -98,7 +99,7 @@ class FlightPlans {
   /// range (the position, too: a vertex can have flown out of it), knots not after t, or an unknown vertex.
   void change(double t, const PlanChange<S>& change, const S* position);
   /// Adds a vertex, with the next free id, that is at `position` (3 scalars) at t and follows the plan from
-  /// there (before t its first line means nothing, but is defined). `plan.body` and `plan.vertex` are
+  /// there (before t its first piece is defined, and means nothing). `plan.body` and `plan.vertex` are
   /// ignored. Throws std::invalid_argument like `change`, and on a position that is not admissible. Amortised
   /// O(knots).
   void add_vertex(double t, const PlanChange<S>& plan, const S* position);
@@ -129,7 +130,7 @@ class FlightPlans {
   };
   void join_rays(OwnPlan& plan);
   void leave_rays(const OwnPlan& plan);
-  void evaluate_rays(double t, S* out, RoundingStats* stats) const;
+  void evaluate_rays(double t, S* out) const;
   Piece<S> own_piece(const OwnPlan& plan, int axis, double t) const;
   double longest_step(std::size_t segment) const;
   std::optional<Translation<S>> find_translation(std::size_t segment) const;
@@ -137,8 +138,7 @@ class FlightPlans {
   double own_speed_bound(double t) const;
   static void check_plan(double t, const PlanChange<S>& change, std::uint32_t vertex, const S* position);
   static OwnPlan own_plan(double t, const PlanChange<S>& change, std::uint32_t vertex, const S* position);
-  void evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out,
-                          RoundingStats* stats) const;
+  void evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out) const;
 
   std::uint32_t vertex_count_ = 0, keyframed_count_ = 0;
   std::shared_ptr<const Keyframes> keyframes_;

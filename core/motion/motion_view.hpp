@@ -119,7 +119,7 @@ class ClipMotion : public SegmentMotion<S> {
  public:
   using SegmentMotion<S>::SegmentMotion;
   const FlightPlans<S>& plans(std::uint32_t body) const { return this->playback_->plans(body); }
-  /// What will be seen of segments at a later time, as long as no plan changes: for work ahead of time.
+  /// What will be seen of segments at a later time if no plan changes; positions are still the present's.
   SegmentMotion<S> from(double t) const {
     ClipMotion view = *this;
     view.from_ = t;

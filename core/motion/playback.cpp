@@ -1,7 +1,9 @@
 #include "core/motion/playback.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
+#include <string>
 
 namespace kbvh {
 
@@ -24,6 +26,7 @@ Playback<S>::Playback(const Scene<S>& scene) {
 
 template <class S>
 void Playback<S>::seek(double t) {
+  if (!std::isfinite(t)) throw std::invalid_argument("a frame at t = " + std::to_string(t));
   time_ = t;
   if (++epoch_ == 0) {  // after 2^32 frames the stamps start over
     for (auto& state : bodies_) std::fill(state.stamp.begin(), state.stamp.end(), 0);
@@ -39,7 +42,7 @@ template <class S>
 void Playback<S>::evaluate_all() {
   for (auto& state : bodies_) {
     if (state.all_current) continue;
-    state.plans.evaluate(time_, state.positions.data(), &rounding_);
+    state.plans.evaluate(time_, state.positions.data());
     state.all_current = true;
   }
 }
@@ -66,13 +69,13 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
   }
   fetched_ += stale_.size();
   state.fetched += std::uint32_t(stale_.size());
-  state.plans.evaluate(time_, stale_, state.positions.data(), &rounding_);
+  state.plans.evaluate(time_, stale_, state.positions.data());
 }
 
 template <class S>
 void Playback<S>::fetch_all(BodyState& state) {
   if (state.plans.moving()) fetched_ += state.plans.vertex_count() - state.fetched;
-  state.plans.evaluate(time_, state.positions.data(), &rounding_);
+  state.plans.evaluate(time_, state.positions.data());
   state.all_current = true;
 }
 

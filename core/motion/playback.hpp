@@ -10,15 +10,15 @@ namespace kbvh {
 /// Plays a scene's motion for one strategy: holds the current time, the current positions (truth B), and the
 /// plans with their run-time changes. The driver owns it; strategies see it through the view that their
 /// declared foresight allows (motion_view.hpp). Positions are evaluated all at once by the driver, or vertex
-/// by vertex on demand; each vertex at most once per frame. No allocation after construction but for added
-/// vertices.
+/// by vertex on demand; each vertex at most once per frame. No allocation after construction but for plans
+/// that change and added vertices.
 template <class S>
 class Playback {
  public:
   explicit Playback(const Scene<S>& scene);
 
   double time() const { return time_; }
-  /// Moves to t without evaluating any position.
+  /// Moves to t without evaluating any position. Throws std::invalid_argument if t is not finite.
   void seek(double t);
   /// Evaluates every vertex of every moving body at the current time.
   void evaluate_all();
@@ -57,9 +57,8 @@ class Playback {
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return bodies_[body].plans; }
   std::uint32_t body_count() const { return std::uint32_t(bodies_.size()); }
-  /// Positions evaluated on demand so far, and how the values were decided.
+  /// Positions evaluated on demand so far.
   std::uint64_t fetched() const { return fetched_; }
-  const RoundingStats& rounding() const { return rounding_; }
 
  private:
   struct BodyState {
@@ -75,7 +74,6 @@ class Playback {
   double time_ = 0;
   std::uint32_t epoch_ = 0;
   std::uint64_t fetched_ = 0;
-  RoundingStats rounding_;
   std::vector<BodyState> bodies_;
   std::vector<std::uint32_t> stale_;
 };

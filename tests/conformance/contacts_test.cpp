@@ -158,8 +158,8 @@ TEST(Features, EveryVertexAndEdgeHasOneOwner) {
   EXPECT_THROW(Features{quad}, std::invalid_argument);
 }
 
-// A triangle falls through another: at half of an interval from 2 to 6.
-TEST(ContactFinder, EnclosesTheTimeOfImpact) {
+/// A triangle falls through another, at half of the interval; the one keyframe of the other is at 0.
+Scene<float> falling_triangle(const std::vector<double>& interval) {
   Scene<float> scene;
   for (int body = 0; body < 2; ++body) {
     Body<float> made;
@@ -171,12 +171,15 @@ TEST(ContactFinder, EnclosesTheTimeOfImpact) {
         positions.push_back(x);
       if (body == 1) positions = {0, 0, 0, 1, 0, 0, 0, 1, 0};
     }
-    made.plans = FlightPlans<float>(3, body == 0 ? std::vector<double>{2, 6} : std::vector<double>{0},
-                                    std::move(positions));
+    made.plans = FlightPlans<float>(3, body == 0 ? interval : std::vector<double>{0}, std::move(positions));
     scene.bodies.push_back(std::move(made));
   }
   scene.pairs = all_pairs(scene.bodies);
-  const Truth<float> truth = truth_of(scene);
+  return scene;
+}
+
+TEST(ContactFinder, EnclosesTheTimeOfImpact) {
+  const Truth<float> truth = truth_of(falling_triangle({2, 6}));
   ASSERT_EQ(truth.contacts.size(), 1u);
   const auto first = std::min_element(truth.contacts[0].begin(), truth.contacts[0].end(),
                                       [](const Contact& a, const Contact& b) { return a.begin < b.begin; });
@@ -186,6 +189,33 @@ TEST(ContactFinder, EnclosesTheTimeOfImpact) {
   EXPECT_LE(first->begin, 4);
   EXPECT_GE(first->end, 4);
   EXPECT_LE(first->end - first->begin, 4 * impact_width + 1e-14);
+}
+
+// It is where the body is at all times: segments of others go on over it.
+TEST(ContactScenes, TheOneKeyframeOfABodyIsNoKnot) {
+  const Scene<float> scene = falling_triangle({-1, 1});
+  const Truth<float> truth = truth_of(scene);
+  ASSERT_EQ(truth.total, 3u);
+  for (const StrategyEntry& entry : registry()) {
+    if (!entry.info.can.contacts) continue;
+    expect_contacts(entry, scene, truth, entry.info.topology.preferred, 2, entry.info.id);
+  }
+}
+
+TEST(ContactScenes, CountWhatBoxesCost) {
+  const auto test = synthetic_scene<float>("self_rolled_cloth");
+  const Truth<float> truth = truth_of(test.scene);
+  for (const char* id : {"bottom_up", "interval_join", "interval_join_ahead"}) {
+    const StrategyEntry& entry = find_strategy(id);
+    Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+    PhaseTimes ignored;
+    session.reset(truth.knots[0]);
+    ContactBuffer found;
+    for (const int k : {1, 2}) session.contacts(truth.knots[std::size_t(k)], found, ignored);
+    const Counters counters = session.strategy().counters();
+    for (const Counter counter : {Counter::nodes_visited, Counter::values_written, Counter::vertex_reads})
+      EXPECT_GT(counters[counter], 0u) << id << ", " << name(counter);
+  }
 }
 
 // Boxes of pieces of segments are for frames; contacts are of whole segments.

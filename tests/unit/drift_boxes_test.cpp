@@ -73,6 +73,24 @@ TEST(DriftBoxes, WithABoundOnStepsBodiesFarApartCostNothing) {
   }
 }
 
+TEST(DriftBoxes, NodesThatAreRefittedAreNotSkipped) {
+  const Scene<float> scene = grids<float>(20, 0.5, left_side);
+  for (const char* id : {"drift_boxes", "drift_boxes_bounded"})
+    for (const char* lists : {"never", "tuned"}) {
+      Play<float> play(scene, id, {{"lists", lists}});
+      int refits = 0;
+      for (int f = 1; f <= 40; ++f) {
+        const Counters frame = play.frame(0.02 * f);
+        // Two bodies with as many nodes; one rests, and the other is refitted or skipped, too.
+        const std::uint64_t visited = frame[Counter::nodes_visited], skipped = frame[Counter::nodes_skipped];
+        EXPECT_GT(skipped, 0u) << id;
+        EXPECT_EQ(visited, visited == 0 ? 0 : skipped) << id << ", " << lists << ", frame " << f;
+        refits += frame[Counter::nodes_visited] > 0 ? 1 : 0;
+      }
+      EXPECT_GT(refits, 0);
+    }
+}
+
 TEST(DriftBoxes, ABodyThatRestsAgainAfterAResetIsWhereItWas) {
   // So slow that lists of near pairs are kept; the body at rest is shifted by a script, and then it is not.
   const Scene<float> scene = grids<float>(20, 0.5, left_side);
