@@ -55,6 +55,16 @@ def configurations(strategy: Any) -> tuple[str, int]:
     return strategy["id"], len(list(product(*map(listed, sweeps))))
 
 
+def contestants(study: dict[str, Any]) -> Iterator[tuple[str, int]]:
+    """Ids and configurations of all strategies; a group of them ("default", "family:...") counts as all that are known."""
+    for strategy in study.get("strategies", ["default"]):
+        name, count = configurations(strategy)
+        if name in ("default", "all") or name.startswith("family:"):
+            yield from ((known, count) for known in COSTS)
+        else:
+            yield name, count
+
+
 def minutes(study: dict[str, Any]) -> float:
     """The estimate for one study, with the plan's own keys filled in."""
     total = 0.0
@@ -64,8 +74,7 @@ def minutes(study: dict[str, Any]) -> float:
             frames = min(frames, study.get("frames_limit") or frames)
             checked = frames / study.get("oracle_every", 1)
             total += checked * ORACLE * thousands
-            for strategy in study.get("strategies", []):
-                name, count = configurations(strategy)
+            for name, count in contestants(study):
                 per_frame, per_interval = COSTS.get(name, UNKNOWN)
                 clip = frames * (per_frame + MOTION) + (frames / l) * per_interval
                 once = clip * (study.get("repetitions", 3) + CLIPS) + checked * ORACLE

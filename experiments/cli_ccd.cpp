@@ -28,8 +28,9 @@ constexpr const char* examples = R"(Examples:
 Decides queries of continuous collision detection (a vertex and a face, or two edges, in linear motion) exactly, and
 compares with the verdicts that come with them: files of 8 rows a query in exact rationals, folders of such files, and
 pairs of frames with lists of pairs, as in the NYU CCD benchmark (Wang et al. 2021). Beside it, where they are built
-in, the peers' own continuous tests of the same two features, which answer in floating point.
-Exit codes: 0 all verdicts are right, 1 one is wrong, 2 wrong use or input.)";
+in, the peers' own continuous tests of the same two features, which answer in floating point. DIR/ccd.json has the table;
+with the folder of a study for DIR, that study's report has it, too.
+Exit codes: 0 all verdicts are right, 1 one is wrong, 2 wrong use or input, 3 anything else.)";
 
 /// What one test said of the queries of one file, and how fast.
 struct Row {

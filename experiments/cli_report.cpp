@@ -20,7 +20,8 @@ namespace {
 
 constexpr const char* examples = R"(Example:
   kbvh report --out results
-writes results/report.html, self-contained, and its figures, from results/results.jsonl.)";
+writes results/report.html, self-contained, its figures and results/claims.json, from results/results.jsonl and what lies
+beside it: targets.json (bench), theory.json, stress.json, ccd.json. Commands that make those take the same --out.)";
 
 int report(const std::string& out, const std::string& title) {
   const std::filesystem::path results = std::filesystem::path(out) / "results.jsonl";

@@ -23,7 +23,7 @@ constexpr const char* run_examples = R"(Examples:
 A body is a file (.obj .ply .gltf .glb, or a folder of numbered frames) or a shape, then key=value separated by
 commas: motion clip fps (files), name scale rotate=axis:degrees translate=x:y:z as=triangles|points (all); `kbvh
 list` shows shapes.
-Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input.)";
+Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input, 3 anything else.)";
 
 constexpr const char* bench_examples = R"(Examples:
   kbvh bench --scene tablecloth --triangles 2000,16000 --l 1,10 --repetitions 5 --out results
@@ -127,9 +127,13 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
       command.add_option("--clip", o->clip,
                          "animation of glTF bodies: its name or index; also as clip= in --body"),
       command.add_option("--name", o->name, "name of the scene in results"),
-      command.add_option("--triangles", o->triangles, "of the built-in scene's moving body; a list sweeps")
+      command
+          .add_option("--triangles", o->triangles,
+                      "of the built-in scene's moving body (2000); a list sweeps")
           ->delimiter(','),
-      command.add_option("--obstacle", o->obstacle, "triangles of the body beside it")
+      command
+          .add_option("--obstacle", o->obstacle,
+                      "triangles of the body beside it (a table: 2048; else as many, up to 20000)")
           ->check(CLI::PositiveNumber),
       command.add_option("--keyframes", o->keyframes, "of a built-in scene (60)")->check(CLI::PositiveNumber),
       command.add_option("--seed", o->seeds, "of what chance decides (1); a list sweeps")->delimiter(','),
@@ -161,7 +165,7 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
       ->check(CLI::PositiveNumber);
   command
       .add_option("--oracle-every", o->oracle_every,
-                  "compare only every n-th frame (and the last) with the truth")
+                  "compare only every n-th frame (and the last) with the truth (1)")
       ->check(CLI::PositiveNumber);
   command.add_option("--out", o->out, "folder to which results are appended (none: the table only)");
   CLI::Option* plan = command.add_option("--plan", o->plan_file, "a study as a file, see RESULTS.md");

@@ -20,8 +20,9 @@ constexpr const char* examples = R"(Examples:
   kbvh stress --strategies family:approximate --out results/error
   kbvh stress --repro results/stress/repro-spikes-kinetic_aabb-float.json
 Scenes made to break what they are played to, from seeds; each contestant in a process of its own, held against the
-oracle. DIR/stress.json has the table, DIR/repro-*.json what failed, made as small as it could be.
-Exit codes: 0 nothing failed, 1 something did, 2 wrong use. Errors of approximate contestants are results.)";
+oracle. DIR/stress.json has the table, DIR/repro-*.json what failed, made as small as it could be. With the folder of a
+study for DIR, that study's report has the table, too.
+Exit codes: 0 nothing failed, 1 something did, 2 wrong use, 3 anything else. Errors of approximate contestants are results.)";
 
 struct StressArguments {
   std::string out, repro;

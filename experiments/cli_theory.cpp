@@ -21,7 +21,7 @@ constexpr const char* examples = R"(Examples:
   kbvh theory --full --out results/theory
 Holds the claims of Zachmann & Weller 2006 against counts and exact arithmetic; no clock decides anything.
 DIR/theory.json has the table with all numbers, DIR/figures what grows with what, DIR/theory.jsonl each measurement as
-soon as it is made: a run that was stopped goes on where it was. Exit codes: 0 done, whatever the verdicts; 2 wrong use.)";
+soon as it is made: a run that was stopped goes on where it was. Exit codes: 0 done, whatever the verdicts; 2 wrong use, 3 else.)";
 
 struct TheoryArguments {
   std::string out;
