@@ -99,8 +99,9 @@ TEST_P(Kernels, Conform) {
     for (const std::string& scene_name : all_scene_names()) {
       const std::string where = id + " on " + scene_name + " with " + name(GetParam());
       const BuilderConfig builder = entry.info.topology.preferred;
-      expect_conforms(check(entry, synthetic_scene<float>(scene_name, 4), 4, {}, builder), where + ", float");
-      expect_conforms(check(entry, synthetic_scene<double>(scene_name, 4), 4, {}, builder),
+      expect_conforms(check(entry, synthetic_scene<float>(scene_name, 10), 10, {}, builder),
+                      where + ", float");
+      expect_conforms(check(entry, synthetic_scene<double>(scene_name, 10), 10, {}, builder),
                       where + ", double");
     }
   }
