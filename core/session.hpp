@@ -1,8 +1,11 @@
 #pragma once
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <map>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "core/continuous/contacts.hpp"
@@ -47,8 +50,10 @@ class Session {
   Session& operator=(const Session&) = delete;
 
   /// Starts at time t, with the scene's own plans and geometry again. Where geometry was changed the
-  /// instance is made anew, and references to it are not valid any more.
+  /// instance is made anew, and references to it are not valid any more. Throws std::invalid_argument, with
+  /// nothing changed, if t is not finite.
   void reset(double t) {
+    if (!std::isfinite(t)) throw std::invalid_argument("cannot start at t = " + std::to_string(t));
     playback_.restore_plans();
     changed_ = geometry_changed_;  // of what the constructor's scene says
     if (geometry_changed_) {
@@ -61,8 +66,12 @@ class Session {
     playback_.evaluate_all();
     strategy_->reset(t);
   }
-  /// Moves to t, with positions if the strategy wants all of them, and advances.
+  /// Moves to t, with positions if the strategy wants all of them, and advances. Throws
+  /// std::invalid_argument, with nothing changed, if t is before the present time or not finite.
   void advance(double t, PhaseTimes& times) {
+    if (!(t >= playback_.time()))
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(playback_.time()) +
+                                  " back to " + std::to_string(t));
     playback_.seek(t);
     if (info_->positions == PositionUse::all ||
         (info_->positions == PositionUse::varying && strategy_->wants_all_positions()))

@@ -173,7 +173,8 @@ class Strategy {
   virtual std::string choice() const { return {}; }
 
   /// Everything counted since `reset`, which is not counted itself: what starting costs is not what running
-  /// costs. All zero but for triangle tests and bytes in a silent instance.
+  /// costs (nor is, of one that chooses, what changing over costs). All zero but for triangle tests and bytes
+  /// in a silent instance.
   Counters counters() const {
     Counters table = counted();
     table[Counter::triangle_tests] += triangle_stats_.tests;
@@ -191,9 +192,9 @@ class Strategy {
     time_ = t;
   }
   /// To be called first by every `advance`. Throws std::invalid_argument if t is before the last time, or not
-  /// a number.
+  /// finite.
   void move_to(double t) {
-    if (!(t >= time_))
+    if (!(t >= time_) || !std::isfinite(t))
       throw std::invalid_argument("cannot advance from t = " + std::to_string(time_) + " back to " +
                                   std::to_string(t));
     time_ = t;

@@ -54,17 +54,22 @@ class BruteForce final : public Strategy<S> {
     std::vector<std::vector<Box<S>>> swept(boxes_.size());
     for (std::uint32_t body = 0; body < boxes_.size(); ++body) {
       const Primitives& primitives = this->scene_.primitives(body);
+      count_.add(Counter::values_written, std::uint64_t(6) * primitives.count());
+      count_.add(Counter::vertex_reads, 2 * primitives.vertices.size());
       for (std::uint32_t p = 0; p < primitives.count(); ++p) {
         Box<S> box = primitive_box(primitives[p], before[body]);
         box.extend(primitive_box(primitives[p], this->sampled_.positions(body)));
         swept[body].push_back(primitives.alive(p) ? box : Box<S>{});
       }
     }
+    std::uint64_t tests = 0;
     for (const BodyPair& pair : this->scene_.pairs())
       for (std::uint32_t i = 0; i < swept[pair.first].size(); ++i)
-        for (std::uint32_t j = pair.first == pair.second ? i + 1 : 0; j < swept[pair.second].size(); ++j)
+        for (std::uint32_t j = pair.first == pair.second ? i + 1 : 0; j < swept[pair.second].size();
+             ++j, ++tests)
           if (overlap(swept[pair.first][i], swept[pair.second][j]))
             out.push_back({pair.first, i, pair.second, j});
+    count_.add(Counter::box_tests, tests);
   }
 
   void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}

@@ -155,7 +155,7 @@ class DriftStrategy : public Strategy<S> {
 
   void observe(std::uint32_t index, double last, double t) {
     Body& body = bodies_[index];
-    body.remade = false;
+    body.read = body.remade = false;
     if (body.watch == Watch::nothing) return;
     if constexpr (bounded) {
       const double way = motion_.displacement_bound(index, last, t);
@@ -174,7 +174,7 @@ class DriftStrategy : public Strategy<S> {
     const Body& body = bodies_[index];
     if (body.remade) return;
     count_.add(Counter::nodes_skipped, hierarchies_[index].topology().size());
-    if (body.watch == Watch::nothing || !body.near) count_.add(Counter::bodies_skipped);
+    if (body.watch == Watch::nothing || (!body.near && !body.read)) count_.add(Counter::bodies_skipped);
   }
 
   /// The box of all vertices now.
@@ -196,6 +196,7 @@ class DriftStrategy : public Strategy<S> {
     S interval[8];
     near_kernels<S>(kernels_).drift(this->sampled_.positions(index), body.before.data(), count, interval);
     body.drifted_by(interval, frames_);
+    body.read = true;
     count_.add(Counter::vertex_reads, 2 * std::uint64_t(count));
   }
 

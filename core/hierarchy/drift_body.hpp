@@ -34,6 +34,7 @@ struct DriftBody {
   bool near = false;     ///< to another body: it takes part in searches
   bool changed = false;  ///< plans of its own: it is no body at rest any more
   bool widened = false;  ///< boxes hold the margin already (bodies at rest)
+  bool read = false;     ///< all its vertices, in this frame, for their drift
   bool remade = false;   ///< its boxes, in this frame
 
   static double below(double value) {

@@ -40,6 +40,7 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
       memory_(scene.body_count(), settings.remembered_bytes),
       bodies_(scene.body_count()),
       counts_(scene.body_count()),
+      ahead_counts_(scene.body_count()),
       near_(scene.body_count(), 0) {
   for (Segment& segment : segments_) segment.sides.resize(body_count());
   for (std::uint32_t body = 0; body < body_count(); ++body) {
@@ -132,7 +133,7 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
     if (const auto* known = memory_.find(index, knot)) {
       at.lanes = known->lanes.data();
       at.own = known->own.data();
-      ++counts_[index].remembered;
+      ++left_alone(index).remembered;
       return {};
     }
   }
@@ -222,6 +223,10 @@ bool LinearBounds<S>::advance() {
   }
   if (came_ahead_) {
     present_ = 1 - present_;
+    for (std::uint32_t body = 0; body < body_count(); ++body) {
+      counts_[body].at_rest += ahead_counts_[body].at_rest;
+      counts_[body].remembered += ahead_counts_[body].remembered;
+    }
     forget_ahead();
   } else {
     go_on();
@@ -263,7 +268,7 @@ bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const 
   if (old.current && old.at_rest && side.at_rest &&
       old.at[1].positions == motion.positions_on_lines(body, t, bodies_[body].room[old.at[1].slot])) {
     side.at[0] = side.at[1] = old.at[1];
-    ++counts_[body].at_rest;
+    ++left_alone(body).at_rest;
     return false;
   }
   if (old.current && !old.at_rest && before.end == segment.begin) {
@@ -309,6 +314,7 @@ template <class S>
 void LinearBounds<S>::forget_ahead() {
   ahead_exists_ = false;
   ahead_ = {};
+  std::fill(ahead_counts_.begin(), ahead_counts_.end(), Counts{});
 }
 
 template <class S>

@@ -111,6 +111,8 @@ class LinearBounds {
   void note_time();
   void go_on();
   void forget_ahead();
+  /// Of what is left alone: in the segment ahead it only counts when that is taken.
+  Counts& left_alone(std::uint32_t body) { return ahead_exists_ ? ahead_counts_[body] : counts_[body]; }
   void choose_segment(Segment& segment, const SegmentMotion<S>& motion, double t) const;
   bool begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion, std::uint32_t body,
                   double t, Before what);
@@ -138,8 +140,8 @@ class LinearBounds {
   bool ahead_exists_ = false, came_ahead_ = false;
   AlignedArray<S> middle_lanes_, middle_own_;  ///< tight boxes in the middle of a piece, if somebody looks
   std::vector<S> middle_room_;
-  std::vector<Counts> counts_;
-  std::vector<std::uint8_t> near_;  ///< by body: to another one, over the segment
+  std::vector<Counts> counts_, ahead_counts_;  ///< by body
+  std::vector<std::uint8_t> near_;             ///< by body: to another one, over the segment
 };
 
 /// Counts what bounds do as updates of a strategy.
@@ -183,5 +185,8 @@ class LinearCounts {
  private:
   std::vector<typename LinearBounds<S>::Counts> before_;
 };
+
+extern template class LinearBounds<float>;
+extern template class LinearBounds<double>;
 
 }  // namespace kbvh
