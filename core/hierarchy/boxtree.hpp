@@ -2,10 +2,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "core/assert.hpp"
+#include "core/hierarchy/builders.hpp"
 #include "core/hierarchy/list_pool.hpp"
 #include "core/hierarchy/realiser_boxes.hpp"
 #include "core/hierarchy/topology.hpp"
@@ -175,6 +178,62 @@ class BoxTreePlanes {
   std::vector<Box<S>> tight_, inherited_;
   std::vector<std::uint32_t> weights_;  ///< primitives below
 };
+
+/// A node and all below it, parents before children; of a topology in any order, as edited ones are.
+inline std::vector<std::uint32_t> subtree_of(const Topology& topology, std::uint32_t top) {
+  std::vector<std::uint32_t> ids{top};
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    if (const TopologyNode n = topology.nodes[ids[i]]; !n.is_leaf())
+      ids.insert(ids.end(), {n.first(), n.first() + 1});
+  return ids;
+}
+
+/// Builds the inner nodes of a subtree anew over its leaves, which stay what they are but change places.
+/// `ids` are its nodes, the top first and the others ascending; `boxes` those of its leaves, in that order.
+template <class S>
+void regrow_subtree(Topology& topology, std::span<const std::uint32_t> ids, std::span<const Box<S>> boxes,
+                    BuildMethod method) {
+  std::vector<TopologyNode> leaves;
+  for (const std::uint32_t id : ids)
+    if (const TopologyNode n = topology.nodes[id]; n.is_leaf()) leaves.push_back(n);
+  const Topology made = build_topology<S>(boxes, {.method = method, .width = 2, .leaf_size = 1});
+  KBVH_ASSERT(made.size() == ids.size());
+  // Children are pairs of neighbours here and there, so the order-preserving renaming keeps them pairs.
+  for (std::uint32_t i = 0; i < made.size(); ++i) {
+    const TopologyNode n = made.nodes[i];
+    const std::uint32_t id = ids[i];
+    topology.nodes[id] =
+        n.is_leaf() ? leaves[made.primitives[n.first()]] : TopologyNode::inner(ids[n.first()], 2);
+    if (i == 0) continue;
+    topology.parents[id] = ids[made.parents[i]];
+    topology.depths[id] = std::uint8_t(std::min(255, topology.depths[topology.parents[id]] + 1));
+  }
+  topology.perfect = false;
+}
+
+/// The own sides of the nodes of a subtree, `ids` as `subtree_of` gives them, as BoxTreePlanes chooses them;
+/// nothing is said of the first. box_of(leaf) is a leaf's tight box, axis(node) as there.
+template <class S, class BoxOf, class Axis>
+std::vector<std::uint8_t> choose_own_sides(const Topology& topology, const std::vector<std::uint32_t>& ids,
+                                           BoxOf&& box_of, const Box<S>* box, Axis&& axis) {
+  // The part is laid out in a topology of its own, in the order that BoxTreePlanes needs.
+  Topology part;
+  std::vector<std::uint32_t> places(ids.size());
+  std::iota(places.begin(), places.end(), 0u);
+  std::uint32_t next = 1;
+  for (const std::uint32_t id : ids) {
+    const TopologyNode n = topology.nodes[id];
+    part.nodes.push_back(n.is_leaf() ? n : TopologyNode::inner(next, 2));
+    if (!n.is_leaf()) next += 2;
+  }
+  std::vector<std::uint8_t> own_sides(ids.size(), 0);
+  BoxTreePlanes<S> planes(part, places);
+  for (std::size_t i = ids.size(); i-- > 0;)
+    if (part.nodes[i].is_leaf()) planes.set_leaf(i, box_of(part.nodes[i]));
+  planes.choose(
+      box, [&](std::uint32_t place) { return axis(ids[place]); }, own_sides);
+  return own_sides;
+}
 
 /// Where a query finds the boxes of a BoxTree's leaves.
 enum class LeafBoxes : std::uint8_t {

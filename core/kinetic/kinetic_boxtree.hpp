@@ -12,33 +12,11 @@
 #include "core/counters.hpp"
 #include "core/hierarchy/boxtree.hpp"
 #include "core/hierarchy/topology_edit.hpp"
+#include "core/kinetic/boxtree_search.hpp"
 #include "core/kinetic/certificate_slots.hpp"
 #include "core/kinetic/kinetic_forest.hpp"
 
 namespace kbvh {
-
-/// What a kinetic BoxTree may be told otherwise: trees with forced axes (Z&W fig. 10), seeded faults.
-struct BoxTreeRules {
-  /// The axis on which every inner node of a depth is split; 3: the best for its children's boxes.
-  static int split_axis(int /*depth*/) { return 3; }
-  /// Does a certificate search of `sought` go down to a child whose own side is another? It must.
-  static bool descends(Side /*own*/, Side /*sought*/) { return true; }
-  /// Is a certificate looked at again when a change has replaced a realiser among its candidates? It must.
-  static bool carries_up() { return true; }
-};
-
-/// What the certificate searches of a BoxTree cost since it was made or `forget` was called.
-struct SearchCost {
-  std::uint64_t searches = 0;
-  std::uint64_t nodes = 0;       ///< nodes looked at by all of them
-  std::uint64_t most_nodes = 0;  ///< by the dearest one
-  void add(std::uint64_t visited) {
-    ++searches;
-    nodes += visited;
-    most_nodes = std::max(most_nodes, visited);
-  }
-  void forget() { *this = {}; }
-};
 
 /// The kinetic BoxTree of one body (Z&W s.6, with errata): a binary tree of which every node but the root
 /// has one side of its own, realised by a vertex, and inherits the other five from its parent: the left child
@@ -79,7 +57,7 @@ class KineticBoxTree {
         observer_(observer),
         own_sides_(topology_.size(), 0),
         realisers_(slot_count(topology_), 0),
-        seen_(clock.plans(body).vertex_count(), 0) {
+        search_(clock.plans(body).vertex_count()) {
     if (topology_.width != 2)
       throw std::invalid_argument("a BoxTree is binary, the topology's width is " +
                                   std::to_string(topology_.width));
@@ -190,7 +168,7 @@ class KineticBoxTree {
               const SampledMotion<S>& motion) {
     start_editing(primitives);
     const std::uint32_t vertex_count = clock_->plans(body_).vertex_count();
-    seen_.resize(vertex_count, 0);
+    search_.resize(vertex_count);
     const auto vertices = primitives[primitive];
     motion.fetch(body_, vertices);
     const Box<S> box = primitive_box(vertices, motion.positions(body_));
@@ -271,7 +249,7 @@ class KineticBoxTree {
 
   std::size_t bytes() const {
     return topology_.bytes() + original_.bytes() + leaves_.bytes() + own_sides_.size() + concerned_.size() +
-           slots_.bytes() + (realisers_.size() + seen_.size()) * sizeof(std::uint32_t) +
+           slots_.bytes() + realisers_.size() * sizeof(std::uint32_t) + search_.bytes() +
            (editor_ ? editor_->bytes() : 0);
   }
 
@@ -297,38 +275,12 @@ class KineticBoxTree {
     return node;
   }
 
-  /// Calls visit(vertex) once for every candidate of a certificate (Z&W figs. 8, 9).
+  /// Calls visit(vertex) once for every candidate of a certificate.
   template <class Visit>
   void for_candidates(std::uint32_t node, Side side, Visit&& visit) {
-    std::uint64_t visited = 0;
-    if (++search_ == 0) {
-      std::fill(seen_.begin(), seen_.end(), 0);
-      search_ = 1;
-    }
-    const auto visit_once = [&](std::uint32_t vertex) {
-      if (seen_[vertex] == search_) return;
-      seen_[vertex] = search_;
-      visit(vertex);
-    };
-    open_.clear();
-    open_.push_back(node);
-    while (!open_.empty()) {
-      const std::uint32_t at = open_.back();
-      open_.pop_back();
-      ++visited;
-      const TopologyNode n = topology_.nodes[at];
-      if (n.is_leaf()) {
-        for (std::uint32_t v : leaves_[n]) visit_once(v);
-        continue;
-      }
-      for (std::uint32_t child = n.first() + 2; child-- > n.first();)
-        if (own_sides_[child] == side) {
-          ++visited;
-          visit_once(realiser(child));
-        } else if (Rules::descends(own_sides_[child], side)) {
-          open_.push_back(child);
-        }
-    }
+    const std::uint64_t visited = search_.run(
+        topology_, leaves_, own_sides_.data(), node, side,
+        [this](std::uint32_t child) { return realiser(child); }, visit);
     count_->add(Counter::nodes_visited, visited);
     if constexpr (Count::enabled) search_cost_.add(visited);
   }
@@ -436,56 +388,27 @@ class KineticBoxTree {
   /// Chooses the own sides of all nodes below `top`, whose box is `box`, or the tight one. Returns `top` and
   /// all below it, parents before children.
   std::vector<std::uint32_t> choose_planes(std::uint32_t top, const S* positions, const Box<S>* box) {
-    // Edited topologies are in no order: the part is laid out in a topology of its own.
-    std::vector<std::uint32_t> ids{top};
-    Topology part;
-    for (std::uint32_t i = 0; i < ids.size(); ++i) {
-      const TopologyNode n = topology_.nodes[ids[i]];
-      part.nodes.push_back(n.is_leaf() ? n : TopologyNode::inner(std::uint32_t(ids.size()), 2));
-      if (!n.is_leaf()) ids.insert(ids.end(), {n.first(), n.first() + 1});
-    }
-    std::vector<std::uint32_t> places(ids.size());
-    std::iota(places.begin(), places.end(), 0u);
-    std::vector<std::uint8_t> own_sides(ids.size(), 0);
-    BoxTreePlanes<S> planes(part, places);
-    for (std::size_t i = ids.size(); i-- > 0;)
-      if (part.nodes[i].is_leaf()) planes.set_leaf(i, leaves_.box(part.nodes[i], positions));
-    planes.choose(
-        box, [&](std::uint32_t place) { return Rules::split_axis(topology_.depths[ids[place]]); }, own_sides);
+    std::vector<std::uint32_t> ids = subtree_of(topology_, top);
+    std::vector<std::uint8_t> own_sides = choose_own_sides<S>(
+        topology_, ids, [&](TopologyNode leaf) { return leaves_.box(leaf, positions); }, box,
+        [&](std::uint32_t node) { return Rules::split_axis(topology_.depths[node]); });
     for (std::size_t i = 1; i < ids.size(); ++i) own_sides_[ids[i]] = own_sides[i];
     return ids;
   }
 
   /// Replaces the inner nodes below `top`.
   void regrow(std::uint32_t top, const SampledMotion<S>& motion, BuildMethod method) {
-    std::vector<std::uint32_t> ids{top};
-    std::vector<TopologyNode> leaves;
-    for (std::size_t i = 0; i < ids.size(); ++i)
-      if (const TopologyNode n = topology_.nodes[ids[i]]; !n.is_leaf())
-        ids.insert(ids.end(), {n.first(), n.first() + 1});
-    std::sort(ids.begin() + 1, ids.end());
+    std::vector<std::uint32_t> ids = subtree_of(topology_, top);
     std::vector<Box<S>> boxes;
-    for (std::uint32_t id : ids) {
+    std::sort(ids.begin() + 1, ids.end());
+    for (const std::uint32_t id : ids) {
       if (id != top) withdraw(slot(id, own_sides_[id]));
       const TopologyNode n = topology_.nodes[id];
       if (!n.is_leaf()) continue;
       motion.fetch(body_, leaves_[n]);
-      leaves.push_back(n);
       boxes.push_back(leaves_.box(n, motion.positions(body_)));
     }
-    const Topology made = build_topology<S>(boxes, {.method = method, .width = 2, .leaf_size = 1});
-    KBVH_ASSERT(made.size() == ids.size());
-    // Children are pairs of neighbours here and there, so the order-preserving renaming keeps them pairs.
-    for (std::uint32_t i = 0; i < made.size(); ++i) {
-      const TopologyNode n = made.nodes[i];
-      const std::uint32_t id = ids[i];
-      topology_.nodes[id] =
-          n.is_leaf() ? leaves[made.primitives[n.first()]] : TopologyNode::inner(ids[n.first()], 2);
-      if (i == 0) continue;
-      topology_.parents[id] = ids[made.parents[i]];
-      topology_.depths[id] = std::uint8_t(std::min(255, topology_.depths[topology_.parents[id]] + 1));
-    }
-    topology_.perfect = false;
+    regrow_subtree<S>(topology_, ids, boxes, method);
     for (const std::uint32_t id : ids) {
       if (!topology_.nodes[id].is_leaf()) continue;
       leaves_.placed(topology_.nodes[id], id);
@@ -599,9 +522,7 @@ class KineticBoxTree {
   Observer observer_;
   std::vector<std::uint8_t> own_sides_;   ///< [node]
   std::vector<std::uint32_t> realisers_;  ///< six of the root, then one of each other node
-  std::vector<std::uint32_t> open_;       ///< of a search
-  std::vector<std::uint32_t> seen_;  ///< [vertex]: the last search that met it, for leaves share vertices
-  std::uint32_t search_ = 0;
+  CandidateSearch<Rules> search_;
   SearchCost search_cost_;
   // For changes, made when the first one comes.
   std::vector<std::uint32_t> affected_;
