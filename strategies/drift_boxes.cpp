@@ -41,9 +41,8 @@ class DriftStrategy : public Strategy<S> {
         pair_is_near_(scene.pairs().size(), 0) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), kernels_);
-    for (const BodyPair& pair : scene.pairs())
-      if (!hierarchies_[pair.first].suits(hierarchies_[pair.second]))
-        throw std::invalid_argument("topologies of all bodies need one width and leaf size");
+    check_layouts(
+        scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
   }
 
   void reset(double t) override {

@@ -47,9 +47,8 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
     hierarchy(body).assign(std::move(topologies[body]), scene.primitives(body), kernels);
     for (Segment& segment : segments_) segment.sides[body].body = &bodies_[body];
   }
-  for (const BodyPair& pair : scene.pairs())
-    if (!hierarchy(pair.first).suits(hierarchy(pair.second)))
-      throw std::invalid_argument("topologies of all bodies need one width and leaf size");
+  check_layouts(
+      scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchy(body); });
 }
 
 template <class S>

@@ -25,9 +25,8 @@ class StoredHierarchyStrategy : public Strategy<S> {
     hierarchies_.resize(scene.body_count());
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), kernels);
-    for (const BodyPair& pair : scene.pairs())
-      if (!hierarchies_[pair.first].suits(hierarchies_[pair.second]))
-        throw std::invalid_argument("topologies of all bodies need one width and leaf size");
+    check_layouts(
+        scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
   }
 
   void reset(double t) override {

@@ -1,6 +1,8 @@
 #pragma once
 #include <boost/align/aligned_allocator.hpp>
 #include <cstdint>
+#include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "core/counters.hpp"
@@ -223,6 +225,15 @@ class WideQuery {
   std::vector<std::uint32_t> to_fetch_;
   WideTraversal lazy_{};
 };
+
+/// Queries of two bodies need one layout: throws std::invalid_argument unless, for each pair of bodies, the
+/// hierarchies hierarchy_of(body) have one width and leaf size.
+template <class HierarchyOf>
+void check_layouts(std::span<const BodyPair> pairs, HierarchyOf&& hierarchy_of) {
+  for (const BodyPair& pair : pairs)
+    if (!hierarchy_of(pair.first).suits(hierarchy_of(pair.second)))
+      throw std::invalid_argument("topologies of all bodies need one width and leaf size");
+}
 
 extern template class WideHierarchy<float>;
 extern template class WideHierarchy<double>;

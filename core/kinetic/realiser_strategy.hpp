@@ -28,9 +28,8 @@ class RealiserStrategy : public Strategy<S> {
       body.stale.assign(body.hierarchy.node_count(), 1);
       body.visited.reserve(body.hierarchy.node_count());
     }
-    for (const BodyPair& pair : scene.pairs())
-      if (!bodies_[pair.first].hierarchy.suits(bodies_[pair.second].hierarchy))
-        throw std::invalid_argument("topologies of all bodies need one width and leaf size");
+    check_layouts(
+        scene.pairs(), [&](std::uint32_t body) -> const auto& { return bodies_[body].hierarchy; });
   }
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
