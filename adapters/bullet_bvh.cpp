@@ -25,6 +25,7 @@
 #include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
 #include <LinearMath/btAabbUtil2.h>
 
+#include <Eigen/Core>
 #include <cmath>
 #include <type_traits>
 

@@ -29,6 +29,7 @@
 // The hierarchy cannot be seen, so there is no audit. Float scenes only.
 #include <embree3/rtcore.h>
 
+#include <Eigen/Core>
 #include <atomic>
 #include <cstring>
 #include <mutex>

@@ -72,34 +72,37 @@ template <class S>
 void confirm_pairs(const SceneView<S>& scene, const SampledMotion<S>& motion, PairBuffer& pairs,
                    TriangleTestStats& stats);
 
-/// Lower and upper corner of a box in 4 lanes, the last of which means nothing.
+/// Lower and upper corner of a box in 4 lanes, so that the compiler keeps each corner in one register; the last
+/// lane has no meaning.
 template <class S>
 struct LaneBox {
-  using Lanes = Eigen::Array<S, 4, 1>;
-  Lanes lower, upper;
+  S lower[4], upper[4];
 
   /// The box of at least one vertex. Reads one scalar past the last vertex (playback positions are padded).
   static LaneBox of(std::span<const std::uint32_t> vertices, const S* positions) {
-    const auto at = [positions](std::uint32_t v) {
-      return Eigen::Map<const Lanes>(positions + std::size_t(3) * v);
-    };
-    LaneBox box{at(vertices[0]), at(vertices[0])};
-    for (std::size_t i = 1; i < vertices.size(); ++i) {
-      const Lanes p = at(vertices[i]);
-      box.lower = box.lower.min(p);
-      box.upper = box.upper.max(p);
+    LaneBox box;
+    const S* first = positions + std::size_t(3) * vertices[0];
+    for (int lane = 0; lane < 4; ++lane) box.lower[lane] = box.upper[lane] = first[lane];
+    for (const std::uint32_t v : vertices.subspan(1)) {
+      const S* p = positions + std::size_t(3) * v;
+      box.extend(p, p);
     }
     return box;
   }
-  void extend(const LaneBox& other) {
-    lower = lower.min(other.lower);
-    upper = upper.max(other.upper);
-  }
+  void extend(const LaneBox& other) { extend(other.lower, other.upper); }
   bool overlaps(const LaneBox& other) const {
     return (lower[0] <= other.upper[0]) & (other.lower[0] <= upper[0]) & (lower[1] <= other.upper[1]) &
            (other.lower[1] <= upper[1]) & (lower[2] <= other.upper[2]) & (other.lower[2] <= upper[2]);
   }
   Box<S> box() const { return {{lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}}; }
+
+ private:
+  void extend(const S* low, const S* high) {
+    for (int lane = 0; lane < 4; ++lane) {
+      lower[lane] = low[lane] < lower[lane] ? low[lane] : lower[lane];
+      upper[lane] = high[lane] > upper[lane] ? high[lane] : upper[lane];
+    }
+  }
 };
 
 /// The box of one primitive at the motion's current time; its vertices must be current.

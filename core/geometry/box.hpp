@@ -2,8 +2,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/geometry/vec3.hpp"
-
 namespace kbvh {
 
 /// A closed axis-aligned box [lower, upper]; 6 scalars. The default box is empty: it contains nothing,
