@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 
 #ifdef BT_USE_DOUBLE_PRECISION
 #error "these adapters are for Bullet in float"

@@ -41,8 +41,8 @@
 #include <xmmintrin.h>
 #endif
 
-#include "core/assert.hpp"
-#include "core/registry.hpp"
+#include "core/base/assert.hpp"
+#include "core/contract/registry.hpp"
 
 namespace kbvh {
 namespace {

@@ -29,7 +29,7 @@
 #include <array>
 
 #include "core/continuous/impact.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 
 namespace kbvh {
 namespace {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 #include "experiments/cli.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/impact_queries.hpp"

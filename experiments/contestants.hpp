@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "core/registry.hpp"
-#include "core/scene.hpp"
-#include "core/session.hpp"
+#include "core/contract/registry.hpp"
+#include "core/judge/session.hpp"
+#include "core/scene/scene.hpp"
 
 namespace kbvh::experiments {
 

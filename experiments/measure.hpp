@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/verify.hpp"
+#include "core/judge/verify.hpp"
 #include "experiments/contestants.hpp"
 
 namespace kbvh::experiments {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/params.hpp"
+#include "core/base/params.hpp"
 #include "experiments/cli.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/machine.hpp"

@@ -2,7 +2,7 @@
 
 #include <system_error>
 
-#include "core/hierarchy/oracle.hpp"
+#include "core/judge/oracle.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/progress.hpp"
 #include "experiments/text.hpp"

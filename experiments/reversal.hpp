@@ -1,8 +1,8 @@
 #pragma once
 #include <filesystem>
 
-#include "core/plan_script.hpp"
-#include "core/scene.hpp"
+#include "core/judge/plan_script.hpp"
+#include "core/scene/scene.hpp"
 #include "experiments/builtin_scenes.hpp"
 
 namespace kbvh::experiments {

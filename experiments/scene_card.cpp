@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/hierarchy/builders.hpp"
+#include "core/topology/builders.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/obj.hpp"
 #include "experiments/io/pc2.hpp"

@@ -4,7 +4,7 @@
 #include <numeric>
 #include <set>
 
-#include "core/hierarchy/renumber.hpp"
+#include "core/topology/renumber.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/io/load.hpp"
 #include "experiments/json_reader.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/scene.hpp"
+#include "core/scene/scene.hpp"
 #include "experiments/builtin_scenes.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/primitives.hpp"
@@ -41,7 +41,7 @@ struct BodySpec {
 enum class VertexOrder : std::uint8_t {
   given,       ///< as the file or the generator has them
   shuffled,    ///< at random, as a careless exporter leaves them
-  renumbered,  ///< as the leaves of the default topology meet them (core/hierarchy/renumber.hpp)
+  renumbered,  ///< as the leaves of the default topology meet them (core/topology/renumber.hpp)
 };
 
 /// A scene as a plan says it.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/motion/playback.hpp"
+#include "core/scene/playback.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/json_reader.hpp"

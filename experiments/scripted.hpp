@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "core/plan_script.hpp"
-#include "core/scene.hpp"
+#include "core/judge/plan_script.hpp"
+#include "core/scene/scene.hpp"
 #include "experiments/builtin_scenes.hpp"
 
 namespace kbvh::experiments {

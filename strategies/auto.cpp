@@ -9,7 +9,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 
 namespace kbvh {
 namespace {

@@ -1,9 +1,9 @@
 // Bottom-up refit, the standard way to keep a hierarchy valid (van den Bergen 1997), as fast as we know how:
-// wide nodes in structure-of-arrays form, over unique vertices in padded lists (core/kernels/wide_refit.cpp).
-// Every ratio that is printed is against this one.
+// wide nodes in structure-of-arrays form, over unique vertices in padded lists
+// (core/families/wide/kernels/wide_refit.cpp). Every ratio that is printed is against this one.
 
-#include "core/hierarchy/stored_hierarchy.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
 
 #if defined(KBVH_WITH_TBB)
 #include <tbb/parallel_for_each.h>

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "core/hierarchy/stored_hierarchy.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
 
 namespace kbvh {
 namespace {

@@ -1,8 +1,8 @@
 // Bottom-up refit with a query that stops when it has used up its work for the frame: what it has found by
 // then is the answer (the idea of time-critical collision detection; Klein & Zachmann 2003).
 
-#include "core/hierarchy/stored_hierarchy.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
 
 namespace kbvh {
 namespace {

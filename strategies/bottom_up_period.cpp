@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 
 namespace kbvh {
 namespace {

@@ -3,7 +3,7 @@
 // any topology, so that its ratio to the best refit shows what code alone is worth, with nothing else changed
 // (`bottom_up_period` links its nodes by pointers besides).
 
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 
 namespace kbvh {
 namespace {

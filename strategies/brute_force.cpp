@@ -1,6 +1,6 @@
 // No hierarchy: the box of every primitive against the box of every other. What any structure has to beat.
 
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 
 namespace kbvh {
 namespace {

@@ -3,8 +3,8 @@
 // Old boxes larger by those intervals hold every vertex; two bodies can only meet where the intervals let
 // their old boxes touch. So one traversal, over boxes swept over the motion of some frames, finds the
 // candidates of all these frames, in the order in which the motion lets them meet, and a frame takes the
-// beginning of that list (core/hierarchy/near_pairs.hpp). Bodies that cannot meet any other get one box a
-// frame and nothing below it.
+// beginning of that list (core/families/drift/near_pairs.hpp). Bodies that cannot meet any other get one box
+// a frame and nothing below it.
 //
 // How far vertices have moved is found by reading each of them twice (then and now, in the order of memory),
 // or, in the variant with a bound on steps, by nothing but an addition for each body.
@@ -12,12 +12,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/contract/registry.hpp"
+#include "core/families/drift/drift_body.hpp"
+#include "core/families/drift/drift_model.hpp"
+#include "core/families/drift/near_pairs.hpp"
+#include "core/families/wide/kernels/bounds.hpp"
 #include "core/geometry/predicates.hpp"
-#include "core/hierarchy/drift_body.hpp"
-#include "core/hierarchy/drift_model.hpp"
-#include "core/hierarchy/near_pairs.hpp"
-#include "core/kernels/bounds.hpp"
-#include "core/registry.hpp"
 
 namespace kbvh {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "core/hierarchy/stored_hierarchy.hpp"
-#include "core/kernels/bounds.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/wide/kernels/bounds.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
 
 namespace kbvh {
 namespace {

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/hierarchy/stored_hierarchy.hpp"
-#include "core/kernels/wide_inflate.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/wide/kernels/wide_inflate.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
 
 namespace kbvh {
 namespace {

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/hierarchy/interval_join.hpp"
-#include "core/hierarchy/linear_bounds.hpp"
-#include "core/hierarchy/span_answers.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/linear/interval_join.hpp"
+#include "core/families/linear/linear_bounds.hpp"
+#include "core/families/linear/span_answers.hpp"
 
 namespace kbvh {
 namespace {

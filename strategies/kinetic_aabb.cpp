@@ -1,8 +1,8 @@
 // The kinetic AABB tree (Z&W 2006, s.4), with the errata of the reproduction: tight at every time, updated at
 // events only.
 
-#include "core/kinetic/kinetic_aabb_strategy.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/events/kinetic_aabb_strategy.hpp"
 
 namespace kbvh {
 namespace {

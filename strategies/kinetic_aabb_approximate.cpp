@@ -2,9 +2,9 @@
 // doubles, and a certificate's failure is where two lines meet. Shows what the exact decisions of
 // kinetic_aabb buy.
 
-#include "core/kinetic/kinetic_aabb_strategy.hpp"
-#include "core/kinetic/rounded_clock.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/events/kinetic_aabb_strategy.hpp"
+#include "core/families/events/rounded_clock.hpp"
 
 namespace kbvh {
 namespace {

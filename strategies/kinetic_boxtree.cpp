@@ -5,9 +5,9 @@
 #include <numeric>
 #include <variant>
 
-#include "core/hierarchy/boxtree_degradation.hpp"
-#include "core/kinetic/kinetic_boxtree.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/boxtree/boxtree_degradation.hpp"
+#include "core/families/boxtree/kinetic_boxtree.hpp"
 
 namespace kbvh {
 namespace {

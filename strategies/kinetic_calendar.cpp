@@ -1,10 +1,10 @@
 // The exact tight AABB tree for motion that changes while it runs: a certificate for each side of each box,
 // in a calendar of buckets by time; frames determine anew what may have changed until then, level by level
-// (core/kinetic/calendar_tree.hpp).
+// (core/families/envelope/calendar_tree.hpp).
 
-#include "core/kinetic/calendar_tree.hpp"
-#include "core/kinetic/realiser_strategy.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/envelope/calendar_tree.hpp"
+#include "core/families/envelope/realiser_strategy.hpp"
 
 namespace kbvh {
 namespace {

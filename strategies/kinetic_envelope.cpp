@@ -1,11 +1,11 @@
 // The exact tight AABB tree without a queue, for keyframed motion: at the begin of each segment one pass
 // finds the sides whose realiser will change in it, and the upper envelopes of these few give a list of
-// stores, sorted by time, that frames carry out (core/kinetic/segment_envelope.hpp). Where the whole clip is
-// known, the frames of a segment can share the pass for the next one among them.
+// stores, sorted by time, that frames carry out (core/families/envelope/segment_envelope.hpp). Where the
+// whole clip is known, the frames of a segment can share the pass for the next one among them.
 
-#include "core/kinetic/realiser_strategy.hpp"
-#include "core/kinetic/segment_envelope.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/envelope/realiser_strategy.hpp"
+#include "core/families/envelope/segment_envelope.hpp"
 
 namespace kbvh {
 namespace {

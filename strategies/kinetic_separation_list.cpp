@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <variant>
 
-#include "core/hierarchy/realiser_boxes.hpp"
-#include "core/kinetic/kinetic_collision.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/events/realiser_boxes.hpp"
+#include "core/families/separation/kinetic_collision.hpp"
 
 namespace kbvh {
 namespace {

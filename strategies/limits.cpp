@@ -5,9 +5,9 @@
 // - limit_plain_motion: an update interpolates every position in the scene's scalar, however it rounds. The
 //   correctly rounded evaluation (phase "motion") is compared with it.
 
-#include "core/kernels/limits.hpp"
-#include "core/hierarchy/wide_hierarchy.hpp"
-#include "core/registry.hpp"
+#include "core/families/limits/kernels/limits.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/wide/wide_hierarchy.hpp"
 
 namespace kbvh {
 namespace {

@@ -1,9 +1,9 @@
 // Boxes that are linear in time: made where all flight plans are known to be straight until, at the ends of
 // each such segment, and interpolated by the query where it comes. No frame updates anything.
 
-#include "core/hierarchy/linear_bounds.hpp"
+#include "core/families/linear/linear_bounds.hpp"
 
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 
 namespace kbvh {
 namespace {

@@ -1,8 +1,8 @@
 // A new topology for every frame: the most that an update can cost, and the best boxes a query can get.
 // Building allocates; that is part of what this strategy costs.
 
-#include "core/hierarchy/stored_hierarchy.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
 
 namespace kbvh {
 namespace {

@@ -2,8 +2,8 @@
 // each vertex once per level, which is what makes it the slower refit; it is the building block of refits on
 // demand (van den Bergen 1998, Larsson & Akenine-Moeller 2001).
 
-#include "core/hierarchy/stored_hierarchy.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
 
 namespace kbvh {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "core/assert.hpp"
+#include "core/base/assert.hpp"
 
 namespace kbvh {
 

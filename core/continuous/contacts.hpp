@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "core/continuous/impact.hpp"
-#include "core/motion/playback.hpp"
-#include "core/scene.hpp"
+#include "core/scene/playback.hpp"
+#include "core/scene/scene.hpp"
 
 namespace kbvh {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <cstdint>
 
-#include "core/pairs.hpp"
+#include "core/scene/pairs.hpp"
 
 namespace kbvh {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "core/kernels/triangles.hpp"
+#include "core/geometry/kernels/triangles.hpp"
 
 namespace kbvh {
 

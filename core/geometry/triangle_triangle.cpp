@@ -9,7 +9,7 @@
 #include <cmath>
 #include <cstddef>
 
-// Three stages; core/kernels/triangles.cpp has the first two for many pairs at once:
+// Three stages; core/geometry/kernels/triangles.cpp has the first two for many pairs at once:
 //   1. signs:    on which sides of each triangle's plane the other's corners lie (filtered), rejecting most
 //                pairs;
 //   2. decision: from the 6 signs alone, which 2 edge-edge orientations tell whether the two intervals that

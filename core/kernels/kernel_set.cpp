@@ -6,13 +6,13 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/kernels/bounds.hpp"
-#include "core/kernels/limits.hpp"
-#include "core/kernels/near_pairs.hpp"
-#include "core/kernels/span_tests.hpp"
-#include "core/kernels/wide_inflate.hpp"
-#include "core/kernels/wide_linear.hpp"
-#include "core/kernels/wide_realisers.hpp"
+#include "core/families/drift/kernels/near_pairs.hpp"
+#include "core/families/envelope/kernels/wide_realisers.hpp"
+#include "core/families/limits/kernels/limits.hpp"
+#include "core/families/linear/kernels/span_tests.hpp"
+#include "core/families/wide/kernels/bounds.hpp"
+#include "core/families/wide/kernels/wide_inflate.hpp"
+#include "core/families/wide/kernels/wide_linear.hpp"
 
 namespace kbvh {
 

@@ -11,8 +11,8 @@
 #include <type_traits>
 
 #include "core/kernels/kernel_set.hpp"
-#include "core/kernels/round.hpp"
 #include "core/motion/exact_arithmetic.hpp"
+#include "core/motion/kernels/round.hpp"
 
 namespace kbvh {
 namespace {
@@ -68,7 +68,7 @@ void complete(TimeFraction& f, PieceKind kind) {
 }
 
 /// The largest power of two that `spread` may be where the fraction is p / q + delta, or 0: the conditions
-/// that core/kernels/round.cpp derives.
+/// that core/motion/kernels/round.cpp derives.
 double largest_spread(double q, double delta) {
   for (double spread = 0x1p12; spread >= 4; spread /= 2) {
     const double reach = 0x1.04p-47 * spread;  // 2.03 * 2^-48

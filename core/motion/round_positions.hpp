@@ -24,10 +24,10 @@ struct RoundingStats {
 // A result beyond the range of S is infinite, as IEEE rounding says. Cost: O(count), with the kernel set in
 // use (core/kernels/kernel_set.hpp). With AVX2 at 3 GHz about 0.45 ns per float of a chord: 2 to 3 times
 // plain interpolation from L2 or L3, also at the frames of clips, where up to a tenth of all values are ties
-// or next to one: their side follows from the fraction (core/kernels/round.cpp). About 25 ns for each value
-// left to later stages: some in 10^4 or 10^3, those much smaller than their segment's larger end. 1.5 to 2 ns
-// per double, more where ties abound. Exact integers (about 1 us) are left for results near zero between
-// values of opposite sign and for odd magnitudes and times. No allocation but in that last stage.
+// or next to one: their side follows from the fraction (core/motion/kernels/round.cpp). About 25 ns for each
+// value left to later stages: some in 10^4 or 10^3, those much smaller than their segment's larger end. 1.5
+// to 2 ns per double, more where ties abound. Exact integers (about 1 us) are left for results near zero
+// between values of opposite sign and for odd magnitudes and times. No allocation but in that last stage.
 
 /// out[i] = RN(x0[i] + (x1[i] - x0[i]) * (t - t0) / (t1 - t0)): coordinates between two keyframes at t0 < t1.
 /// At t == t0 and t == t1 the stored values come back. `out` may be x0 or x1, but must not overlap them

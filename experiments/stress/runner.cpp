@@ -5,7 +5,7 @@
 #include <ctime>
 #include <optional>
 
-#include "core/verify.hpp"
+#include "core/judge/verify.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/stress/isolate.hpp"

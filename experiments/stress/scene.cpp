@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/session.hpp"
+#include "core/judge/session.hpp"
 #include "experiments/json_reader.hpp"
 
 namespace kbvh::experiments::stress {

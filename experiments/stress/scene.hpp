@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/plan_script.hpp"
-#include "core/scene.hpp"
+#include "core/judge/plan_script.hpp"
+#include "core/scene/scene.hpp"
 
 namespace kbvh::experiments::stress {
 

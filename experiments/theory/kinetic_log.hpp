@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/kinetic/kinetic_forest.hpp"
-#include "core/session.hpp"
+#include "core/families/events/kinetic_forest.hpp"
+#include "core/judge/session.hpp"
 #include "experiments/theory/envelope.hpp"
 
 namespace kbvh::theory {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "core/kinetic/kinetic_boxtree.hpp"
+#include "core/families/boxtree/kinetic_boxtree.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "experiments/theory/measure_counts.hpp"
 #include "experiments/theory/theory_scenes.hpp"

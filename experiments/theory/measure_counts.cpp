@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/kinetic/kinetic_forest.hpp"
+#include "core/families/events/kinetic_forest.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 

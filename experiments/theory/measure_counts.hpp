@@ -1,8 +1,8 @@
 #pragma once
 #include <span>
 
-#include "core/scene.hpp"
-#include "core/session.hpp"
+#include "core/judge/session.hpp"
+#include "core/scene/scene.hpp"
 #include "experiments/theory/measurements.hpp"
 
 namespace kbvh::theory {

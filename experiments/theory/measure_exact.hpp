@@ -1,6 +1,6 @@
 #pragma once
-#include "core/scene.hpp"
-#include "core/session.hpp"
+#include "core/judge/session.hpp"
+#include "core/scene/scene.hpp"
 #include "experiments/theory/measurements.hpp"
 
 namespace kbvh::theory {

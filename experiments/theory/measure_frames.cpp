@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "core/hierarchy/audit.hpp"
-#include "core/kinetic/kinetic_forest.hpp"
+#include "core/families/events/kinetic_forest.hpp"
+#include "core/judge/audit.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "experiments/theory/measure_counts.hpp"
 

@@ -4,7 +4,7 @@
 #include <set>
 #include <tuple>
 
-#include "core/kinetic/kinetic_collision.hpp"
+#include "core/families/separation/kinetic_collision.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "experiments/theory/measure_counts.hpp"

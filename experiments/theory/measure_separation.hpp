@@ -1,5 +1,5 @@
 #pragma once
-#include "core/scene.hpp"
+#include "core/scene/scene.hpp"
 #include "experiments/theory/measurements.hpp"
 
 namespace kbvh::theory {

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "core/scene.hpp"
-#include "core/session.hpp"
+#include "core/judge/session.hpp"
+#include "core/scene/scene.hpp"
 #include "experiments/builtin_scenes.hpp"
 
 namespace kbvh::theory {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/verify.hpp"
+#include "core/judge/verify.hpp"
 #include "scenes.hpp"
 
 namespace {

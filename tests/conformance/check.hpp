@@ -1,5 +1,5 @@
 #pragma once
-#include "core/verify.hpp"
+#include "core/judge/verify.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <map>
 
-#include "core/session.hpp"
+#include "core/judge/session.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "core/hierarchy/realiser_boxes.hpp"
-#include "core/hierarchy/stored_hierarchy.hpp"
-#include "core/kinetic/kinetic_forest.hpp"
+#include "core/families/events/kinetic_forest.hpp"
+#include "core/families/events/realiser_boxes.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
 #include "tests/conformance/check.hpp"
 
 namespace kbvh::test {

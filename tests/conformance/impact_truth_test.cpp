@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "core/continuous/contacts.hpp"
-#include "core/session.hpp"
+#include "core/judge/session.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/impact_queries.hpp"
 #include "experiments/io/animated_mesh.hpp"

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "core/hierarchy/builders.hpp"
-#include "core/hierarchy/interval_join.hpp"
-#include "core/hierarchy/linear_bounds.hpp"
-#include "core/hierarchy/span_answers.hpp"
+#include "core/families/linear/interval_join.hpp"
+#include "core/families/linear/linear_bounds.hpp"
+#include "core/families/linear/span_answers.hpp"
 #include "core/kernels/kernel_set.hpp"
+#include "core/topology/builders.hpp"
 #include "tests/support/rational_geometry.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 

@@ -26,7 +26,7 @@
 #include <map>
 #include <optional>
 
-#include "core/hierarchy/oracle.hpp"
+#include "core/judge/oracle.hpp"
 #include "tests/conformance/interval_play.hpp"
 
 namespace kbvh::test {

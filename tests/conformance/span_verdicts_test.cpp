@@ -6,8 +6,8 @@
 
 #include <algorithm>
 
-#include "core/hierarchy/oracle.hpp"
-#include "core/kernels/span_tests.hpp"
+#include "core/families/linear/kernels/span_tests.hpp"
+#include "core/judge/oracle.hpp"
 #include "tests/conformance/interval_play.hpp"
 
 namespace kbvh::test {

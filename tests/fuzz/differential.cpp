@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <cstring>
 
-#include "core/verify.hpp"
+#include "core/judge/verify.hpp"
 #include "experiments/contestants.hpp"
 #include "tests/fuzz/input_file.hpp"
 

@@ -8,9 +8,9 @@
 #include <cstdio>
 #include <cstring>
 
-#include "core/hasher.hpp"
+#include "core/base/hasher.hpp"
+#include "core/judge/verify.hpp"
 #include "core/kernels/kernel_set.hpp"
-#include "core/verify.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {

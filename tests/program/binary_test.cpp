@@ -1,6 +1,6 @@
 // The kbvh binary as a shell sees it: exit codes, and what goes where.
 #include "binary.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 
 namespace kbvh::experiments {
 namespace {

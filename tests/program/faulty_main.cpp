@@ -1,6 +1,6 @@
 // The program with a list of strategies of its own, as a project out of the tree links it: one honest
 // strategy and some that fail, to see that the program refuses them a time and says so.
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 #include "experiments/program.hpp"
 
 namespace kbvh {

@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "core/hierarchy/builders.hpp"
+#include "core/topology/builders.hpp"
 #include "experiments/scene_card.hpp"
 #include "experiments/scenes/shapes.hpp"
 

@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "core/hierarchy/stored_hierarchy.hpp"
-#include "core/kinetic/kinetic_aabb_strategy.hpp"
+#include "core/families/events/kinetic_aabb_strategy.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/stress/isolate.hpp"

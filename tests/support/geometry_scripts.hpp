@@ -1,5 +1,5 @@
 #pragma once
-#include "core/session.hpp"
+#include "core/judge/session.hpp"
 
 namespace kbvh::test {
 

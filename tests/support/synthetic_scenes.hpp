@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "core/session.hpp"
+#include "core/judge/session.hpp"
 
 namespace kbvh::test {
 

@@ -2,7 +2,7 @@
 #include <map>
 #include <memory>
 
-#include "core/kinetic/kinetic_boxtree.hpp"
+#include "core/families/boxtree/kinetic_boxtree.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 

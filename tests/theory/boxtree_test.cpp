@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "core/hierarchy/audit.hpp"
+#include "core/judge/audit.hpp"
 #include "tests/theory/boxtree_log.hpp"
 
 namespace kbvh::test {

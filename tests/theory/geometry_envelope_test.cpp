@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <numeric>
 
-#include "core/kinetic/kinetic_boxtree.hpp"
+#include "core/families/boxtree/kinetic_boxtree.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 

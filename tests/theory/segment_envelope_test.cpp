@@ -1,12 +1,12 @@
 // The stores of segment envelopes against exact envelopes computed apart (claims T1, T8): over whole clips,
 // on every synthetic scene without changes, entry by entry.
-#include "core/kinetic/segment_envelope.hpp"
+#include "core/families/envelope/segment_envelope.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "core/hierarchy/builders.hpp"
+#include "core/topology/builders.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 

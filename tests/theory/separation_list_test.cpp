@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <set>
 
-#include "core/kinetic/kinetic_collision.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/separation/kinetic_collision.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 #include "tests/support/moving_grids.hpp"
 
 namespace kbvh::test {

@@ -7,10 +7,10 @@
 #include <fstream>
 #include <limits>
 
-#include "core/hierarchy/audit.hpp"
-#include "core/hierarchy/oracle.hpp"
-#include "core/hierarchy/renumber.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/judge/audit.hpp"
+#include "core/judge/oracle.hpp"
+#include "core/topology/renumber.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {

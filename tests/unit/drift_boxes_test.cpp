@@ -5,9 +5,9 @@
 
 #include <random>
 
-#include "core/hierarchy/near_pairs.hpp"
+#include "core/families/drift/near_pairs.hpp"
+#include "core/judge/verify.hpp"
 #include "core/kernels/kernel_set.hpp"
-#include "core/verify.hpp"
 #include "tests/support/moving_grids.hpp"
 
 namespace kbvh::test {

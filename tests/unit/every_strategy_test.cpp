@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
 #include "tests/support/moving_grids.hpp"
 
 namespace kbvh::test {

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/hierarchy/builders.hpp"
-#include "core/kinetic/calendar_tree.hpp"
-#include "core/kinetic/segment_envelope.hpp"
+#include "core/families/envelope/calendar_tree.hpp"
+#include "core/families/envelope/segment_envelope.hpp"
 #include "core/motion/exact_piece.hpp"
-#include "core/motion/playback.hpp"
+#include "core/scene/playback.hpp"
+#include "core/topology/builders.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {

@@ -7,8 +7,8 @@
 #include <cstdio>
 #include <map>
 
-#include "core/kinetic/kinetic_forest.hpp"
-#include "core/registry.hpp"
+#include "core/contract/registry.hpp"
+#include "core/families/events/kinetic_forest.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {

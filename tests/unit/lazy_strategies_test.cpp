@@ -6,10 +6,10 @@
 #include <cmath>
 #include <random>
 
-#include "core/kernels/bounds.hpp"
+#include "core/families/wide/kernels/bounds.hpp"
+#include "core/judge/session.hpp"
+#include "core/judge/verify.hpp"
 #include "core/kernels/kernel_set.hpp"
-#include "core/session.hpp"
-#include "core/verify.hpp"
 #include "tests/support/moving_grids.hpp"
 
 namespace kbvh::test {

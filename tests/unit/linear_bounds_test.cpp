@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/verify.hpp"
+#include "core/judge/verify.hpp"
 #include "tests/support/moving_grids.hpp"
 
 namespace kbvh::test {

@@ -1,4 +1,4 @@
-#include "core/kernels/span_tests.hpp"
+#include "core/families/linear/kernels/span_tests.hpp"
 
 #include <gtest/gtest.h>
 

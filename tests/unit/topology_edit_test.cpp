@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/hierarchy/builders.hpp"
-#include "core/hierarchy/list_pool.hpp"
-#include "core/hierarchy/topology_edit.hpp"
+#include "core/base/list_pool.hpp"
+#include "core/topology/builders.hpp"
+#include "core/topology/topology_edit.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "core/motion/playback.hpp"
-#include "core/pairs.hpp"
+#include "core/scene/pairs.hpp"
+#include "core/scene/playback.hpp"
 #include "tests/unit/triangle_pairs.hpp"
 
 // The batched test against the single one, which triangle_triangle_test checks against CGAL: the same answers

@@ -1,14 +1,14 @@
 // Wide hierarchies: every set of kernels gives the same bits as boxes made one by one, for every builder,
 // width and leaf size, and the same pairs as comparing all boxes with all.
-#include "core/hierarchy/wide_hierarchy.hpp"
+#include "core/families/wide/wide_hierarchy.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
-#include "core/hierarchy/builders.hpp"
-#include "core/hierarchy/stored_hierarchy.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
+#include "core/topology/builders.hpp"
 
 namespace kbvh {
 namespace {

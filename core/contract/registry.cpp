@@ -1,0 +1,52 @@
+#include "core/contract/registry.hpp"
+
+#include <algorithm>
+
+namespace kbvh {
+
+BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> method,
+                               std::optional<std::uint32_t> width, std::optional<std::uint32_t> leaf_size) {
+  BuilderConfig config = info.topology.preferred;
+  if (method) config.method = *method;
+  if (width) config.width = *width;
+  if (leaf_size) config.leaf_size = *leaf_size;
+  if (info.topology.own) return config;
+  const auto& widths = info.topology.widths;
+  if (std::find(widths.begin(), widths.end(), config.width) == widths.end())
+    throw ConfigError("'" + info.id + "' does not take nodes of width " + std::to_string(config.width));
+  if (config.leaf_size < info.topology.min_leaf_size || config.leaf_size > info.topology.max_leaf_size)
+    throw ConfigError("'" + info.id + "' takes " + std::to_string(info.topology.min_leaf_size) + " to " +
+                      std::to_string(info.topology.max_leaf_size) + " primitives per leaf, not " +
+                      std::to_string(config.leaf_size));
+  return config;
+}
+
+template <class S>
+Topologies build_topologies(const SceneView<S>& scene, Playback<S>& playback, const BuilderConfig& config) {
+  playback.evaluate_all();
+  Topologies topologies;
+  for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+    topologies.push_back(build_topology(scene.primitives(body), playback.positions(body), config));
+  }
+  return topologies;
+}
+
+template <class S>
+std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<S>& scene,
+                                    Playback<S>& playback, Topologies topologies, const Params& params,
+                                    CountingPolicy policy) {
+  const auto factory = entry.factory<S>();
+  if (factory == nullptr)
+    throw ConfigError("'" + entry.info.id + "' has no " + (sizeof(S) == 4 ? "float" : "double") + " version");
+  return factory(scene, playback, std::move(topologies), params, policy);
+}
+
+#define KBVH_INSTANTIATE(S)                                                                             \
+  template Topologies build_topologies(const SceneView<S>&, Playback<S>&, const BuilderConfig&);        \
+  template std::unique_ptr<Strategy<S>> create(const StrategyEntry&, const SceneView<S>&, Playback<S>&, \
+                                               Topologies, const Params&, CountingPolicy);
+KBVH_INSTANTIATE(float)
+KBVH_INSTANTIATE(double)
+#undef KBVH_INSTANTIATE
+
+}  // namespace kbvh

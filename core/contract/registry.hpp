@@ -1,0 +1,109 @@
+#pragma once
+#include <string_view>
+#include <type_traits>
+
+#include "core/contract/strategy.hpp"
+
+namespace kbvh {
+
+/// Which counting policy an instance is made with: benchmarks take times from silent ones.
+enum class CountingPolicy : std::uint8_t { counting, silent };
+
+/// A registered contestant: its description and how to make it.
+struct StrategyEntry {
+  Info info;
+  template <class S>
+  using Factory = std::unique_ptr<Strategy<S>> (*)(const SceneView<S>&, Playback<S>&, Topologies,
+                                                   const Params&, CountingPolicy);
+  Factory<float> make_float = nullptr;
+  Factory<double> make_double = nullptr;
+
+  template <class S>
+  Factory<S> factory() const {
+    if constexpr (std::is_same_v<S, float>)
+      return make_float;
+    else
+      return make_double;
+  }
+};
+
+namespace detail {
+template <template <class, class> class T, class S, class Count>
+std::unique_ptr<Strategy<S>> construct(const SceneView<S>& scene, Playback<S>& playback,
+                                       Topologies&& topologies, const Params& params) {
+  return std::make_unique<T<S, Count>>(scene, MotionView<T<S, Count>::foresight, S>(playback),
+                                       std::move(topologies), params);
+}
+template <template <class, class> class T, class S>
+std::unique_ptr<Strategy<S>> make(const SceneView<S>& scene, Playback<S>& playback, Topologies topologies,
+                                  const Params& params, CountingPolicy policy) {
+  return policy == CountingPolicy::counting
+             ? construct<T, S, Counting>(scene, playback, std::move(topologies), params)
+             : construct<T, S, Silent>(scene, playback, std::move(topologies), params);
+}
+}  // namespace detail
+
+/// Which scene scalars a strategy takes part in.
+enum class Scalars : std::uint8_t { both, float_only, double_only };
+
+/// Registers the class template T<Scalar, CountingPolicy>, which must
+///   - derive from Strategy<Scalar>,
+///   - say `static constexpr Foresight foresight`,
+///   - be constructible from (SceneView<S>, MotionView<foresight, S>, Topologies, const Params&).
+template <template <class, class> class T, Scalars scalars = Scalars::both>
+StrategyEntry make_entry(Info info) {
+  using Any = std::conditional_t<scalars == Scalars::double_only, double, float>;
+  StrategyEntry entry;
+  info.foresight = T<Any, Silent>::foresight;
+  info.has_float = scalars != Scalars::double_only;
+  info.has_double = scalars != Scalars::float_only;
+  entry.info = std::move(info);
+  if constexpr (scalars != Scalars::double_only) entry.make_float = &detail::make<T, float>;
+  if constexpr (scalars != Scalars::float_only) entry.make_double = &detail::make<T, double>;
+  return entry;
+}
+
+/// Defines the one function by which the generated manifest finds a source file. In strategies/NAME.cpp:
+///   KBVH_STRATEGY(NAME) { return {make_entry<MyStrategy>({.id = ...})}; }
+#define KBVH_STRATEGY(name) std::vector<kbvh::StrategyEntry> kbvh_strategy_##name()
+
+/// All contestants linked into this program, in manifest order.
+const std::vector<StrategyEntry>& registry();
+
+/// Throws ConfigError that lists the known ids.
+const StrategyEntry& find_strategy(std::string_view id);
+
+/// A builder configuration that suits the strategy: `wanted` where given, clipped to nothing: throws
+/// ConfigError if the strategy cannot take it.
+BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> method,
+                               std::optional<std::uint32_t> width, std::optional<std::uint32_t> leaf_size);
+
+/// Topologies of all bodies, built from the positions at the playback's current time.
+template <class S>
+Topologies build_topologies(const SceneView<S>& scene, Playback<S>& playback, const BuilderConfig& config);
+
+/// Makes an instance. Throws ConfigError if the strategy does not exist in scalar S.
+template <class S>
+std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<S>& scene,
+                                    Playback<S>& playback, Topologies topologies, const Params& params,
+                                    CountingPolicy policy);
+
+/// Makes instances for a strategy that consists of others and hands calls on to them.
+template <class S>
+struct NestedStrategies {
+  /// As `create`. Throws ConfigError, too, if the instance is to know more of the future than `motion` does.
+  template <class Motion>
+  static std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<S>& scene,
+                                             const Motion& motion, Topologies topologies,
+                                             const Params& params, CountingPolicy policy) {
+    constexpr Foresight offered = std::is_base_of_v<ClipMotion<S>, Motion>      ? Foresight::whole_clip
+                                  : std::is_base_of_v<SegmentMotion<S>, Motion> ? Foresight::next_keyframe
+                                  : std::is_base_of_v<SteppedMotion<S>, Motion> ? Foresight::step_bound
+                                                                                : Foresight::none;
+    if (entry.info.foresight > offered)
+      throw ConfigError("'" + entry.info.id + "' has to know more of the future than there is to know");
+    return kbvh::create(entry, scene, *motion.playback_, std::move(topologies), params, policy);
+  }
+};
+
+}  // namespace kbvh

@@ -1,0 +1,86 @@
+#pragma once
+#include "core/families/wide/kernels/wide_layout.hpp"
+#include "core/families/wide/kernels/wide_overlap.hpp"
+#include "core/kernels/kernel_tables.hpp"
+
+namespace kbvh {
+
+enum class KernelSet : std::uint8_t;
+
+/// Two primitives that are near each other: how much of the reach it takes until their boxes can meet. Not
+/// positive if they overlap already.
+struct NearPair {
+  std::uint32_t primitive_a, primitive_b;
+  float ratio;
+};
+
+/// A leaf pair's side: as `WideLeaves`, with room of its own for rows, in leaves of any size.
+template <class S>
+struct NearLeaves {
+  WideLeafLists lists;
+  S* rows;                ///< [leaf][6][padded leaf size, at least 4]
+  std::uint32_t* stamps;  ///< [leaf]: the rows are those of these positions
+  std::uint32_t stamp;
+  const S* positions;
+  S margin[6];  ///< by how much the rows of the hierarchy are larger than the vertices: lower sides, upper
+                ///< ones
+};
+
+/// Turns pairs of leaves into pairs of primitives whose boxes may meet while they close in on each other by
+/// no more than the reach. Sides 0 to 2: b lies on the upper side of a along x, y, z; 3 to 5: on the lower
+/// one.
+template <class S>
+struct LeafNear {
+  WideArrays<S> a, b;
+  NearLeaves<S> leaves_a, leaves_b;
+  S inverse_reach[6];     ///< 1 / reach, by side; positive and finite
+  const LeafSlot* pairs;  ///< first, second, ...
+  std::size_t next, count;
+  NearPair* out;
+  std::size_t found, out_room;
+  std::uint64_t tests;
+};
+
+/// One body's primitives as they are now: CSR lists, and positions [vertex][3], one number past the end
+/// readable.
+template <class S>
+struct PrimitivesNow {
+  const std::uint32_t *offsets, *vertices;
+  const S* positions;
+};
+
+template <class S>
+struct NearKernels {
+  /// Goes on until all pairs of leaves are done or the next might not find room (`leaf_pair_step`).
+  using Near = void (*)(LeafNear<S>& state);
+  /// Makes all boxes of a hierarchy larger by the margin: lower sides x, y, z, upper sides x, y, z.
+  using Widen = void (*)(WideArrays<S> hierarchy, std::uint32_t node_count, const S* margin);
+  Near near_padded[3][3];  ///< [log2(width) - 1][padded leaf size 4, 8, 16]
+  Widen widen_width[3];    ///< [log2(width) - 1]
+  /// The least and the largest of now - before over `vertices` points [vertex][3], each rounded to nearest:
+  /// lower x, y, z, any, upper x, y, z, any.
+  void (*drift)(const S* now, const S* before, std::size_t vertices, S* interval);
+
+  /// Keeps the pairs whose primitives' boxes overlap now, in their order; `out` has room for all of them.
+  /// Returns how many.
+  std::size_t (*meeting)(const FoundPair* pairs, std::size_t count, PrimitivesNow<S> a, PrimitivesNow<S> b,
+                         FoundPair* out);
+
+  static constexpr std::size_t index(std::uint32_t width) { return width == 2 ? 0 : width == 4 ? 1 : 2; }
+  Near near(std::uint32_t width, std::uint32_t padded) const {
+    return near_padded[index(width)][index(padded / 2)];
+  }
+  Widen widen(std::uint32_t width) const { return widen_width[index(width)]; }
+};
+KBVH_DECLARE_KERNELS(NearKernels<float>, near_float)
+KBVH_DECLARE_KERNELS(NearKernels<double>, near_double)
+
+/// Those of one instruction set.
+template <class S>
+const NearKernels<S>& near_kernels(KernelSet set);
+template <>
+const NearKernels<float>& near_kernels(KernelSet set);
+template <>
+const NearKernels<double>& near_kernels(KernelSet set);
+
+}  // namespace kbvh

@@ -1,0 +1,159 @@
+#include "core/families/drift/near_pairs.hpp"
+
+#include <algorithm>
+#include <type_traits>
+
+namespace kbvh {
+
+namespace {
+/// Leaf pairs that are collected before they are turned into pairs of primitives: few enough to stay in the
+/// cache.
+constexpr std::size_t leaf_pair_room = 2048;
+/// Room for pairs of primitives that is made at least.
+constexpr std::size_t chunk_room = 2048;
+
+template <class S>
+const WideOverlapKernels<S>& overlap_kernels(KernelSet set) {
+  if constexpr (std::is_same_v<S, float>)
+    return KBVH_SELECT_KERNELS(set, wide_overlap_float);
+  else
+    return KBVH_SELECT_KERNELS(set, wide_overlap_double);
+}
+}  // namespace
+
+template <class S>
+NearLeaves<S> NearPairs<S>::leaves(const NearSide<S>& side, Leaves& own) {
+  const std::size_t count = side.hierarchy->leaf_count();
+  if (own.stamps.size() != count) {
+    own.stamps.assign(count, 0);
+    own.rows.resize(count * lane_scalars(std::max(4u, side.hierarchy->padded_leaf_size())));
+    own.stamp = 1;
+  } else if (!side.same && ++own.stamp == 0) {
+    std::fill(own.stamps.begin(), own.stamps.end(), 0);
+    own.stamp = 1;
+  }
+  NearLeaves<S> result{
+      side.hierarchy->leaf_lists(), own.rows.data(), own.stamps.data(), own.stamp, side.positions, {}};
+  std::copy_n(side.margin, 6, result.margin);
+  return result;
+}
+
+template <class S>
+void NearPairs<S>::forget() {
+  for (Leaves& own : leaves_) {
+    std::fill(own.stamps.begin(), own.stamps.end(), 0);
+    own.stamp = 1;
+  }
+}
+
+template <class S>
+void NearPairs<S>::build(const NearSide<S>& a, const NearSide<S>& b, std::uint32_t body_a,
+                         std::uint32_t body_b, const S (&reach)[6], std::uint64_t& tests) {
+  WideHierarchy<S>&hierarchy_a = *a.hierarchy, &hierarchy_b = *b.hierarchy;
+  const std::uint32_t width = hierarchy_a.topology().width;
+  kernels_ = hierarchy_a.kernels();
+  stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
+  leaf_pairs_.resize(2 * leaf_pair_room);
+  const auto no_limit = Budget{}.box_tests;
+  WideTraversal state{stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pair_room, 1, no_limit};
+  if (overlap(hierarchy_a.box(0), hierarchy_b.box(0))) state.stack[state.depth++] = {0, 0};
+  LeafNear<S> near{hierarchy_a.arrays(),
+                   hierarchy_b.arrays(),
+                   leaves(a, leaves_[0]),
+                   leaves(b, leaves_[1]),
+                   {},
+                   leaf_pairs_.data(),
+                   0,
+                   0,
+                   nullptr,
+                   0,
+                   0,
+                   0};
+  for (std::size_t k = 0; k < 6; ++k) near.inverse_reach[k] = 1 / reach[k];
+  const auto traverse = overlap_kernels<S>(hierarchy_a.kernels()).traverse(width);
+  const auto pairs_of_leaves =
+      near_kernels<S>(hierarchy_a.kernels())
+          .near(width,
+                std::max(4u, std::max(hierarchy_a.padded_leaf_size(), hierarchy_b.padded_leaf_size())));
+  while (state.depth > 0) {
+    traverse(near.a, near.b, state);
+    near.next = 0;
+    near.count = state.found;
+    while (near.next < near.count) {
+      if (found_.size() < near.found + chunk_room) found_.resize(2 * near.found + chunk_room);
+      near.out = found_.data();
+      near.out_room = found_.size();
+      pairs_of_leaves(near);
+    }
+    state.found = 0;
+    if (state.depth + wide_step >= state.stack_room) {
+      stack_.resize(2 * stack_.size());
+      state.stack = stack_.data();
+      state.stack_room = stack_.size();
+    }
+  }
+  tests += state.tests + near.tests;
+  sort(near.found, body_a, body_b);
+}
+
+template <class S>
+void NearPairs<S>::sort(std::size_t found, std::uint32_t body_a, std::uint32_t body_b) {
+  std::uint32_t place[buckets] = {};
+  for (std::size_t i = 0; i < found; ++i) ++place[bucket(found_[i].ratio)];
+  std::uint32_t sum = 0;
+  for (std::uint32_t k = 0; k < buckets; ++k) {
+    const std::uint32_t count = place[k];
+    place[k] = sum;
+    sum += count;
+    bucket_end_[k] = sum;
+  }
+  pairs_.resize(found);
+  for (std::size_t i = 0; i < found; ++i)
+    pairs_[place[bucket(found_[i].ratio)]++] = {body_a, found_[i].primitive_a, body_b, found_[i].primitive_b};
+}
+
+template <class S>
+void NearPairs<S>::append(const FoundPair* pairs, std::size_t count, PairBuffer& out) {
+  const std::size_t before = out.size();
+  out.resize(before + count);
+  for (std::size_t i = 0; i < count; ++i)
+    out[before + i] = {pairs[i].body_a, pairs[i].primitive_a, pairs[i].body_b, pairs[i].primitive_b};
+}
+
+template <class S>
+void NearPairs<S>::read(double fraction, PairBuffer& out) const {
+  append(pairs_.data(), bucket_end_[bucket(float(fraction))], out);
+}
+
+template <class S>
+std::size_t NearPairs<S>::read_meeting(double fraction, const PrimitivesNow<S>& a, const PrimitivesNow<S>& b,
+                                       PairBuffer& out) {
+  const std::size_t end = bucket_end_[bucket(float(fraction))];
+  const NearKernels<S>& kernels = near_kernels<S>(kernels_);
+  chunk_.resize(chunk_room);
+  for (std::size_t first = 0; first < end; first += chunk_room) {
+    const std::size_t count = std::min(chunk_room, end - first);
+    append(chunk_.data(), kernels.meeting(pairs_.data() + first, count, a, b, chunk_.data()), out);
+  }
+  return end;
+}
+
+template <class S>
+void NearPairs<S>::clear() {
+  pairs_.clear();
+  std::fill(std::begin(bucket_end_), std::end(bucket_end_), 0);
+}
+
+template <class S>
+std::size_t NearPairs<S>::bytes() const {
+  std::size_t total = 0;
+  for (const Leaves& own : leaves_)
+    total += own.rows.size() * sizeof(S) + own.stamps.size() * sizeof(std::uint32_t);
+  return total + stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
+         found_.capacity() * sizeof(NearPair) + (pairs_.capacity() + chunk_.capacity()) * sizeof(FoundPair);
+}
+
+template class NearPairs<float>;
+template class NearPairs<double>;
+
+}  // namespace kbvh

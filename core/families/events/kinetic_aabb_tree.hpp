@@ -1,0 +1,426 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "core/base/assert.hpp"
+#include "core/base/counters.hpp"
+#include "core/base/list_pool.hpp"
+#include "core/families/events/certificate_slots.hpp"
+#include "core/families/events/event.hpp"
+#include "core/families/events/realiser_boxes.hpp"
+#include "core/scene/pairs.hpp"
+#include "core/topology/topology_edit.hpp"
+
+namespace kbvh {
+
+/// The realiser of a bound that did not exist before (in notices).
+inline constexpr std::uint32_t no_vertex = std::numeric_limits<std::uint32_t>::max();
+
+/// Change notices for a kinetic tree that nobody watches.
+///
+/// An observer may also have any of these, which tell how insertions and deletions change the nodes; they
+/// come when the topology is whole again and before the notices of the realisers that change in consequence:
+///   leaf_split(body, node, first_child)            a leaf became the parent of first_child, which is what it
+///                                                  was, and first_child + 1, which holds the new primitive
+///   leaf_changed(body, node)                       a leaf has other primitives, or is a new root
+///   node_removed(body, node)                       a leaf has lost its last primitive; the id means nothing
+///   node_moved(body, from, to)                     what was below `from` is below `to` now, which was its
+///                                                  parent, or a sibling that is gone; `from` means nothing
+///   subtree_rebuilt(body, node)                    everything below an inner node is other nodes now
+/// Nodes that are new have `no_vertex` as old realisers.
+struct NoObserver {
+  template <class S>
+  void realiser_changed(std::uint32_t /*body*/, std::uint32_t /*node*/, Side /*side*/,
+                        std::uint32_t /*old_vertex*/, std::uint32_t /*new_vertex*/,
+                        const Instant<S>& /*now*/) {}
+  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
+};
+
+/// The kinetic AABB tree of one body (Z&W s.4): per node and side the vertex that realises the bound, and one
+/// certificate that it does; the earliest failure of each certificate is scheduled in a queue that several
+/// structures may share. Any width and leaf size: a leaf's certificate is the earliest overtaker among its
+/// unique vertices, an inner node's the earliest among its other children's realisers.
+///
+/// Slots of the queue are first_slot + 6 * node + side for the nodes that there were at the start; later ones
+/// get theirs in chunks. Observer::realiser_changed(body, node, side, old, new, instant) is called at every
+/// change of a bound's realiser, deeper nodes first, and Observer::realiser_plan_changed(body, node) for a
+/// node of which a realiser has another plan from now on.
+///
+/// Primitives can be inserted and removed at any time (the paper's claim): a local edit of the topology, then
+/// certificates of the few nodes whose candidates are others, and of their ancestors as far up and on as many
+/// sides as the realisers change.
+template <class S, class Queue, class Count, class Observer = NoObserver>
+class KineticAabbTree {
+ public:
+  KineticAabbTree(Topology topology, const Primitives& primitives, std::uint16_t body,
+                  std::uint32_t first_slot, typename Queue::ClockType& clock, Queue& queue, Count& count,
+                  Observer observer = {})
+      : topology_(std::move(topology)),
+        leaf_vertices_(packed_leaf_vertices(topology_, primitives)),
+        body_(body),
+        slots_(first_slot, std::uint32_t(slot_count(topology_))),
+        clock_(&clock),
+        queue_(&queue),
+        count_(&count),
+        observer_(observer),
+        realisers_(std::size_t(6) * topology_.size(), 0) {}
+
+  static std::uint64_t slot_count(const Topology& topology) { return std::uint64_t(6) * topology.size(); }
+  /// After insertions or deletions it is laid out as TopologyEditor says, with ids that mean nothing.
+  const Topology& topology() const { return topology_; }
+  /// The topology as a builder lays it out, for audits: node i of it is node order[i] of the tree.
+  Topology compacted_topology(std::vector<std::uint32_t>& order) const {
+    if (editor_) return compacted(topology_, order);
+    order.resize(topology_.size());
+    std::iota(order.begin(), order.end(), 0u);
+    return topology_;
+  }
+  /// Unique vertices of a leaf, ascending.
+  std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const { return leaf_vertices_[node]; }
+  std::uint32_t slot(std::uint32_t node, Side side) const { return slots_.slot(6 * node + side); }
+  /// The node that a slot of the queue belongs to.
+  std::uint32_t node_of(std::uint32_t slot) const { return slots_.place(slot) / 6; }
+  std::uint32_t realiser(std::uint32_t node, Side side) const {
+    return realisers_[std::size_t(6) * node + side];
+  }
+  const std::uint32_t* realisers(std::uint32_t node) const {
+    return realisers_.data() + std::size_t(6) * node;
+  }
+
+  /// Finds every realiser at t and schedules every certificate. O(nodes log nodes + vertices of leaves).
+  void initialise(double t) {
+    const auto now = Instant<S>::at(t);
+    const auto start = [&](std::uint32_t node) {
+      for (Side side = 0; side < 6; ++side) {
+        realisers_[std::size_t(6) * node + side] = best_at(node, side, t, candidate(node, side, 0));
+        certify(node, side, now);
+      }
+    };
+    if (editor_) {  // ids need not descend towards the root any more
+      std::vector<std::uint32_t> order;
+      compacted(topology_, order);
+      for (std::size_t i = order.size(); i-- > 0;) start(order[i]);
+      return;
+    }
+    for (std::uint32_t node = topology_.size(); node-- > 0;) start(node);
+  }
+
+  /// Handles a failure that was popped from the queue: the loser takes over, here and in every ancestor that
+  /// the winner realises (leaf and tree events, Z&W s.4). O(depth) certificates.
+  void handle(const Event& event) {
+    KBVH_ASSERT(event.body == body_);
+    const Crossing<S> crossing = clock_->crossing(event);
+    const Instant<S> now{event.begin, event.end, &crossing};
+    const Side side = event.side;
+    std::uint32_t node = node_of(event.slot);
+    KBVH_ASSERT(realiser(node, side) == event.winner);
+    count_->add(Counter::certificates_failed);
+    count_->event_at(topology_.depths[node]);
+    for (;;) {
+      replace(node, side, event.loser, now);
+      certify(node, side, now);
+      if (node == 0) return;
+      node = topology_.parents[node];
+      count_->add(Counter::nodes_visited);
+      if (realiser(node, side) != event.winner) break;
+    }
+    certify(node, side, now);  // one of its challengers has changed
+  }
+
+  /// The plans of `vertices` (ascending, unique) changed at t, each from its stored position: rechecks every
+  /// certificate that they, or realisers that change in consequence, take part in.
+  void plans_changed(double t, std::span<const std::uint32_t> vertices) {
+    index_leaves();
+    touched_.clear();
+    for (std::uint32_t v : vertices) {
+      if (v >= leaves_.keys()) continue;  // new, and of no primitive yet
+      touched_.insert(touched_.end(), leaves_[v].begin(), leaves_[v].end());
+    }
+    repair(t, vertices);
+  }
+
+  /// Inserts a primitive that the body has now, at t: at the leaf whose boxes on the way down grow least.
+  /// O(depth) certificates, and O(nodes) the first time for what edits need. Where a leaf gets deeper than
+  /// 2 log2(leaves), a subtree is balanced anew: O(its leaves), amortised O(log) per insertion.
+  void insert(double t, std::uint32_t primitive, const Primitives& primitives,
+              const SampledMotion<S>& motion) {
+    start_editing(primitives);
+    const auto vertices = primitives[primitive];
+    motion.fetch(body_, vertices);
+    const auto box_of = [&](std::uint32_t node) { return box_of_realisers(realisers(node), motion, body_); };
+    const std::uint32_t old_leaf =
+        leaf_for(topology_, primitive_box(vertices, motion.positions(body_)), box_of);
+    const std::uint32_t leaf = editor_->insert(topology_, old_leaf, primitive, edit_);
+    follow_edit();
+    unique_.assign(leaf_vertices_[leaf].begin(), leaf_vertices_[leaf].end());
+    unique_.insert(unique_.end(), vertices.begin(), vertices.end());
+    set_leaf_vertices(leaf);
+    if (leaf != old_leaf && old_leaf != TopologyEditor::none)
+      notify_split(old_leaf, leaf - 1);
+    else
+      notify_leaf_changed(leaf);
+    repair(t, {});
+    for (std::uint32_t top;
+         (top = editor_->unbalanced_above(topology_, primitive)) != TopologyEditor::none;) {
+      editor_->rebalance(topology_, top, edit_, [&](std::uint32_t node) { return to_double(box_of(node)); });
+      follow_edit();
+      if constexpr (requires { observer_.subtree_rebuilt(body_, top); })
+        observer_.subtree_rebuilt(body_, top);
+      repair(t, {});
+    }
+  }
+
+  /// Takes a primitive out at t. O(depth) certificates, and O(nodes) the first time.
+  void remove(double t, std::uint32_t primitive, const Primitives& primitives) {
+    start_editing(primitives);
+    const std::uint32_t leaf = editor_->leaf_of(primitive);
+    const bool removed = topology_.nodes[leaf].count() == 1;
+    unique_.clear();
+    if (removed) set_leaf_vertices(leaf);
+    editor_->remove(topology_, primitive, edit_);
+    follow_edit();
+    if (removed) {
+      notify_removed(leaf);
+    } else {
+      const TopologyNode content = topology_.nodes[leaf];
+      for (std::uint32_t k = content.first(); k < content.first() + content.count(); ++k) {
+        const auto vertices = primitives[topology_.primitives[k]];
+        unique_.insert(unique_.end(), vertices.begin(), vertices.end());
+      }
+      set_leaf_vertices(leaf);
+      notify_leaf_changed(leaf);
+    }
+    repair(t, {});
+  }
+
+  std::size_t bytes() const {
+    return topology_.bytes() + leaf_vertices_.bytes() + leaves_.bytes() + moved_.size() + slots_.bytes() +
+           (realisers_.size() + marked_.size()) * sizeof(std::uint32_t) + (editor_ ? editor_->bytes() : 0);
+  }
+
+ private:
+  std::uint32_t candidate_count(std::uint32_t node) const {
+    const TopologyNode n = topology_.nodes[node];
+    return n.is_leaf() ? std::uint32_t(leaf_vertices_[node].size()) : n.count();
+  }
+  /// A vertex that may realise the side: one of the leaf's, or a child's realiser.
+  std::uint32_t candidate(std::uint32_t node, Side side, std::uint32_t i) const {
+    const TopologyNode n = topology_.nodes[node];
+    return n.is_leaf() ? leaf_vertices_[node][i] : realiser(n.first() + i, side);
+  }
+  bool old_is_candidate(std::uint32_t node, Side side, std::uint32_t vertex) const {
+    for (std::uint32_t i = 0; i < candidate_count(node); ++i)
+      if (candidate(node, side, i) == vertex) return true;
+    return false;
+  }
+  std::uint32_t best_at(std::uint32_t node, Side side, double t, std::uint32_t best) {
+    const std::uint32_t n = candidate_count(node);
+    count_->add(Counter::vertex_reads, n);
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::uint32_t challenger = candidate(node, side, i);
+      if (challenger != best && clock_->compare_values(body_, side, challenger, best, t) > 0)
+        best = challenger;
+    }
+    return best;
+  }
+
+  void replace(std::uint32_t node, Side side, std::uint32_t vertex, const Instant<S>& now) {
+    std::uint32_t& realiser = realisers_[std::size_t(6) * node + side];
+    const std::uint32_t old = realiser;
+    realiser = vertex;
+    count_->add(Counter::values_written);
+    observer_.template realiser_changed<S>(body_, node, side, old, vertex, now);
+  }
+
+  void discard(std::uint32_t slot) {
+    if (!queue_->cancel(slot)) return;
+    count_->add(Counter::certificates_discarded);
+    count_->add(Counter::queue_operations);
+  }
+  /// Schedules the earliest failure of the side's certificate from now on, in place of the one that stood.
+  void certify(std::uint32_t node, Side side, const Instant<S>& now) {
+    const std::uint32_t slot = this->slot(node, side), winner = realiser(node, side);
+    const std::uint32_t n = candidate_count(node);
+    Event event, earliest;
+    bool found = false;
+    event.winner = winner;
+    event.slot = slot;
+    event.body = body_;
+    event.side = std::uint8_t(side);
+    event.depth = topology_.depths[node];
+    // The queue must not hold this slot while the clock learns its new crossing.
+    discard(slot);
+    std::optional<Crossing<S>> own, earliest_own;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      event.loser = candidate(node, side, i);
+      if (event.loser == winner) continue;
+      count_->add(Counter::certificates_made);
+      if (!clock_->first_failure(event, now, own)) continue;
+      if (found && !clock_->overtakes_first(event, own, earliest, earliest_own)) continue;
+      found = true;
+      earliest = event;
+      earliest_own = own;
+    }
+    clock_->remember(slot, earliest_own);
+    if (!found) return;
+    queue_->schedule(earliest);
+    count_->add(Counter::queue_operations);
+    count_->peak(Counter::queue_peak, queue_->size());
+  }
+
+  static ListPool packed_leaf_vertices(const Topology& topology, const Primitives& primitives) {
+    LeafVertices lists = unique_leaf_vertices(topology, primitives);
+    return ListPool(lists.offsets, std::move(lists.vertices));
+  }
+  /// The leaves of each vertex, made when the first plan changes.
+  void index_leaves() {
+    if (leaves_.keys() != 0) return;
+    std::vector<std::uint32_t> offsets(clock_->plans(body_).vertex_count() + 1, 0);
+    for (std::uint32_t node = 0; node < topology_.size(); ++node)
+      for (std::uint32_t v : leaf_vertices_[node]) ++offsets[v + 1];
+    for (std::size_t v = 1; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
+    std::vector<std::uint32_t> leaves(offsets.back()), next(offsets.begin(), offsets.end() - 1);
+    for (std::uint32_t node = 0; node < topology_.size(); ++node)
+      for (std::uint32_t v : leaf_vertices_[node]) leaves[next[v]++] = node;
+    leaves_ = ListPool(offsets, std::move(leaves));
+  }
+  /// Makes `unique_`, in any order and with repetitions, the list of a leaf.
+  void set_leaf_vertices(std::uint32_t leaf) {
+    std::sort(unique_.begin(), unique_.end());
+    unique_.erase(std::unique(unique_.begin(), unique_.end()), unique_.end());
+    list_under(leaf, {});
+    leaf_vertices_.assign(leaf, unique_);
+    list_under(leaf, unique_);
+  }
+  /// Enters a leaf at the vertices of its list, or takes it out there if `vertices` is empty.
+  void list_under(std::uint32_t leaf, std::span<const std::uint32_t> vertices) {
+    if (leaves_.keys() == 0) return;
+    if (vertices.empty())
+      for (std::uint32_t v : leaf_vertices_[leaf]) leaves_.erase(v, leaf);
+    leaves_.resize(clock_->plans(body_).vertex_count());
+    for (std::uint32_t v : vertices) leaves_.push(v, leaf);
+  }
+
+  void start_editing(const Primitives& primitives) {
+    if (!editor_) editor_.emplace(topology_, primitives.count());
+  }
+  /// Brings all that is kept by node in line with what the editor did, and notes which nodes to look at.
+  void follow_edit() {
+    std::vector<std::pair<std::uint32_t, std::vector<std::uint32_t>>> lists;
+    for (const TopologyEdit::Move& move : edit_.moved) {
+      const auto list = leaf_vertices_[move.from];
+      if (list.empty()) continue;
+      lists.emplace_back(move.to, std::vector<std::uint32_t>(list.begin(), list.end()));
+      list_under(move.from, {});
+      leaf_vertices_.clear(move.from);
+    }
+    for (const std::uint32_t node : edit_.vacated) {
+      for (Side side = 0; side < 6; ++side) {
+        discard(slot(node, side));
+        clock_->remember(slot(node, side), {});
+        realisers_[std::size_t(6) * node + side] = no_vertex;
+      }
+    }
+    const std::uint32_t nodes = topology_.size();
+    slots_.grow(6 * nodes, *queue_);
+    realisers_.resize(std::size_t(6) * nodes, no_vertex);
+    leaf_vertices_.resize(nodes);
+    for (const auto& [to, list] : lists) {
+      leaf_vertices_.assign(to, list);
+      list_under(to, list);
+    }
+    touched_ = edit_.fresh;
+    touched_.insert(touched_.end(), edit_.changed.begin(), edit_.changed.end());
+  }
+  void notify_split(std::uint32_t node, std::uint32_t first_child) {
+    if constexpr (requires { observer_.leaf_split(body_, node, first_child); })
+      observer_.leaf_split(body_, node, first_child);
+  }
+  void notify_leaf_changed(std::uint32_t leaf) {
+    if constexpr (requires { observer_.leaf_changed(body_, leaf); }) observer_.leaf_changed(body_, leaf);
+  }
+  void notify_removed(std::uint32_t leaf) {
+    if constexpr (requires { observer_.node_removed(body_, leaf); }) observer_.node_removed(body_, leaf);
+    if constexpr (requires { observer_.node_moved(body_, leaf, leaf); })
+      for (const TopologyEdit::Move& move : edit_.moved) observer_.node_moved(body_, move.from, move.to);
+  }
+
+  /// Brings realisers and certificates in order at t, from `touched_` up, after changes of plans (`vertices`,
+  /// ascending) or of candidates.
+  void repair(double t, std::span<const std::uint32_t> vertices) {
+    const auto now = Instant<S>::at(t);
+    marked_.resize(topology_.size(), 0);
+    moved_.resize(topology_.size(), 0);
+    ++mark_;
+    for (const std::uint32_t start : touched_) {
+      moved_[start] |= other_candidates;
+      for (std::uint32_t node = start; marked_[node] != mark_; node = topology_.parents[node]) {
+        marked_[node] = mark_;
+        if (node == 0) break;
+      }
+    }
+    affected_.clear();
+    if (!touched_.empty()) affected_.push_back(0);
+    for (std::size_t i = 0; i < affected_.size(); ++i) {
+      const TopologyNode node = topology_.nodes[affected_[i]];
+      if (node.is_leaf()) continue;
+      for (std::uint32_t child = node.first(); child < node.first() + node.count(); ++child)
+        if (marked_[child] == mark_) affected_.push_back(child);
+    }
+    const auto changed = [&](std::uint32_t v) {
+      return std::binary_search(vertices.begin(), vertices.end(), v);
+    };
+    // Level by level from the root, so backwards it is bottom-up.
+    for (std::size_t i = affected_.size(); i-- > 0;) {
+      const std::uint32_t node = affected_[i];
+      for (Side side = 0; side < 6; ++side) {
+        const std::uint32_t old = realiser(node, side);
+        bool concerned = (moved_[node] & other_candidates) != 0 || changed(old);
+        for (std::uint32_t c = 0; !concerned && c < candidate_count(node); ++c) {
+          const std::uint32_t child = topology_.nodes[node].first() + c;
+          concerned = changed(candidate(node, side, c)) || side_moved(child, side);
+        }
+        if (!concerned) continue;
+        count_->add(Counter::nodes_visited);
+        const bool still_there = old_is_candidate(node, side, old);
+        const std::uint32_t best = best_at(node, side, t, still_there ? old : candidate(node, side, 0));
+        if (best != old) {
+          replace(node, side, best, now);
+          moved_[node] = std::uint8_t(moved_[node] | (1u << side));
+        }
+        certify(node, side, now);
+      }
+      if (!vertices.empty() && std::any_of(realisers(node), realisers(node) + 6, changed))
+        observer_.realiser_plan_changed(body_, node);
+    }
+    for (std::uint32_t node : affected_) moved_[node] = 0;
+  }
+  bool side_moved(std::uint32_t node, Side side) const { return (moved_[node] >> side) & 1; }
+
+  static constexpr std::uint8_t other_candidates = 1 << 6;  ///< in `moved_`
+
+  Topology topology_;
+  ListPool leaf_vertices_;
+  std::uint16_t body_;
+  CertificateSlots slots_;
+  typename Queue::ClockType* clock_;
+  Queue* queue_;
+  Count* count_;
+  Observer observer_;
+  std::vector<std::uint32_t> realisers_;  ///< [node][side]
+  // For changes of plans, made when the first one comes: leaves of each vertex, marks of affected nodes.
+  ListPool leaves_;
+  std::vector<std::uint32_t> touched_, marked_, affected_;
+  std::vector<std::uint8_t> moved_;  ///< sides whose realiser changed in this pass, one bit each
+  std::uint32_t mark_ = 0;
+  // For changes of geometry, made when the first one comes.
+  std::optional<TopologyEditor> editor_;
+  TopologyEdit edit_;
+  std::vector<std::uint32_t> unique_;
+};
+
+}  // namespace kbvh

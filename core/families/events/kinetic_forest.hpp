@@ -1,0 +1,113 @@
+#pragma once
+#include <algorithm>
+#include <vector>
+
+#include "core/contract/strategy.hpp"
+#include "core/families/events/event_queue.hpp"
+#include "core/families/events/kinetic_aabb_tree.hpp"
+
+namespace kbvh {
+
+/// The kinetic trees of all bodies of a scene on one event queue: AABB trees, or others that are made and
+/// used alike.
+template <class S, class Queue, class Count, class Observer = NoObserver,
+          template <class, class, class, class> class KineticTree = KineticAabbTree>
+class KineticForest {
+ public:
+  using Tree = KineticTree<S, Queue, Count, Observer>;
+  using Clock = typename Queue::ClockType;
+
+  KineticForest(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, Count& count,
+                Observer observer = {})
+      : clock_(plans_of(scene, motion)), queue_(clock_, slots_of(topologies)), count_(&count) {
+    std::uint32_t first_slot = 0;
+    trees_.reserve(topologies.size());
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+      const auto slots = std::uint32_t(Tree::slot_count(topologies[body]));
+      trees_.emplace_back(std::move(topologies[body]), scene.primitives(body), std::uint16_t(body),
+                          first_slot, clock_, queue_, count, observer);
+      first_slot += slots;
+    }
+  }
+  KineticForest(const KineticForest&) = delete;  // trees point to the clock and the queue
+  KineticForest& operator=(const KineticForest&) = delete;
+
+  /// Starts over at t.
+  void reset(double t) {
+    queue_.clear();
+    clock_.clear();
+    for (Tree& tree : trees_) tree.initialise(t);
+  }
+  /// Handles every event up to and including t (Z&W Algorithm 1).
+  void advance(double t) {
+    while (due(t)) handle_next();
+  }
+  bool due(double t) const { return !queue_.empty() && clock_.due(queue_.top(), t); }
+  /// Takes the first event off the queue and handles it.
+  void handle_next() {
+    const Event event = queue_.top();
+    queue_.pop();
+    count_->add(Counter::queue_operations);
+    trees_[event.body].handle(event);
+  }
+
+  /// Follows changes of plans at t that the motion shows already; of each body's tree once.
+  void plans_changed(double t, std::span<const PlanChange<S>> changes) {
+    for (std::uint32_t body = 0; body < trees_.size(); ++body) {
+      changed_.clear();
+      for (const PlanChange<S>& change : changes)
+        if (change.body == body) changed_.push_back(change.vertex);
+      if (changed_.empty()) continue;
+      std::sort(changed_.begin(), changed_.end());
+      changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+      trees_[body].plans_changed(t, changed_);
+    }
+  }
+
+  /// Follows a change of geometry at t that scene and motion show already. O(depth) certificates for each
+  /// primitive, and O(nodes) the first time.
+  void geometry_changed(double t, const SceneView<S>& scene, const SampledMotion<S>& motion,
+                        std::span<const BodyChange> changes) {
+    for (const BodyChange& change : changes) {
+      const Primitives& primitives = scene.primitives(change.body);
+      Tree& tree = trees_[change.body];
+      for (const std::uint32_t p : change.removed_primitives) tree.remove(t, p, primitives);
+      for (std::uint32_t p = change.first_primitive; p < primitives.count(); ++p)
+        tree.insert(t, p, primitives, motion);
+    }
+  }
+
+  Tree& tree(std::uint32_t body) { return trees_[body]; }
+  const Tree& tree(std::uint32_t body) const { return trees_[body]; }
+  Clock& clock() { return clock_; }
+  const Clock& clock() const { return clock_; }
+  Queue& queue() { return queue_; }
+  const Queue& queue() const { return queue_; }
+  std::size_t bytes() const {
+    std::size_t total = queue_.bytes();
+    for (const Tree& tree : trees_) total += tree.bytes();
+    return total;
+  }
+
+ private:
+  static std::vector<const FlightPlans<S>*> plans_of(const SceneView<S>& scene, const ClipMotion<S>& motion) {
+    std::vector<const FlightPlans<S>*> plans;
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) plans.push_back(&motion.plans(body));
+    return plans;
+  }
+  static std::uint32_t slots_of(const Topologies& topologies) {
+    std::uint64_t slots = 0;
+    for (const Topology& topology : topologies) slots += Tree::slot_count(topology);
+    if (slots > std::numeric_limits<std::uint32_t>::max())
+      throw std::length_error(std::to_string(slots) + " certificates are more than a queue can number");
+    return std::uint32_t(slots);
+  }
+
+  Clock clock_;
+  Queue queue_;
+  Count* count_;
+  std::vector<Tree> trees_;
+  std::vector<std::uint32_t> changed_;  ///< vertices of one body
+};
+
+}  // namespace kbvh

@@ -1,0 +1,111 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <type_traits>
+#include <vector>
+
+#include "core/families/events/event.hpp"
+
+namespace kbvh {
+
+/// How a clock that rounds finds the failure of a certificate within a segment.
+enum class FailureRule : std::uint8_t {
+  end_point_rule,  ///< there is one iff the loser is ahead at the segment's end, which is data; only its time
+                   ///< is rounded
+  textbook,  ///< intersect the two lines, and take what lies between now and the segment's end (Z&W 2006,
+             ///< Algorithm 3, as printed): all of it is rounded
+};
+
+/// What EventClock would be without exact arithmetic: times of events are numbers of type T (float or
+/// double), and what two of them say about each other is what counts. For contestants that show what
+/// exactness buys; with either rule a bound may be late. Plans of single vertices are not supported.
+template <class S, class T, FailureRule rule>
+class RoundedClock {
+ public:
+  using Event = kbvh::Event;
+  explicit RoundedClock(std::vector<const FlightPlans<S>*> plans) : plans_(std::move(plans)) {}
+
+  const FlightPlans<S>& plans(std::uint32_t body) const { return *plans_[body]; }
+  /// Nothing: `first_failure` starts from an event's `begin`.
+  Crossing<S> crossing(const Event& /*event*/) const { return {}; }
+
+  bool earlier(const Event& a, const Event& b) const {
+    if (a.hint != b.hint) return a.hint < b.hint;
+    if (a.depth != b.depth) return a.depth > b.depth;
+    return a.slot < b.slot;
+  }
+  bool due(const Event& event, double t) const { return event.hint <= t; }
+
+  /// As EventClock::first_failure, with rounded times: `hint` is the event's time; `begin` and `end` are the
+  /// same, but for a time that is rounded out of its segment, which they are not.
+  bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own,
+                     double until = std::numeric_limits<double>::infinity()) const {
+    own.reset();
+    const FlightPlans<S>& plan = *plans_[event.body];
+    const auto times = plan.keyframe_times();
+    const auto axis = std::size_t(axis_of(event.side));
+    const std::size_t w = std::size_t(3) * event.winner + axis, l = std::size_t(3) * event.loser + axis;
+    // Differences of coordinates come first, so that float times do not mean float coordinates.
+    using Wide = std::conditional_t<sizeof(T) < sizeof(S), S, T>;
+    const T sign = is_upper(event.side) ? T(1) : T(-1);
+    for (std::size_t k = plan.segment_at(now.begin); k + 1 < times.size() && times[k] < until; ++k) {
+      const T begin = T(times[k]), length = T(times[k + 1]) - begin;
+      const T behind = sign * T(Wide(plan.keyframe(k)[w]) - Wide(plan.keyframe(k)[l]));
+      T time = 0;
+      if constexpr (rule == FailureRule::end_point_rule) {
+        const double ahead = double(plan.keyframe(k + 1)[l]) - double(plan.keyframe(k + 1)[w]);
+        if (!((is_upper(event.side) ? ahead : -ahead) > 0)) continue;
+        time = begin + length * (behind / (behind + T(sign * T(ahead))));
+        // Behind at the start and ahead at the end, so it is in between, whatever rounding says.
+        if (!(time >= begin)) time = begin;
+        time = std::min(time, T(times[k + 1]));
+        if (!(double(time) >= now.begin)) time = T(now.begin);
+      } else {
+        const T ahead = sign * T(Wide(plan.keyframe(k + 1)[l]) - Wide(plan.keyframe(k + 1)[w]));
+        const T closing = (behind + ahead) / length;  // of the loser, relative to the winner
+        if (!(closing > 0)) continue;
+        time = begin + behind / closing;
+        if (!(double(time) >= std::max(now.begin, times[k]) && double(time) < times[k + 1])) continue;
+      }
+      event.hint = double(time);
+      // What follows is looked for from within this segment on: no event comes twice, and those that are
+      // still to come in it are not passed over because this one was rounded to its end.
+      event.begin = event.end = std::clamp(double(time), times[k], std::nextafter(times[k + 1], times[k]));
+      event.error = 0;
+      return true;
+    }
+    return false;
+  }
+
+  /// Exact: only times are rounded, not what holds at the beginning.
+  int compare_values(std::uint32_t body, Side side, std::uint32_t challenger, std::uint32_t winner,
+                     double t) const {
+    const FlightPlans<S>& plan = *plans_[body];
+    const int axis = axis_of(side);
+    const int sign = compare_at(plan.piece_after(challenger, axis, t), plan.piece_after(winner, axis, t), t);
+    return is_upper(side) ? sign : -sign;
+  }
+
+  /// Of two failures of the same certificate, does `a` come first? At equal times the one that gets further
+  /// ahead by the end of the segment.
+  bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& /*own_a*/, const Event& b,
+                       const std::optional<Crossing<S>>& /*own_b*/) const {
+    if (a.hint != b.hint) return a.hint < b.hint;
+    const FlightPlans<S>& plan = *plans_[a.body];
+    const std::size_t k = std::min(plan.segment_at(a.hint) + 1, plan.keyframe_count() - 1);
+    const auto axis = std::size_t(axis_of(a.side));
+    const S end_a = plan.keyframe(k)[std::size_t(3) * a.loser + axis];
+    const S end_b = plan.keyframe(k)[std::size_t(3) * b.loser + axis];
+    return is_upper(a.side) ? end_a > end_b : end_a < end_b;
+  }
+
+  void remember(std::uint32_t /*slot*/, const std::optional<Crossing<S>>& /*own*/) {}
+  void clear() {}
+
+ private:
+  std::vector<const FlightPlans<S>*> plans_;
+};
+
+}  // namespace kbvh

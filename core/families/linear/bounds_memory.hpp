@@ -1,0 +1,47 @@
+#pragma once
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <vector>
+
+#include "core/families/wide/wide_hierarchy.hpp"
+
+namespace kbvh {
+
+/// Boxes of bodies at ends of a clip's segments, kept to be used again when it plays again. What came first
+/// stays: where not all finds room, a clip that loops would otherwise push out each box before it is wanted.
+template <class S>
+class BoundsMemory {
+ public:
+  struct Boxes {
+    AlignedArray<S> lanes, own;  ///< as in WideArrays
+    bool complete = false;       ///< to be said by whoever fills them in
+  };
+
+  BoundsMemory(std::size_t bodies, std::size_t most_bytes) : kept_(bodies), most_bytes_(most_bytes) {}
+  bool is_used() const { return most_bytes_ > 0; }
+
+  /// Those of a body at t; null if there are none.
+  const Boxes* find(std::size_t body, double t) const {
+    const auto found = kept_[body].find(t);
+    return found == kept_[body].end() || !found->second.complete ? nullptr : &found->second;
+  }
+  /// Room for those of a body at t that are not complete yet; null if there is no more.
+  Boxes* add(std::size_t body, double t, std::size_t lanes, std::size_t own) {
+    if (const auto begun = kept_[body].find(t); begun != kept_[body].end()) return &begun->second;
+    const std::size_t more = (lanes + own) * sizeof(S);
+    if (bytes_ + more > most_bytes_) return nullptr;
+    bytes_ += more;
+    Boxes& boxes = kept_[body][t];
+    boxes.lanes.assign(lanes, std::numeric_limits<S>::infinity());
+    boxes.own.assign(own, S(0));
+    return &boxes;
+  }
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::map<double, Boxes>> kept_;
+  std::size_t most_bytes_, bytes_ = 0;
+};
+
+}  // namespace kbvh

@@ -1,0 +1,243 @@
+#include "core/families/linear/interval_join.hpp"
+
+#include <algorithm>
+
+namespace kbvh {
+
+namespace {
+/// Room for pairs of primitives that is made at least.
+constexpr std::size_t chunk_room = 2048;
+
+/// Of pairs in columns, keeps those that are pairs within a body, from one on.
+void keep_self_columns(const Primitives* neighbours, LeavesOf leaves, JoinColumns& pairs, std::size_t from) {
+  std::size_t kept = from;
+  for (std::size_t i = from; i < pairs.found; ++i) {
+    std::uint32_t a = pairs.primitive_a[i], b = pairs.primitive_b[i];
+    if (!keep_self_pair(neighbours, leaves, a, b)) continue;
+    pairs.primitive_a[kept] = a;
+    pairs.primitive_b[kept] = b;
+    if (pairs.begin != nullptr) {
+      pairs.begin[kept] = pairs.begin[i];
+      pairs.end[kept] = pairs.end[i];
+    }
+    ++kept;
+  }
+  pairs.found = kept;
+}
+}  // namespace
+
+template <class S>
+JoinColumns IntervalJoin<S>::Columns::view(std::size_t found, bool timed) {
+  if (primitive_a.size() < found + chunk_room) {
+    const std::size_t room = 2 * found + chunk_room;
+    for (auto* column : {&primitive_a, &primitive_b}) column->resize(room);
+    if (timed)
+      for (auto* column : {&begin, &end}) column->resize(room);
+  }
+  return {primitive_a.data(),
+          primitive_b.data(),
+          timed ? begin.data() : nullptr,
+          timed ? end.data() : nullptr,
+          found,
+          primitive_a.size()};
+}
+
+template <class S>
+std::size_t IntervalJoin<S>::Columns::bytes() const {
+  return (primitive_a.capacity() + primitive_b.capacity()) * sizeof(std::uint32_t) +
+         (begin.capacity() + end.capacity()) * sizeof(float);
+}
+
+template <class S>
+void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>& scene, std::uint32_t body_a,
+                            std::uint32_t body_b, std::size_t leaf_pairs) {
+  body_a_ = body_a;
+  body_b_ = body_b;
+  reading_ = false;
+  throughout_ = count_ = 0;
+  traversal_ = {};
+  leaf_join_ = {};
+  const LinearSide<S>&a = segment.sides[body_a], &b = segment.sides[body_b];
+  done_ = a.hierarchy().empty() || b.hierarchy().empty() || a.apart || b.apart;
+  if (done_) return sort_by_begin();
+  const bool self = body_a == body_b;
+  const std::uint32_t width = a.hierarchy().topology().width;
+  const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(a.hierarchy().kernels());
+  traverse_ = self ? kernels.self(width) : kernels.join(width);
+  join_leaves_ =
+      kernels.leaf_join(std::max({4u, a.hierarchy().padded_leaf_size(), b.hierarchy().padded_leaf_size()}));
+  neighbours_ = self && !with_neighbours_ ? &scene.primitives(body_a) : nullptr;
+  stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
+  leaf_pairs_.resize(std::max(leaf_pairs_.size(), 2 * leaf_pairs));
+  traversal_ = {stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pairs, 1, Budget{}.box_tests};
+  // A root that is a leaf lies in a node's only lane, so that the roots are compared with each other there.
+  traversal_.stack[traversal_.depth++] = {0, 0};
+  leaf_join_ = {width,
+                a.hierarchy().arrays(),
+                b.hierarchy().arrays(),
+                a.ends(),
+                b.ends(),
+                a.leaves(),
+                b.leaves(),
+                leaf_pairs_.data(),
+                0,
+                0,
+                found_throughout_.view(0, false),
+                found_partly_.view(0, true),
+                0};
+}
+
+template <class S>
+bool IntervalJoin<S>::go_on(std::uint64_t box_tests) {
+  if (done_) return true;
+  const std::uint64_t before = tests();
+  while (traversal_.depth > 0) {
+    const std::uint64_t made = tests() - before;
+    if (made >= box_tests) return false;
+    const std::uint64_t left = box_tests - made, most = Budget{}.box_tests;
+    traversal_.test_limit = left < most - traversal_.tests ? traversal_.tests + left : most;
+    traverse_(leaf_join_.a, leaf_join_.ends_a, leaf_join_.b, leaf_join_.ends_b, traversal_);
+    leaf_join_.next = 0;
+    if (body_a_ == body_b_) {
+      take_self_leaves(different_leaves_first(leaf_pairs_.data(), traversal_.found), LeavesOf::two);
+      take_self_leaves(traversal_.found, LeavesOf::one);
+    } else {
+      take_leaves(traversal_.found);
+    }
+    traversal_.found = 0;
+    if (traversal_.depth + wide_step >= traversal_.stack_room) {
+      stack_.resize(2 * stack_.size());
+      traversal_.stack = stack_.data();
+      traversal_.stack_room = stack_.size();
+    }
+  }
+  done_ = true;
+  sort_by_begin();
+  return true;
+}
+
+template <class S>
+void IntervalJoin<S>::take_leaves(std::size_t end) {
+  leaf_join_.count = end;
+  while (leaf_join_.next < leaf_join_.count) {
+    leaf_join_.throughout = found_throughout_.view(leaf_join_.throughout.found, false);
+    leaf_join_.partly = found_partly_.view(leaf_join_.partly.found, true);
+    join_leaves_(leaf_join_);
+  }
+}
+
+template <class S>
+void IntervalJoin<S>::take_self_leaves(std::size_t end, LeavesOf leaves) {
+  const std::size_t old_throughout = leaf_join_.throughout.found, old_partly = leaf_join_.partly.found;
+  take_leaves(end);
+  keep_self_columns(neighbours_, leaves, leaf_join_.throughout, old_throughout);
+  keep_self_columns(neighbours_, leaves, leaf_join_.partly, old_partly);
+}
+
+template <class S>
+void IntervalJoin<S>::sort_by_begin() {
+  throughout_ = leaf_join_.throughout.found;
+  const std::size_t partly = leaf_join_.partly.found;
+  std::uint32_t place[FractionBuckets::count] = {};
+  for (std::size_t i = 0; i < partly; ++i) ++place[FractionBuckets::of(found_partly_.begin[i])];
+  std::uint32_t sum = std::uint32_t(throughout_);
+  for (std::uint32_t k = 0; k < FractionBuckets::count; ++k) {
+    const std::uint32_t count = place[k];
+    place[k] = sum;
+    sum += count;
+    bucket_end_[k] = sum;
+  }
+  count_ = throughout_ + partly;
+  if (sorted_.size() < count_) sorted_.resize(count_);
+  for (std::size_t i = 0; i < throughout_; ++i)
+    sorted_[i] = {found_throughout_.primitive_a[i], found_throughout_.primitive_b[i], 0, 1};
+  for (std::size_t i = 0; i < partly; ++i)
+    sorted_[place[FractionBuckets::of(found_partly_.begin[i])]++] = {
+        found_partly_.primitive_a[i], found_partly_.primitive_b[i], found_partly_.begin[i],
+        found_partly_.end[i]};
+}
+
+template <class S>
+void IntervalJoin<S>::start_reading() {
+  reading_ = true;
+  if (alive_.size() < count_) {
+    alive_.resize(count_);
+    alive_places_.resize(count_);
+    next_ending_.resize(count_);
+    place_.resize(count_);
+  }
+  for (std::size_t i = 0; i < throughout_; ++i)
+    alive_[i] = {body_a_, sorted_[i].primitive_a, body_b_, sorted_[i].primitive_b};
+  next_ = alive_count_ = std::uint32_t(throughout_);
+  waiting_.clear();
+  std::fill(std::begin(ending_), std::end(ending_), none);
+  present_ = 0;
+}
+
+template <class S>
+void IntervalJoin<S>::begin_pair(std::uint32_t index) {
+  const JoinedPair pair = sorted_[index];
+  const std::uint32_t bucket = FractionBuckets::of(pair.end), place = alive_count_++;
+  next_ending_[index] = ending_[bucket];
+  ending_[bucket] = index;
+  place_[index] = place;
+  alive_[place] = {body_a_, pair.primitive_a, body_b_, pair.primitive_b};
+  alive_places_[place] = index;
+}
+
+template <class S>
+void IntervalJoin<S>::end_pair(std::uint32_t index) {
+  const std::uint32_t place = place_[index], last = --alive_count_;
+  alive_[place] = alive_[last];
+  alive_places_[place] = alive_places_[last];
+  place_[alive_places_[place]] = place;
+}
+
+template <class S>
+void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
+  if (!reading_) start_reading();
+  const std::uint32_t bucket = FractionBuckets::of(fraction);
+  // What begins: all of earlier buckets, some of the present one.
+  std::size_t kept = 0;
+  const auto begin_or_wait = [&](std::uint32_t index) {
+    const JoinedPair& pair = sorted_[index];
+    if (pair.begin > fraction)
+      waiting_[kept++] = index;
+    else if (pair.end >= fraction)
+      begin_pair(index);
+  };
+  const std::size_t before = waiting_.size();
+  waiting_.resize(before + (bucket_end_[bucket] - next_));
+  for (std::size_t i = 0; i < before; ++i) begin_or_wait(waiting_[i]);
+  for (; next_ < bucket_end_[bucket]; ++next_) begin_or_wait(next_);
+  waiting_.resize(kept);
+  // What ends: the lists of earlier buckets as a whole.
+  for (; present_ < bucket; ++present_) {
+    for (std::uint32_t index = ending_[present_]; index != none; index = next_ending_[index]) end_pair(index);
+    ending_[present_] = none;
+  }
+  for (std::uint32_t* link = &ending_[bucket]; *link != none;) {
+    const std::uint32_t index = *link;
+    if (sorted_[index].end < fraction) {
+      *link = next_ending_[index];
+      end_pair(index);
+    } else {
+      link = &next_ending_[index];
+    }
+  }
+  out.insert(out.end(), alive_.begin(), alive_.begin() + std::ptrdiff_t(alive_count_));
+}
+
+template <class S>
+std::size_t IntervalJoin<S>::bytes() const {
+  return stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
+         found_throughout_.bytes() + found_partly_.bytes() + sorted_.capacity() * sizeof(JoinedPair) +
+         alive_.capacity() * sizeof(PrimitivePair) +
+         (waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() + place_.capacity()) *
+             sizeof(std::uint32_t);
+}
+
+template class IntervalJoin<float>;
+template class IntervalJoin<double>;
+
+}  // namespace kbvh

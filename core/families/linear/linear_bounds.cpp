@@ -1,0 +1,488 @@
+#include "core/families/linear/linear_bounds.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "core/families/linear/moved_boxes.hpp"
+#include "core/families/wide/kernels/bounds.hpp"
+
+namespace kbvh {
+
+namespace {
+template <class S>
+Box<S> swept(const LinearSide<S>& side) {
+  Box<S> box;
+  for (const LinearEnd<S>& end : side.at)
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lower[axis] = std::min(box.lower[axis], end.own[axis] - 2 * side.margin);
+      box.upper[axis] = std::max(box.upper[axis], end.own[axis + 4] + 2 * side.margin);
+    }
+  return box;
+}
+
+template <class S>
+bool finite_root(const LinearEnd<S>& end) {
+  return std::all_of(end.own, end.own + 3, [](S x) { return std::isfinite(x); }) &&
+         std::all_of(end.own + 4, end.own + 7, [](S x) { return std::isfinite(x); });
+}
+
+constexpr std::uint32_t none_used = ~std::uint32_t(0);
+}  // namespace
+
+template <class S>
+LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>& motion,
+                              Topologies topologies, KernelSet kernels, const LinearSettings& settings)
+    : scene_(scene),
+      motion_(motion),
+      cuts_(settings.cuts),
+      memory_(scene.body_count(), settings.remembered_bytes),
+      bodies_(scene.body_count()),
+      counts_(scene.body_count()),
+      ahead_counts_(scene.body_count()),
+      near_(scene.body_count(), 0) {
+  for (Segment& segment : segments_) segment.sides.resize(body_count());
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    hierarchy(body).assign(std::move(topologies[body]), scene.primitives(body), kernels);
+    for (Segment& segment : segments_) segment.sides[body].body = &bodies_[body];
+  }
+  check_layouts(
+      scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchy(body); });
+}
+
+template <class S>
+void LinearBounds<S>::choose_segment(Segment& segment, const SegmentMotion<S>& motion, double t) const {
+  double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
+  bool rest = true;
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    begin = std::max(begin, motion.lines_begin(body));
+    end = std::min(end, motion.lines_end(body));
+    rest = rest && motion.at_rest(body);
+  }
+  if (rest || begin == -std::numeric_limits<double>::infinity()) begin = t;
+  // Plans without an end: as many frames ahead as they have lasted lately, as far as can be told.
+  segment.endless = !rest && end == std::numeric_limits<double>::infinity();
+  if (segment.endless) {
+    segment.begin = std::max(begin, t);
+    segment.end = segment.knot = t + 1.01 * foreseen_ * (step_ > 0 ? step_ : 1.0 / 64);
+    return;
+  }
+  segment.begin = begin;
+  segment.end = segment.knot = end;
+  const std::uint32_t pieces = segment.pieces;
+  if (pieces == 1 || rest) return;
+  const auto cut = [&](std::uint32_t k) {
+    return k == pieces ? end : begin + (end - begin) * (double(k) / double(pieces));
+  };
+  std::uint32_t k = 0;
+  while (k + 1 < pieces && t >= cut(k + 1)) ++k;
+  if (!(cut(k) < cut(k + 1))) return;  // so short that the doubles between are all used up
+  segment.begin = cut(k);
+  segment.end = cut(k + 1);
+}
+
+/// Sets out to make the boxes of one end, which has its slot: returns what is left to do.
+template <class S>
+auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t index,
+                                std::uint32_t end, double t) -> Refit {
+  LinearBody<S>& body = bodies_[index];
+  LinearSide<S>& side = segment.sides[index];
+  LinearEnd<S>& at = side.at[end];
+  const std::size_t nodes = body.hierarchy.node_count();
+  AlignedArray<S>&lanes = body.lanes[at.slot], &own = body.own[at.slot];
+  if (own.size() != 8 * nodes) {
+    lanes.assign(nodes * lane_scalars(body.hierarchy.topology().width), std::numeric_limits<S>::infinity());
+    own.assign(8 * nodes, S(0));
+  }
+  at.lanes = lanes.data();
+  at.own = own.data();
+  at.positions = motion.positions_on_lines(index, t, body.room[at.slot]);
+  at.made = ++body.made;
+  if (body.hierarchy.empty()) return {};
+  at.excess = 0;
+  // Over the whole of a segment of its own a body may be moved, as long as its boxes become no larger than
+  // by their margin.
+  const bool whole =
+      end == 1 && segment.begin == motion.lines_begin(index) && segment.end == motion.lines_end(index);
+  const auto step = whole ? motion.translation(index) : std::optional<Translation<S>>{};
+  std::optional<MovedBoxes<S>> moved;
+  if (step) moved.emplace(side.at[0], *step);
+  if (moved && moved->excess > 8 * std::numeric_limits<S>::epsilon() * largest_coordinate(side.at[0]))
+    moved.reset();
+  if (side.apart) {
+    if (moved) {
+      moved->move_own(side.at[0].own, own.data());
+      at.excess = moved->excess;
+      ++counts_[index].translated_apart;
+      return {};
+    }
+    const VertexRun all{0, scene_.vertex_count(index)};
+    bounds_kernels<S>(body.hierarchy.kernels()).of_runs(&all, 1, at.positions, own.data());
+    ++counts_[index].apart;
+    return {};
+  }
+  Refit refit{lanes.data(), own.data(), at.positions, std::uint32_t(nodes), nullptr};
+  const bool remembers = memory_.is_used() && motion.as_in_the_scene(index);
+  // A body at rest is at a keyframe, whenever it is looked at.
+  const double knot = !side.at_rest                              ? t
+                      : std::isfinite(motion.lines_begin(index)) ? motion.lines_begin(index)
+                                                                 : motion.lines_end(index);
+  if (remembers) {
+    if (const auto* known = memory_.find(index, knot)) {
+      at.lanes = known->lanes.data();
+      at.own = known->own.data();
+      ++left_alone(index).remembered;
+      return {};
+    }
+  }
+  if (moved) {
+    moved->move(side.at[0].lanes, side.at[0].own, body.hierarchy.topology().width, nodes, lanes.data(),
+                own.data());
+    at.excess = moved->excess;
+    ++counts_[index].translated;
+    return {};
+  }
+  if (remembers) {
+    if (auto* target = memory_.add(index, knot, lanes.size(), own.size())) {
+      at.lanes = refit.lanes = target->lanes.data();
+      at.own = refit.own = target->own.data();
+      refit.remembered = target;
+    }
+  }
+  return refit;
+}
+
+template <class S>
+void LinearBounds<S>::proceed(std::uint32_t body, Refit& refit, std::uint64_t nodes) {
+  if (refit.left == 0) return;
+  const std::uint32_t begin = refit.left - std::uint32_t(std::min<std::uint64_t>(refit.left, nodes));
+  bodies_[body].hierarchy.refit_into(refit.lanes, refit.own, refit.positions, begin, refit.left);
+  counts_[body].refitted += refit.left - begin;
+  refit.left = begin;
+  if (begin == 0 && refit.remembered != nullptr) refit.remembered->complete = true;
+}
+
+/// Returns whether the boxes are finite: a line without end may leave the range of numbers.
+template <class S>
+bool LinearBounds<S>::make_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body,
+                               std::uint32_t end, double t) {
+  Refit refit = begin_end(segment, motion, body, end, t);
+  proceed(body, refit, refit.left);
+  if (hierarchy(body).empty()) return true;
+  return finite_root(segment.sides[body].at[end]);
+}
+
+template <class S>
+void LinearBounds<S>::make_margin(LinearSide<S>& side) const {
+  S largest = 0;
+  if (!side.hierarchy().empty())
+    largest = std::max(largest_coordinate(side.at[0]), largest_coordinate(side.at[1]));
+  side.margin = 8 * std::numeric_limits<S>::epsilon() * largest + 8 * std::numeric_limits<S>::denorm_min();
+}
+
+template <class S>
+void LinearBounds<S>::start() {
+  whole_ = false;
+  last_ = motion_.time();
+  step_ = 0;
+  foreseen_ = 1;
+  std::fill(counts_.begin(), counts_.end(), Counts{});
+  restart();
+}
+
+template <class S>
+void LinearBounds<S>::plans_changed() {
+  foreseen_ = std::max(1.0, foreseen_ / 2);
+  restart();
+}
+
+template <class S>
+void LinearBounds<S>::restart() {
+  for (Segment& segment : segments_)
+    for (LinearSide<S>& side : segment.sides) side.current = side.apart = false;
+  segments_[present_].end = none;
+  forget_ahead();
+  advance();
+}
+
+template <class S>
+void LinearBounds<S>::note_time() {
+  if (motion_.time() > last_) step_ = motion_.time() - last_;
+  last_ = motion_.time();
+}
+
+template <class S>
+bool LinearBounds<S>::advance() {
+  note_time();
+  came_ahead_ = false;
+  if (end() != none && motion_.time() <= end()) return false;
+  if (ahead_exists_ && motion_.time() <= ahead().end) {
+    came_ahead_ = go_ahead(std::numeric_limits<std::uint64_t>::max());
+  }
+  if (came_ahead_) {
+    present_ = 1 - present_;
+    for (std::uint32_t body = 0; body < body_count(); ++body) {
+      counts_[body].at_rest += ahead_counts_[body].at_rest;
+      counts_[body].remembered += ahead_counts_[body].remembered;
+    }
+    forget_ahead();
+  } else {
+    go_on();
+  }
+  return true;
+}
+
+template <class S>
+void LinearBounds<S>::enter() {
+  note_time();
+  forget_ahead();
+  const bool cut = segments_[present_].pieces != 1;
+  whole_ = true;
+  if (cut) {
+    restart();
+  } else if (end() == none || motion_.time() >= end()) {
+    go_on();
+  }
+}
+
+/// Gives a body's ends over a segment their slots, and makes what is at its begin. Returns whether the other
+/// end is to be made. `before` is the segment before.
+template <class S>
+bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion,
+                                 std::uint32_t body, double t, Before what) {
+  LinearSide<S>& side = segment.sides[body];
+  const LinearSide<S>& old = before.sides[body];
+  side.apart = old.apart;
+  side.at_rest = motion.at_rest(body);
+  side.current = true;
+  std::array<std::uint32_t, 3> used{none_used, none_used, none_used};
+  if (what == Before::stays) used = {old.at[0].slot, old.at[1].slot, none_used};
+  const auto free_slot = [&used] {
+    std::uint32_t slot = 0;
+    while (std::find(used.begin(), used.end(), slot) != used.end()) ++slot;
+    return slot;
+  };
+  // Where it was, and not at rest behind the clip after it was before it.
+  if (old.current && old.at_rest && side.at_rest &&
+      old.at[1].positions == motion.positions_on_lines(body, t, bodies_[body].room[old.at[1].slot])) {
+    side.at[0] = side.at[1] = old.at[1];
+    ++left_alone(body).at_rest;
+    return false;
+  }
+  if (old.current && !old.at_rest && before.end == segment.begin) {
+    side.at[0] = old.at[1];
+  } else {
+    side.at[0].slot = free_slot();
+    make_end(segment, motion, body, 0, side.at_rest ? t : segment.begin);
+  }
+  if (side.at_rest) {
+    side.at[1] = side.at[0];
+    return false;
+  }
+  used[2] = side.at[0].slot;
+  side.at[1].slot = free_slot();
+  return true;
+}
+
+template <class S>
+void LinearBounds<S>::go_on() {
+  forget_ahead();
+  const double t = motion_.time();
+  const Segment& before = segments_[present_];
+  Segment& segment = segments_[1 - present_];
+  const bool anew = before.end == none, new_knot = anew || t >= before.knot || before.end >= before.knot;
+  if (!anew) foreseen_ = std::min(16.0, 2 * foreseen_);
+  segment.pieces = whole_ ? 1 : new_knot ? cuts_.pieces : before.pieces;
+  choose_segment(segment, motion_, t);
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    if (!begin_side(segment, before, motion_, body, t, Before::ends)) continue;
+    // A line without end may leave the range of numbers: then less of it.
+    while (!make_end(segment, motion_, body, 1, segment.end) && segment.end > segment.begin) {
+      segment.end = segment.begin + (segment.end - segment.begin) / 2;
+      for (std::uint32_t other = 0; other < body; ++other)
+        if (!segment.sides[other].at_rest) make_end(segment, motion_, other, 1, segment.end);
+    }
+  }
+  present_ = 1 - present_;
+  if (new_knot && cuts_.max_looseness > 0 && !whole_ && !segment.endless) cut_while_loose(t);
+  finish(segment, motion_);
+}
+
+template <class S>
+void LinearBounds<S>::forget_ahead() {
+  ahead_exists_ = false;
+  ahead_ = {};
+  std::fill(ahead_counts_.begin(), ahead_counts_.end(), Counts{});
+}
+
+template <class S>
+bool LinearBounds<S>::start_ahead(const SegmentMotion<S>& motion) {
+  forget_ahead();
+  const Segment& before = segments_[present_];
+  Segment& segment = segments_[1 - present_];
+  // How a segment is to be cut is seen when it is there.
+  if (whole_ || cuts_.max_looseness > 0 || motion.time() != before.end) return false;
+  bool ends = false;
+  for (std::uint32_t body = 0; body < body_count(); ++body)
+    ends = ends || motion.lines_end(body) != std::numeric_limits<double>::infinity();
+  if (!ends) return false;
+  segment.pieces = before.end >= before.knot ? cuts_.pieces : before.pieces;
+  choose_segment(segment, motion, before.end);
+  if (segment.begin != before.end) return false;
+  ahead_.motion = motion;
+  ahead_exists_ = true;
+  return true;
+}
+
+template <class S>
+bool LinearBounds<S>::go_ahead(std::uint64_t nodes) {
+  constexpr std::uint64_t step = 64;
+  const Segment& before = segments_[present_];
+  Segment& segment = segments_[1 - present_];
+  for (std::uint64_t done = 0; done < nodes;) {
+    if (ahead_.refit.left > 0) {
+      proceed(ahead_.body - 1, ahead_.refit, step);
+      done += step;
+    } else if (ahead_.body < body_count()) {
+      const std::uint32_t body = ahead_.body++;
+      if (begin_side(segment, before, *ahead_.motion, body, before.end, Before::stays))
+        ahead_.refit = begin_end(segment, *ahead_.motion, body, 1, segment.end);
+      // What is done at once costs a part of a refit.
+      if (ahead_.refit.left == 0) done += hierarchy(body).node_count() / 4;
+    } else if (ahead_.finished) {
+      return true;
+    } else {
+      ahead_.finished = true;
+      const auto is_finite = [&](const LinearSide<S>& side) {
+        return side.hierarchy().empty() || finite_root(side.at[1]);
+      };
+      if (!std::all_of(segment.sides.begin(), segment.sides.end(), is_finite)) {
+        forget_ahead();  // less of it is to be taken, as `go_on` does
+        return false;
+      }
+      finish(segment, *ahead_.motion);
+    }
+  }
+  return false;
+}
+
+template <class S>
+std::uint64_t LinearBounds<S>::nodes_of_segment() const {
+  std::uint64_t nodes = 0;
+  for (const LinearSide<S>& side : segment().sides)
+    if (!side.at_rest) nodes += side.hierarchy().node_count();
+  return nodes;
+}
+
+/// Cuts the segment that has just begun into twice as many pieces until the present one is tight enough.
+template <class S>
+void LinearBounds<S>::cut_while_loose(double t) {
+  Segment& segment = segments_[present_];
+  while (segment.pieces < SegmentCuts::most && std::isfinite(segment.end) && segment.end > segment.begin &&
+         looseness_in_the_middle() > cuts_.max_looseness) {
+    segment.pieces *= 2;
+    const double begin = segment.begin, end = segment.end;
+    choose_segment(segment, motion_, t);
+    if (segment.begin == begin && segment.end == end) return;  // as short as doubles can be
+    for (std::uint32_t body = 0; body < body_count(); ++body) {
+      if (segment.sides[body].at_rest) continue;
+      if (segment.begin != begin) make_end(segment, motion_, body, 0, segment.begin);
+      make_end(segment, motion_, body, 1, segment.end);
+    }
+  }
+}
+
+template <class S>
+double LinearBounds<S>::looseness_in_the_middle() {
+  const auto area = [](const auto& box) {
+    const double x = double(box.upper[0]) - double(box.lower[0]);
+    const double y = double(box.upper[1]) - double(box.lower[1]);
+    const double z = double(box.upper[2]) - double(box.lower[2]);
+    return x * y + y * z + z * x;
+  };
+  const double t = begin() + (end() - begin()) / 2;
+  double tight = 0, linear = 0;
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    const LinearSide<S>& one = side(body);
+    if (one.at_rest || one.apart || hierarchy(body).empty()) continue;
+    const std::size_t nodes = hierarchy(body).node_count(),
+                      scalars = nodes * lane_scalars(hierarchy(body).topology().width);
+    middle_lanes_.resize(std::max(middle_lanes_.size(), scalars));
+    middle_own_.resize(std::max(middle_own_.size(), 8 * nodes));
+    std::copy_n(one.at[0].lanes, scalars, middle_lanes_.data());  // empty lanes
+    hierarchy(body).refit_into(middle_lanes_.data(), middle_own_.data(),
+                               motion_.positions_on_lines(body, t, middle_room_));
+    counts_[body].refitted += nodes;
+    for (std::uint32_t node = 0; node < hierarchy(body).topology().size(); ++node) {
+      tight += area(hierarchy(body).box_in(middle_lanes_.data(), middle_own_.data(), node));
+      linear += area(one.box_between(node, 0.5));
+    }
+  }
+  return tight > 0 ? linear / tight - 1 : 0;
+}
+
+/// Margins, and which bodies meet another's box over the segment. Those that come near again get all their
+/// boxes; those that are apart get one from the next segment on, and keep those they have until then.
+template <class S>
+void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
+  for (LinearSide<S>& side : segment.sides) make_margin(side);
+  std::fill(near_.begin(), near_.end(), 0);
+  for (const BodyPair& pair : scene_.pairs()) {
+    const LinearSide<S>&a = segment.sides[pair.first], &b = segment.sides[pair.second];
+    if (a.hierarchy().empty() || b.hierarchy().empty() || !overlap(swept(a), swept(b))) continue;
+    near_[pair.first] = near_[pair.second] = 1;
+  }
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    LinearSide<S>& side = segment.sides[body];
+    if (near_[body] == 0) {
+      // What rests has its boxes already; a root that is a leaf lies where those of others do.
+      side.apart = side.apart || (!side.at_rest && side.hierarchy().topology().size() > 1);
+    } else if (side.apart) {
+      side.apart = false;
+      make_end(segment, motion, body, 0, side.at_rest ? motion.time() : segment.begin);
+      if (side.at_rest)
+        side.at[1] = side.at[0];
+      else
+        make_end(segment, motion, body, 1, segment.end);
+    }
+  }
+}
+
+template <class S>
+std::vector<Box<double>> LinearBounds<S>::boxes_at(std::uint32_t body, double t) const {
+  const LinearSide<S>& one = side(body);
+  const double s = double(fraction(t)), margin = double(one.margin);
+  std::vector<Box<double>> boxes;
+  for (std::uint32_t node = 0; node < one.hierarchy().topology().size(); ++node) {
+    Box<double> box = one.box_between(node, s);
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lower[axis] -= margin;
+      box.upper[axis] += margin;
+    }
+    boxes.push_back(box);
+  }
+  return boxes;
+}
+
+template <class S>
+AuditView LinearBounds<S>::audit_view(std::uint32_t body, double t) const {
+  AuditView view{side(body).hierarchy().topology(), boxes_at(body, t), {}};
+  if (!side(body).apart || view.boxes.empty()) return view;
+  view.stale.assign(view.boxes.size(), 1);
+  view.stale[0] = 0;
+  return view;
+}
+
+template <class S>
+std::size_t LinearBounds<S>::bytes() const {
+  std::size_t total =
+      memory_.bytes() + (middle_lanes_.size() + middle_own_.size() + middle_room_.capacity()) * sizeof(S);
+  for (const LinearBody<S>& body : bodies_) total += body.bytes();
+  return total;
+}
+
+template class LinearBounds<float>;
+template class LinearBounds<double>;
+
+}  // namespace kbvh

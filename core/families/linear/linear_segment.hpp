@@ -1,0 +1,99 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/families/wide/kernels/wide_linear.hpp"
+#include "core/families/wide/wide_hierarchy.hpp"
+
+namespace kbvh {
+
+/// Boxes of one body at one end of a segment, and the positions that they are of.
+template <class S>
+struct LinearEnd {
+  const S *lanes = nullptr, *own = nullptr;  ///< as in WideArrays
+  const S* positions = nullptr;              ///< [vertex][3]
+  std::uint32_t slot = 0;                    ///< place in LinearBody::rows of what is made from positions
+  std::uint32_t made = 0;                    ///< one number for one set of positions
+  S excess = 0;  ///< at most so much larger is a box than a tight one, on each side
+};
+
+/// A body with linear bounds: its topology, and room for three ends, those of the present segment and the
+/// one after it.
+template <class S>
+struct LinearBody {
+  static constexpr std::uint32_t slots = 3;
+  WideHierarchy<S> hierarchy;  ///< its boxes are free to be used
+  AlignedArray<S> lanes[slots], own[slots];
+  std::vector<S> room[slots];  ///< for positions that are nowhere else
+  /// Rows of the leaves that a join came to, and which positions they are of.
+  AlignedArray<S> rows[slots];
+  std::vector<std::uint32_t> stamps[slots];
+  std::uint32_t made = 0;  ///< ends so far
+
+  WideLinearLeaves<S> leaves(const LinearEnd<S>& first, const LinearEnd<S>& last) {
+    const std::size_t count = hierarchy.leaf_count();
+    for (const std::uint32_t slot : {first.slot, last.slot}) {
+      rows[slot].resize(count * lane_scalars(std::max(4u, hierarchy.padded_leaf_size())));
+      stamps[slot].resize(count, 0);
+    }
+    return {hierarchy.leaf_lists(),
+            {rows[first.slot].data(), rows[last.slot].data()},
+            {stamps[first.slot].data(), stamps[last.slot].data()},
+            {first.made, last.made},
+            {first.positions, last.positions}};
+  }
+  std::size_t bytes() const {
+    std::size_t total = hierarchy.bytes();
+    for (std::uint32_t slot = 0; slot < slots; ++slot)
+      total +=
+          (lanes[slot].size() + own[slot].size() + room[slot].capacity() + rows[slot].size()) * sizeof(S) +
+          stamps[slot].size() * sizeof(std::uint32_t);
+    return total;
+  }
+};
+
+/// One body over a segment.
+template <class S>
+struct LinearSide {
+  LinearBody<S>* body = nullptr;
+  LinearEnd<S> at[2];  ///< the same at both ends for a body at rest
+  bool at_rest = false, current = false;
+  /// It meets no other body's box over this segment: of its boxes nobody reads any but the root's.
+  bool apart = false;
+  S margin = 0;  ///< by which every box is larger
+
+  WideHierarchy<S>& hierarchy() const { return body->hierarchy; }
+  WideEnds<S> ends() const { return {{at[0].lanes, at[1].lanes}, {at[0].own, at[1].own}, margin}; }
+  WideLinearLeaves<S> leaves() const { return body->leaves(at[0], at[1]); }
+  Box<S> box_at(std::uint32_t end, std::uint32_t node) const {
+    return hierarchy().box_in(at[end].lanes, at[end].own, node);
+  }
+  /// What is between the ends at a fraction of the segment, without the margin.
+  Box<double> box_between(std::uint32_t node, double fraction) const {
+    const Box<S> first = box_at(0, node), last = box_at(1, node);
+    Box<double> box;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double low = double(first.lower[axis]), high = double(first.upper[axis]);
+      box.lower[axis] = low + fraction * (double(last.lower[axis]) - low);
+      box.upper[axis] = high + fraction * (double(last.upper[axis]) - high);
+    }
+    return box;
+  }
+};
+
+/// All bodies of a scene over a segment in which every vertex keeps to one line.
+template <class S>
+struct LinearSegment {
+  double begin = 0, end = 0;  ///< the end may be infinite if nothing moves
+  std::vector<LinearSide<S>> sides;
+
+  /// Where in the segment a time lies, from 0 to 1.
+  S fraction(double t) const {
+    if (!(end > begin) || end == std::numeric_limits<double>::infinity()) return 0;
+    return std::clamp(S((t - begin) / (end - begin)), S(0), S(1));
+  }
+};
+
+}  // namespace kbvh

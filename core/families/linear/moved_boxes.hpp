@@ -1,0 +1,60 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/families/linear/linear_segment.hpp"
+#include "core/motion/flight_plans.hpp"
+
+namespace kbvh {
+
+/// Of the root's box.
+template <class S>
+S largest_coordinate(const LinearEnd<S>& end) {
+  S largest = 0;
+  for (std::size_t i = 0; i < 8; ++i)
+    if (i % 4 != 3) largest = std::max(largest, std::abs(end.own[i]));
+  return largest;
+}
+
+/// Boxes at the end of a segment over which a body moves as a whole, from those at its begin: all of them, or
+/// only the root's. They hold what those at the begin held, and are larger than tight ones by rounding only.
+template <class S>
+struct MovedBoxes {
+  S lower[3], upper[3];  ///< what is added
+  S excess;              ///< of the result
+
+  MovedBoxes(const LinearEnd<S>& from, const Translation<S>& step) : excess(from.excess) {
+    S largest = largest_coordinate(from);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      largest += std::max(std::abs(step.lower[axis]), std::abs(step.upper[axis]));
+    // More than the rounding of two additions.
+    const bool exact = step.exact && from.excess == 0;
+    const S rounding = exact ? S(0) : std::numeric_limits<S>::epsilon() * largest;
+    S width = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      lower[axis] = step.lower[axis] - rounding;
+      upper[axis] = step.upper[axis] + rounding;
+      width = std::max(width, upper[axis] - lower[axis]);
+    }
+    excess += width + rounding;
+  }
+  void move(const S* from_lanes, const S* from_own, std::size_t width, std::size_t nodes, S* lanes,
+            S* own) const {
+    for (std::size_t node = 0; node < nodes; ++node)
+      for (std::size_t row = 0; row < 6; ++row) {
+        const S by = row < 3 ? lower[row] : -upper[row - 3];  // rows have -upper
+        const std::size_t first = node * lane_scalars(std::uint32_t(width)) + row * width;
+        for (std::size_t i = first; i < first + width; ++i) lanes[i] = from_lanes[i] + by;
+      }
+    for (std::size_t node = 0; node < nodes; ++node) move_own(from_own + 8 * node, own + 8 * node);
+  }
+  void move_own(const S* from, S* to) const {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      to[axis] = from[axis] + lower[axis];
+      to[axis + 4] = from[axis + 4] + upper[axis];
+    }
+  }
+};
+
+}  // namespace kbvh

@@ -1,0 +1,187 @@
+#include "core/families/linear/span_answers.hpp"
+
+#include <algorithm>
+
+namespace kbvh {
+
+namespace {
+/// More than all rounding of fractions in float.
+constexpr float fraction_slack = 0x1p-21F;
+}  // namespace
+
+/// All pairs wait for their begin; ahead of time those that overlap then are asked about otherwise.
+template <class S>
+void SpanAnswers<S>::begin(const IntervalJoin<S>& join, When when) {
+  intersecting_.clear();
+  open_.clear();
+  const auto pairs = join.pairs();
+  next_.resize(std::max(next_.size(), pairs.size()));
+  time_.resize(next_.size());
+  std::fill(std::begin(head_), std::end(head_), none);
+  bucket_ = 0;
+  last_ = -1;
+  const bool ahead = when == When::ahead;
+  const std::size_t first = ahead ? join.throughout() : 0;
+  for (std::size_t i = pairs.size(); i-- > first;)
+    if (!ahead || pairs[i].begin > 0) wait(std::uint32_t(i), pairs[i].begin);
+}
+
+template <class S>
+void SpanAnswers<S>::start(const IntervalJoin<S>& join) {
+  begin(join, When::now);
+}
+
+template <class S>
+void SpanAnswers<S>::start_ahead(const IntervalJoin<S>& join) {
+  begin(join, When::ahead);
+  asked_ = 0;
+}
+
+template <class S>
+bool SpanAnswers<S>::go_on(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                           const IntervalJoin<S>& join, std::size_t pairs) {
+  const std::size_t all = join.from_begin(), end = asked_ + std::min(pairs, all - asked_);
+  due_.clear();
+  for (; asked_ < end; ++asked_)
+    if (join.pairs()[asked_].begin == 0) due_.push_back(std::uint32_t(asked_));
+  attempt_all(segment, scene, join, 0);
+  return end == all;
+}
+
+template <class S>
+void SpanAnswers<S>::wait(std::uint32_t pair, float until) {
+  const std::uint32_t bucket = std::max(FractionBuckets::of(std::max(until, 0.0F)), bucket_);
+  time_[pair] = until;
+  next_[pair] = head_[bucket];
+  head_[bucket] = pair;
+}
+
+template <class S>
+void SpanAnswers<S>::collect_due(const IntervalJoin<S>& join, float fraction) {
+  due_.clear();
+  const std::uint32_t present = FractionBuckets::of(fraction);
+  const auto pairs = join.pairs();
+  for (std::uint32_t bucket = bucket_; bucket <= present; ++bucket) {
+    std::uint32_t pair = head_[bucket];
+    head_[bucket] = none;
+    bucket_ = bucket;
+    while (pair != none) {
+      const std::uint32_t next = next_[pair];
+      if (time_[pair] > fraction)
+        wait(pair, time_[pair]);  // later in the present bucket
+      else if (pairs[pair].end >= fraction)
+        due_.push_back(pair);
+      pair = next;
+    }
+  }
+  for (std::vector<Item>* list : {&intersecting_, &open_}) {
+    std::size_t kept = 0;
+    for (const Item item : *list)
+      if (fraction <= item.until)
+        (*list)[kept++] = item;
+      else if (pairs[item.pair].end >= fraction)
+        due_.push_back(item.pair);
+    list->resize(kept);
+  }
+}
+
+template <class S>
+void SpanAnswers<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                             const IntervalJoin<S>& join, float fraction, float share) {
+  if (due_.empty()) return;
+  const LinearSide<S>&a = segment.sides[join.body_a()], &b = segment.sides[join.body_b()];
+  const std::uint32_t* const corners_a = scene.primitives(join.body_a()).vertices.data();
+  const std::uint32_t* const corners_b = scene.primitives(join.body_b()).vertices.data();
+  const auto pairs = join.pairs();
+  tries_.resize(due_.size());
+  verdicts_.resize(due_.size());
+  for (std::size_t k = 0; k < due_.size(); ++k) {
+    const JoinedPair pair = pairs[due_[k]];
+    SpanPair<S>& span = tries_[k];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t va = std::size_t(3) * corners_a[std::size_t(3) * pair.primitive_a + c];
+      const std::size_t vb = std::size_t(3) * corners_b[std::size_t(3) * pair.primitive_b + c];
+      for (int end = 0; end < 2; ++end) {
+        span.corner[end][c] = a.at[end].positions + va;
+        span.corner[end][c + 3] = b.at[end].positions + vb;
+      }
+    }
+    // Lines go on beyond the span: a little more of it holds the frame's time, which the fraction is not.
+    span.begin = fraction - fraction_slack;
+    span.end = fraction + share * (pair.end - fraction) + fraction_slack;
+  }
+  // A body's margin is 8 ulps of its largest coordinate. Positions of frames differ from the plans, and so do
+  // the ends that are read here, by half an ulp each; interpolation in S adds two and a half at each of two
+  // corners, their difference another one, products some more.
+  const S margin = a.margin + b.margin;
+  span_test_kernels<S>(a.hierarchy().kernels())
+      .decide(tries_.data(), tries_.size(), {.gap = 2 * margin, .component = margin}, verdicts_.data());
+  attempts_ += tries_.size();
+  std::size_t left = 0;
+  for (std::size_t k = 0; k < due_.size(); ++k) {
+    const std::uint32_t pair = due_[k];
+    const float until = fraction + share * (pairs[pair].end - fraction);
+    if (verdicts_[k] == SpanVerdict::open)
+      due_[left++] = pair;
+    else if (verdicts_[k] == SpanVerdict::intersect)
+      intersecting_.push_back({pair, until});
+    else if (until < pairs[pair].end)
+      wait(pair, until);
+  }
+  due_.resize(left);
+}
+
+/// Of what is due first the rest of its span, then a quarter of that.
+template <class S>
+void SpanAnswers<S>::attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                 const IntervalJoin<S>& join, float fraction) {
+  attempt(segment, scene, join, fraction, 1);
+  attempt(segment, scene, join, fraction, 0.25F);
+  for (const std::uint32_t pair : due_)
+    open_.push_back({pair, fraction + (join.pairs()[pair].end - fraction) / 4});
+}
+
+template <class S>
+std::size_t SpanAnswers<S>::read(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                 const IntervalJoin<S>& join, float fraction, PairBuffer& out) {
+  if (fraction > last_) step_ = fraction - std::max(last_, 0.0F);
+  last_ = fraction;
+  collect_due(join, fraction);
+  const auto pairs = join.pairs();
+  // Not worth a span: no frame comes after this one.
+  std::size_t worth = 0;
+  for (const std::uint32_t pair : due_)
+    if (pairs[pair].end >= fraction + step_)
+      due_[worth++] = pair;
+    else
+      open_.push_back({pair, fraction});
+  due_.resize(worth);
+  decided_ += intersecting_.size();
+  attempt_all(segment, scene, join, fraction);
+  const std::size_t before = out.size();
+  out.resize(before + intersecting_.size() + open_.size());
+  PrimitivePair* to = out.data() + before;
+  for (const std::vector<Item>* list : {&intersecting_, &open_})
+    for (const Item item : *list)
+      *to++ = {join.body_a(), pairs[item.pair].primitive_a, join.body_b(), pairs[item.pair].primitive_b};
+  return open_.size();
+}
+
+template <class S>
+std::size_t SpanAnswers<S>::bytes() const {
+  return (intersecting_.capacity() + open_.capacity()) * sizeof(Item) +
+         (next_.capacity() + due_.capacity()) * sizeof(std::uint32_t) + time_.capacity() * sizeof(float) +
+         tries_.capacity() * sizeof(SpanPair<S>) + verdicts_.capacity();
+}
+
+bool all_triangles(const Primitives& primitives) {
+  if (primitives.kind != PrimitiveKind::polygons) return false;
+  for (std::uint32_t p = 0; p < primitives.count(); ++p)
+    if (primitives.offsets[p] != 3 * p || primitives.offsets[p + 1] != 3 * p + 3) return false;
+  return true;
+}
+
+template class SpanAnswers<float>;
+template class SpanAnswers<double>;
+
+}  // namespace kbvh

@@ -1,0 +1,43 @@
+#pragma once
+#include <compare>
+#include <cstdint>
+#include <vector>
+
+#include "core/families/events/event.hpp"
+
+namespace kbvh {
+
+/// What kinetic trees tell a separation list: boxes that have changed, in the order of the notices, and nodes
+/// that are not what they were.
+struct ChangedBoxes {
+  struct Box {
+    std::uint32_t body, node;
+    auto operator<=>(const Box&) const = default;
+  };
+  /// A node that insertions or deletions have changed: it has other children, or became a leaf or ceased to
+  /// be one; or it is gone, and its id means nothing or something else now.
+  struct Node {
+    std::uint32_t body, node;
+    bool gone;
+  };
+  std::vector<Box>* boxes;
+  std::vector<Node>* nodes;
+
+  template <class S>
+  void realiser_changed(std::uint32_t body, std::uint32_t node, Side /*side*/, std::uint32_t /*old_vertex*/,
+                        std::uint32_t /*new_vertex*/, const Instant<S>& /*now*/) {
+    boxes->push_back({body, node});
+  }
+  void realiser_plan_changed(std::uint32_t body, std::uint32_t node) { boxes->push_back({body, node}); }
+  void leaf_split(std::uint32_t body, std::uint32_t node, std::uint32_t /*first_child*/) {
+    nodes->push_back({body, node, false});
+  }
+  void node_removed(std::uint32_t body, std::uint32_t node) { nodes->push_back({body, node, true}); }
+  void node_moved(std::uint32_t body, std::uint32_t from, std::uint32_t to) {
+    nodes->push_back({body, from, true});
+    nodes->push_back({body, to, false});
+  }
+  void subtree_rebuilt(std::uint32_t body, std::uint32_t node) { nodes->push_back({body, node, false}); }
+};
+
+}  // namespace kbvh

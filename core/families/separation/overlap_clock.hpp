@@ -1,0 +1,338 @@
+#pragma once
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <type_traits>
+#include <vector>
+
+#include "core/families/events/event.hpp"
+
+namespace kbvh {
+
+/// What is added to a bound before it is compared with another body's. Rounding keeps <= but not <: two
+/// bounds that are apart on the flight plans may be equal as rounded positions, by a gap of at most one ulp.
+/// Widened by at least four ulps at its knots, a bound is apart from another only if their rounded positions
+/// are, too: between knots the margin is linear, and thus at least four ulps of the value in between.
+enum class Widening : std::uint8_t { none, up, down };
+
+/// A value of S that is above x by 4 to 8 ulps (some 2^-21 or 2^-50 of |x|), and by something at zero.
+template <class S>
+S widened_up(S x) {
+  using Bits = std::conditional_t<sizeof(S) == 4, std::uint32_t, std::uint64_t>;
+  constexpr S share = sizeof(S) == 4 ? S(0x1p-21) : S(0x1p-50);
+  const S sum = x + std::abs(x) * share;
+  if (sum == 0) return 2 * std::numeric_limits<S>::denorm_min();
+  // Two units up, for the roundings of product and sum.
+  const Bits bits = std::bit_cast<Bits>(sum);
+  return std::bit_cast<S>(sum > 0 ? bits + 2 : bits > std::bit_cast<Bits>(S(-0.0)) + 2 ? bits - 2 : Bits(0));
+}
+
+/// One coordinate of a vertex, piece by piece from an instant on.
+template <class S>
+class PieceWalk {
+ public:
+  PieceWalk(const FlightPlans<S>& plans, std::uint32_t vertex, int axis, Widening widening,
+            const Instant<S>& now)
+      : plans_(&plans),
+        vertex_(vertex),
+        axis_(axis),
+        widening_(widening),
+        own_(plans.has_own_plan(vertex)),
+        times_(plans.keyframe_times()) {
+    take(now.begin);
+    while (now.exact != nullptr && piece_.t1 < now.end && compare_crossing_to(*now.exact, piece_.t1) >= 0)
+      next();
+  }
+
+  const Piece<S>& piece() const { return piece_; }
+  /// Goes on to the piece that begins where this one ends.
+  void next() {
+    if (own_ || segment_ == before_first)
+      take(piece_.t1);
+    else
+      take_segment(segment_ + 1);
+  }
+  /// The value at `end`, not after the piece's own, if it is one of the stored numbers.
+  std::optional<S> stored_value(double end) const {
+    if (piece_.kind == PieceKind::chord) return end == piece_.t1 ? std::optional<S>(piece_.x1) : std::nullopt;
+    return piece_.x1 == 0 ? std::optional<S>(piece_.x0) : std::nullopt;
+  }
+
+ private:
+  static constexpr std::size_t before_first = std::numeric_limits<std::size_t>::max();
+
+  void take(double t) {
+    if (own_ || t < times_[0]) {
+      piece_ = plans_->piece_after(vertex_, axis_, t);
+      segment_ = before_first;
+      widen();
+    } else {
+      take_segment(plans_->segment_at(t));
+    }
+  }
+  void take_segment(std::size_t k) {
+    const std::size_t at = std::size_t(3) * vertex_ + std::size_t(axis_);
+    segment_ = k;
+    if (k + 1 < times_.size())
+      piece_ = {times_[k], times_[k + 1], plans_->keyframe(k)[at], plans_->keyframe(k + 1)[at],
+                PieceKind::chord};
+    else
+      piece_ = {times_[k], std::numeric_limits<double>::infinity(), plans_->keyframe(k)[at], S(0),
+                PieceKind::ray};
+    widen();
+  }
+  void widen() {
+    if (widening_ == Widening::none) return;
+    piece_.x0 = widened(piece_.x0);
+    // A body at rest stays there; a velocity takes its share of the margin.
+    if (piece_.kind == PieceKind::chord || piece_.x1 != 0) piece_.x1 = widened(piece_.x1);
+  }
+  S widened(S x) const { return widening_ == Widening::up ? widened_up(x) : -widened_up(-x); }
+
+  const FlightPlans<S>* plans_;
+  std::uint32_t vertex_;
+  int axis_;
+  Widening widening_;
+  bool own_;
+  std::span<const double> times_;
+  std::size_t segment_ = before_first;
+  Piece<S> piece_;
+};
+
+/// A box by the six vertices that realise its sides now: [lower x, upper x, lower y, ...].
+template <class S>
+struct RealisedBox {
+  const FlightPlans<S>* plans;
+  const std::uint32_t* realisers;
+};
+
+/// The moment at which two boxes begin or cease to overlap: the root of two pieces, within `error` of `hint`.
+/// Or one up to which it is known that they do not, and at which the clock is to be asked again.
+template <class S>
+struct OverlapEvent {
+  double hint = 0, error = 0;
+  Crossing<S> crossing;
+  std::uint32_t slot = 0;
+  std::uint32_t depth = 0;  ///< of the pair below the pair of roots
+  bool review = false;      ///< nothing happens at `hint`, exactly
+
+  /// Doubles on either side of the moment.
+  double not_after() const { return std::nextafter(hint - error, -std::numeric_limits<double>::infinity()); }
+  double not_before() const { return std::nextafter(hint + error, std::numeric_limits<double>::infinity()); }
+  Instant<S> instant() const { return {not_after(), not_before(), &crossing}; }
+};
+
+/// Decides exactly, on the flight plans, when two boxes of different bodies overlap (Z&W s.8.1 with its
+/// erratum: the overlap intervals of the axes are intersected). Boxes are closed, the first one widened as
+/// `Widening` says. "After" an instant means right after it: a contact of no duration is none, which the
+/// margin allows. Boxes are taken with the realisers that they have; who changes one asks anew.
+///
+/// It looks some linear pieces ahead and then asks to be asked again: realisers seldom last through a clip,
+/// and looking to its end each time would be quadratic in its keyframes.
+template <class S>
+class OverlapClock {
+ public:
+  using Event = OverlapEvent<S>;
+  static constexpr int usual_look_ahead = 32;
+  explicit OverlapClock(int look_ahead = usual_look_ahead) : look_ahead_(look_ahead) {}
+
+  /// Strict weak order of events: exact time, higher pair, slot.
+  bool earlier(const Event& a, const Event& b) const {
+    const int order = compare_times(a, b);
+    if (order != 0) return order < 0;
+    if (a.depth != b.depth) return a.depth < b.depth;
+    return a.slot < b.slot;
+  }
+  int compare_times(const Event& a, const Event& b) const {
+    const double error = a.error + b.error;
+    if (a.hint + error < b.hint) return -1;
+    if (b.hint + error < a.hint) return 1;
+    if (a.crossing == b.crossing) return 0;  // pairs often share their realisers
+    return compare_crossings(a.crossing, b.crossing);
+  }
+  /// Does the event happen at or before t?
+  bool due(const Event& event, double t) const {
+    if (event.hint + event.error < t) return true;
+    if (event.hint - event.error > t) return false;
+    return compare_crossing_to(event.crossing, t) <= 0;
+  }
+
+  /// Do the boxes overlap right after the instant?
+  bool overlap_after(const RealisedBox<S>& a, const RealisedBox<S>& b, const Instant<S>& now) const {
+    for (int side = 0; side < 6; ++side)
+      if (Gap(a, b, side, now).sign_after(now) < 0) return false;
+    return true;
+  }
+
+  /// The first moment after `now` from which on boxes that are apart right after `now` overlap, or a review;
+  /// false: never.
+  bool next_overlap(const RealisedBox<S>& a, const RealisedBox<S>& b, const Instant<S>& now,
+                    Event& event) const {
+    Instant<S> instant = now;
+    int pieces = look_ahead_;
+    event.review = false;
+    // Each axis in turn moves the instant on to where it does not separate; done when six in a row agree.
+    for (int side = 0, agreed = 0; agreed < 6; side = (side + 1) % 6) {
+      Gap gap(a, b, side, instant);
+      if (gap.sign_after(instant) >= 0) {
+        ++agreed;
+        continue;
+      }
+      Crossing<S> crossing;
+      if (!gap.first_closing(pieces, crossing)) {
+        if (!std::isfinite(gap.known_until())) return false;
+        set_review(event, gap.known_until());
+        return true;
+      }
+      if (!set(event, crossing)) return false;
+      instant = event.instant();
+      agreed = 1;
+    }
+    return true;
+  }
+
+  /// The first moment after `now` right after which boxes that overlap right after `now` do not, or a review;
+  /// false: never.
+  bool next_separation(const RealisedBox<S>& a, const RealisedBox<S>& b, const Instant<S>& now,
+                       Event& event) const {
+    constexpr double never = std::numeric_limits<double>::infinity();
+    bool found = false;
+    double latest = never, known_until = never;
+    event.review = false;
+    for (int side = 0; side < 6; ++side) {
+      Crossing<S> crossing;
+      Event other = event;
+      Gap gap(a, b, side, now);
+      const bool opens = gap.first_opening(look_ahead_, std::min(latest, known_until), crossing);
+      known_until = std::min(known_until, gap.known_until());
+      if (!opens || !set(other, crossing)) continue;
+      if (found && compare_times(event, other) <= 0) continue;
+      found = true;
+      event = other;
+      latest = event.not_before();
+    }
+    if (known_until == never || (found && due(event, known_until))) return found;
+    set_review(event, known_until);
+    return true;
+  }
+
+ private:
+  /// One of the six conditions of an overlap: upper bound of one box minus lower bound of the other on one
+  /// axis; apart where it is negative.
+  class Gap {
+   public:
+    Gap(const RealisedBox<S>& a, const RealisedBox<S>& b, int side, const Instant<S>& now)
+        : axis_(side / 2),
+          upper_(side % 2 == 0
+                     ? PieceWalk<S>(*a.plans, a.realisers[2 * axis_ + 1], axis_, Widening::up, now)
+                     : PieceWalk<S>(*b.plans, b.realisers[2 * axis_ + 1], axis_, Widening::none, now)),
+          lower_(side % 2 == 0 ? PieceWalk<S>(*b.plans, b.realisers[2 * axis_], axis_, Widening::none, now)
+                               : PieceWalk<S>(*a.plans, a.realisers[2 * axis_], axis_, Widening::down, now)) {
+    }
+
+    /// Sign of the gap right after the instant at which the walk stands.
+    int sign_after(const Instant<S>& now) const {
+      const Piece<S>&u = upper_.piece(), &l = lower_.piece();
+      int sign = 0;  // as for the gap that closes or opens at this very instant
+      if (now.exact == nullptr)
+        sign = compare_at(u, l, now.begin);
+      else if (!is_crossing(*now.exact, u, l))
+        sign = compare_at_crossing(u, l, *now.exact);
+      return sign != 0 ? sign : compare_slopes(u, l);
+    }
+
+    /// From a gap that is negative: where it is no longer. Takes what it looks at off `pieces`, and gives up
+    /// when none is left.
+    bool first_closing(int& pieces, Crossing<S>& crossing) {
+      for (double begin = -never;;) {
+        const double end = this->end();
+        if (std::isinf(end)) {
+          if (compare_slopes(upper_.piece(), lower_.piece()) <= 0) return false;
+          crossing = {lower_.piece(), upper_.piece()};
+          return true;
+        }
+        const int sign = sign_at(end);
+        if (sign >= 0) crossing = {lower_.piece(), upper_.piece()};
+        // It is negative throughout this piece.
+        if (sign < 0 && --pieces < 0 && std::isfinite(begin)) return gives_up(begin);
+        next(end);
+        if (sign > 0) return true;
+        // At zero it depends on where it goes from there.
+        if (sign == 0 && compare_slopes(upper_.piece(), lower_.piece()) >= 0) return true;
+        begin = end;
+      }
+    }
+
+    /// From a gap that is not negative: where it becomes so, unless that is after `latest`. Gives up
+    /// when that is not known after so many pieces.
+    bool first_opening(int pieces, double latest, Crossing<S>& crossing) {
+      for (double begin = -never; begin <= latest;) {
+        const double end = this->end();
+        const int sign = std::isinf(end) ? compare_slopes(upper_.piece(), lower_.piece()) : sign_at(end);
+        if (sign < 0) {
+          crossing = {upper_.piece(), lower_.piece()};
+          return true;
+        }
+        if (std::isinf(end)) return false;
+        // It is not negative throughout this piece.
+        if (--pieces < 0) return gives_up(begin);
+        next(end);
+        begin = end;
+      }
+      return false;
+    }
+
+    /// When a search gave up: begin of a piece through which the gap has the sign it began with. Infinite
+    /// when it did not.
+    double known_until() const { return known_until_; }
+
+   private:
+    static constexpr double never = std::numeric_limits<double>::infinity();
+
+    bool gives_up(double begin) {
+      known_until_ = begin;
+      return false;
+    }
+    static bool is_crossing(const Crossing<S>& crossing, const Piece<S>& u, const Piece<S>& l) {
+      return (crossing.winner == u && crossing.loser == l) || (crossing.winner == l && crossing.loser == u);
+    }
+    double end() const { return std::min(upper_.piece().t1, lower_.piece().t1); }
+    void next(double end) {
+      if (upper_.piece().t1 <= end) upper_.next();
+      if (lower_.piece().t1 <= end) lower_.next();
+    }
+    int sign_at(double end) const {
+      const auto u = upper_.stored_value(end), l = lower_.stored_value(end);
+      if (u && l) return *u > *l ? 1 : *u < *l ? -1 : 0;
+      return compare_at(upper_.piece(), lower_.piece(), end);
+    }
+
+    int axis_;
+    PieceWalk<S> upper_, lower_;
+    double known_until_ = never;
+  };
+
+  int look_ahead_;
+
+  static void set_review(Event& event, double t) {
+    const Piece<S> rest{t, std::numeric_limits<double>::infinity(), S(0), S(0), PieceKind::ray};
+    Piece<S> rises = rest;
+    rises.x1 = 1;
+    event.crossing = {rises, rest};
+    event.hint = t;
+    event.error = 0;
+    event.review = true;
+  }
+  static bool set(Event& event, const Crossing<S>& crossing) {
+    const TimeEstimate estimate = crossing_estimate(crossing);
+    if (!std::isfinite(estimate.time)) return false;  // beyond any time that can be asked for
+    event.crossing = crossing;
+    event.hint = estimate.time;
+    event.error = estimate.error;
+    return true;
+  }
+};
+
+}  // namespace kbvh

@@ -1,0 +1,173 @@
+#pragma once
+// Internal to core/kernels/*.cpp: the boxes of one wide node, from the vertices of its leaves and the boxes
+// of its children.
+#include "core/families/wide/kernels/wide_layout.hpp"
+#include "core/kernels/quads.hpp"
+
+namespace kbvh {
+namespace {
+
+/// Boxes of the `width` children of a node, from one point each (lower and upper corners, 8 numbers from one
+/// child to the next) or from a list of vertices, into the node's rows and its own box.
+template <class S, std::uint32_t width>
+struct NodeFit {
+  using P = Points<S, width == 8 ? 2 : 1>;
+  using Pack = typename P::Pack;
+  static constexpr std::uint32_t packs = width < 4 ? width : 4;
+  static constexpr std::uint32_t per_pass = packs * std::uint32_t(P::points);
+
+  Pack smallest, largest;
+
+  /// Writes the rows of one pass over the children [first, first + per_pass).
+  [[gnu::always_inline]] inline void take(Pack (&lower)[4], Pack (&upper)[4], S* rows, std::uint32_t first) {
+    Pack low = lower[0], high = upper[0];
+    for (std::uint32_t j = 1; j < packs; ++j) {
+      low = smaller(low, lower[j]);
+      high = larger(high, upper[j]);
+    }
+    for (std::uint32_t j = packs; j < 4; ++j) {
+      lower[j] = lower[0];
+      upper[j] = upper[0];
+    }
+    smallest = first == 0 ? low : smaller(smallest, low);
+    largest = first == 0 ? high : larger(largest, high);
+    P::template store_rows<false>(lower, rows + first, width, per_pass);
+    P::template store_rows<true>(upper, rows + 3 * width + first, width, per_pass);
+  }
+
+  /// The pack j of the lanes from `first` on, in one row of the lists.
+  [[gnu::always_inline]] static Pack listed(const std::uint32_t* row, std::uint32_t first, std::uint32_t j,
+                                            const S* positions) {
+    if constexpr (P::points == 2) {
+      std::uint64_t two;  // one load for two numbers: loads are what limits this loop
+      __builtin_memcpy(&two, row + 2 * j, sizeof two);
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+      return P::load(positions + std::uint32_t(two), positions + (two >> 32));
+#else
+      return P::load(positions + (two >> 32), positions + std::uint32_t(two));
+#endif
+    } else {
+      return P::load(positions + row[list_place(first + j, width)], positions);
+    }
+  }
+
+  [[gnu::always_inline]] inline void from_lists(const std::uint32_t* vertices, std::uint32_t length,
+                                                const S* positions, S* rows) {
+    for (std::uint32_t first = 0; first < width; first += per_pass) {
+      Pack lower[4], upper[4];
+      const std::uint32_t* row = vertices;
+      for (std::uint32_t j = 0; j < packs; ++j) lower[j] = upper[j] = listed(row, first, j, positions);
+      for (std::uint32_t i = 1; i < length; ++i) {
+        row += width;
+        for (std::uint32_t j = 0; j < packs; ++j) {
+          const Pack p = listed(row, first, j, positions);
+          lower[j] = smaller(lower[j], p);
+          upper[j] = larger(upper[j], p);
+        }
+      }
+      take(lower, upper, rows, first);
+    }
+  }
+
+  /// boxes[lane]: a child's box, 8 numbers.
+  [[gnu::always_inline]] inline void from_boxes(const S* const (&boxes)[width], S* rows) {
+    for (std::uint32_t first = 0; first < width; first += per_pass) {
+      Pack lower[4], upper[4];
+      for (std::uint32_t j = 0; j < packs; ++j) {
+        const S *one = boxes[first + j], *other = boxes[(first + j + 4) % width];
+        lower[j] = P::load(one, other);
+        upper[j] = P::load(one + 4, other + 4);
+      }
+      take(lower, upper, rows, first);
+    }
+  }
+
+  [[gnu::always_inline]] inline void store_own(S* own) const {
+    P::store_smallest(own, smallest);
+    P::store_largest(own + 4, largest);
+  }
+};
+
+template <class S>
+constexpr S infinity = S(__builtin_inf());
+/// The box of an empty lane.
+template <class S>
+constexpr S empty_box[8] = {infinity<S>,  infinity<S>,  infinity<S>,  infinity<S>,
+                            -infinity<S>, -infinity<S>, -infinity<S>, -infinity<S>};
+
+/// Few leaves beside nodes (SAH trees; the last nodes of a level): one box at a time.
+template <class S, std::uint32_t width>
+[[gnu::noinline]] void fit_single(const WideArrays<S>& h, const WideNode& node, const S* positions, S* rows,
+                                  S* own) {
+  using P = Points<S, 1>;
+  alignas(64) S leaves[width][8];
+  const S* boxes[width];
+  for (std::uint32_t lane = 0; lane < width; ++lane) {
+    if (lane < node.leaf_count) {
+      const std::uint32_t* at = h.vertices + node.list + list_place(lane, width);
+      auto lower = P::load(positions + *at, positions), upper = lower;
+      for (std::uint32_t i = 1; i < node.length; ++i) {
+        const auto p = P::load(positions + at[i * width], positions);
+        lower = smaller(lower, p);
+        upper = larger(upper, p);
+      }
+      P::store_smallest(leaves[lane], lower);
+      P::store_largest(leaves[lane] + 4, upper);
+      boxes[lane] = leaves[lane];
+    } else {
+      boxes[lane] = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane - node.leaf_count)
+                                      : empty_box<S>;
+    }
+  }
+  NodeFit<S, width> fit;
+  fit.from_boxes(boxes, rows);
+  fit.store_own(own);
+}
+
+/// Many leaves, whose lists fill all lanes: what belongs to nodes, or to nobody, is put right afterwards.
+template <class S, std::uint32_t width>
+[[gnu::noinline]] void put_right(const WideArrays<S>& h, const WideNode& node, S* rows, S* own) {
+  for (std::uint32_t lane = node.leaf_count; lane < width; ++lane) {
+    const S* box = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane - node.leaf_count)
+                                     : empty_box<S>;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      rows[axis * width + lane] = box[axis];
+      rows[(axis + 3) * width + lane] = -box[axis + 4];
+      own[axis] = smaller(own[axis], box[axis]);
+      own[axis + 4] = larger(own[axis + 4], box[axis + 4]);
+    }
+  }
+}
+
+/// A node whose children are all leaves.
+template <class S, std::uint32_t width>
+[[gnu::always_inline]] inline void fit_leaves(const WideArrays<S>& h, const WideNode& node,
+                                              const S* positions, S* rows, S* own) {
+  NodeFit<S, width> fit;
+  fit.from_lists(h.vertices + node.list, node.length, positions, rows);
+  fit.store_own(own);
+  if (node.leaf_count != width) put_right<S, width>(h, node, rows, own);
+}
+
+/// Any other; the own boxes of children that are nodes must be current.
+template <class S, std::uint32_t width>
+[[gnu::always_inline]] inline void fit_above(const WideArrays<S>& h, const WideNode& node, const S* positions,
+                                             S* rows, S* own) {
+  NodeFit<S, width> fit;
+  if (2 * node.leaf_count >= width) {
+    fit.from_lists(h.vertices + node.list, node.length, positions, rows);
+    fit.store_own(own);
+    put_right<S, width>(h, node, rows, own);
+  } else if (node.leaf_count == 0) {
+    const S* boxes[width];
+    for (std::uint32_t lane = 0; lane < width; ++lane)
+      boxes[lane] = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane) : empty_box<S>;
+    fit.from_boxes(boxes, rows);
+    fit.store_own(own);
+  } else {
+    fit_single<S, width>(h, node, positions, rows, own);
+  }
+}
+
+}  // namespace
+}  // namespace kbvh

@@ -1,0 +1,47 @@
+#pragma once
+#include "core/families/wide/kernels/wide_layout.hpp"
+#include "core/kernels/kernel_tables.hpp"
+
+namespace kbvh {
+
+enum class KernelSet : std::uint8_t;
+
+/// One look at a hierarchy whose leaf boxes were inflated by a margin: which of them still hold their
+/// vertices, with how much room, and which are to be made anew.
+template <class S>
+struct WideLook {
+  WideArrays<S> hierarchy;
+  std::uint32_t node_count;
+  const S* positions;    ///< [vertex][3], with one readable number after the last vertex
+  std::uint8_t* remade;  ///< [node]: written; 1 if the node's own box was changed
+  S margin;              ///< leaf boxes are made so much larger on every side, rounded to nearest
+  /// The leaves of a node stay as they are if all their sides have room within these: their vertices moved by
+  /// at most the difference to the margin. From infinity: none stay.
+  S keep_from, keep_to;
+  /// The smallest room of all leaves now: how far any side of a stored box is at least from the vertices in
+  /// it. Rounded to nearest.
+  S room;
+  S room_before;                          ///< the same as it was found; negative if a vertex had left its box
+  std::uint64_t leaf_boxes, inner_boxes;  ///< boxes that were made anew
+};
+
+template <class S>
+struct WideInflateKernels {
+  /// Brings boxes up to date, leaves first, and nothing but those that must change. O(nodes + vertices of
+  /// leaves).
+  using Look = void (*)(WideLook<S>& look);
+  Look width2, width4, width8;
+  Look of(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
+};
+KBVH_DECLARE_KERNELS(WideInflateKernels<float>, wide_inflate_float)
+KBVH_DECLARE_KERNELS(WideInflateKernels<double>, wide_inflate_double)
+
+/// Those of one instruction set.
+template <class S>
+const WideInflateKernels<S>& wide_inflate_kernels(KernelSet set);
+template <>
+const WideInflateKernels<float>& wide_inflate_kernels(KernelSet set);
+template <>
+const WideInflateKernels<double>& wide_inflate_kernels(KernelSet set);
+
+}  // namespace kbvh

@@ -1,0 +1,427 @@
+#include "core/families/wide/kernels/wide_linear.hpp"
+
+#include "core/families/wide/kernels/leaf_fit.hpp"
+#include "core/families/wide/kernels/wide_traverse.hpp"
+
+namespace kbvh {
+namespace {
+
+// ---- One moment -------------------------------------------------------------------------------------------
+
+template <class S, std::uint32_t width>
+void make(const WideMoment<S>& moment, std::uint32_t node) {
+  constexpr std::size_t scalars = 6 * width;
+  const S margin = moment.ends.margin, s = moment.fraction;
+  const S* first = moment.ends.lanes[0] + node * scalars;
+  const S* last = moment.ends.lanes[1] + node * scalars;
+  S* rows = moment.hierarchy.lanes + node * scalars;
+  // Upper bounds are stored with their sign turned: less is larger for every row. Empty lanes become NaN,
+  // which overlaps nothing either.
+  for (std::size_t i = 0; i < scalars; ++i) rows[i] = first[i] + s * (last[i] - first[i]) - margin;
+  const S* own_first = moment.ends.own[0] + std::size_t(8) * node;
+  const S* own_last = moment.ends.own[1] + std::size_t(8) * node;
+  S* own = moment.hierarchy.own + std::size_t(8) * node;
+  for (std::size_t i = 0; i < 8; ++i)
+    own[i] = own_first[i] + s * (own_last[i] - own_first[i]) + (i < 4 ? -margin : margin);
+}
+
+/// Stored boxes that are made on the first visit.
+template <class S, std::uint32_t width>
+struct MomentView : StoredView<S, width> {
+  const WideMoment<S>&a, &b;
+  [[gnu::always_inline]] MomentView(const WideMoment<S>& first, const WideMoment<S>& second)
+      : StoredView<S, width>(first.hierarchy, second.hierarchy), a(first), b(second) {}
+  [[gnu::always_inline]] static void refresh(const WideMoment<S>& moment, std::uint32_t node) {
+    if ((node & WidePair::leaf_bit) != 0 || moment.stale[node] == 0) return;
+    make<S, width>(moment, node);
+    moment.stale[node] = 0;
+  }
+  [[gnu::always_inline]] void enter(std::uint32_t first, std::uint32_t second) const {
+    refresh(a, first);
+    refresh(b, second);
+  }
+};
+
+template <class S, std::uint32_t width>
+void at(WideMoment<S> a, WideMoment<S> b, WideTraversal& state) {
+  MomentView<S, width> view(a, b);
+  traverse_pairs(a.hierarchy, b.hierarchy, view, state);
+}
+
+// ---- A whole segment --------------------------------------------------------------------------------------
+
+/// A box at both ends, as what the rows of the other side are compared with: upper bounds, and lower ones
+/// with their sign turned, both larger by the margin.
+template <class S>
+struct Reach {
+  S bound[2][6];
+};
+
+template <class S>
+[[gnu::always_inline]] inline Reach<S> reach_of(const SixSides<S>& first, const SixSides<S>& last, S margin) {
+  Reach<S> reach;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    reach.bound[0][axis] = first.upper[axis] + margin;
+    reach.bound[0][axis + 3] = margin - first.lower[axis];
+    reach.bound[1][axis] = last.upper[axis] + margin;
+    reach.bound[1][axis + 3] = margin - last.lower[axis];
+  }
+  return reach;
+}
+
+/// Gaps of a register of boxes to one box at both ends: positive where a side keeps them apart.
+template <class S, class V>
+struct Gaps {
+  V first[6], last[6];
+};
+
+/// From when to when no side keeps them apart, of lanes in which every side closes at one end at least.
+template <class S, class V>
+[[gnu::always_inline]] inline void together(const Gaps<S, V>& gaps, V& begin, V& end) {
+  begin = V{} + S(0);
+  end = V{} + S(1);
+  for (std::size_t k = 0; k < 6; ++k) {
+    const V zero = V{} + S(0);
+    const V crossing = gaps.first[k] / (gaps.first[k] - gaps.last[k]);
+    const V later = larger(begin, crossing), sooner = smaller(end, crossing);
+    begin = gaps.first[k] > zero ? later : begin;
+    end = gaps.last[k] > zero ? sooner : end;
+  }
+}
+
+/// More than all rounding of a fraction, of `together` and of frames alike.
+constexpr float fraction_slack = 0x1p-20f;
+
+/// Bits of the lanes that no side keeps apart at the begin, or none at the end.
+template <class S, class V>
+[[gnu::always_inline]] inline unsigned together_at_an_end(const Gaps<S, V>& gaps) {
+  V first = gaps.first[0], last = gaps.last[0];
+  for (std::size_t k = 1; k < 6; ++k) {
+    first = larger(first, gaps.first[k]);
+    last = larger(last, gaps.last[k]);
+  }
+  const V zero = V{} + S(0);
+  return mask_bits(first <= zero) | mask_bits(last <= zero);
+}
+
+template <class S, std::size_t width>
+constexpr std::size_t register_lanes = [] {
+  constexpr std::size_t fit = native_lanes<S> < width ? native_lanes<S> : width;
+  return fit * sizeof(S) < 16 ? std::size_t(1) : fit;  // there are no shorter registers
+}();
+
+/// Bit i: lane i of the rows overlaps the box at some time.
+template <class S, std::size_t width>
+[[gnu::always_inline]] inline unsigned meeting(const S* first, const S* last, const Reach<S>& reach) {
+  constexpr std::size_t lanes = register_lanes<S, width>;
+  using V = Vector<S, lanes>;
+  unsigned bits = 0;
+  for (std::size_t i = 0; i < width; i += lanes) {
+    Gaps<S, V> gaps;
+    V apart;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const V d0 = load_lanes<V>(first + k * width + i) - reach.bound[0][k];
+      const V d1 = load_lanes<V>(last + k * width + i) - reach.bound[1][k];
+      gaps.first[k] = d0;
+      gaps.last[k] = d1;
+      apart = k == 0 ? smaller(d0, d1) : larger(apart, smaller(d0, d1));
+    }
+    const V zero = V{} + S(0);
+    unsigned hit = mask_bits(apart <= zero);
+    if ((hit & ~together_at_an_end(gaps)) != 0) {
+      V from, to;
+      together<S, V>(gaps, from, to);
+      hit &= ~mask_bits(from > to + 2 * S(fraction_slack));
+    }
+    bits |= hit << i;
+  }
+  return bits;
+}
+
+/// Boxes that are linear in time.
+template <class S, std::uint32_t width, bool self>
+struct SegmentView {
+  static constexpr bool within_one = self;
+  WideEnds<S> a, b;
+  S margin;
+  static constexpr std::size_t row_scalars = 6 * width;
+
+  [[gnu::always_inline]] SegmentView(const WideEnds<S>& first, const WideEnds<S>& second)
+      : a(first), b(second), margin(first.margin + second.margin) {}
+  [[gnu::always_inline]] static bool waits(const WideTraversal&) { return false; }
+  [[gnu::always_inline]] static void enter(std::uint32_t, std::uint32_t) {}
+  [[gnu::always_inline]] Reach<S> own_b(std::uint32_t node) const {
+    return reach_of(own_box(b.own[0] + std::size_t(8) * node), own_box(b.own[1] + std::size_t(8) * node),
+                    margin);
+  }
+  [[gnu::always_inline]] Reach<S> lane_of(const WideEnds<S>& ends, std::uint32_t node,
+                                          std::uint32_t lane) const {
+    return reach_of(lane_box(ends.lanes[0] + node * row_scalars, width, lane),
+                    lane_box(ends.lanes[1] + node * row_scalars, width, lane), margin);
+  }
+  [[gnu::always_inline]] Reach<S> lane_a(std::uint32_t node, std::uint32_t lane) const {
+    return lane_of(a, node, lane);
+  }
+  [[gnu::always_inline]] Reach<S> lane_b(std::uint32_t node, std::uint32_t lane) const {
+    return lane_of(b, node, lane);
+  }
+  [[gnu::always_inline]] static unsigned meeting_of(const WideEnds<S>& ends, std::uint32_t node,
+                                                    const Reach<S>& box) {
+    return meeting<S, width>(ends.lanes[0] + node * row_scalars, ends.lanes[1] + node * row_scalars, box);
+  }
+  [[gnu::always_inline]] unsigned meeting_a(std::uint32_t node, const Reach<S>& box) const {
+    return meeting_of(a, node, box);
+  }
+  [[gnu::always_inline]] unsigned meeting_b(std::uint32_t node, const Reach<S>& box) const {
+    return meeting_of(b, node, box);
+  }
+};
+
+template <class S, std::uint32_t width, bool self>
+void join(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b, WideTraversal& state) {
+  SegmentView<S, width, self> view(ends_a, ends_b);
+  traverse_pairs(a, b, view, state);
+}
+
+/// Pairs of leaves whose rows are made before they are compared.
+constexpr std::size_t rows_ahead = 32;
+
+/// Makes the rows of leaves where they are not there already: several at a time, so that their memory comes
+/// while others are made.
+template <class S, std::size_t padded>
+class RowMaker {
+ public:
+  [[gnu::always_inline]] void want(const WideLinearLeaves<S>& leaves, std::uint32_t leaf) {
+    for (int end = 0; end < 2; ++end) {
+      std::uint32_t& stamp = leaves.stamps[end][leaf];
+      if (stamp == leaves.stamp[end]) continue;
+      stamp = leaves.stamp[end];
+      wanted_[count_++] = {&leaves, leaf, end};
+      const std::uint32_t corner = leaves.lists.first_corner[leaves.lists.first_entry[leaf]];
+      for (std::size_t i = 0; i < 3 * padded; i += 16) __builtin_prefetch(leaves.lists.corners + corner + i);
+      if (count_ == room) make();
+    }
+  }
+  void make() {
+    for (std::size_t w = 0; w < count_; ++w) {
+      const Wanted& wanted = wanted_[w];
+      const WideLeafLists& lists = wanted.leaves->lists;
+      for (std::uint32_t entry = lists.first_entry[wanted.leaf]; entry < lists.first_entry[wanted.leaf + 1];
+           ++entry)
+        __builtin_prefetch(wanted.leaves->positions[wanted.end] + lists.corners[lists.first_corner[entry]]);
+    }
+    for (std::size_t w = 0; w < count_; ++w) {
+      const auto [leaves, leaf, end] = wanted_[w];
+      fit_leaf<S, padded>(leaves->lists, leaf, leaves->positions[end],
+                          leaves->rows[end] + std::size_t(leaf) * 6 * padded);
+    }
+    count_ = 0;
+  }
+
+ private:
+  struct Wanted {
+    const WideLinearLeaves<S>* leaves;
+    std::uint32_t leaf;
+    int end;
+  };
+  static constexpr std::size_t room = 16;
+  Wanted wanted_[room];
+  std::size_t count_ = 0;
+};
+
+/// One leaf of a pair: its rows at both ends, and its primitives.
+template <class S>
+struct LeafRows {
+  const S *first, *last;
+  const std::uint32_t* primitives;
+  std::uint32_t count;
+};
+
+/// What primitives of a leaf are compared with, as `Reach`.
+template <class S, std::size_t padded>
+struct LeafReach {
+  alignas(64) S bound[2][6][padded];  ///< by end, side and primitive
+
+  [[gnu::always_inline]] void make(const LeafRows<S>& leaf, S margin) {
+    for (std::size_t side = 0; side < 6; ++side) {
+      const std::size_t opposite = (side < 3 ? side + 3 : side - 3) * padded;
+      for (std::size_t i = 0; i < padded; ++i) {
+        bound[0][side][i] = margin - leaf.first[opposite + i];
+        bound[1][side][i] = margin - leaf.last[opposite + i];
+      }
+    }
+  }
+};
+
+/// Lanes of a leaf that may overlap primitive i of another at some time, and those that do from begin to end.
+struct LaneBits {
+  unsigned hit, throughout;
+};
+template <class S, std::size_t padded>
+[[gnu::always_inline]] inline LaneBits compare(const LeafRows<S>& leaf, const LeafReach<S, padded>& reach,
+                                               std::size_t i) {
+  constexpr std::size_t lanes = register_lanes<S, padded>;
+  using V = Vector<S, lanes>;
+  LaneBits bits{0, 0};
+  for (std::size_t lane = 0; lane < padded; lane += lanes) {
+    V apart, open;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const V d0 = load_lanes<V>(leaf.first + k * padded + lane) - reach.bound[0][k][i];
+      const V d1 = load_lanes<V>(leaf.last + k * padded + lane) - reach.bound[1][k][i];
+      apart = k == 0 ? smaller(d0, d1) : larger(apart, smaller(d0, d1));
+      open = k == 0 ? larger(d0, d1) : larger(open, larger(d0, d1));
+    }
+    const V zero = V{} + S(0);
+    const unsigned hit = mask_bits(apart <= zero);
+    bits.hit |= hit << lane;
+    bits.throughout |= (hit & mask_bits(open <= zero)) << lane;
+  }
+  return bits;
+}
+
+/// Pairs that overlap in a part of the segment perhaps, a register of them at a time: divisions cost more
+/// than all the rest, so that no lane of one is to be idle.
+template <class S>
+struct PartlyBatch {
+  static constexpr std::uint32_t room = 16;
+  alignas(64) S first[6][room] = {}, last[6][room] = {};  ///< gaps
+  alignas(64) std::uint32_t primitive_a[room] = {}, primitive_b[room] = {};
+  std::uint32_t count = 0;
+
+  /// Appends those that do overlap, and from when to when, rounded outwards.
+  [[gnu::noinline]] void flush(JoinColumns& to) {
+    constexpr std::size_t lanes = register_lanes<S, room>;
+    using V = Vector<S, lanes>;
+    alignas(64) S froms[room], tos[room];
+    alignas(64) float begin[room], end[room];
+    unsigned bits = 0;
+    for (std::size_t lane = 0; lane < room; lane += lanes) {
+      Gaps<S, V> gaps;
+      for (std::size_t k = 0; k < 6; ++k) {
+        gaps.first[k] = load_lanes<V>(first[k] + lane);
+        gaps.last[k] = load_lanes<V>(last[k] + lane);
+      }
+      V from, until;
+      together<S, V>(gaps, from, until);
+      bits |= mask_bits(from <= until + 2 * S(fraction_slack)) << lane;
+      store_lanes(froms + lane, from);
+      store_lanes(tos + lane, until);
+    }
+    for (std::size_t lane = 0; lane < room; ++lane) {
+      const float from = float(froms[lane]) - fraction_slack, until = float(tos[lane]) + fraction_slack;
+      begin[lane] = from > 0 ? from : 0;
+      end[lane] = until < 1 ? until : 1;
+    }
+    bits &= (1U << count) - 1;
+    pack_lanes(bits, primitive_a, to.primitive_a + to.found);
+    pack_lanes(bits, primitive_b, to.primitive_b + to.found);
+    pack_lanes(bits, begin, to.begin + to.found);
+    to.found += pack_lanes(bits, end, to.end + to.found);
+    count = 0;
+  }
+};
+
+/// Pairs of the primitives of two leaves, of which those of `outer` with a bit are looked at. Branches that
+/// depend on what overlaps cost as much as the comparisons: there are none but the ends of loops.
+template <class S, std::size_t padded>
+[[gnu::always_inline]] inline void leaf_pairs(const LeafRows<S>& outer, unsigned bits,
+                                              const LeafRows<S>& inner, S margin, bool swapped,
+                                              WideLeafJoin<S>& state, PartlyBatch<S>& batch) {
+  LeafReach<S, padded> reach;
+  reach.make(outer, margin);
+  JoinColumns& all = state.throughout;
+  std::uint32_t* const column_outer = swapped ? all.primitive_b : all.primitive_a;
+  std::uint32_t* const column_inner = swapped ? all.primitive_a : all.primitive_b;
+  alignas(64) static constexpr std::uint32_t numbers[16] = {0, 1, 2,  3,  4,  5,  6,  7,
+                                                            8, 9, 10, 11, 12, 13, 14, 15};
+  alignas(64) std::uint32_t part_outer[padded * padded + 16], part_inner[padded * padded + 16];
+  std::uint32_t parts = 0;
+  const auto fill = [](std::uint32_t* to, std::uint32_t value) {
+    for (std::size_t i = 0; i < 16; ++i) to[i] = value;
+  };
+  for (; bits != 0; bits &= bits - 1) {
+    const std::uint32_t i = lowest(bits);
+    const LaneBits found = compare<S, padded>(inner, reach, i);
+    fill(column_outer + all.found, outer.primitives[i]);
+    all.found += pack_lanes(found.throughout, inner.primitives, column_inner + all.found);
+    fill(part_outer + parts, i);
+    parts += pack_lanes(found.hit & ~found.throughout, numbers, part_inner + parts);
+  }
+  for (std::uint32_t p = 0; p < parts; ++p) {
+    const std::uint32_t i = part_outer[p], j = part_inner[p], place = batch.count++;
+    for (std::size_t k = 0; k < 6; ++k) {
+      batch.first[k][place] = inner.first[k * padded + j] - reach.bound[0][k][i];
+      batch.last[k][place] = inner.last[k * padded + j] - reach.bound[1][k][i];
+    }
+    batch.primitive_a[place] = swapped ? inner.primitives[j] : outer.primitives[i];
+    batch.primitive_b[place] = swapped ? outer.primitives[i] : inner.primitives[j];
+    if (batch.count == batch.room) batch.flush(state.partly);
+  }
+}
+
+// The width is not known to the compiler: it is only where boxes of leaves lie, and each copy of this is
+// large.
+template <class S, std::size_t padded>
+void leaf_join(WideLeafJoin<S>& shared) {
+  WideLeafJoin<S> state = shared;
+  const S margin = state.ends_a.margin + state.ends_b.margin;
+  const auto number = [](const WideArrays<S>& h, LeafSlot slot) {
+    return h.nodes[slot.node()].first_leaf + slot.lane();
+  };
+  const auto rows_of = [](const WideLinearLeaves<S>& leaves, std::uint32_t leaf) {
+    const std::size_t place = std::size_t(leaf) * 6 * padded;
+    const std::uint32_t begin = leaves.lists.first_entry[leaf], end = leaves.lists.first_entry[leaf + 1];
+    return LeafRows<S>{leaves.rows[0] + place, leaves.rows[1] + place, leaves.lists.primitives + begin,
+                       end - begin};
+  };
+  const auto box_of = [margin, width = state.width](const WideEnds<S>& ends, LeafSlot slot) {
+    const std::size_t place = slot.node() * std::size_t(6) * width;
+    return reach_of(lane_box(ends.lanes[0] + place, width, slot.lane()),
+                    lane_box(ends.lanes[1] + place, width, slot.lane()), margin);
+  };
+  PartlyBatch<S> batch;
+  std::size_t made = state.next;
+  for (; state.next < state.count && state.throughout.has_room() && state.partly.has_room(); ++state.next) {
+    if (state.next == made) {
+      RowMaker<S, padded> maker;
+      for (; made < state.count && made < state.next + rows_ahead; ++made) {
+        maker.want(state.leaves_a, number(state.a, state.pairs[2 * made]));
+        maker.want(state.leaves_b, number(state.b, state.pairs[2 * made + 1]));
+      }
+      maker.make();
+    }
+    const LeafSlot slot_a = state.pairs[2 * state.next], slot_b = state.pairs[2 * state.next + 1];
+    const LeafRows<S> a = rows_of(state.leaves_a, number(state.a, slot_a));
+    const LeafRows<S> b = rows_of(state.leaves_b, number(state.b, slot_b));
+    const unsigned near_a = meeting<S, padded>(a.first, a.last, box_of(state.ends_b, slot_b));
+    const unsigned near_b = meeting<S, padded>(b.first, b.last, box_of(state.ends_a, slot_a));
+    const auto count_a = unsigned(__builtin_popcount(near_a)), count_b = unsigned(__builtin_popcount(near_b));
+    state.tests += a.count + b.count;
+    if (count_a == 0 || count_b == 0) continue;
+    if (count_a <= count_b) {
+      state.tests += std::uint64_t(count_a) * b.count;
+      leaf_pairs<S, padded>(a, near_a, b, margin, false, state, batch);
+    } else {
+      state.tests += std::uint64_t(count_b) * a.count;
+      leaf_pairs<S, padded>(b, near_b, a, margin, true, state, batch);
+    }
+  }
+  if (batch.count > 0) batch.flush(state.partly);
+  shared = state;
+}
+
+template <class S>
+constexpr WideLinearKernels<S> table{{&at<S, 2>, &at<S, 4>, &at<S, 8>},
+                                     {&join<S, 2, false>, &join<S, 4, false>, &join<S, 8, false>},
+                                     {&leaf_join<S, 4>, &leaf_join<S, 8>, &leaf_join<S, 16>},
+                                     {&make<S, 2>, &make<S, 4>, &make<S, 8>},
+                                     {&join<S, 2, true>, &join<S, 4, true>, &join<S, 8, true>}};
+
+}  // namespace
+
+namespace kernels::KBVH_KERNELS {
+const WideLinearKernels<float> wide_linear_float = table<float>;
+const WideLinearKernels<double> wide_linear_double = table<double>;
+}  // namespace kernels::KBVH_KERNELS
+
+}  // namespace kbvh

@@ -1,0 +1,93 @@
+#include "core/families/wide/kernels/wide_overlap.hpp"
+
+#include "core/families/wide/kernels/leaf_fit.hpp"
+#include "core/families/wide/kernels/wide_traverse.hpp"
+
+namespace kbvh {
+namespace {
+
+/// Stored boxes some of which are made when they are first needed: the traversal is left for it.
+template <class S, std::uint32_t width>
+struct LazyView : StoredView<S, width> {
+  using StoredView<S, width>::StoredView;
+  [[gnu::always_inline]] static bool waits(const WideTraversal& state) {
+    return state.first_is_stale() || state.second_is_stale();
+  }
+};
+
+/// Of a hierarchy with itself.
+template <class S, std::uint32_t width>
+struct SelfView : StoredView<S, width> {
+  using StoredView<S, width>::StoredView;
+  static constexpr bool within_one = true;
+};
+
+template <template <class, std::uint32_t> class View, class S, std::uint32_t width>
+void traverse(WideArrays<S> a, WideArrays<S> b, WideTraversal& state) {
+  View<S, width> view(a, b);
+  traverse_pairs(a, b, view, state);
+}
+
+/// Makes the rows of a leaf, unless they are those of the present positions.
+template <class S, std::size_t padded>
+[[gnu::always_inline]] inline const S* leaf_rows(const WideLeaves<S>& leaves, std::uint32_t leaf) {
+  S* rows = leaves.rows + std::size_t(leaf) * 6 * padded;
+  if (leaves.stamps[leaf] != leaves.stamp) {
+    fit_leaf<S, padded>(leaves.lists, leaf, leaves.positions, rows);
+    leaves.stamps[leaf] = leaves.stamp;
+  }
+  return rows;
+}
+
+template <class S, std::uint32_t width, std::size_t padded>
+void leaf_pairs(WideLeafPairs<S>& shared) {
+  WideLeafPairs<S> state = shared;
+  const auto number = [](const WideArrays<S>& h, LeafSlot slot) {
+    return h.nodes[slot.node()].first_leaf + slot.lane();
+  };
+  for (; state.next < state.count && state.found + leaf_pair_step <= state.out_room; ++state.next) {
+    const LeafSlot slot_a = state.pairs[2 * state.next], slot_b = state.pairs[2 * state.next + 1];
+    const std::uint32_t leaf_a = number(state.a, slot_a), leaf_b = number(state.b, slot_b);
+    const S* rows_a = leaf_rows<S, padded>(state.leaves_a, leaf_a);
+    const S* rows_b = leaf_rows<S, padded>(state.leaves_b, leaf_b);
+    const WideLeafLists &lists_a = state.leaves_a.lists, &lists_b = state.leaves_b.lists;
+    const std::uint32_t begin_a = lists_a.first_entry[leaf_a], begin_b = lists_b.first_entry[leaf_b];
+    const std::uint32_t count_a = lists_a.first_entry[leaf_a + 1] - begin_a;
+    const std::uint32_t count_b = lists_b.first_entry[leaf_b + 1] - begin_b;
+    const SixSides<S> box_b =
+        lane_box(state.b.lanes + slot_b.node() * std::size_t(6) * width, width, slot_b.lane());
+    unsigned first = overlapping<S, padded>(rows_a, box_b);
+    state.tests += count_a + std::uint64_t(unsigned(__builtin_popcount(first))) * count_b;
+    for (; first != 0; first &= first - 1) {
+      const std::uint32_t i = lowest(first), primitive_a = lists_a.primitives[begin_a + i];
+      unsigned second = overlapping<S, padded>(rows_b, lane_box(rows_a, padded, i));
+      for (; second != 0; second &= second - 1) {
+        state.out[state.found++] = {state.body_a, primitive_a, state.body_b,
+                                    lists_b.primitives[begin_b + lowest(second)]};
+      }
+    }
+  }
+  shared = state;
+}
+
+template <class S>
+constexpr WideOverlapKernels<S> table{
+    &traverse<StoredView, S, 2>,
+    &traverse<StoredView, S, 4>,
+    &traverse<StoredView, S, 8>,
+    {{&leaf_pairs<S, 2, 4>, &leaf_pairs<S, 2, 8>, &leaf_pairs<S, 2, 16>},
+     {&leaf_pairs<S, 4, 4>, &leaf_pairs<S, 4, 8>, &leaf_pairs<S, 4, 16>},
+     {&leaf_pairs<S, 8, 4>, &leaf_pairs<S, 8, 8>, &leaf_pairs<S, 8, 16>}},
+    &traverse<LazyView, S, 2>,
+    &traverse<LazyView, S, 4>,
+    &traverse<LazyView, S, 8>,
+    {&traverse<SelfView, S, 2>, &traverse<SelfView, S, 4>, &traverse<SelfView, S, 8>}};
+
+}  // namespace
+
+namespace kernels::KBVH_KERNELS {
+const WideOverlapKernels<float> wide_overlap_float = table<float>;
+const WideOverlapKernels<double> wide_overlap_double = table<double>;
+}  // namespace kernels::KBVH_KERNELS
+
+}  // namespace kbvh

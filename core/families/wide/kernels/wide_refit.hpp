@@ -1,0 +1,19 @@
+#pragma once
+#include "core/families/wide/kernels/wide_layout.hpp"
+#include "core/kernels/kernel_tables.hpp"
+
+namespace kbvh {
+
+/// Recomputes the boxes of the wide nodes [begin, end), the last first. Children that are nodes must be
+/// current or lie in the range, too. `positions` is [vertex][3], with one readable number after the last
+/// vertex.
+template <class S>
+struct WideRefitKernels {
+  using Refit = void (*)(WideArrays<S> hierarchy, const S* positions, std::uint32_t begin, std::uint32_t end);
+  Refit width2, width4, width8;
+  Refit of(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
+};
+KBVH_DECLARE_KERNELS(WideRefitKernels<float>, wide_refit_float)
+KBVH_DECLARE_KERNELS(WideRefitKernels<double>, wide_refit_double)
+
+}  // namespace kbvh

@@ -1,0 +1,130 @@
+#pragma once
+#include <optional>
+
+#include "core/contract/strategy.hpp"
+#include "core/families/wide/swept_hierarchies.hpp"
+#include "core/families/wide/wide_hierarchy.hpp"
+#include "core/topology/topology_edit.hpp"
+
+namespace kbvh {
+
+/// Box of a leaf from its unique vertices; 4 lanes, of which the last is padding.
+template <class S>
+inline Box<S> leaf_box(std::span<const std::uint32_t> vertices, const S* positions) {
+  return LaneBox<S>::of(vertices, positions).box();
+}
+
+/// Everything that strategies with stored boxes share, the query included: `update(body)` is all that a
+/// derived class must say. Bodies that cannot move are brought up to date at `reset` only.
+template <class S, class Count>
+class StoredHierarchyStrategy : public Strategy<S> {
+ public:
+  StoredHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
+                          const Params& /*params*/, KernelSet kernels = active_kernel_set())
+      : Strategy<S>(scene, motion) {
+    hierarchies_.resize(scene.body_count());
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), kernels);
+    check_layouts(
+        scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
+  }
+
+  void reset(double t) override {
+    this->start_at(t);
+    plans_changed_ = false;
+    for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
+      hierarchies_[body].positions_changed();
+      refit(body);
+    }
+    count_.table = {};
+  }
+
+  void advance(double t) override {
+    this->move_to(t);
+    for (std::uint32_t body = 0; body < hierarchies_.size(); ++body)
+      if (this->scene_.moving(body) || plans_changed_) {
+        hierarchies_[body].positions_changed();
+        update(body);
+      }
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+    QueryStatus status;
+    std::uint64_t tests = 0;
+    for (const BodyPair& pair : this->scene_.pairs())
+      status.pending += query_
+                            .run(hierarchies_[pair.first], pair.first, hierarchies_[pair.second], pair.second,
+                                 this->scene_, this->sampled_, budget, out, tests)
+                            .pending;
+    count_.add(Counter::box_tests, tests);
+    return status;
+  }
+
+  /// Positions are all it reads: nothing to do but to remember that no body is at rest for certain.
+  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+    plans_changed_ = true;
+  }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    const WideHierarchy<S>& hierarchy = hierarchies_[body];
+    AuditView view{hierarchy.topology(), {}, {}};
+    for (std::uint32_t node = 0; node < view.topology.size(); ++node)
+      view.boxes.push_back(to_double(hierarchy.box(node)));
+    return view;
+  }
+
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
+    return total + (swept_ ? swept_->bytes() : 0);
+  }
+
+ protected:
+  /// Brings one moving body's bounds to the current time.
+  virtual void update(std::uint32_t body) = 0;
+  /// Edits the topologies locally and lays the hierarchies out anew: O(nodes) for each body that changes.
+  /// What a strategy that declares geometry changes does when they come, unless it builds anew.
+  void edit_geometry(const GeometryChange<S>& change) {
+    plans_changed_ = true;  // new vertices have plans of their own
+    for (const BodyChange& own : body_changes(this->scene_, change)) {
+      WideHierarchy<S>& hierarchy = hierarchies_[own.body];
+      const Primitives& primitives = this->scene_.primitives(own.body);
+      const S* positions = this->sampled_.positions(own.body);
+      std::vector<Box<S>> boxes(hierarchy.topology().size());
+      for (std::uint32_t node = 0; node < boxes.size(); ++node) boxes[node] = hierarchy.box(node);
+      hierarchy.assign(edited_topology(hierarchy.topology(), std::move(boxes), own, primitives, positions),
+                       primitives, hierarchy.kernels());
+      topology_changed(own.body);
+      update(own.body);
+    }
+  }
+  /// Called when a body's hierarchy has another topology than before, for what is kept beside it.
+  virtual void topology_changed(std::uint32_t /*body*/) {}
+  /// The broad phase of contacts by one refit to both ends of the motion, on the topologies as they are at
+  /// its first call: what a strategy that declares contacts can do in `swept_pairs`.
+  void sweep(double t0, double t1, std::span<const S* const> before, PairBuffer& out) {
+    this->stand_at(t0);
+    this->move_to(t1);
+    if (!swept_) swept_.emplace(this->scene_, hierarchies_);
+    swept_->refit(before, this->sampled_);
+    for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
+      const std::uint64_t nodes = hierarchies_[body].topology().size();
+      count_.add(Counter::nodes_visited, nodes);
+      count_.add(Counter::values_written, 6 * nodes);
+      count_.add(Counter::vertex_reads, 2 * hierarchies_[body].leaf_vertex_count());
+    }
+    std::uint64_t tests = 0;
+    swept_->pairs(query_, out, tests);
+    count_.add(Counter::box_tests, tests);
+  }
+  void refit(std::uint32_t body) { hierarchies_[body].refit(this->sampled_.positions(body)); }
+  Counters counted() const override { return count_.table; }
+
+  std::vector<WideHierarchy<S>> hierarchies_;
+  WideQuery<S> query_;
+  Count count_;
+  bool plans_changed_ = false;
+  std::optional<SweptHierarchies<S>> swept_;  ///< made when contacts are first asked for
+};
+
+}  // namespace kbvh

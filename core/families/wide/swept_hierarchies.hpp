@@ -1,0 +1,68 @@
+#pragma once
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "core/families/wide/wide_hierarchy.hpp"
+
+namespace kbvh {
+
+/// Boxes that hold everything at both ends of a motion, and so, if it is linear, all the way: hierarchies
+/// over primitives with every vertex twice, where it was and where it is, refitted bottom-up. Boxes are not
+/// rounded.
+template <class S>
+class SweptHierarchies {
+ public:
+  /// On the topologies of other hierarchies of the scene's bodies.
+  SweptHierarchies(const SceneView<S>& scene, const std::vector<WideHierarchy<S>>& hierarchies)
+      : scene_(scene), hierarchies_(hierarchies.size()), positions_(hierarchies.size()) {
+    for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
+      const Primitives& primitives = scene.primitives(body);
+      const std::uint32_t vertices = scene.vertex_count(body);
+      Primitives twice;
+      twice.kind = primitives.kind;
+      std::vector<std::uint32_t> corners;
+      for (std::uint32_t p = 0; p < primitives.count(); ++p) {
+        corners.assign(primitives[p].begin(), primitives[p].end());
+        for (const std::uint32_t v : primitives[p]) corners.push_back(v + vertices);
+        twice.add(corners);
+      }
+      twice.removed = primitives.removed;
+      twice.removed_count = primitives.removed_count;
+      hierarchies_[body].assign(hierarchies[body].topology(), twice, hierarchies[body].kernels());
+      positions_[body].resize(std::size_t(6) * vertices + 1);
+    }
+  }
+
+  /// Refits to a motion from `before` (positions of each body) to where the motion view stands now.
+  void refit(std::span<const S* const> before, const SampledMotion<S>& motion) {
+    for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
+      const std::size_t size = std::size_t(3) * scene_.vertex_count(body);
+      std::copy_n(before[body], size, positions_[body].data());
+      std::copy_n(motion.positions(body), size, positions_[body].data() + size);
+      hierarchies_[body].positions_changed();
+      hierarchies_[body].refit(positions_[body].data());
+    }
+  }
+
+  /// Appends the pairs of primitives whose boxes overlap; within a body those that share a vertex, too.
+  void pairs(WideQuery<S>& query, PairBuffer& out, std::uint64_t& tests) {
+    for (const BodyPair& pair : scene_.pairs())
+      query.run_over(hierarchies_[pair.first], pair.first, positions_[pair.first].data(),
+                     hierarchies_[pair.second], pair.second, positions_[pair.second].data(), out, tests);
+  }
+
+  std::size_t bytes() const {
+    std::size_t total = 0;
+    for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
+    for (const auto& positions : positions_) total += positions.size() * sizeof(S);
+    return total;
+  }
+
+ private:
+  SceneView<S> scene_;
+  std::vector<WideHierarchy<S>> hierarchies_;
+  std::vector<std::vector<S>> positions_;  ///< [body][before, now][vertex][3], one scalar past the end
+};
+
+}  // namespace kbvh

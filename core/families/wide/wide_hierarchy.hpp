@@ -1,0 +1,244 @@
+#pragma once
+#include <boost/align/aligned_allocator.hpp>
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "core/base/counters.hpp"
+#include "core/families/wide/kernels/wide_linear.hpp"
+#include "core/families/wide/kernels/wide_overlap.hpp"
+#include "core/families/wide/kernels/wide_refit.hpp"
+#include "core/kernels/kernel_set.hpp"
+#include "core/scene/motion_view.hpp"
+#include "core/scene/pairs.hpp"
+#include "core/topology/topology.hpp"
+#include "core/topology/traversal.hpp"
+
+namespace kbvh {
+
+/// An array that starts on a cache line.
+template <class T>
+using AlignedArray = std::vector<T, boost::alignment::aligned_allocator<T, 64>>;
+
+/// One body's hierarchy with stored boxes, laid out for refits and queries that handle all children of a node
+/// at once: structure of arrays per node, -upper instead of upper, the unique vertices of a node's leaves in
+/// lists of one length (core/families/wide/kernels/wide_layout.hpp). Any topology fits; perfect ones are
+/// fastest.
+template <class S>
+class WideHierarchy {
+ public:
+  /// Takes a topology over the primitives; boxes mean nothing until they are made. Allocates; nothing else
+  /// does. Throws std::length_error beyond 2^28 nodes, 65,535 vertices in a leaf, or 2^32 entries of vertex
+  /// lists.
+  void assign(Topology topology, const Primitives& primitives, KernelSet kernels);
+
+  const Topology& topology() const { return topology_; }
+  bool empty() const { return topology_.empty(); }
+
+  /// Recomputes every box from positions [vertex][3], children first. O(nodes + vertices of leaves).
+  void refit(const S* positions) { refit_nodes(positions, 0, node_count()); }
+  /// The same for the wide nodes [begin, end); children must be current or in the range.
+  void refit_nodes(const S* positions, std::uint32_t begin, std::uint32_t end) {
+    refit_(arrays(), positions, begin, end);
+  }
+  /// The same into rows and own boxes that lie elsewhere, in the layout of `arrays`.
+  void refit_into(S* lanes, S* own, const S* positions) const {
+    refit_into(lanes, own, positions, 0, node_count());
+  }
+  void refit_into(S* lanes, S* own, const S* positions, std::uint32_t begin, std::uint32_t end) const {
+    refit_({nodes_.data(), lanes, own, vertices_.data()}, positions, begin, end);
+  }
+  std::uint32_t node_count() const { return std::uint32_t(nodes_.size()); }
+  /// Ranges of wide nodes that do not depend on each other, and the nodes above them, children first: what
+  /// threads can share. No ranges where it would not pay, or where the topology is not numbered depth first.
+  struct Subtree {
+    std::uint32_t begin, end;
+  };
+  const std::vector<Subtree>& subtrees() const { return subtrees_; }
+  const std::vector<std::uint32_t>& above_subtrees() const { return above_subtrees_; }
+
+  static constexpr std::uint32_t no_node = ~std::uint32_t(0);
+  /// The wide node of an inner node of the topology; `no_node` for a leaf.
+  std::uint32_t wide_node(std::uint32_t node) const { return places_[node].wide; }
+  /// The wide node that holds the box of a node of the topology; `no_node` for a root that is no leaf.
+  std::uint32_t wide_parent(std::uint32_t node) const { return places_[node].node; }
+  /// Where a bound of a node of the topology stands in arrays laid out as `WideArrays::lanes`, rows in the
+  /// order given there; not for a root that is no leaf.
+  std::size_t row_place(std::uint32_t node, std::uint32_t row) const {
+    return places_[node].node * lane_scalars(topology_.width) + row * topology_.width + places_[node].lane;
+  }
+  /// Unique vertices of the leaves of one wide node, summed over its leaves.
+  std::uint32_t leaf_vertices_of(std::uint32_t wide) const { return listed_[wide]; }
+
+  /// The box of a node of the topology.
+  Box<S> box(std::uint32_t node) const { return box_in(lanes_.data(), own_.data(), node); }
+  /// The same from rows and own boxes that `refit_into` made.
+  Box<S> box_in(const S* lanes, const S* own, std::uint32_t node) const;
+  void set_box(std::uint32_t node, const Box<S>& box);
+  /// The unique vertices of a leaf, ascending; nothing for an inner node.
+  std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const { return leaf_vertices_[node]; }
+  std::size_t leaf_vertex_count() const { return leaf_vertices_.vertices.size(); }
+
+  /// To be called when positions have changed: boxes of primitives are made anew when a query asks.
+  void positions_changed() {
+    if (++stamp_ == 0) {
+      std::fill(stamps_.begin(), stamps_.end(), 0);
+      std::fill(fetched_.begin(), fetched_.end(), 0);
+      stamp_ = 1;
+    }
+  }
+
+  WideArrays<S> arrays() { return {nodes_.data(), lanes_.data(), own_.data(), vertices_.data()}; }
+  WideLeaves<S> leaves(const S* positions) {
+    return {leaf_lists(), rows_.data(), stamps_.data(), stamp_, positions};
+  }
+  WideLeafLists leaf_lists() const {
+    return {first_entry_.data(), first_corner_.data(), corners_.data(), primitives_.data()};
+  }
+  std::uint32_t leaf_count() const { return std::uint32_t(stamps_.size()); }
+  /// The leaf numbered by `WideNode::first_leaf`: true when first asked since `positions_changed`.
+  bool to_be_fetched(std::uint32_t leaf) {
+    const bool first = fetched_[leaf] != stamp_;
+    fetched_[leaf] = stamp_;
+    return first;
+  }
+  std::uint32_t leaf_number(LeafSlot slot) const { return nodes_[slot.node()].first_leaf + slot.lane(); }
+  std::span<const std::uint32_t> leaf_primitives(std::uint32_t leaf) const {
+    return {primitives_.data() + first_entry_[leaf], primitives_.data() + first_entry_[leaf + 1]};
+  }
+  /// Lanes for the primitives of a leaf in a query; 1: the leaf's box is that of its primitive.
+  std::uint32_t padded_leaf_size() const {
+    return topology_.leaf_size == 1 ? 1 : topology_.leaf_size <= 4 ? 4 : topology_.leaf_size <= 8 ? 8 : 16;
+  }
+  KernelSet kernels() const { return kernels_; }
+  /// Whether one query can take both.
+  bool suits(const WideHierarchy& other) const {
+    return empty() || other.empty() ||
+           (topology_.width == other.topology_.width && padded_leaf_size() == other.padded_leaf_size());
+  }
+
+  /// Memory in bytes.
+  std::size_t bytes() const;
+  /// Entries of the padded vertex lists.
+  std::size_t listed_vertices() const { return vertices_.size(); }
+
+ private:
+  struct Place {
+    std::uint32_t node = none, lane = 0;  // in the parent; the root has none
+    std::uint32_t wide = none;            // of inner nodes
+  };
+  static constexpr std::uint32_t none = ~std::uint32_t(0);
+  void place_nodes();
+  void find_subtrees();
+  void list_vertices();
+  void list_leaves(const Primitives& primitives);
+
+  Topology topology_;
+  LeafVertices leaf_vertices_;
+  KernelSet kernels_ = KernelSet::portable;
+  typename WideRefitKernels<S>::Refit refit_ = nullptr;
+  std::vector<Place> places_;          // of the topology's nodes
+  std::vector<std::uint32_t> parent_;  // of wide nodes
+  std::vector<std::uint32_t> listed_;  // of wide nodes: vertices of their leaves
+  std::vector<Subtree> subtrees_;
+  std::vector<std::uint32_t> above_subtrees_;
+  AlignedArray<WideNode> nodes_;
+  AlignedArray<S> lanes_, own_;
+  AlignedArray<std::uint32_t> vertices_;
+  std::vector<std::uint32_t> first_entry_, first_corner_, corners_, primitives_, stamps_, fetched_;
+  AlignedArray<S> rows_;
+  std::uint32_t stamp_ = 1;
+};
+
+/// The query on two wide hierarchies; keeps its buffers from frame to frame.
+template <class S>
+class WideQuery {
+ public:
+  /// Appends the pairs of primitives whose boxes, and those of all nodes above them, overlap. Both
+  /// hierarchies need the same width and leaf size. If both bodies are the same, so must be the hierarchies:
+  /// these are the pairs within it, without those that share a vertex. Returns what the budget left undone;
+  /// adds the box tests made to `tests`.
+  QueryStatus run(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
+                  const SceneView<S>& scene, const SampledMotion<S>& motion, const Budget& budget,
+                  PairBuffer& out, std::uint64_t& tests);
+
+  /// The same for hierarchies over primitives and positions that are not a scene's, and with the pairs that
+  /// share a vertex.
+  void run_over(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a, WideHierarchy<S>& b,
+                std::uint32_t body_b, const S* positions_b, PairBuffer& out, std::uint64_t& tests);
+
+  /// The same for the boxes of one moment of a segment in which they are linear in time: those that are read
+  /// are made from the moments' ends, into the hierarchies. All nodes are marked as stale before.
+  QueryStatus run_at(WideHierarchy<S>& a, const WideMoment<S>& moment_a, std::uint32_t body_a,
+                     WideHierarchy<S>& b, const WideMoment<S>& moment_b, std::uint32_t body_b,
+                     const SceneView<S>& scene, const SampledMotion<S>& motion, const Budget& budget,
+                     PairBuffer& out, std::uint64_t& tests);
+
+  /// One side of a lazy query: `stale[wide node]` is not 0 while the boxes of the node's children are not
+  /// those of the present. The boxes of the roots must be.
+  struct LazySide {
+    WideHierarchy<S>* hierarchy;
+    std::uint32_t body;
+    const std::uint8_t* stale;
+  };
+  /// Wide nodes whose boxes a lazy query waits for; `none`: on that side it waits for nothing.
+  struct Wanted {
+    static constexpr std::uint32_t none = ~std::uint32_t(0);
+    std::uint32_t first = none, second = none;
+    explicit operator bool() const { return first != none || second != none; }
+  };
+  /// The same query for hierarchies whose boxes are made when they are first needed:
+  ///   query.start_lazy(a, b, budget);
+  ///   while (const auto wanted = query.proceed(a, b, scene, motion, out, tests)) make the boxes of their
+  ///   children,
+  ///     and take back the marks
+  /// Nothing is read that is marked. `run` pays nothing for it: the traversal is another one.
+  void start_lazy(const LazySide& a, const LazySide& b, const Budget& budget);
+  Wanted proceed(const LazySide& a, const LazySide& b, const SceneView<S>& scene,
+                 const SampledMotion<S>& motion, PairBuffer& out, std::uint64_t& tests);
+  /// What the budget left undone, once `proceed` waits for nothing.
+  QueryStatus lazy_status() const { return {lazy_.depth}; }
+
+ private:
+  /// An empty traversal in this query's buffers.
+  WideTraversal fresh_traversal(const Budget& budget);
+  void grow(WideTraversal& state);
+  /// Traverses, and takes what was found, until nothing is left or the budget is used up.
+  template <class Traverse, class Take>
+  QueryStatus complete(WideTraversal& state, const Traverse& traverse, const Take& take,
+                       std::uint64_t& tests);
+  void leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
+                       const SceneView<S>& scene, const SampledMotion<S>& motion, std::size_t count,
+                       PairBuffer& out, std::uint64_t& tests);
+  void fetch_leaves(WideHierarchy<S>& h, std::uint32_t body, std::size_t side, std::size_t count,
+                    const SceneView<S>& scene, const SampledMotion<S>& motion);
+  /// Within one body pairs that share a vertex are left out; not so if `neighbours` is null.
+  void leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a, WideHierarchy<S>& b,
+                       std::uint32_t body_b, const S* positions_b, const Primitives* neighbours,
+                       std::size_t count, PairBuffer& out, std::uint64_t& tests);
+  void append_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a, WideHierarchy<S>& b,
+                    std::uint32_t body_b, const S* positions_b, std::size_t begin, std::size_t end,
+                    PairBuffer& out, std::uint64_t& tests);
+  std::vector<WidePair> stack_;
+  std::vector<LeafSlot> leaf_pairs_;
+  std::vector<FoundPair> chunk_;
+  std::vector<std::uint32_t> to_fetch_;
+  WideTraversal lazy_{};
+};
+
+/// Queries of two bodies need one layout: throws std::invalid_argument unless, for each pair of bodies, the
+/// hierarchies hierarchy_of(body) have one width and leaf size.
+template <class HierarchyOf>
+void check_layouts(std::span<const BodyPair> pairs, HierarchyOf&& hierarchy_of) {
+  for (const BodyPair& pair : pairs)
+    if (!hierarchy_of(pair.first).suits(hierarchy_of(pair.second)))
+      throw std::invalid_argument("topologies of all bodies need one width and leaf size");
+}
+
+extern template class WideHierarchy<float>;
+extern template class WideHierarchy<double>;
+extern template class WideQuery<float>;
+extern template class WideQuery<double>;
+
+}  // namespace kbvh

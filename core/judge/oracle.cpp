@@ -1,0 +1,231 @@
+#include "core/judge/oracle.hpp"
+
+#include "core/base/hasher.hpp"
+#include "core/scene/self_pairs.hpp"
+#include "core/topology/builders.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <numeric>
+
+namespace kbvh {
+
+namespace {
+
+template <class S>
+bool truly_meet(const Body<S>& a, std::uint32_t primitive_a, const S* positions_a, const Body<S>& b,
+                std::uint32_t primitive_b, const S* positions_b) {
+  const auto polygon_a = a.primitives[primitive_a], polygon_b = b.primitives[primitive_b];
+  if (a.primitives.kind != PrimitiveKind::polygons || b.primitives.kind != PrimitiveKind::polygons)
+    return overlap(primitive_box(polygon_a, positions_a), primitive_box(polygon_b, positions_b));
+  TriangleTestStats stats;
+  return polygons_intersect<S>(
+      polygon_a, [&](std::uint32_t v) { return positions_a + std::size_t(3) * v; }, polygon_b,
+      [&](std::uint32_t v) { return positions_b + std::size_t(3) * v; }, stats);
+}
+
+}  // namespace
+
+template <class S>
+std::vector<PrimitivePair> brute_force_pairs(const Scene<S>& scene, Playback<S>& playback) {
+  playback.evaluate_all();
+  std::vector<PrimitivePair> result;
+  for (const BodyPair& pair : scene.pairs) {
+    const Body<S>&a = scene.bodies[pair.first], &b = scene.bodies[pair.second];
+    const bool within = pair.first == pair.second;
+    for (std::uint32_t i = 0; i < a.primitives.count(); ++i)
+      for (std::uint32_t j = within ? i + 1 : 0; j < b.primitives.count(); ++j)
+        if (a.primitives.alive(i) && b.primitives.alive(j) &&
+            !(within && share_vertex(a.primitives[i], a.primitives[j])) &&
+            truly_meet(a, i, playback.positions(pair.first), b, j, playback.positions(pair.second)))
+          result.push_back({pair.first, i, pair.second, j});
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+template <class S>
+std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
+  playback.evaluate_all();
+  std::vector<PrimitivePair> result;
+  struct Item {
+    Box<S> box;
+    std::uint32_t primitive;
+  };
+  const auto sorted_items = [&](std::uint32_t body, int axis, const Box<S>& window) {
+    const auto boxes = primitive_boxes(scene.bodies[body].primitives, playback.positions(body));
+    std::vector<Item> items;
+    for (std::uint32_t p = 0; p < boxes.size(); ++p)
+      if (overlap(boxes[p], window)) items.push_back({boxes[p], p});
+    std::sort(items.begin(), items.end(),
+              [axis](const Item& x, const Item& y) { return x.box.lower[axis] < y.box.lower[axis]; });
+    return items;
+  };
+  for (const BodyPair& pair : scene.pairs) {
+    const Body<S>&a = scene.bodies[pair.first], &b = scene.bodies[pair.second];
+    const S* positions_a = playback.positions(pair.first);
+    const S* positions_b = playback.positions(pair.second);
+    Box<S> whole_a, whole_b;
+    for (const auto& box : primitive_boxes(a.primitives, positions_a)) whole_a.extend(box);
+    for (const auto& box : primitive_boxes(b.primitives, positions_b)) whole_b.extend(box);
+    if (!overlap(whole_a, whole_b)) continue;
+    int axis = 0;
+    for (int d = 1; d < 3; ++d)
+      if (double(whole_a.upper[d]) - double(whole_a.lower[d]) >
+          double(whole_a.upper[axis]) - double(whole_a.lower[axis]))
+        axis = d;
+    const auto items_a = sorted_items(pair.first, axis, whole_b),
+               items_b = sorted_items(pair.second, axis, whole_a);
+    const auto report = [&](const Item& x, const Item& y) {
+      if (pair.first == pair.second &&
+          (x.primitive >= y.primitive || share_vertex(a.primitives[x.primitive], a.primitives[y.primitive])))
+        return;  // each of these pairs is seen twice: of both lists
+      if (overlap(x.box, y.box) && truly_meet(a, x.primitive, positions_a, b, y.primitive, positions_b))
+        result.push_back({pair.first, x.primitive, pair.second, y.primitive});
+    };
+    // Two sorted lists: whichever starts first looks ahead in the other. Equal starts are seen from a's side.
+    std::size_t i = 0, j = 0;
+    while (i < items_a.size() && j < items_b.size()) {
+      if (items_a[i].box.lower[axis] <= items_b[j].box.lower[axis]) {
+        for (std::size_t k = j;
+             k < items_b.size() && items_b[k].box.lower[axis] <= items_a[i].box.upper[axis]; ++k)
+          report(items_a[i], items_b[k]);
+        ++i;
+      } else {
+        for (std::size_t k = i;
+             k < items_a.size() && items_a[k].box.lower[axis] <= items_b[j].box.upper[axis]; ++k)
+          report(items_a[k], items_b[j]);
+        ++j;
+      }
+    }
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+namespace {
+constexpr std::uint64_t cache_magic =
+    0x6b62766f72633032ull;  // "kbvorc02": change with the format or the test
+}
+
+template <class S>
+Oracle<S>::Oracle(const Scene<S>& scene, std::filesystem::path cache_folder, std::uint64_t script)
+    : scene_(&scene), script_(script) {
+  if (cache_folder.empty()) return;
+  char file_name[64];
+  if (script == 0)
+    std::snprintf(file_name, sizeof file_name, "oracle-%016llx.bin",
+                  static_cast<unsigned long long>(hash(scene)));
+  else
+    std::snprintf(file_name, sizeof file_name, "oracle-%016llx-%016llx.bin",
+                  static_cast<unsigned long long>(hash(scene)), static_cast<unsigned long long>(script));
+  file_ = cache_folder / file_name;
+  std::error_code error;
+  if (std::filesystem::exists(file_, error) && !load())
+    problem_ = file_.string() + ": damaged or of another version, true pairs are computed anew";
+}
+
+template <class S>
+Oracle<S>::~Oracle() {
+  keep();
+}
+
+template <class S>
+void Oracle<S>::keep() {
+  if (!grown_ || file_.empty()) return;
+  grown_ = false;
+  bool written = false;
+  try {
+    written = save();
+  } catch (const std::exception&) {
+  }
+  if (!written) problem_ = file_.string() + ": cannot be written, true pairs are not kept";
+}
+
+template <class S>
+const std::vector<PrimitivePair>& Oracle<S>::pairs(Playback<S>& playback) {
+  const auto [entry, fresh] = known_.try_emplace(playback.time());
+  if (fresh) {
+    entry->second = sweep_pairs(*scene_, playback);
+    grown_ = true;
+  }
+  return entry->second;
+}
+
+/// The file: magic, number of times, size in bytes; for each time t, number of pairs, pairs; hash of all
+/// before.
+template <class S>
+bool Oracle<S>::load() {
+  std::ifstream in(file_, std::ios::binary | std::ios::ate);
+  const auto size = std::uint64_t(std::max<std::streamoff>(in.tellg(), 0));
+  in.seekg(0);
+  Hasher hasher;
+  const auto read = [&](void* to, std::size_t bytes) {
+    if (!in.read(static_cast<char*>(to), std::streamsize(bytes))) return false;
+    hasher.bytes(to, bytes);
+    return true;
+  };
+  std::uint64_t head[3];
+  if (!read(head, sizeof head) || head[0] != cache_magic || head[2] != size) return false;
+  std::map<double, std::vector<PrimitivePair>> known;
+  for (std::uint64_t i = 0; i < head[1]; ++i) {
+    double t = 0;
+    std::uint64_t count = 0;
+    if (!read(&t, sizeof t) || !read(&count, sizeof count) || count > size / sizeof(PrimitivePair))
+      return false;
+    std::vector<PrimitivePair> pairs(count);
+    if (!read(pairs.data(), count * sizeof(PrimitivePair))) return false;
+    known.emplace(t, std::move(pairs));
+  }
+  const std::uint64_t expected = hasher.value();
+  std::uint64_t found = 0;
+  if (!read(&found, sizeof found) || found != expected) return false;
+  known_ = std::move(known);
+  return true;
+}
+
+template <class S>
+bool Oracle<S>::save() const {
+  std::filesystem::create_directories(file_.parent_path());
+  auto temporary = file_;
+  temporary += "." + std::to_string(::getpid());
+  {
+    std::ofstream out(temporary, std::ios::binary);
+    Hasher hasher;
+    const auto write = [&](const void* from, std::size_t bytes) {
+      out.write(static_cast<const char*>(from), std::streamsize(bytes));
+      hasher.bytes(from, bytes);
+    };
+    std::uint64_t head[3] = {cache_magic, known_.size(), sizeof head + 8};
+    for (const auto& [t, pairs] : known_) head[2] += 16 + pairs.size() * sizeof(PrimitivePair);
+    write(head, sizeof head);
+    for (const auto& [t, pairs] : known_) {
+      const std::uint64_t count = pairs.size();
+      write(&t, sizeof t);
+      write(&count, sizeof count);
+      write(pairs.data(), count * sizeof(PrimitivePair));
+    }
+    const std::uint64_t check = hasher.value();
+    write(&check, sizeof check);
+    if (!out.flush()) {
+      out.close();
+      std::error_code ignored;
+      std::filesystem::remove(temporary, ignored);
+      return false;
+    }
+  }
+  std::filesystem::rename(temporary, file_);
+  return true;
+}
+
+#define KBVH_INSTANTIATE(S)                                                             \
+  template std::vector<PrimitivePair> brute_force_pairs(const Scene<S>&, Playback<S>&); \
+  template std::vector<PrimitivePair> sweep_pairs(const Scene<S>&, Playback<S>&);       \
+  template class Oracle<S>;
+KBVH_INSTANTIATE(float)
+KBVH_INSTANTIATE(double)
+#undef KBVH_INSTANTIATE
+
+}  // namespace kbvh

@@ -1,0 +1,184 @@
+#pragma once
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "core/continuous/contacts.hpp"
+#include "core/contract/registry.hpp"
+#include "core/judge/oracle.hpp"
+#include "core/judge/plan_script.hpp"
+#include "core/scene/self_pairs.hpp"
+
+namespace kbvh {
+
+/// How one contestant is to be run.
+struct Contestant {
+  const StrategyEntry* entry = nullptr;
+  std::map<std::string, std::string> params;
+  BuilderConfig builder;  ///< ignored by strategies that build their own hierarchy
+};
+
+/// Seconds of one frame by phase.
+struct PhaseTimes {
+  double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0, geometry_changes = 0;
+  double query() const { return traversal + triangle_tests; }
+  double total() const { return update + traversal + triangle_tests + plan_changes + geometry_changes; }
+};
+
+/// One contestant on one scene: the only driver there is; verification, benchmarks and lessons all use it.
+template <class S>
+class Session {
+ public:
+  /// Builds topologies at the first frame and makes the instance. Throws ConfigError.
+  Session(const Scene<S>& scene, const Contestant& contestant, CountingPolicy policy)
+      : original_(&scene),
+        contestant_(contestant),
+        policy_(policy),
+        info_(&contestant.entry->info),
+        changing_(info_->can.geometry_changes ? std::optional<ChangingScene<S>>(scene) : std::nullopt),
+        scene_(changing_ ? &changing_->scene() : &scene),
+        view_(*scene_),
+        playback_(scene) {
+    make_strategy();
+  }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// Starts at time t, with the scene's own plans and geometry again. Where geometry was changed the
+  /// instance is made anew, and references to it are not valid any more. Throws std::invalid_argument, with
+  /// nothing changed, if t is not finite.
+  void reset(double t) {
+    if (!std::isfinite(t)) throw std::invalid_argument("cannot start at t = " + std::to_string(t));
+    playback_.restore_plans();
+    changed_ = geometry_changed_;  // of what the constructor's scene says
+    if (geometry_changed_) {
+      changing_.emplace(*original_);
+      playback_.seek(overlaid_keyframes(*original_).front());
+      make_strategy();
+      geometry_changed_ = changed_ = false;
+    }
+    playback_.seek(t);
+    playback_.evaluate_all();
+    strategy_->reset(t);
+  }
+  /// Moves to t, with positions if the strategy wants all of them, and advances. Throws
+  /// std::invalid_argument, with nothing changed, if t is before the present time or not finite.
+  void advance(double t, PhaseTimes& times) {
+    if (!(t >= playback_.time()))
+      throw std::invalid_argument("cannot advance from t = " + std::to_string(playback_.time()) +
+                                  " back to " + std::to_string(t));
+    playback_.seek(t);
+    if (info_->positions == PositionUse::all ||
+        (info_->positions == PositionUse::varying && strategy_->wants_all_positions()))
+      timed(times.motion, [&] { playback_.evaluate_all(); });
+    timed(times.update, [&] { strategy_->advance(t); });
+  }
+  /// Fills `pairs` with the confirmed pairs at the current time.
+  QueryStatus query(PairBuffer& pairs, PhaseTimes& times, const Budget& budget = {}) {
+    QueryStatus status;
+    pairs.clear();
+    timed(times.traversal, [&] { status = strategy_->candidates_at(playback_.time(), pairs, budget); });
+    timed(times.triangle_tests, [&] { strategy_->confirm(playback_.time(), pairs); });
+    return status;
+  }
+  /// Moves to t and appends the pairs of the interval that this takes, for strategies that declare spans.
+  void spans(double t, SpanBuffer& out) {
+    const double from = playback_.time();
+    playback_.seek(t);
+    strategy_->spans(from, t, out);
+  }
+  /// Moves to t and appends the contacts of features on the way, for strategies that declare contacts: every
+  /// vertex moves on a straight line from its present position to that at t. To be called from one time of
+  /// `overlaid_keyframes` to the next, beginning after `reset`, without frames between. The narrow phase
+  /// counts as triangle tests. Throws std::invalid_argument unless all bodies consist of triangles, and
+  /// std::logic_error after changes of plans or geometry, of which it knows nothing. Returns the pairs of
+  /// primitives that came to the narrow phase.
+  std::size_t contacts(double t, ContactBuffer& out, PhaseTimes& times) {
+    if (changed_) throw std::logic_error("contacts are not found after changes of plans or geometry");
+    if (!finder_) finder_.emplace(*scene_);
+    playback_.evaluate_all();
+    finder_->start(playback_);
+    const double from = playback_.time();
+    timed(times.update, [&] { strategy_->start_sweep(from); });
+    playback_.seek(t);
+    timed(times.motion, [&] { playback_.evaluate_all(); });
+    before_.clear();
+    for (std::uint32_t body = 0; body < playback_.body_count(); ++body)
+      before_.push_back(finder_->before(body));
+    swept_.clear();
+    timed(times.traversal, [&] { strategy_->swept_pairs(from, t, before_, swept_); });
+    timed(times.triangle_tests, [&] { finder_->find(playback_, swept_, out); });
+    return swept_.size();
+  }
+  /// How contacts were decided; after the first call of `contacts`.
+  ImpactStats impact_stats() const { return finder_ ? finder_->stats() : ImpactStats{}; }
+  /// The pairs of the last call of `contacts`.
+  const PairBuffer& swept_pairs() const { return swept_; }
+
+  /// Makes the changes at the current time, all of them or, if one is not valid, none
+  /// (Playback::change_plans).
+  void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
+    if (changing_) changing_->check_plans(changes);
+    playback_.change_plans(playback_.time(), changes);
+    changed_ = true;
+    timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });
+  }
+  /// Inserts and deletes at the current time; the scene given to the constructor stays as it is. Throws
+  /// std::logic_error if the strategy does not declare geometry changes, std::invalid_argument (see
+  /// ChangingScene) with nothing changed.
+  void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
+    if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
+    changing_->apply(change, playback_);
+    geometry_changed_ = changed_ = true;
+    timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
+  }
+
+  /// Makes a script's changes at the current time; nullptr: there are none.
+  void follow(const typename PlanScript<S>::Step* step, PhaseTimes& times) {
+    if (step == nullptr) return;
+    if (!step->changes.empty()) change_plans(step->changes, times);
+    if (!step->geometry.empty()) change_geometry(step->geometry, times);
+  }
+
+  Strategy<S>& strategy() { return *strategy_; }
+  Playback<S>& playback() { return playback_; }
+  const Info& info() const { return *info_; }
+  /// The scene as it is now.
+  const Scene<S>& scene() const { return *scene_; }
+
+ private:
+  void make_strategy() {
+    if (has_self_pairs(view_.pairs()) && !info_->can.self_pairs)
+      throw ConfigError("'" + info_->id + "' does not declare self pairs, which the scene asks for");
+    const Params params(info_->id, info_->parameters, contestant_.params);
+    Topologies topologies;
+    if (!info_->topology.own) topologies = build_topologies(view_, playback_, contestant_.builder);
+    strategy_ = create(*contestant_.entry, view_, playback_, std::move(topologies), params, policy_);
+  }
+  template <class Work>
+  static void timed(double& seconds, Work&& work) {
+    const auto begin = std::chrono::steady_clock::now();
+    work();
+    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+  const Scene<S>* original_;
+  Contestant contestant_;
+  CountingPolicy policy_;
+  const Info* info_;
+  std::optional<ChangingScene<S>> changing_;  ///< for strategies that can follow
+  const Scene<S>* scene_;
+  SceneView<S> view_;
+  Playback<S> playback_;
+  std::unique_ptr<Strategy<S>> strategy_;
+  bool geometry_changed_ = false, changed_ = false;
+  std::optional<ContactFinder<S>> finder_;
+  std::vector<const S*> before_;
+  PairBuffer swept_;
+};
+
+}  // namespace kbvh

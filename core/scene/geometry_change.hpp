@@ -1,0 +1,82 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "core/scene/playback.hpp"
+#include "core/scene/scene.hpp"
+
+namespace kbvh {
+
+/// Vertices and primitives that are inserted and deleted at one time. Ids are stable: what is inserted gets
+/// the next free ids of its body in the order given, and no id is ever used again.
+template <class S>
+struct GeometryChange {
+  struct NewVertex {
+    std::uint32_t body = 0;
+    S position[3] = {0, 0, 0};  ///< at the change
+    PlanChange<S> plan{};       ///< its motion from there; the body and vertex in it are ignored
+  };
+  struct NewPrimitive {
+    std::uint32_t body = 0;
+    std::vector<std::uint32_t> vertices;  ///< at least one; vertices of the same change are known already
+  };
+  struct Removed {
+    std::uint32_t body = 0, id = 0;
+  };
+  std::vector<NewVertex> vertices{};
+  std::vector<NewPrimitive> primitives{};
+  std::vector<Removed> removed_primitives{};  ///< must be older than the change
+  std::vector<Removed> removed_vertices{};    ///< no primitive may use them after the change
+
+  bool empty() const {
+    return vertices.empty() && primitives.empty() && removed_primitives.empty() && removed_vertices.empty();
+  }
+};
+
+/// A scene whose geometry changes while it is played: a copy of the connectivity (keyframes are shared) that
+/// grows and is cut. What was removed keeps its id: primitives are marked, vertices rest on their plans.
+template <class S>
+class ChangingScene {
+ public:
+  explicit ChangingScene(const Scene<S>& original) : scene_(original), bodies_(original.bodies.size()) {}
+
+  const Scene<S>& scene() const { return scene_; }
+
+  /// Makes the change in the scene and in the playback, at the playback's time. Throws std::invalid_argument
+  /// naming the first thing that is wrong, with nothing changed: bodies, vertices or primitives that do not
+  /// exist or were removed, primitives without vertices, vertices removed that a primitive uses, anything
+  /// removed twice, numbers that are not finite or not admissible. Amortised O(change), but O(body) the first
+  /// time that vertices of a body are removed.
+  void apply(const GeometryChange<S>& change, Playback<S>& playback);
+
+  /// Throws std::invalid_argument if a plan is given to a vertex that was removed.
+  void check_plans(std::span<const PlanChange<S>> changes) const;
+
+ private:
+  struct BodyState {
+    std::vector<std::uint32_t> uses;    ///< living primitive corners at each vertex; made when first needed
+    std::vector<std::uint8_t> removed;  ///< vertices; may be shorter than all of them
+    bool is_removed(std::uint32_t vertex) const { return vertex < removed.size() && removed[vertex] != 0; }
+  };
+  void check(const GeometryChange<S>& change, const Playback<S>& playback);
+  void count_uses(std::uint32_t body);
+
+  Scene<S> scene_;
+  std::vector<BodyState> bodies_;
+};
+
+/// What a change means for one body, once the scene shows it.
+struct BodyChange {
+  std::uint32_t body = 0;
+  std::uint32_t first_vertex = 0, first_primitive = 0;  ///< ids from here on are new
+  std::vector<std::uint32_t> removed_primitives{};
+};
+
+/// One entry for each body that the change touches, ascending.
+template <class S>
+std::vector<BodyChange> body_changes(const SceneView<S>& scene, const GeometryChange<S>& change);
+
+extern template class ChangingScene<float>;
+extern template class ChangingScene<double>;
+
+}  // namespace kbvh

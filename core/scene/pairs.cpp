@@ -1,0 +1,137 @@
+#include "core/scene/pairs.hpp"
+
+#include <algorithm>
+
+#include "core/geometry/triangle_batch.hpp"
+
+namespace kbvh {
+
+namespace {
+
+/// One body of the pairs at hand, as plain pointers: the loop over them is short.
+template <class S>
+struct PairedBody {
+  PairedBody(const SceneView<S>& scene, const SampledMotion<S>& motion, std::uint32_t id)
+      : body(id),
+        polygons(scene.primitives(id).kind == PrimitiveKind::polygons),
+        current(motion.all_current(id)),
+        offsets(scene.primitives(id).offsets.data()),
+        vertices(scene.primitives(id).vertices.data()),
+        positions(motion.positions(id)) {}
+
+  std::span<const std::uint32_t> operator[](std::uint32_t primitive) const {
+    return {vertices + offsets[primitive], vertices + offsets[primitive + 1]};
+  }
+  const S* operator()(std::uint32_t vertex) const { return positions + std::size_t(3) * vertex; }
+
+  std::uint32_t body;
+  bool polygons;
+  bool current;  ///< nothing has to be fetched
+  const std::uint32_t* offsets;
+  const std::uint32_t* vertices;
+  const S* positions;
+};
+
+/// Pairs that are tested together: what is known of them stays in the first-level cache. Places fit into
+/// bytes.
+constexpr std::size_t block = 128;
+
+/// Up to `block` candidates: pairs of triangles are collected, others decided one by one.
+template <class S>
+class CandidateBlock {
+ public:
+  CandidateBlock(const SceneView<S>& scene, const SampledMotion<S>& motion, TriangleTestStats& stats)
+      : scene_(&scene), motion_(&motion), stats_(&stats), kernels_(active_kernel_set()) {}
+
+  /// One byte for each of `count` candidates: 1 where the pair intersects, else 0. Overwritten by the next
+  /// call.
+  const std::uint8_t* intersect(const PrimitivePair* candidates, std::size_t count) {
+    size_ = 0;
+    for (std::size_t begin = 0, end = 0; begin < count; begin = end) {
+      end = begin + same_bodies(candidates + begin, count - begin);
+      const PairedBody<S> a(*scene_, *motion_, candidates[begin].body_a);
+      const PairedBody<S> b(*scene_, *motion_, candidates[begin].body_b);
+      collect(candidates, begin, end, a, b);
+    }
+    triangles_intersect(std::span<const TrianglePair<S>>(triangles_, size_), verdicts_, *stats_, kernels_);
+    if (size_ == count) return verdicts_;
+    for (std::size_t k = 0; k < size_; ++k) intersect_[places_[k]] = verdicts_[k];
+    return intersect_;
+  }
+
+ private:
+  /// How many of the first candidates are of the same two bodies; most often all.
+  static std::size_t same_bodies(const PrimitivePair* candidates, std::size_t count) {
+    const std::uint32_t body_a = candidates[0].body_a, body_b = candidates[0].body_b;
+    std::uint32_t difference = 0;
+    for (std::size_t i = 0; i < count; ++i)
+      difference |= (candidates[i].body_a ^ body_a) | (candidates[i].body_b ^ body_b);
+    if (difference == 0) return count;
+    std::size_t same = 1;
+    while (candidates[same].body_a == body_a && candidates[same].body_b == body_b) ++same;
+    return same;
+  }
+
+  void collect(const PrimitivePair* candidates, std::size_t begin, std::size_t end, const PairedBody<S>& a,
+               const PairedBody<S>& b) {
+    const bool polygons = a.polygons && b.polygons, current = a.current && b.current;
+    std::size_t size = size_;
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto p = a[candidates[i].primitive_a], q = b[candidates[i].primitive_b];
+      if (!current) {
+        motion_->fetch(a.body, p);
+        motion_->fetch(b.body, q);
+      }
+      if (polygons && p.size() == 3 && q.size() == 3) {
+        triangles_[size] = {{a(p[0]), a(p[1]), a(p[2]), b(q[0]), b(q[1]), b(q[2])}};
+        places_[size] = std::uint8_t(i);
+        ++size;
+      } else {
+        intersect_[i] = one_by_one(p, a, q, b, polygons) ? 1 : 0;
+      }
+    }
+    size_ = size;
+  }
+
+  [[gnu::noinline]] bool one_by_one(std::span<const std::uint32_t> p, const PairedBody<S>& a,
+                                    std::span<const std::uint32_t> q, const PairedBody<S>& b, bool polygons) {
+    return polygons ? polygons_intersect<S>(p, a, q, b, *stats_)
+                    : overlap(primitive_box(p, a.positions), primitive_box(q, b.positions));
+  }
+
+  const SceneView<S>* scene_;
+  const SampledMotion<S>* motion_;
+  TriangleTestStats* stats_;
+  KernelSet kernels_;
+  std::size_t size_ = 0;  // triangles
+  TrianglePair<S> triangles_[block];
+  std::uint8_t places_[block];     // of triangles among the candidates
+  std::uint8_t verdicts_[block];   // of triangles
+  std::uint8_t intersect_[block];  // of candidates
+};
+
+}  // namespace
+
+template <class S>
+void confirm_pairs(const SceneView<S>& scene, const SampledMotion<S>& motion, PairBuffer& pairs,
+                   TriangleTestStats& stats) {
+  CandidateBlock<S> candidates(scene, motion, stats);
+  std::size_t kept = 0;
+  for (std::size_t first = 0; first < pairs.size(); first += block) {
+    const std::size_t count = std::min(block, pairs.size() - first);
+    const std::uint8_t* const intersect = candidates.intersect(pairs.data() + first, count);
+    // Without branches; the place of a kept pair is never after the one it comes from.
+    for (std::size_t i = 0; i < count; ++i) {
+      pairs[kept] = pairs[first + i];
+      kept += intersect[i];
+    }
+  }
+  pairs.resize(kept);
+}
+
+template void confirm_pairs(const SceneView<float>&, const SampledMotion<float>&, PairBuffer&,
+                            TriangleTestStats&);
+template void confirm_pairs(const SceneView<double>&, const SampledMotion<double>&, PairBuffer&,
+                            TriangleTestStats&);
+
+}  // namespace kbvh

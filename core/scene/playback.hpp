@@ -1,0 +1,84 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+
+namespace kbvh {
+
+/// Plays a scene's motion for one strategy: holds the current time, the current positions (truth B), and the
+/// plans with their run-time changes. The driver owns it; strategies see it through the view that their
+/// declared foresight allows (motion_view.hpp). Positions are evaluated all at once by the driver, or vertex
+/// by vertex on demand; each vertex at most once per frame. No allocation after construction but for plans
+/// that change and added vertices.
+template <class S>
+class Playback {
+ public:
+  explicit Playback(const Scene<S>& scene);
+
+  double time() const { return time_; }
+  /// Moves to t without evaluating any position. Throws std::invalid_argument if t is not finite.
+  void seek(double t);
+  /// Evaluates every vertex of every moving body at the current time.
+  void evaluate_all();
+  /// Evaluates the listed vertices of one body, as far as they are not current.
+  void fetch(std::uint32_t body, std::span<const std::uint32_t> vertices) {
+    BodyState& state = bodies_[body];
+    if (state.all_current) return;
+    fetch_stale(state, vertices);
+  }
+  /// Evaluates all vertices of one body, unless they are current.
+  void fetch_all(std::uint32_t body) {
+    if (!bodies_[body].all_current) fetch_all(bodies_[body]);
+  }
+  /// Position of one vertex at the current time: 3 scalars.
+  const S* position(std::uint32_t body, std::uint32_t vertex) {
+    BodyState& state = bodies_[body];
+    if (!state.all_current && state.stamp[vertex] != epoch_) fetch_stale(state, {&vertex, 1});
+    return state.positions.data() + std::size_t(3) * vertex;
+  }
+  /// Positions [vertex][3] of a body, followed by one scalar of padding, so that a fourth lane may be read.
+  /// Only vertices evaluated or fetched for the current time are meaningful.
+  const S* positions(std::uint32_t body) const { return bodies_[body].positions.data(); }
+  bool all_current(std::uint32_t body) const { return bodies_[body].all_current; }
+
+  /// Each changed vertex starts its new plan at the current time from its stored position.
+  /// Of several changes of one vertex the last counts. Throws std::invalid_argument, with nothing changed, if
+  /// t is not the current time or a change is not valid.
+  void change_plans(double t, std::span<const PlanChange<S>> changes);
+  /// Forgets every change: the plans are the scene's again, and positions are to be evaluated anew after the
+  /// next `seek`.
+  void restore_plans();
+
+  /// Adds a vertex to a body at the current time; see FlightPlans::add_vertex. Its position is current.
+  /// Amortised O(1); `positions` may move.
+  void add_vertex(std::uint32_t body, const PlanChange<S>& plan, const S* position);
+
+  const FlightPlans<S>& plans(std::uint32_t body) const { return bodies_[body].plans; }
+  std::uint32_t body_count() const { return std::uint32_t(bodies_.size()); }
+  /// Positions evaluated on demand so far.
+  std::uint64_t fetched() const { return fetched_; }
+
+ private:
+  struct BodyState {
+    FlightPlans<S> plans, scene_plans;  ///< as changed, and as the scene has them
+    std::vector<S> positions;
+    std::vector<std::uint32_t> stamp;
+    std::uint32_t fetched = 0;  ///< at the current time
+    bool all_current = false;
+  };
+  void fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices);
+  void fetch_all(BodyState& state);
+
+  double time_ = 0;
+  std::uint32_t epoch_ = 0;
+  std::uint64_t fetched_ = 0;
+  std::vector<BodyState> bodies_;
+  std::vector<std::uint32_t> stale_;
+};
+
+extern template class Playback<float>;
+extern template class Playback<double>;
+
+}  // namespace kbvh

@@ -1,0 +1,90 @@
+#include "core/scene/scene.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "core/base/hasher.hpp"
+
+namespace kbvh {
+
+template <class S>
+void validate(const Scene<S>& scene) {
+  for (const auto& body : scene.bodies) {
+    const std::string where = "body '" + body.name + "': ";
+    const Primitives& primitives = body.primitives;
+    if (primitives.offsets.empty() || primitives.offsets.front() != 0 ||
+        primitives.offsets.back() != primitives.vertices.size())
+      throw std::invalid_argument(where + "primitive offsets do not span the vertex list");
+    for (std::uint32_t p = 0; p < primitives.count(); ++p) {
+      if (primitives.offsets[p + 1] <= primitives.offsets[p])
+        throw std::invalid_argument(where + "primitive " + std::to_string(p) + " has no vertex");
+      for (std::uint32_t v : primitives[p])
+        if (v >= body.plans.vertex_count())
+          throw std::invalid_argument(where + "primitive " + std::to_string(p) + " refers to vertex " +
+                                      std::to_string(v) + ", but there are " +
+                                      std::to_string(body.plans.vertex_count()));
+    }
+  }
+  for (const BodyPair& pair : scene.pairs)
+    if (pair.first > pair.second || pair.second >= scene.bodies.size())
+      throw std::invalid_argument("body pair (" + std::to_string(pair.first) + ", " +
+                                  std::to_string(pair.second) + ") in a scene of " +
+                                  std::to_string(scene.bodies.size()) + " bodies");
+}
+
+template <class S>
+std::uint64_t hash(const Scene<S>& scene) {
+  Hasher hasher;
+  hasher.mix(sizeof(S));
+  for (const auto& body : scene.bodies) {
+    hasher.mix(std::uint64_t(body.primitives.kind));
+    hasher.list(body.primitives.offsets);
+    hasher.list(body.primitives.vertices);
+    if (body.primitives.removed_count != 0) hasher.list(body.primitives.removed);
+    const auto times = body.plans.keyframe_times();
+    hasher.bytes(times.data(), times.size_bytes());
+    hasher.bytes(body.plans.keyframe(0),
+                 body.plans.keyframe_count() * 3 * body.plans.keyframed_count() * sizeof(S));
+  }
+  for (const BodyPair& pair : scene.pairs) hasher.mix((std::uint64_t(pair.first) << 32) | pair.second);
+  return hasher.value();
+}
+
+template <class S>
+std::vector<double> overlaid_keyframes(const Scene<S>& scene) {
+  std::vector<double> times;
+  for (const auto& body : scene.bodies)
+    if (body.plans.keyframe_count() > 1)
+      times.insert(times.end(), body.plans.keyframe_times().begin(), body.plans.keyframe_times().end());
+  if (times.empty()) return {scene.bodies.empty() ? 0.0 : scene.bodies[0].plans.keyframe_times()[0]};
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  return times;
+}
+
+template <class S>
+std::vector<double> frame_times(const Scene<S>& scene, std::uint32_t per_keyframe) {
+  if (per_keyframe == 0) throw std::invalid_argument("frames per keyframe must be at least 1, got 0");
+  const std::vector<double> keyframes = overlaid_keyframes(scene);
+  std::vector<double> frames;
+  frames.reserve((keyframes.size() - 1) * per_keyframe + 1);
+  for (std::size_t k = 0; k + 1 < keyframes.size(); ++k)
+    for (std::uint32_t j = 0; j < per_keyframe; ++j) {
+      const double t = keyframes[k] + (keyframes[k + 1] - keyframes[k]) * double(j) / double(per_keyframe);
+      // Between keyframes that nearly touch, rounding may reach the next one; it comes as its own frame.
+      if (t < keyframes[k + 1] && (frames.empty() || frames.back() < t)) frames.push_back(t);
+    }
+  frames.push_back(keyframes.back());
+  return frames;
+}
+
+#define KBVH_INSTANTIATE(S)                                         \
+  template void validate(const Scene<S>&);                          \
+  template std::uint64_t hash(const Scene<S>&);                     \
+  template std::vector<double> overlaid_keyframes(const Scene<S>&); \
+  template std::vector<double> frame_times(const Scene<S>&, std::uint32_t);
+KBVH_INSTANTIATE(float)
+KBVH_INSTANTIATE(double)
+#undef KBVH_INSTANTIATE
+
+}  // namespace kbvh

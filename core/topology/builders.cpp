@@ -1,0 +1,409 @@
+#include "core/topology/builders.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <stdexcept>
+
+namespace kbvh {
+
+const char* name(BuildMethod method) {
+  switch (method) {
+    case BuildMethod::median:
+      return "median";
+    case BuildMethod::sah:
+      return "sah";
+    case BuildMethod::morton:
+      return "morton";
+  }
+  return "?";
+}
+
+BuildMethod build_method(std::string_view text) {
+  for (BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
+    if (text == name(method)) return method;
+  throw std::invalid_argument("unknown builder '" + std::string(text) + "'; known are median, sah, morton");
+}
+
+template <class S>
+std::vector<Box<S>> primitive_boxes(const Primitives& primitives, const S* positions) {
+  std::vector<Box<S>> boxes(primitives.count());
+  for (std::uint32_t p = 0; p < primitives.count(); ++p)
+    if (primitives.alive(p))
+      for (std::uint32_t v : primitives[p]) boxes[p].extend(positions + std::size_t(3) * v);
+  return boxes;
+}
+
+namespace {
+
+/// A binary node under construction: a range of the permuted primitives, split or not.
+struct BinaryNode {
+  std::uint32_t begin, end;
+  std::uint32_t left = 0, right = 0;  // 0: leaf (the root is nobody's child)
+  double weight = 0;                  // what decides which child is opened first when collapsing
+};
+
+struct BuildItem {
+  std::array<double, 3> centroid;
+  std::uint32_t primitive;
+};
+
+template <class S>
+class BinaryBuilder {
+ public:
+  BinaryBuilder(std::span<const Box<S>> boxes, const BuilderConfig& config) : boxes_(boxes), config_(config) {
+    items_.resize(boxes.size());
+    for (std::uint32_t p = 0; p < boxes.size(); ++p) {
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        items_[p].centroid[axis] = 0.5 * double(boxes[p].lower[axis]) + 0.5 * double(boxes[p].upper[axis]);
+      items_[p].primitive = p;
+    }
+    if (config.method == BuildMethod::morton) sort_by_morton_code();
+  }
+
+  void build() {
+    nodes_.push_back({0, std::uint32_t(items_.size())});
+    nodes_.reserve(2 * items_.size());
+    std::vector<std::uint32_t> open{0};
+    while (!open.empty()) {
+      const std::uint32_t index = open.back();
+      open.pop_back();
+      const std::uint32_t begin = nodes_[index].begin, end = nodes_[index].end;
+      nodes_[index].weight = weight(begin, end);
+      const std::uint32_t middle = split(begin, end);
+      if (middle == begin) continue;
+      nodes_[index].left = std::uint32_t(nodes_.size());
+      nodes_[index].right = nodes_[index].left + 1;
+      nodes_.push_back({begin, middle});
+      nodes_.push_back({middle, end});
+      open.push_back(nodes_[index].left);
+      open.push_back(nodes_[index].right);
+    }
+  }
+
+  const std::vector<BinaryNode>& nodes() const { return nodes_; }
+  const std::vector<BuildItem>& items() const { return items_; }
+
+  /// Puts the primitives of [begin, end) with the smallest centroids along the longest axis before `middle`.
+  void median_split(std::uint32_t begin, std::uint32_t middle, std::uint32_t end) {
+    std::array<double, 3> lower, upper;
+    centroid_bounds(begin, end, lower, upper);
+    std::size_t axis = 0;
+    for (std::size_t a = 1; a < 3; ++a)
+      if (upper[a] - lower[a] > upper[axis] - lower[axis]) axis = a;
+    std::nth_element(items_.begin() + begin, items_.begin() + middle, items_.begin() + end,
+                     [axis](const BuildItem& a, const BuildItem& b) {
+                       return a.centroid[axis] != b.centroid[axis] ? a.centroid[axis] < b.centroid[axis]
+                                                                   : a.primitive < b.primitive;
+                     });
+  }
+
+ private:
+  /// Where to split; `begin` for a leaf.
+  std::uint32_t split(std::uint32_t begin, std::uint32_t end) {
+    const std::uint32_t count = end - begin;
+    if (config_.method == BuildMethod::sah) return count < 2 ? begin : sah_split(begin, end);
+    return count <= config_.leaf_size ? begin : morton_split(begin, end);
+  }
+
+  std::uint32_t halve(std::uint32_t begin, std::uint32_t end) {
+    const std::uint32_t middle = begin + (end - begin) / 2;
+    median_split(begin, middle, end);
+    return middle;
+  }
+
+  std::uint32_t sah_split(std::uint32_t begin, std::uint32_t end) {
+    const std::uint32_t count = end - begin, bins = config_.sah_bins;
+    std::array<double, 3> lower, upper;
+    centroid_bounds(begin, end, lower, upper);
+    double best_cost = std::numeric_limits<double>::infinity();
+    std::size_t best_axis = 3;
+    std::uint32_t best_bin = 0;
+    const auto bin_of = [&](const BuildItem& item, std::size_t axis) {
+      const double scaled = (item.centroid[axis] - lower[axis]) / (upper[axis] - lower[axis]) * bins;
+      return std::min(bins - 1, std::uint32_t(std::max(0.0, scaled)));
+    };
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!(lower[axis] < upper[axis])) continue;
+      bins_.assign(bins, Bin{});
+      for (std::uint32_t i = begin; i < end; ++i) {
+        Bin& target = bins_[bin_of(items_[i], axis)];
+        target.box.extend(boxes_[items_[i].primitive]);
+        ++target.count;
+      }
+      right_cost_.assign(bins, 0);
+      Box<S> box;
+      std::uint32_t n = 0;
+      for (std::uint32_t b = bins - 1; b > 0; --b) {
+        box.extend(bins_[b].box);
+        n += bins_[b].count;
+        right_cost_[b] = surface_area(box) * n;
+      }
+      box = {};
+      n = 0;
+      for (std::uint32_t b = 0; b + 1 < bins; ++b) {
+        box.extend(bins_[b].box);
+        n += bins_[b].count;
+        if (n == 0 || n == count) continue;
+        const double cost = surface_area(box) * n + right_cost_[b + 1];
+        if (cost < best_cost) best_cost = cost, best_axis = axis, best_bin = b;
+      }
+    }
+    if (best_axis == 3) return count <= config_.leaf_size ? begin : halve(begin, end);
+    Box<S> whole;
+    for (std::uint32_t i = begin; i < end; ++i) whole.extend(boxes_[items_[i].primitive]);
+    const double area = surface_area(whole);
+    if (count <= config_.leaf_size && area * count <= best_cost + config_.sah_traversal_cost * area)
+      return begin;
+    // A stable partition keeps the result independent of the library's choice of swaps.
+    const auto middle =
+        std::stable_partition(items_.begin() + begin, items_.begin() + end,
+                              [&](const BuildItem& item) { return bin_of(item, best_axis) <= best_bin; });
+    return std::uint32_t(middle - items_.begin());
+  }
+
+  std::uint32_t morton_split(std::uint32_t begin, std::uint32_t end) {
+    const std::uint64_t first = codes_[begin], last = codes_[end - 1];
+    if (first == last) return begin + (end - begin) / 2;
+    const std::uint64_t bit = std::uint64_t(1) << (63 - std::countl_zero(first ^ last));
+    return std::uint32_t(std::partition_point(codes_.begin() + begin, codes_.begin() + end,
+                                              [bit](std::uint64_t code) { return (code & bit) == 0; }) -
+                         codes_.begin());
+  }
+
+  void sort_by_morton_code() {
+    std::array<double, 3> lower, upper;
+    centroid_bounds(0, std::uint32_t(items_.size()), lower, upper);
+    std::vector<std::uint64_t> code(items_.size(), 0);
+    for (const BuildItem& item : items_)
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (!(lower[axis] < upper[axis])) continue;
+        const double scaled = (item.centroid[axis] - lower[axis]) / (upper[axis] - lower[axis]) * 2097152.0;
+        const auto cell = std::min<std::uint64_t>(2097151, std::uint64_t(std::max(0.0, scaled)));
+        for (int b = 0; b < 21; ++b) code[item.primitive] |= ((cell >> b) & 1) << (3 * b + int(axis));
+      }
+    std::sort(items_.begin(), items_.end(), [&](const BuildItem& a, const BuildItem& b) {
+      return code[a.primitive] != code[b.primitive] ? code[a.primitive] < code[b.primitive]
+                                                    : a.primitive < b.primitive;
+    });
+    for (const BuildItem& item : items_) codes_.push_back(code[item.primitive]);
+  }
+
+  void centroid_bounds(std::uint32_t begin, std::uint32_t end, std::array<double, 3>& lower,
+                       std::array<double, 3>& upper) const {
+    lower.fill(std::numeric_limits<double>::infinity());
+    upper.fill(-std::numeric_limits<double>::infinity());
+    for (std::uint32_t i = begin; i < end; ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        lower[axis] = std::min(lower[axis], items_[i].centroid[axis]);
+        upper[axis] = std::max(upper[axis], items_[i].centroid[axis]);
+      }
+  }
+
+  double weight(std::uint32_t begin, std::uint32_t end) const {
+    if (config_.width == 2 || config_.method != BuildMethod::sah) return end - begin;
+    Box<S> box;
+    for (std::uint32_t i = begin; i < end; ++i) box.extend(boxes_[items_[i].primitive]);
+    return surface_area(box);
+  }
+
+  std::span<const Box<S>> boxes_;
+  BuilderConfig config_;
+  std::vector<BuildItem> items_;
+  std::vector<std::uint64_t> codes_;
+  std::vector<BinaryNode> nodes_;
+  struct Bin {
+    Box<S> box;
+    std::uint32_t count = 0;
+  };
+  std::vector<Bin> bins_;
+  std::vector<double> right_cost_;
+};
+
+/// Adds `count` children to a node, in one row; returns the first.
+std::uint32_t add_children(Topology& topology, std::uint32_t parent, std::uint32_t count) {
+  const std::uint32_t first = topology.size();
+  topology.nodes.resize(first + count);
+  topology.parents.resize(first + count, parent);
+  topology.depths.resize(first + count, std::uint8_t(std::min(255, topology.depths[parent] + 1)));
+  topology.nodes[parent] = TopologyNode::inner(first, count);
+  return first;
+}
+
+Topology with_root(const BuilderConfig& config) {
+  Topology topology;
+  topology.width = config.width;
+  topology.leaf_size = config.leaf_size;
+  topology.nodes.resize(1);
+  topology.parents.push_back(0);
+  topology.depths.push_back(0);
+  return topology;
+}
+
+/// Makes wide nodes of the binary tree, depth first: what lies below a node lies together.
+Topology collapse(const std::vector<BinaryNode>& binary, const BuilderConfig& config) {
+  Topology topology = with_root(config);
+  struct Open {
+    std::uint32_t node, binary;
+  };
+  std::vector<Open> open{{0, 0}};
+  std::vector<std::uint32_t> children;
+  while (!open.empty()) {
+    const auto [index, source] = open.back();
+    open.pop_back();
+    const BinaryNode& node = binary[source];
+    if (node.left == 0) {
+      topology.nodes[index] = TopologyNode::leaf(node.begin, node.end - node.begin);
+      continue;
+    }
+    children = {node.left, node.right};
+    while (children.size() < config.width) {
+      // Open the heaviest inner child, the first of equals, in place: leaf order stays left to right.
+      std::size_t heaviest = children.size();
+      for (std::size_t c = 0; c < children.size(); ++c)
+        if (binary[children[c]].left != 0 &&
+            (heaviest == children.size() || binary[children[c]].weight > binary[children[heaviest]].weight))
+          heaviest = c;
+      if (heaviest == children.size()) break;
+      const BinaryNode& opened = binary[children[heaviest]];
+      children[heaviest] = opened.left;
+      children.insert(children.begin() + std::ptrdiff_t(heaviest) + 1, opened.right);
+    }
+    const std::uint32_t first = add_children(topology, index, std::uint32_t(children.size()));
+    for (std::size_t c = children.size(); c-- > 0;) open.push_back({first + std::uint32_t(c), children[c]});
+  }
+  return topology;
+}
+
+/// The median tree, made wide at once: every leaf but the last holds `leaf_size` primitives, every node above
+/// the leaves but the last has `width` of them, all leaves lie at one depth as long as numbers allow, and
+/// nodes are as full as can be. With width^k full leaves it is perfect.
+template <class S>
+class MedianTree {
+ public:
+  MedianTree(BinaryBuilder<S>& builder, const BuilderConfig& config) : builder_(&builder), config_(config) {}
+
+  Topology build(std::uint32_t primitives) {
+    Topology topology = with_root(config_);
+    std::uint64_t reach = 1;
+    std::uint32_t height = 0;
+    for (; reach < units(primitives, block()); reach *= config_.width) ++height;
+    make(topology, 0, 0, primitives, height);
+    return topology;
+  }
+
+ private:
+  /// Primitives below a full node of leaves.
+  std::uint32_t block() const { return config_.leaf_size * config_.width; }
+  static std::uint32_t units(std::uint32_t count, std::uint32_t unit) { return (count + unit - 1) / unit; }
+
+  /// Recursion is as deep as the tree: at most 32.
+  void make(Topology& topology, std::uint32_t index, std::uint32_t begin, std::uint32_t end,
+            std::uint32_t height) {
+    const std::uint32_t count = end - begin;
+    if (count <= config_.leaf_size) {
+      topology.nodes[index] = TopologyNode::leaf(begin, count);
+      return;
+    }
+    std::array<std::uint32_t, 9> bounds;
+    std::uint32_t parts = units(count, config_.leaf_size), unit = config_.leaf_size;
+    if (parts > config_.width) {
+      unit = block();
+      std::uint64_t below = 1;
+      for (std::uint32_t h = 1; h < height; ++h) below *= config_.width;
+      parts = std::uint32_t((units(count, unit) + below - 1) / below);
+      parts = std::clamp(parts, 2U, config_.width);
+    }
+    bounds[0] = begin;
+    bounds[parts] = end;
+    divide(bounds.data(), parts, unit);
+    const std::uint32_t first = add_children(topology, index, parts);
+    for (std::uint32_t p = 0; p < parts; ++p)
+      make(topology, first + p, bounds[p], bounds[p + 1], height > 0 ? height - 1 : 0);
+  }
+
+  /// Sets the inner ones of `parts` + 1 bounds, halving the parts each time; all lie whole units apart but
+  /// the last.
+  void divide(std::uint32_t* bounds, std::uint32_t parts, std::uint32_t unit) {
+    if (parts == 1) return;
+    const std::uint32_t left = (parts + 1) / 2, all = units(bounds[parts] - bounds[0], unit);
+    const auto taken = std::uint32_t((std::uint64_t(all) * left + parts - 1) / parts);
+    bounds[left] = bounds[0] + std::min(taken, all - (parts - left)) * unit;
+    builder_->median_split(bounds[0], bounds[left], bounds[parts]);
+    divide(bounds, left, unit);
+    divide(bounds + left, parts - left, unit);
+  }
+
+  BinaryBuilder<S>* builder_;
+  BuilderConfig config_;
+};
+
+bool is_perfect(const Topology& topology) {
+  int leaf_depth = -1;
+  for (std::uint32_t i = 0; i < topology.size(); ++i) {
+    const TopologyNode node = topology.nodes[i];
+    if (node.is_leaf()) {
+      if (leaf_depth >= 0 && topology.depths[i] != leaf_depth) return false;
+      leaf_depth = topology.depths[i];
+    } else if (i != 0 && node.count() != topology.width) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+template <class S>
+Topology build_topology(std::span<const Box<S>> boxes, const BuilderConfig& config) {
+  if (config.width != 2 && config.width != 4 && config.width != 8)
+    throw std::invalid_argument("tree width must be 2, 4 or 8, got " + std::to_string(config.width));
+  if (config.leaf_size < 1 || config.leaf_size > 16)
+    throw std::invalid_argument("leaf size must be 1 to 16, got " + std::to_string(config.leaf_size));
+  if (config.sah_bins < 2)
+    throw std::invalid_argument("SAH needs at least 2 bins, got " + std::to_string(config.sah_bins));
+  if (boxes.empty()) {
+    Topology topology;
+    topology.width = config.width;
+    topology.leaf_size = config.leaf_size;
+    return topology;
+  }
+  BinaryBuilder<S> builder(boxes, config);
+  Topology topology;
+  if (config.method == BuildMethod::median) {
+    topology = MedianTree<S>(builder, config).build(std::uint32_t(boxes.size()));
+  } else {
+    builder.build();
+    topology = collapse(builder.nodes(), config);
+  }
+  topology.primitives.reserve(boxes.size());
+  for (const BuildItem& item : builder.items()) topology.primitives.push_back(item.primitive);
+  topology.perfect = is_perfect(topology);
+  return topology;
+}
+
+template <class S>
+Topology build_topology(const Primitives& primitives, const S* positions, const BuilderConfig& config) {
+  auto boxes = primitive_boxes(primitives, positions);
+  if (primitives.removed_count == 0) return build_topology<S>(boxes, config);
+  std::vector<std::uint32_t> living;
+  for (std::uint32_t p = 0; p < primitives.count(); ++p)
+    if (primitives.alive(p)) {
+      boxes[living.size()] = boxes[p];
+      living.push_back(p);
+    }
+  boxes.resize(living.size());
+  Topology topology = build_topology<S>(boxes, config);
+  for (std::uint32_t& p : topology.primitives) p = living[p];
+  return topology;
+}
+
+#define KBVH_INSTANTIATE(S)                                                        \
+  template std::vector<Box<S>> primitive_boxes(const Primitives&, const S*);       \
+  template Topology build_topology(std::span<const Box<S>>, const BuilderConfig&); \
+  template Topology build_topology(const Primitives&, const S*, const BuilderConfig&);
+KBVH_INSTANTIATE(float)
+KBVH_INSTANTIATE(double)
+#undef KBVH_INSTANTIATE
+
+}  // namespace kbvh

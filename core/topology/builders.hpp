@@ -1,0 +1,42 @@
+#pragma once
+#include <span>
+#include <string_view>
+
+#include "core/topology/topology.hpp"
+
+namespace kbvh {
+
+/// How a topology is built from primitive boxes at one time.
+enum class BuildMethod : std::uint8_t {
+  median,  ///< exact median along the longest axis of the centroids; full leaves and nodes, one depth,
+           ///< perfect when sizes allow
+  sah,     ///< binned surface-area heuristic (Wald 2007), cost = traversal + area ratio x primitives
+  morton,  ///< linear BVH over 63-bit Morton codes of the centroids (Lauterbach et al. 2009)
+};
+const char* name(BuildMethod method);
+/// Throws std::invalid_argument naming the known methods.
+BuildMethod build_method(std::string_view name);
+
+struct BuilderConfig {
+  BuildMethod method = BuildMethod::median;
+  std::uint32_t width = 2;          ///< 2, 4 or 8
+  std::uint32_t leaf_size = 4;      ///< most primitives per leaf, 1..16
+  std::uint32_t sah_bins = 16;      ///< candidate planes + 1 per axis
+  double sah_traversal_cost = 1.0;  ///< of one node, in units of one primitive test
+};
+
+/// Boxes of all primitives; empty for removed ones. O(primitives).
+template <class S>
+std::vector<Box<S>> primitive_boxes(const Primitives& primitives, const S* positions);
+
+/// Builds a topology over the boxes. Deterministic: ties are broken by primitive id. O(n log n).
+/// Nodes come depth first. SAH and Morton trees are binary at first and collapsed, largest child first.
+/// Throws std::invalid_argument on a width or leaf size that is not admissible.
+template <class S>
+Topology build_topology(std::span<const Box<S>> boxes, const BuilderConfig& config);
+
+/// Builds a topology over the living primitives of one body from positions [vertex][3].
+template <class S>
+Topology build_topology(const Primitives& primitives, const S* positions, const BuilderConfig& config);
+
+}  // namespace kbvh

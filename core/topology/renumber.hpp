@@ -1,0 +1,22 @@
+#pragma once
+#include "core/scene/scene.hpp"
+#include "core/topology/builders.hpp"
+
+namespace kbvh {
+
+/// A scene whose vertices and primitives are stored in the order in which a hierarchy's leaves meet them, so
+/// that updates read memory in order. Ids change: the maps lead back.
+template <class S>
+struct RenumberedScene {
+  Scene<S> scene;
+  std::vector<std::vector<std::uint32_t>> old_vertex;     ///< [body][new vertex]; unused vertices come last
+  std::vector<std::vector<std::uint32_t>> old_primitive;  ///< [body][new primitive]
+};
+
+/// Renumbers every body along the leaves of the topology that `config` builds at the first frame. Geometry
+/// and motion stay the same; corners of a primitive keep their order. O(n log n), and a copy of all
+/// keyframes. Plans changed at run time are not carried over: renumber before a session starts.
+template <class S>
+RenumberedScene<S> renumber_in_leaf_order(const Scene<S>& scene, const BuilderConfig& config);
+
+}  // namespace kbvh

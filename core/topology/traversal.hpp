@@ -1,0 +1,72 @@
+#pragma once
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/base/counters.hpp"
+#include "core/geometry/box.hpp"
+#include "core/topology/topology.hpp"
+
+namespace kbvh {
+
+/// How much work a query may do; counted, so that a budget means the same on every machine.
+struct Budget {
+  std::uint64_t box_tests = std::numeric_limits<std::uint64_t>::max();
+};
+
+/// What a query left undone; 0 and complete unless a budget ran out.
+struct QueryStatus {
+  std::uint64_t pending = 0;  ///< node pairs (or other units of work) not looked at
+  bool complete() const { return pending == 0; }
+};
+
+/// Two nodes still to be compared.
+struct NodePair {
+  std::uint32_t first, second;
+};
+
+/// The simultaneous traversal of two hierarchies (Z&W Algorithm 2): visits every pair of leaves whose boxes,
+/// and whose ancestors' boxes on both sides, overlap, and calls on_leaves(leaf of a, leaf of b) once for
+/// each. A bounds view tells how a hierarchy's bounds are read:
+///   void ensure(std::uint32_t node)         makes the node's bounds valid at the query's time
+///   Box<S> operator()(std::uint32_t node)   its box, read only after `ensure`
+/// Views of the two bodies may differ. (Stored boxes have a query of their own: wide_hierarchy.hpp.) Both
+/// inner: descend both; one leaf: descend the other. The stack grows as needed and is the caller's, so that
+/// no work is dropped and a frame allocates nothing. `Count` is a counting policy.
+template <class ViewA, class ViewB, class Count, class OnLeaves>
+QueryStatus traverse(const Topology& a, ViewA&& bounds_a, const Topology& b, ViewB&& bounds_b,
+                     std::vector<NodePair>& stack, Count& count, const Budget& budget, OnLeaves&& on_leaves) {
+  stack.clear();
+  if (a.empty() || b.empty()) return {};
+  bounds_a.ensure(0);
+  bounds_b.ensure(0);
+  std::uint64_t tests = 1;
+  if (overlap(bounds_a(0), bounds_b(0))) stack.push_back({0, 0});
+  const TopologyNode* nodes_a = a.nodes.data();
+  const TopologyNode* nodes_b = b.nodes.data();
+  while (!stack.empty() && tests < budget.box_tests) {
+    const NodePair pair = stack.back();
+    stack.pop_back();
+    const TopologyNode node_a = nodes_a[pair.first], node_b = nodes_b[pair.second];
+    if (node_a.is_leaf() && node_b.is_leaf()) {
+      on_leaves(pair.first, pair.second);
+      continue;
+    }
+    const std::uint32_t begin_a = node_a.is_leaf() ? pair.first : node_a.first();
+    const std::uint32_t end_a = node_a.is_leaf() ? pair.first + 1 : begin_a + node_a.count();
+    const std::uint32_t begin_b = node_b.is_leaf() ? pair.second : node_b.first();
+    const std::uint32_t end_b = node_b.is_leaf() ? pair.second + 1 : begin_b + node_b.count();
+    for (std::uint32_t j = begin_b; j < end_b; ++j) bounds_b.ensure(j);
+    for (std::uint32_t i = begin_a; i < end_a; ++i) {
+      bounds_a.ensure(i);
+      const auto box = bounds_a(i);
+      for (std::uint32_t j = begin_b; j < end_b; ++j)
+        if (overlap(box, bounds_b(j))) stack.push_back({i, j});
+    }
+    tests += std::uint64_t(end_a - begin_a) * (end_b - begin_b);
+  }
+  count.add(Counter::box_tests, tests);
+  return {stack.size()};
+}
+
+}  // namespace kbvh
