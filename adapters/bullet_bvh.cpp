@@ -29,6 +29,8 @@
 #include <cmath>
 #include <type_traits>
 
+#include "core/geometry/lane_box.hpp"
+
 namespace kbvh::bullet {
 namespace {
 

@@ -30,6 +30,7 @@
 
 #include "core/continuous/impact.hpp"
 #include "core/contract/registry.hpp"
+#include "core/geometry/lane_box.hpp"
 
 namespace kbvh {
 namespace {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <set>
 
+#include "core/scene/self_pairs.hpp"
+
 namespace kbvh::experiments {
 
 namespace {

@@ -1,6 +1,8 @@
 // No hierarchy: the box of every primitive against the box of every other. What any structure has to beat.
 
 #include "core/contract/registry.hpp"
+#include "core/geometry/lane_box.hpp"
+#include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
 namespace {

@@ -8,6 +8,8 @@
 #include "core/contract/registry.hpp"
 #include "core/families/boxtree/boxtree_degradation.hpp"
 #include "core/families/boxtree/kinetic_boxtree.hpp"
+#include "core/geometry/lane_box.hpp"
+#include "core/topology/leaf_pairs.hpp"
 
 namespace kbvh {
 namespace {

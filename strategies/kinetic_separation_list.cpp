@@ -7,6 +7,8 @@
 #include "core/contract/registry.hpp"
 #include "core/families/events/realiser_boxes.hpp"
 #include "core/families/separation/kinetic_collision.hpp"
+#include "core/scene/self_pairs.hpp"
+#include "core/topology/leaf_pairs.hpp"
 
 namespace kbvh {
 namespace {

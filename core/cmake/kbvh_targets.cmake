@@ -62,7 +62,7 @@ function(kbvh_add_strategy_targets program)
     endif()
   endforeach()
   add_library(${program}_strategies STATIC ${ARGN})
-  target_link_libraries(${program}_strategies PUBLIC kbvh::core)
+  target_link_libraries(${program}_strategies PUBLIC kbvh::families)
 
   if(TARGET kbvh::experiments)
     set(manifest ${CMAKE_CURRENT_BINARY_DIR}/${program}_manifest.cpp)

@@ -1,6 +1,7 @@
 #include "core/judge/oracle.hpp"
 
 #include "core/base/hasher.hpp"
+#include "core/geometry/lane_box.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "core/topology/builders.hpp"
 

@@ -6,14 +6,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/families/drift/kernels/near_pairs.hpp"
-#include "core/families/envelope/kernels/wide_realisers.hpp"
-#include "core/families/limits/kernels/limits.hpp"
-#include "core/families/linear/kernels/span_tests.hpp"
-#include "core/families/wide/kernels/bounds.hpp"
-#include "core/families/wide/kernels/wide_inflate.hpp"
-#include "core/families/wide/kernels/wide_linear.hpp"
-
 namespace kbvh {
 
 namespace {
@@ -94,62 +86,6 @@ KernelSet active_kernel_set() {
                                                 : checked(kernel_set(wanted));
   }();
   return initial;
-}
-
-const LimitKernels& limit_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, limits);
-}
-
-template <>
-const BoundsKernels<float>& bounds_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, bounds_float);
-}
-template <>
-const BoundsKernels<double>& bounds_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, bounds_double);
-}
-template <>
-const NearKernels<float>& near_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, near_float);
-}
-template <>
-const NearKernels<double>& near_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, near_double);
-}
-template <>
-const WideInflateKernels<float>& wide_inflate_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_inflate_float);
-}
-template <>
-const WideInflateKernels<double>& wide_inflate_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_inflate_double);
-}
-
-template <>
-const WideLinearKernels<float>& wide_linear_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_linear_float);
-}
-template <>
-const WideLinearKernels<double>& wide_linear_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_linear_double);
-}
-
-template <>
-const WideRealiserKernels<float>& wide_realiser_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_realisers_float);
-}
-template <>
-const WideRealiserKernels<double>& wide_realiser_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_realisers_double);
-}
-
-template <>
-const SpanTestKernels<float>& span_test_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, span_tests_float);
-}
-template <>
-const SpanTestKernels<double>& span_test_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, span_tests_double);
 }
 
 void use_kernel_set(KernelSet set) {

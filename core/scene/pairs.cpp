@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/geometry/lane_box.hpp"
 #include "core/geometry/triangle_batch.hpp"
 
 namespace kbvh {

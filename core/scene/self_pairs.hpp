@@ -4,7 +4,6 @@
 #include <span>
 #include <utility>
 
-#include "core/families/wide/kernels/wide_layout.hpp"
 #include "core/scene/scene.hpp"
 
 namespace kbvh {
@@ -44,18 +43,6 @@ std::size_t keep_self_pairs(const Primitives* primitives, LeavesOf leaves, Pair*
     if (keep_self_pair(primitives, leaves, pair.primitive_a, pair.primitive_b)) pairs[kept++] = pair;
   }
   return kept;
-}
-
-/// Puts pairs of two different leaves before those of a leaf with itself; returns how many they are.
-inline std::size_t different_leaves_first(LeafSlot* pairs, std::size_t count) {
-  std::size_t different = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (pairs[2 * i].word == pairs[2 * i + 1].word) continue;
-    std::swap(pairs[2 * different], pairs[2 * i]);
-    std::swap(pairs[2 * different + 1], pairs[2 * i + 1]);
-    ++different;
-  }
-  return different;
 }
 
 /// Does a scene ask for pairs within a body?

@@ -1,5 +1,6 @@
 #pragma once
 #include "core/judge/verify.hpp"
+#include "core/scene/self_pairs.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {

@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "core/kernels/kernel_set.hpp"
+#include "core/scene/self_pairs.hpp"
 #include "tests/conformance/check.hpp"
 
 namespace kbvh::test {

@@ -8,6 +8,7 @@
 #include "core/families/events/kinetic_forest.hpp"
 #include "core/families/events/realiser_boxes.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
+#include "core/topology/leaf_pairs.hpp"
 #include "tests/conformance/check.hpp"
 
 namespace kbvh::test {

@@ -68,6 +68,9 @@ refuse("conformance covers nothing else" "${output}" "bottom_up")
 string(REGEX MATCH "[0-9]+% tests passed[^\n]*" line "${output}")
 message(STATUS "  ${line}")
 
+step("a program of one's own" ${build}/raw_arrays)
+expect("a program of one's own" "${output}" "[1-9][0-9] strategies\nt = 0.5: 0 pairs\nt = 1: 1 pairs\nt = 1.5: 0 pairs")
+
 if(NOT EXISTS ${prefix}/bin/kbvh)
   message(STATUS "no program was installed: list and bench are not tried")
   return()

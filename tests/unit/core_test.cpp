@@ -10,6 +10,7 @@
 #include "core/contract/registry.hpp"
 #include "core/judge/audit.hpp"
 #include "core/judge/oracle.hpp"
+#include "core/scene/self_pairs.hpp"
 #include "core/topology/renumber.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 

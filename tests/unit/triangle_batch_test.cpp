@@ -1,4 +1,5 @@
 #include "core/geometry/triangle_batch.hpp"
+#include "core/geometry/lane_box.hpp"
 
 #include <gtest/gtest.h>
 

@@ -10,6 +10,7 @@
 #include "core/base/assert.hpp"
 #include "core/base/list_pool.hpp"
 #include "core/families/events/realiser_boxes.hpp"
+#include "core/geometry/lane_box.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/topology/builders.hpp"
 #include "core/topology/topology.hpp"

@@ -14,6 +14,7 @@
 #include "core/families/boxtree/boxtree_search.hpp"
 #include "core/families/events/certificate_slots.hpp"
 #include "core/families/events/kinetic_forest.hpp"
+#include "core/geometry/lane_box.hpp"
 #include "core/topology/topology_edit.hpp"
 
 namespace kbvh {

@@ -1,7 +1,6 @@
 #include "core/families/drift/near_pairs.hpp"
 
 #include <algorithm>
-#include <type_traits>
 
 namespace kbvh {
 
@@ -11,14 +10,6 @@ namespace {
 constexpr std::size_t leaf_pair_room = 2048;
 /// Room for pairs of primitives that is made at least.
 constexpr std::size_t chunk_room = 2048;
-
-template <class S>
-const WideOverlapKernels<S>& overlap_kernels(KernelSet set) {
-  if constexpr (std::is_same_v<S, float>)
-    return KBVH_SELECT_KERNELS(set, wide_overlap_float);
-  else
-    return KBVH_SELECT_KERNELS(set, wide_overlap_double);
-}
 }  // namespace
 
 template <class S>
@@ -70,7 +61,7 @@ void NearPairs<S>::build(const NearSide<S>& a, const NearSide<S>& b, std::uint32
                    0,
                    0};
   for (std::size_t k = 0; k < 6; ++k) near.inverse_reach[k] = 1 / reach[k];
-  const auto traverse = overlap_kernels<S>(hierarchy_a.kernels()).traverse(width);
+  const auto traverse = wide_overlap_kernels<S>(hierarchy_a.kernels()).traverse(width);
   const auto pairs_of_leaves =
       near_kernels<S>(hierarchy_a.kernels())
           .near(width,

@@ -5,6 +5,7 @@
 #include "core/contract/strategy.hpp"
 #include "core/families/events/kinetic_forest.hpp"
 #include "core/families/events/realiser_boxes.hpp"
+#include "core/topology/leaf_pairs.hpp"
 
 namespace kbvh {
 

@@ -12,6 +12,7 @@
 #include "core/families/events/certificate_slots.hpp"
 #include "core/families/events/event.hpp"
 #include "core/families/events/realiser_boxes.hpp"
+#include "core/geometry/lane_box.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/topology/topology_edit.hpp"
 

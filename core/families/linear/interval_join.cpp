@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/families/wide/leaf_slots.hpp"
+
 namespace kbvh {
 
 namespace {

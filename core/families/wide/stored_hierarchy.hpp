@@ -4,6 +4,7 @@
 #include "core/contract/strategy.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
+#include "core/geometry/lane_box.hpp"
 #include "core/topology/topology_edit.hpp"
 
 namespace kbvh {

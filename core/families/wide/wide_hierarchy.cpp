@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
-#include <type_traits>
+
+#include "core/families/wide/leaf_slots.hpp"
+#include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
 
@@ -14,21 +16,6 @@ namespace {
 constexpr std::size_t leaf_pair_room = 2048;
 constexpr std::size_t chunk_room = 2048;
 
-template <class S>
-const WideRefitKernels<S>& refit_kernels(KernelSet set) {
-  if constexpr (std::is_same_v<S, float>)
-    return KBVH_SELECT_KERNELS(set, wide_refit_float);
-  else
-    return KBVH_SELECT_KERNELS(set, wide_refit_double);
-}
-template <class S>
-const WideOverlapKernels<S>& overlap_kernels(KernelSet set) {
-  if constexpr (std::is_same_v<S, float>)
-    return KBVH_SELECT_KERNELS(set, wide_overlap_float);
-  else
-    return KBVH_SELECT_KERNELS(set, wide_overlap_double);
-}
-
 }  // namespace
 
 template <class S>
@@ -36,7 +23,7 @@ void WideHierarchy<S>::assign(Topology topology, const Primitives& primitives, K
   topology_ = std::move(topology);
   leaf_vertices_ = unique_leaf_vertices(topology_, primitives);
   kernels_ = kernels;
-  refit_ = refit_kernels<S>(kernels).of(topology_.width);
+  refit_ = wide_refit_kernels<S>(kernels).of(topology_.width);
   place_nodes();
   find_subtrees();
   list_vertices();
@@ -238,7 +225,7 @@ QueryStatus WideQuery<S>::run(WideHierarchy<S>& a, std::uint32_t body_a, WideHie
   if (!a.suits(b)) throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
   WideTraversal state = fresh_traversal(budget);
   if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
-  const auto& kernels = overlap_kernels<S>(a.kernels());
+  const auto& kernels = wide_overlap_kernels<S>(a.kernels());
   const std::uint32_t width = a.topology().width;
   const auto traverse = body_a == body_b ? kernels.self(width) : kernels.traverse(width);
   return complete(
@@ -254,7 +241,7 @@ void WideQuery<S>::run_over(WideHierarchy<S>& a, std::uint32_t body_a, const S* 
   if (!a.suits(b)) throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
   WideTraversal state = fresh_traversal(Budget{});
   if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
-  const auto& kernels = overlap_kernels<S>(a.kernels());
+  const auto& kernels = wide_overlap_kernels<S>(a.kernels());
   const std::uint32_t width = a.topology().width;
   const auto traverse = body_a == body_b ? kernels.self(width) : kernels.traverse(width);
   complete(
@@ -332,7 +319,7 @@ template <class S>
 typename WideQuery<S>::Wanted WideQuery<S>::proceed(const LazySide& a, const LazySide& b,
                                                     const SceneView<S>& scene, const SampledMotion<S>& motion,
                                                     PairBuffer& out, std::uint64_t& tests) {
-  const auto traverse = overlap_kernels<S>(a.hierarchy->kernels()).lazy(a.hierarchy->topology().width);
+  const auto traverse = wide_overlap_kernels<S>(a.hierarchy->kernels()).lazy(a.hierarchy->topology().width);
   while (lazy_.depth > 0 && lazy_.tests < lazy_.test_limit) {
     traverse(a.hierarchy->arrays(), b.hierarchy->arrays(), lazy_);
     if (lazy_.depth > 0 && lazy_.tests < lazy_.test_limit) {
@@ -426,7 +413,7 @@ void WideQuery<S>::append_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const
                          0,
                          chunk_room,
                          0};
-  const auto kernel = overlap_kernels<S>(a.kernels()).pairs(a.topology().width, a.padded_leaf_size());
+  const auto kernel = wide_overlap_kernels<S>(a.kernels()).pairs(a.topology().width, a.padded_leaf_size());
   while (state.next < state.count) {
     kernel(state);
     const std::size_t before = out.size();

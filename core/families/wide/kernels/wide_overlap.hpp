@@ -1,8 +1,12 @@
 #pragma once
+#include <cstdint>
+
 #include "core/families/wide/kernels/wide_layout.hpp"
 #include "core/kernels/kernel_tables.hpp"
 
 namespace kbvh {
+
+enum class KernelSet : std::uint8_t;
 
 /// A simultaneous traversal that can be left and resumed: whoever calls provides room.
 struct WideTraversal {
@@ -88,5 +92,13 @@ struct WideOverlapKernels {
 };
 KBVH_DECLARE_KERNELS(WideOverlapKernels<float>, wide_overlap_float)
 KBVH_DECLARE_KERNELS(WideOverlapKernels<double>, wide_overlap_double)
+
+/// The table of a kernel set.
+template <class S>
+const WideOverlapKernels<S>& wide_overlap_kernels(KernelSet set);
+template <>
+const WideOverlapKernels<float>& wide_overlap_kernels(KernelSet set);
+template <>
+const WideOverlapKernels<double>& wide_overlap_kernels(KernelSet set);
 
 }  // namespace kbvh

@@ -1,8 +1,12 @@
 #pragma once
+#include <cstdint>
+
 #include "core/families/wide/kernels/wide_layout.hpp"
 #include "core/kernels/kernel_tables.hpp"
 
 namespace kbvh {
+
+enum class KernelSet : std::uint8_t;
 
 /// Recomputes the boxes of the wide nodes [begin, end), the last first. Children that are nodes must be
 /// current or lie in the range, too. `positions` is [vertex][3], with one readable number after the last
@@ -15,5 +19,13 @@ struct WideRefitKernels {
 };
 KBVH_DECLARE_KERNELS(WideRefitKernels<float>, wide_refit_float)
 KBVH_DECLARE_KERNELS(WideRefitKernels<double>, wide_refit_double)
+
+/// The table of a kernel set.
+template <class S>
+const WideRefitKernels<S>& wide_refit_kernels(KernelSet set);
+template <>
+const WideRefitKernels<float>& wide_refit_kernels(KernelSet set);
+template <>
+const WideRefitKernels<double>& wide_refit_kernels(KernelSet set);
 
 }  // namespace kbvh

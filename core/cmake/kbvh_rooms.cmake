@@ -1,0 +1,66 @@
+# Rooms: folders of core, each a library of its own that sees the headers of the rooms it declares and no others.
+
+# Instruction sets for which the kernels of a room are compiled, and chosen from at run time
+# (core/kernels/kernel_set.hpp). A kernel file defines its tables in the namespace kbvh::kernels::KBVH_KERNELS and
+# includes nothing whose inline functions another file might share: the linker keeps one copy of those, and it could
+# be one that this processor cannot run.
+set(KBVH_KERNEL_OPTIMISATION -O3 CACHE STRING "optimisation level of the kernels, but in Debug builds")
+set(kbvh_kernel_flags_portable "")
+set(kbvh_kernel_flags_sse -msse4.2)
+set(kbvh_kernel_flags_avx2 -mavx2 -mfma)
+set(kbvh_kernel_flags_avx512 -mavx2 -mfma -mavx512f -mavx512vl -mavx512dq -mavx512bw -mprefer-vector-width=512
+  # GCC 12 complains about its own undefined registers.
+  -Wno-uninitialized)
+set(kbvh_kernel_sets portable)
+set(kbvh_kernel_definitions "")
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  list(APPEND kbvh_kernel_sets sse avx2 avx512)
+  set(kbvh_kernel_definitions KBVH_X86_KERNELS)
+endif()
+
+# kbvh_room(NAME SOURCES file... [KERNELS file...] [USES room...]): the folder that calls it is a room, the library
+# kbvh_NAME. Its headers are staged alone, under the path that #include spells, so that a file sees the rooms that its
+# own room uses, those that these use in turn, and nothing else of the tree. USES are all edges: there are no others.
+function(kbvh_room name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;KERNELS;USES")
+  cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY ${PROJECT_SOURCE_DIR} OUTPUT_VARIABLE path)
+  set(stage ${CMAKE_BINARY_DIR}/rooms/${name})
+  cmake_path(GET path PARENT_PATH folder)
+  file(MAKE_DIRECTORY ${stage}/${folder})
+  file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR} ${stage}/${path} SYMBOLIC)
+
+  set(uses ${arg_USES})
+  list(TRANSFORM uses PREPEND kbvh_)
+  if(arg_SOURCES)
+    add_library(kbvh_${name} STATIC ${arg_SOURCES})
+    set(visibility PUBLIC)
+    target_link_libraries(kbvh_${name} PRIVATE $<BUILD_INTERFACE:kbvh_warnings>)
+    target_compile_definitions(kbvh_${name} PRIVATE ${kbvh_kernel_definitions})
+  else()
+    add_library(kbvh_${name} INTERFACE)
+    set(visibility INTERFACE)
+  endif()
+  add_library(kbvh::${name} ALIAS kbvh_${name})
+  set_target_properties(kbvh_${name} PROPERTIES EXPORT_NAME ${name})
+  target_include_directories(kbvh_${name} ${visibility}
+    $<BUILD_INTERFACE:${stage}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/kbvh>)
+  target_link_libraries(kbvh_${name} ${visibility} kbvh_flags ${uses})
+  set_property(GLOBAL APPEND PROPERTY KBVH_ROOMS ${name})
+  set_property(GLOBAL PROPERTY KBVH_ROOM_${name}_PATH ${path})
+  set_property(GLOBAL PROPERTY KBVH_ROOM_${name}_USES ${arg_USES})
+
+  if(NOT arg_KERNELS)
+    return()
+  endif()
+  foreach(set IN LISTS kbvh_kernel_sets)
+    add_library(kbvh_${name}_${set} OBJECT ${arg_KERNELS})
+    target_include_directories(kbvh_${name}_${set} PRIVATE ${stage})
+    target_link_libraries(kbvh_${name}_${set} PRIVATE kbvh_flags kbvh_warnings ${uses})
+    target_compile_definitions(kbvh_${name}_${set}
+      PRIVATE KBVH_KERNELS=${set} KBVH_KERNELS_${set} ${kbvh_kernel_definitions})
+    target_compile_options(kbvh_${name}_${set} PRIVATE ${kbvh_kernel_flags_${set}}
+      # Loops over the points of a node have to be unrolled to stay in registers.
+      $<$<NOT:$<CONFIG:Debug>>:${KBVH_KERNEL_OPTIMISATION}>)
+    target_sources(kbvh_${name} PRIVATE $<TARGET_OBJECTS:kbvh_${name}_${set}>)
+  endforeach()
+endfunction()

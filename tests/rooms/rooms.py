@@ -1,0 +1,77 @@
+"""Tries every edge between rooms of core: declared ones must be visible, all others must not compile.
+
+usage: rooms.py TABLE SOURCE_DIR COMPILER
+
+TABLE has one room a line: name|folder|rooms it uses, by commas|include folders, by colons.
+"""
+
+import pathlib
+import subprocess
+import sys
+
+
+def read_table(file):
+    rooms = {}
+    for line in pathlib.Path(file).read_text().splitlines():
+        name, folder, uses, include = line.split("|")
+        rooms[name] = {
+            "folder": folder,
+            "uses": [use for use in uses.split(",") if use],
+            "include": [path for path in include.split(":") if path],
+        }
+    return rooms
+
+
+def reach(rooms, name):
+    """The room itself and all that it uses, directly or through others."""
+    seen, todo = set(), [name]
+    while todo:
+        room = todo.pop()
+        if room not in seen:
+            seen.add(room)
+            todo += rooms[room]["uses"]
+    return seen
+
+
+def sees(compiler, include, header):
+    """Does a file with these include folders find the header itself? Only the include line is asked about."""
+    source = f'#if !__has_include("{header}")\n#error hidden\n#endif\n'
+    # A source from standard input is in the current folder: one that holds nothing of the tree.
+    command = [compiler, "-std=c++20", "-x", "c++", "-E", "-P", "-o", "/dev/null", "-"]
+    command += [option for path in include for option in ("-I", path)]
+    return subprocess.run(command, input=source, text=True, capture_output=True, cwd="/").returncode == 0
+
+
+def main(table, source_dir, compiler):
+    rooms = read_table(table)
+    source = pathlib.Path(source_dir)
+    headers = {}
+    for name, room in rooms.items():
+        found = sorted((source / room["folder"]).rglob("*.hpp"))
+        if found and room["folder"].startswith("core/"):
+            headers[name] = str(found[0].relative_to(source))
+    faults, forbidden, declared = [], 0, 0
+    for name, room in rooms.items():
+        allowed = reach(rooms, name)
+        for other, header in headers.items():
+            visible = sees(compiler, room["include"], header)
+            if other in allowed:
+                declared += 1
+                if not visible:
+                    faults.append(f"{name} declares {other}, but does not see {header}")
+            else:
+                forbidden += 1
+                if visible:
+                    faults.append(f"{name} does not declare {other}, but sees {header}")
+        # The tree itself: nobody reaches past the rooms.
+        for header in ("experiments/study.hpp", "experiments/program.hpp", "strategies/bottom_up.cpp", "tests/support/rounding.hpp"):
+            if (source / header).exists():
+                forbidden += 1
+                if sees(compiler, room["include"], header):
+                    faults.append(f"{name} sees {header}")
+    print("\n".join(faults) if faults else f"{declared} declared edges work, {forbidden} others do not compile")
+    return 1 if faults or forbidden == 0 or declared == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
