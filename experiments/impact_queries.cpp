@@ -7,6 +7,7 @@
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/ply.hpp"
 #include "experiments/json_reader.hpp"
+#include "experiments/names.hpp"
 #include "experiments/text.hpp"
 
 namespace kbvh::experiments {
@@ -89,8 +90,8 @@ ImpactQueries read_impact_queries(const fs::path& file) {
   std::optional<Contact::Kind> kind = kind_named(file.parent_path().filename().string());
   if (const auto own = kind_named(file.stem().string())) kind = own;
   if (!kind) io::fail(file, "", "neither its name nor its folder's says vertex-face (vf) or edge-edge (ee)");
-  ImpactQueries result{file.stem().string(), {}};
-  const std::string text = io::read_file(file);
+  ImpactQueries result{readable(file.stem().string()), {}};
+  const std::string text = io::read_text(file);
   std::uint64_t rows = 0, line = 0;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
@@ -135,7 +136,7 @@ bool is_frame_pair(const fs::path& folder) {
 
 FramePair read_frame_pair(const fs::path& folder) {
   FramePair pair;
-  pair.name = folder.filename().string();
+  pair.name = readable(folder.filename().string());
   const std::vector<fs::path> frames = files_in(folder / "frames", ".ply");
   if (frames.size() != 2) io::fail(folder / "frames", "", "expected two PLY files");
   for (int end = 0; end < 2; ++end) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "experiments/io/json_text.hpp"
 #include "experiments/text.hpp"
 
 namespace kbvh::experiments {
@@ -107,9 +108,11 @@ std::optional<std::vector<double>> JsonReader::numbers(const std::string& key, s
 
 void JsonReader::finish() const {
   for (const auto& [key, value] : value_->items())
-    if (!known_.contains(key))
-      throw io::InputError(place_ + ": there is no key '" + key + "'; known are " +
-                           joined({known_.begin(), known_.end()}));
+    if (!known_.contains(key)) {
+      const std::vector<std::string> known(known_.begin(), known_.end());
+      throw io::InputError(place_ + ": there is no key '" + key + "'; known are " + joined(known) +
+                           suggestion(key, known));
+    }
 }
 
 void JsonReader::fail(const std::string& key, const std::string& what) const {
@@ -117,18 +120,7 @@ void JsonReader::fail(const std::string& key, const std::string& what) const {
 }
 
 json parse_json(const std::string& text, const std::string& name) {
-  try {
-    return json::parse(text);
-  } catch (const json::parse_error& error) {
-    const std::size_t end = std::min(error.byte > 0 ? error.byte - 1 : 0, text.size());
-    const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(end), '\n');
-    const std::size_t begin = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
-    const std::size_t column = begin == std::string::npos ? end + 1 : end - begin;
-    throw io::InputError(name + ": line " + std::to_string(line) + ", column " + std::to_string(column) +
-                         ": this is not JSON");
-  } catch (const json::out_of_range&) {
-    throw io::InputError(name + ": holds a number that is too large for a double");
-  }
+  return io::parse_json_text(text, name);
 }
 
 }  // namespace kbvh::experiments

@@ -47,7 +47,7 @@ class JsonReader {
   std::set<std::string> known_;
 };
 
-/// Parses a text; throws io::InputError with `name`, line and column.
+/// Parses a text; see io::parse_json_text: throws io::InputError with `name`, line and column.
 nlohmann::json parse_json(const std::string& text, const std::string& name);
 
 }  // namespace kbvh::experiments

@@ -157,12 +157,6 @@ io::AnimatedMesh thinned(const io::AnimatedMesh& mesh, std::size_t most_keyframe
 
 }  // namespace
 
-std::string file_name(std::string name) {
-  for (char& c : name)
-    if (c == '/' || c == '\0') c = '-';
-  return name;
-}
-
 void export_scene(const LoadedScene& scene, const std::filesystem::path& folder, std::size_t most_keyframes) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "experiments/names.hpp"
 #include "experiments/scene_spec.hpp"
 
 namespace kbvh::experiments {
@@ -32,9 +33,6 @@ nlohmann::json as_json(const BodyCard& card);
 
 /// {"scene": name, "bodies": [cards]}.
 nlohmann::json as_json(const std::string& scene, const std::vector<BodyCard>& list);
-
-/// A scene's or body's name as the name of a file or folder.
-std::string file_name(std::string name);
 
 /// Writes a scene for people and pictures: every body as OBJ, with PC2 if it moves, its number before its
 /// name, and the cards as card.json. `most_keyframes`: of long clips only so many, the first, the last and

@@ -1,13 +1,16 @@
 #include "experiments/scene_spec.hpp"
 
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <set>
 
+#include "core/motion/admissible.hpp"
 #include "core/topology/renumber.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/io/load.hpp"
 #include "experiments/json_reader.hpp"
+#include "experiments/names.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/shape_bodies.hpp"
 #include "experiments/text.hpp"
@@ -44,6 +47,17 @@ Placement::Rotation rotation_of(const std::string& text, const std::string& wher
   return rotation;
 }
 
+/// JSON as text. What is not UTF-8 in it, such as the name of a file, is spelt out.
+std::string text_of(json value) {
+  const std::function<void(json&)> mend = [&](json& part) {
+    if (part.is_string()) part = readable(part.get_ref<const std::string&>());
+    if (part.is_structured())
+      for (json& inner : part) mend(inner);
+  };
+  mend(value);
+  return value.dump();
+}
+
 fs::path resolved(const std::string& text, const fs::path& folder) {
   constexpr std::string_view data = "data:";
   if (text.starts_with(data)) return data_folder() / text.substr(data.size());
@@ -65,6 +79,7 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
   BodySpec body;
   body.place = place;
   body.name = keys.word("name").value_or("");
+  check_name(body.name, place + ": name");
   body.placement.scale = keys.number("scale").value_or(1);
   if (body.placement.scale == 0) keys.fail("scale", "must not be 0");
   for (const std::string& rotation : keys.words("rotate"))
@@ -100,6 +115,15 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
   if (body.frames_per_second < 0) keys.fail("fps", "must not be negative");
   keys.finish();
   return body;
+}
+
+/// A word that is neither a file nor the beginning of one's name was meant for a shape.
+void check_is_a_file(const BodySpec& body) {
+  std::error_code error;
+  const std::string word = body.file.filename().string();
+  if (body.file.empty() || body.file.has_extension() || fs::exists(body.file, error)) return;
+  throw io::InputError(body.place + ": there is no file or folder " + body.file.string() + " and no shape '" +
+                       word + "'; shapes are " + joined(shape_names()) + suggestion(word, shape_names()));
 }
 
 VertexOrder order_of(const std::string& word, const JsonReader& keys) {
@@ -141,7 +165,11 @@ json body_from_text(const std::string& text) {
   auto parts = split(text, ',');
   const std::size_t colon = parts[0].find(':');
   const std::string head = parts[0].substr(0, colon);
-  if (is_shape(head)) {
+  // "name:key=value" is a shape, also if there is no shape of that name.
+  const bool means_a_shape = colon != std::string::npos && head.find_first_of("./\\") == std::string::npos &&
+                             head != "data" && parse_assignment(parts[0].substr(colon + 1));
+  if (is_shape(head) || means_a_shape) {
+    shape_kind(head, where);
     body["shape"] = head;
     if (colon == std::string::npos)
       parts.erase(parts.begin());
@@ -191,6 +219,7 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
   JsonReader keys(object, place);
   SceneSpec base;
   base.name = keys.word("name").value_or("");
+  check_name(base.name, place + ": name");
   base.optional = keys.truth("optional").value_or(false);
   base.self = keys.truth("self").value_or(false);
   base.builtin = keys.word("builtin").value_or("");
@@ -200,6 +229,8 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
     const auto bodies = keys.list("bodies");
     for (std::size_t i = 0; i < bodies.size(); ++i)
       base.bodies.push_back(read_body(bodies[i], place + ": bodies[" + std::to_string(i) + "]", folder));
+    if (!base.optional)
+      for (const BodySpec& body : base.bodies) check_is_a_file(body);
     for (const char* key : {"triangles", "keyframes", "obstacle"})
       if (keys.has(key)) keys.fail(key, "is for built-in scenes; bodies have their own numbers");
   } else {
@@ -234,7 +265,7 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
         spec.order = order_of(order, keys);
         if (spec.script && spec.order != VertexOrder::given)
           keys.fail("order", "a script names vertices in the given order");
-        spec.said = json{object, folder.string(), count, seed, order}.dump();
+        spec.said = text_of(json{object, count, seed, order}) + " in " + folder.string();
         scenes.push_back(std::move(spec));
       }
   return scenes;
@@ -343,7 +374,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
       loaded.origin = SceneOrigin::files;
       mesh = io::load_animated_mesh({body.file, body.motion, body.clip, body.frames_per_second});
     }
-    if (!body.name.empty()) mesh.name = body.name;
+    mesh.name = body.name.empty() ? readable(mesh.name) : body.name;
     io::take_as(mesh, body.as);
     const std::string source = body.shape.is_null() ? body.file.string() : mesh.name;
     if (mesh.degenerate_primitives > 0)
@@ -352,6 +383,14 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     if (mesh.merged_keyframes > 0)
       loaded.notes.push_back(source + ": " + std::to_string(mesh.merged_keyframes) +
                              " keyframes repeat time and positions of the one before, merged");
+    if (mesh.added_keyframes > 0)
+      loaded.notes.push_back(source + ": " + counted(mesh.added_keyframes, "keyframe") +
+                             " added between those of the file, so that straight lines follow its turns and "
+                             "splines within a thousandth of the body's size");
+    if (mesh.jumps > 0)
+      loaded.notes.push_back(source + ": " + counted(mesh.jumps, "jump") +
+                             " of STEP samplers take one rounding of time: no frame lies within, but "
+                             "contacts between keyframes are found on the way");
     if (mesh.kind != io::MeshKind::polygons)
       loaded.notes.push_back(
           source + ": " +
@@ -364,7 +403,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     loaded.meshes.push_back(std::move(mesh));
   }
   if (spec.self) loaded.self.assign(loaded.meshes.size(), true);
-  if (loaded.name.empty()) loaded.name = joined(names, "+");
+  if (loaded.name.empty()) loaded.name = name_of_bodies(names);
   if (!spec.name.empty()) loaded.name = spec.name;
   loaded.order = spec.order;
   loaded.script = spec.script;
@@ -390,12 +429,25 @@ PrimitiveKind kind_of(io::MeshKind kind) {
 }
 }  // namespace
 
+namespace {
+void check_corners(const io::AnimatedMesh& mesh, const std::string& source) {
+  for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
+    const std::uint32_t corners = mesh.primitive_offsets[p + 1] - mesh.primitive_offsets[p];
+    if (corners <= most_corners) continue;
+    throw io::InputError(source + ": polygon " + std::to_string(p) + " has " + std::to_string(corners) +
+                         " corners; at most " + std::to_string(most_corners) +
+                         " are possible, as=triangles cuts it into triangles");
+  }
+}
+}  // namespace
+
 template <class S>
 Scene<S> assemble(const LoadedScene& loaded) {
   Scene<S> scene;
   scene.name = loaded.name;
   for (std::size_t i = 0; i < loaded.meshes.size(); ++i) {
     const io::AnimatedMesh& mesh = loaded.meshes[i];
+    check_corners(mesh, loaded.sources[i]);
     Body<S> body;
     body.name = mesh.name;
     body.primitives.kind = kind_of(mesh.kind);

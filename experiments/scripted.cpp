@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/judge/range_watch.hpp"
 #include "core/scene/playback.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/io/bytes.hpp"
@@ -136,7 +137,11 @@ PlanScript<S> tried_out(const Scene<S>& scene, const ScriptSpec& spec) {
       throw io::InputError(step.place + ": time " + io::text_of(step.time) +
                            " is in the past: the scene begins at " + io::text_of(first));
     typename PlanScript<S>::Step changes{step.time, {}};
-    playback.seek(step.time);
+    try {
+      playback.seek(step.time);
+    } catch (const std::invalid_argument& problem) {
+      throw io::InputError(step.place + ": " + problem.what());
+    }
     for (const ScriptSpec::Change& change : step.changes) {
       changes.changes.push_back(in_scalar(change, scene));
       try {
@@ -178,6 +183,11 @@ std::vector<double> frames_of(const Scene<S>& scene, const LoadedScene& loaded, 
   for (const auto& step : script.steps) frames.push_back(step.time);
   std::sort(frames.begin(), frames.end());
   frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+  try {
+    check_played(scene, script, frames);
+  } catch (const std::invalid_argument& problem) {
+    throw io::InputError(scene.name + ": " + problem.what());
+  }
   return frames;
 }
 

@@ -46,6 +46,8 @@ PlanScript<S> script_of(const Scene<S>& scene, const LoadedScene& loaded, const 
 bool has_own_frames(const LoadedScene& loaded);
 
 /// The frames of a scene: its own, or l for each keyframe interval; every time of the script is one of them.
+/// Throws io::InputError with vertex, time and value if the scene leaves the admissible range until the last
+/// one (core/motion/admissible.hpp): before any contestant sees it.
 template <class S>
 std::vector<double> frames_of(const Scene<S>& scene, const LoadedScene& loaded, const PlanScript<S>& script,
                               std::uint32_t per_keyframe);

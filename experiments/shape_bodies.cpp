@@ -132,18 +132,22 @@ const std::vector<ShapeKind>& shape_kinds() {
   return kinds;
 }
 
+std::vector<std::string> shape_names() {
+  std::vector<std::string> names;
+  for (const ShapeKind& kind : shape_kinds()) names.push_back(kind.name);
+  return names;
+}
+
 bool is_shape(const std::string& name) {
   const auto& kinds = shape_kinds();
   return std::any_of(kinds.begin(), kinds.end(), [&](const ShapeKind& kind) { return kind.name == name; });
 }
 
 const ShapeKind& shape_kind(const std::string& name, const std::string& place) {
-  std::vector<std::string> known;
-  for (const ShapeKind& kind : shape_kinds()) {
+  for (const ShapeKind& kind : shape_kinds())
     if (kind.name == name) return kind;
-    known.push_back(kind.name);
-  }
-  throw io::InputError(place + ": shape: there is no shape '" + name + "'; known are " + joined(known));
+  throw io::InputError(place + ": shape: there is no shape '" + name + "'; known are " +
+                       joined(shape_names()) + suggestion(name, shape_names()));
 }
 
 io::AnimatedMesh make_shape(JsonReader& keys) {

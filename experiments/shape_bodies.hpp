@@ -22,6 +22,9 @@ const std::vector<ShapeKind>& shape_kinds();
 /// The kind of that name. Throws io::InputError, naming those that there are.
 const ShapeKind& shape_kind(const std::string& name, const std::string& place);
 
+/// The names of all of them.
+std::vector<std::string> shape_names();
+
 bool is_shape(const std::string& name);
 
 /// Makes the shape that `keys` describes ("shape" and the keys of its kind). Shapes that do not move of

@@ -12,6 +12,7 @@
 #include "core/contract/registry.hpp"
 #include "core/judge/oracle.hpp"
 #include "core/judge/plan_script.hpp"
+#include "core/judge/range_watch.hpp"
 #include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
@@ -51,9 +52,9 @@ class Session {
 
   /// Starts at time t, with the scene's own plans and geometry again. Where geometry was changed the
   /// instance is made anew, and references to it are not valid any more. Throws std::invalid_argument, with
-  /// nothing changed, if t is not finite.
+  /// nothing changed, if t is not finite, or not admissible (motion/admissible.hpp).
   void reset(double t) {
-    if (!std::isfinite(t)) throw std::invalid_argument("cannot start at t = " + std::to_string(t));
+    check_time(t, "cannot start");
     playback_.restore_plans();
     changed_ = geometry_changed_;  // of what the constructor's scene says
     if (geometry_changed_) {
@@ -62,16 +63,19 @@ class Session {
       make_strategy();
       geometry_changed_ = changed_ = false;
     }
+    watch_.start(playback_);
     playback_.seek(t);
     playback_.evaluate_all();
     strategy_->reset(t);
   }
   /// Moves to t, with positions if the strategy wants all of them, and advances. Throws
-  /// std::invalid_argument, with nothing changed, if t is before the present time or not finite.
+  /// std::invalid_argument, with nothing changed, if t is before the present time, not finite or not
+  /// admissible, or a vertex has left the admissible range by then.
   void advance(double t, PhaseTimes& times) {
     if (!(t >= playback_.time()))
       throw std::invalid_argument("cannot advance from t = " + std::to_string(playback_.time()) +
                                   " back to " + std::to_string(t));
+    watch_.check(playback_, t);
     playback_.seek(t);
     if (info_->positions == PositionUse::all ||
         (info_->positions == PositionUse::varying && strategy_->wants_all_positions()))
@@ -89,6 +93,7 @@ class Session {
   /// Moves to t and appends the pairs of the interval that this takes, for strategies that declare spans.
   void spans(double t, SpanBuffer& out) {
     const double from = playback_.time();
+    watch_.check(playback_, t);
     playback_.seek(t);
     strategy_->spans(from, t, out);
   }
@@ -126,6 +131,7 @@ class Session {
     if (changing_) changing_->check_plans(changes);
     playback_.change_plans(playback_.time(), changes);
     changed_ = true;
+    for (const PlanChange<S>& change : changes) watch_.changed(playback_, change.body, change.vertex);
     timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });
   }
   /// Inserts and deletes at the current time; the scene given to the constructor stays as it is. Throws
@@ -135,6 +141,7 @@ class Session {
     if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
     changing_->apply(change, playback_);
     geometry_changed_ = changed_ = true;
+    watch_.added(playback_, change);
     timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
   }
 
@@ -174,6 +181,7 @@ class Session {
   const Scene<S>* scene_;
   SceneView<S> view_;
   Playback<S> playback_;
+  RangeWatch<S> watch_;
   std::unique_ptr<Strategy<S>> strategy_;
   bool geometry_changed_ = false, changed_ = false;
   std::optional<ContactFinder<S>> finder_;

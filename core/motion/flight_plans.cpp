@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/geometry/predicates.hpp"
+#include "core/motion/admissible.hpp"
 #include "core/motion/error_free.hpp"
 
 namespace kbvh {
@@ -16,7 +16,8 @@ void check_value(S value, const char* what, std::size_t keyframe, std::size_t ve
   if (std::isfinite(value) && std::abs(value) <= admissible_magnitude<S>) return;
   throw std::invalid_argument(std::string(what) + " of vertex " + std::to_string(vertex) + ", axis " +
                               "xyz"[axis] + ", at knot " + std::to_string(keyframe) + " is " +
-                              std::to_string(value) + ", outside the admissible range");
+                              number_text(double(value)) + ", outside the admissible range (" +
+                              admissible_text<S>() + ")");
 }
 }  // namespace
 
@@ -25,11 +26,10 @@ FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> time
     : vertex_count_(vertex_count), keyframed_count_(vertex_count) {
   if (times.empty()) throw std::invalid_argument("flight plans need at least one keyframe");
   for (std::size_t k = 0; k < times.size(); ++k) {
-    if (!std::isfinite(times[k]))
-      throw std::invalid_argument("keyframe " + std::to_string(k) + " has time " + std::to_string(times[k]));
+    check_time(times[k], "keyframe " + std::to_string(k) + " is");
     if (k > 0 && !(times[k - 1] < times[k]))
       throw std::invalid_argument("keyframe times must increase: keyframe " + std::to_string(k) + " at " +
-                                  std::to_string(times[k]) + " follows " + std::to_string(times[k - 1]));
+                                  number_text(times[k]) + " follows " + number_text(times[k - 1]));
   }
   if (positions.size() != std::size_t(3) * vertex_count * times.size())
     throw std::invalid_argument("expected " + std::to_string(std::size_t(3) * vertex_count * times.size()) +
@@ -261,7 +261,7 @@ void FlightPlans<S>::check_vertex(std::uint32_t vertex) const {
 template <class S>
 void FlightPlans<S>::check_plan(double t, const PlanChange<S>& change, std::uint32_t vertex,
                                 const S* position) {
-  if (!std::isfinite(t)) throw std::invalid_argument("plan change at t = " + std::to_string(t));
+  check_time(t, "plan change");
   if (change.positions.size() != 3 * change.times.size())
     throw std::invalid_argument("plan change with " + std::to_string(change.times.size()) + " knots and " +
                                 std::to_string(change.positions.size()) + " coordinates");
@@ -271,9 +271,11 @@ void FlightPlans<S>::check_plan(double t, const PlanChange<S>& change, std::uint
   }
   double before = t;
   for (std::size_t k = 0; k < change.times.size(); ++k) {
-    if (!std::isfinite(change.times[k]) || !(before < change.times[k]))
-      throw std::invalid_argument("knot " + std::to_string(k) + " of a plan change at " + std::to_string(t) +
-                                  " has time " + std::to_string(change.times[k]) + ", which does not follow");
+    check_time(change.times[k],
+               "knot " + std::to_string(k) + " of the plan of vertex " + std::to_string(vertex) + " is");
+    if (!(before < change.times[k]))
+      throw std::invalid_argument("knot " + std::to_string(k) + " of a plan change at " + number_text(t) +
+                                  " has time " + number_text(change.times[k]) + ", which does not follow");
     before = change.times[k];
     for (int axis = 0; axis < 3; ++axis)
       check_value(change.positions[3 * k + std::size_t(axis)], "coordinate", k + 1, vertex, axis);

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/motion/admissible.hpp"
+
 namespace kbvh {
 
 namespace {
@@ -72,6 +74,9 @@ void ChangingScene<S>::check(const GeometryChange<S>& change, const Playback<S>&
     known_body(primitive.body);
     const std::string name = "a new primitive of body " + std::to_string(primitive.body);
     if (primitive.vertices.empty()) refuse(name + " has no vertex");
+    if (primitive.vertices.size() > most_corners)
+      refuse(name + " has " + std::to_string(primitive.vertices.size()) + " corners; at most " +
+             std::to_string(most_corners) + " are possible");
     for (std::uint32_t v : primitive.vertices) {
       if (v >= vertex_counts[primitive.body])
         refuse(name + " refers to vertex " + std::to_string(v) + ", but there are " +

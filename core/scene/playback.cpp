@@ -1,9 +1,10 @@
 #include "core/scene/playback.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
+
+#include "core/motion/admissible.hpp"
 
 namespace kbvh {
 
@@ -26,7 +27,7 @@ Playback<S>::Playback(const Scene<S>& scene) {
 
 template <class S>
 void Playback<S>::seek(double t) {
-  if (!std::isfinite(t)) throw std::invalid_argument("a frame at t = " + std::to_string(t));
+  check_time(t, "a frame");
   time_ = t;
   if (++epoch_ == 0) {  // after 2^32 frames the stamps start over
     for (auto& state : bodies_) std::fill(state.stamp.begin(), state.stamp.end(), 0);
@@ -82,8 +83,8 @@ void Playback<S>::fetch_all(BodyState& state) {
 template <class S>
 void Playback<S>::change_plans(double t, std::span<const PlanChange<S>> changes) {
   if (t != time_)
-    throw std::invalid_argument("plan changes at " + std::to_string(t) + " while the motion stands at " +
-                                std::to_string(time_));
+    throw std::invalid_argument("plan changes at " + number_text(t) + " while the motion stands at " +
+                                number_text(time_));
   for (const PlanChange<S>& change : changes) {
     if (change.body >= bodies_.size())
       throw std::invalid_argument("plan change for body " + std::to_string(change.body) + " of " +

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "core/base/hasher.hpp"
+#include "core/motion/admissible.hpp"
 
 namespace kbvh {
 
@@ -18,6 +19,10 @@ void validate(const Scene<S>& scene) {
     for (std::uint32_t p = 0; p < primitives.count(); ++p) {
       if (primitives.offsets[p + 1] <= primitives.offsets[p])
         throw std::invalid_argument(where + "primitive " + std::to_string(p) + " has no vertex");
+      if (primitives[p].size() > most_corners)
+        throw std::invalid_argument(where + "primitive " + std::to_string(p) + " has " +
+                                    std::to_string(primitives[p].size()) + " corners; at most " +
+                                    std::to_string(most_corners) + " are possible");
       for (std::uint32_t v : primitives[p])
         if (v >= body.plans.vertex_count())
           throw std::invalid_argument(where + "primitive " + std::to_string(p) + " refers to vertex " +

@@ -27,6 +27,8 @@ struct AnimatedMesh {
   // What the reader noticed and kept or mended (printed for the user, never an error).
   std::size_t degenerate_primitives = 0;  ///< zero area or repeated vertex at the first keyframe; kept
   std::size_t merged_keyframes = 0;       ///< equal times with equal positions, merged into one
+  std::size_t added_keyframes = 0;        ///< between those of the file, so that chords follow curves
+  std::size_t jumps = 0;                  ///< places that are left within one rounding of time
 
   std::size_t primitive_count() const { return primitive_offsets.size() - 1; }
   bool moving() const { return keyframe_times.size() > 1; }

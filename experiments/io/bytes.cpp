@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -59,6 +60,58 @@ std::string read_file(const fs::path& file) {
          "only " + std::to_string(in.gcount()) + " of " + std::to_string(size) + " bytes could be read");
   }
   return bytes;
+}
+
+void refuse_utf16(std::string_view bytes, const std::string& name) {
+  const auto begins = [&](std::initializer_list<int> pattern) {  // -1: any byte but 0
+    if (bytes.size() < pattern.size()) return false;
+    std::size_t i = 0;
+    for (const int wanted : pattern) {
+      const int byte = static_cast<unsigned char>(bytes[i++]);
+      if (wanted < 0 ? byte == 0 || byte >= 128 : byte != wanted) return false;
+    }
+    return true;
+  };
+  if (begins({0xFF, 0xFE}) || begins({0xFE, 0xFF}) || begins({0, 0, 0xFE, 0xFF}) || begins({-1, 0, -1, 0}) ||
+      begins({0, -1, 0, -1}) || begins({-1, 0, 0, 0}) || begins({0, 0, 0, -1}))
+    fail(name, "", "is text in UTF-16 or UTF-32, which is not read; save it as UTF-8");
+}
+
+void unify_line_ends(std::string& text) {
+  std::size_t from = text.find('\r');
+  if (from == std::string::npos) return;
+  std::size_t to = from;
+  for (; from < text.size(); ++from) {
+    const bool ends = text[from] == '\r';
+    if (ends && from + 1 < text.size() && text[from + 1] == '\n') continue;
+    text[to++] = ends ? '\n' : text[from];
+  }
+  text.resize(to);
+}
+
+std::string read_text(const fs::path& file) {
+  std::string text = read_file(file);
+  refuse_utf16(text, file.string());
+  if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
+  unify_line_ends(text);
+  return text;
+}
+
+std::string place_in_text(std::string_view text, std::size_t at) {
+  std::size_t line = 1, begin = 0;
+  for (std::size_t i = 0; i < std::min(at, text.size()); ++i) {
+    const bool ends = text[i] == '\n' || (text[i] == '\r' && (i + 1 == text.size() || text[i + 1] != '\n'));
+    if (!ends) continue;
+    ++line;
+    begin = i + 1;
+  }
+  return "line " + std::to_string(line) + ", column " + std::to_string(at - begin + 1);
+}
+
+std::string byte_text(std::string_view text, std::size_t at) {
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  const unsigned char byte = at < text.size() ? static_cast<unsigned char>(text[at]) : 0;
+  return {'0', 'x', digits[byte >> 4], digits[byte & 15]};
 }
 
 void write_file_atomically(const fs::path& file, std::string_view bytes) {

@@ -23,6 +23,23 @@ std::string text_of(double value);
 /// All bytes of a regular file. Throws InputError if it is missing, not a regular file, empty or unreadable.
 std::string read_file(const std::filesystem::path& file);
 
+/// The text of a file: as `read_file`, without a byte order mark, every line ending in '\n' (files of old
+/// Macs end lines with '\r', those of Windows with both). Throws InputError on UTF-16 and UTF-32.
+std::string read_text(const std::filesystem::path& file);
+
+/// Throws InputError that begins with `name` if the bytes begin as UTF-16 or UTF-32 text does: with its byte
+/// order mark, or with an ASCII character in two or four bytes.
+void refuse_utf16(std::string_view bytes, const std::string& name);
+
+/// Ends every line with '\n': "\r\n" and a single '\r' become one.
+void unify_line_ends(std::string& text);
+
+/// "line 3, column 14", counted from 1, of the byte at `at`; lines may end in any of the three ways.
+std::string place_in_text(std::string_view text, std::size_t at);
+
+/// "0xE9", of the byte at `at`.
+std::string byte_text(std::string_view text, std::size_t at);
+
 /// Writes a file under a temporary name beside it and renames it: whoever reads `file` sees all of it or
 /// nothing. Throws InputError if the folder is missing or not writable, or the disk is full.
 void write_file_atomically(const std::filesystem::path& file, std::string_view bytes);

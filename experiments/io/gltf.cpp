@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/gltf_motion.hpp"
+#include "experiments/io/keyframe_times.hpp"
 #include "experiments/io/number_text.hpp"
 #include "experiments/io/weld.hpp"
 
@@ -15,6 +17,31 @@ namespace {
 using namespace gltf;
 
 constexpr std::uint64_t most_baked_numbers = std::uint64_t{1} << 30;  // 8 GiB of doubles
+constexpr std::uint64_t most_keyframes = 1'000'000;
+
+/// Lower and upper corner of the box of points.
+std::array<double, 6> box_of(const std::vector<double>& points) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  std::array<double, 6> box{infinity, infinity, infinity, -infinity, -infinity, -infinity};
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    box[i % 3] = std::min(box[i % 3], points[i]);
+    box[3 + i % 3] = std::max(box[3 + i % 3], points[i]);
+  }
+  return box;
+}
+
+double diagonal(const std::vector<double>& points) {
+  const auto box = box_of(points);
+  return points.empty() ? 0 : std::hypot(box[3] - box[0], box[4] - box[1], box[5] - box[2]);
+}
+
+std::vector<double> corners(const std::vector<double>& points) {
+  const auto box = box_of(points);
+  std::vector<double> list;
+  for (std::size_t corner = 0; corner < 8; ++corner)
+    for (std::size_t axis = 0; axis < 3; ++axis) list.push_back(box[axis + 3 * (corner >> axis & 1)]);
+  return list;
+}
 
 struct Influence {
   std::uint32_t joint;
@@ -54,7 +81,7 @@ class Baker {
     if (animation_ != nullptr && pose_.times().empty()) {
       fail(document_.file, "", "the animation " + printable(animation_->name) + " has no keyframes");
     }
-    if (times.empty()) times = animation_ != nullptr ? pose_.times() : std::vector<double>{0.0};
+    if (times.empty()) times = animation_ != nullptr ? chosen_times(mesh) : std::vector<double>{0.0};
     mesh.keyframe_times = std::move(times);
     mesh.vertex_count = static_cast<std::uint32_t>(vertices_);
     mesh.primitive_vertices = std::move(corners_);
@@ -204,6 +231,88 @@ class Baker {
     inverse_binds_.push_back(std::move(matrices));
   }
 
+  /// The times of keyframes that follow the animation, and what is to be said about them.
+  std::vector<double> chosen_times(AnimatedMesh& mesh) {
+    const std::vector<Rigid> rigid = rigid_groups();
+    CurvedMotion motion{pose_.times(), pose_.jumps(),
+                        [&](double time, std::vector<double>& out) { place_probes(rigid, time, out); }};
+    std::vector<double> first(3 * vertices_);
+    pose_.evaluate(motion.keys[0]);
+    bake_keyframe(first.data());
+    double tolerance = gltf_tolerance * diagonal(first);
+    if (!(tolerance > 0)) {  // of a body that grows from a point
+      std::vector<double> points;
+      for (const double key : motion.keys) {
+        motion.points(key, points);
+        tolerance = std::max(tolerance, gltf_tolerance * diagonal(points));
+      }
+    }
+    for (const double x : first) tolerance = std::max(tolerance, 1e-9 * std::abs(x));
+    const std::size_t most = std::min<std::uint64_t>(most_keyframes, most_baked_numbers / (3 * vertices_));
+    std::optional<KeyframeTimes> found = follow(motion, tolerance, std::max(most, motion.keys.size()));
+    if (!found) {
+      fail(document_.file, "",
+           "the animation " + printable(animation_->name) +
+               " turns so fast between its keys that 4096 keyframes between two of them, or " +
+               std::to_string(most) + " in all, do not follow it within " + text_of(tolerance));
+    }
+    mesh.added_keyframes = found->added;
+    mesh.jumps = found->jumps;
+    return std::move(found->times);
+  }
+
+  /// Vertices that move with one node or joint: the corners of their box stand for them, since the distance
+  /// of an affine image from another one is largest at a corner. A blend of joints is nowhere further from
+  /// its chord than one of them. Where weights of morph targets change, every vertex stands for itself.
+  struct Rigid {
+    const Part* part;
+    Index joint;                  // in the part's skin; none: the part's node
+    bool morphs = false;          // then without corners
+    std::vector<double> corners;  // [8][3]
+  };
+
+  std::vector<Rigid> rigid_groups() {
+    std::vector<Rigid> groups;
+    for (const Part& part : parts_) {
+      if (pose_.morphs(part.node)) {
+        groups.push_back({&part, {}, true, {}});
+        continue;
+      }
+      const std::vector<double> rest = morphed(part);
+      std::map<std::uint32_t, std::vector<double>> members;  // positions, by joint
+      if (part.skin) {
+        for (std::size_t v = 0; v < part.vertex_count(); ++v)
+          for (std::size_t i = part.influence_offsets[v]; i < part.influence_offsets[v + 1]; ++i) {
+            auto& list = members[part.influences[i].joint];
+            list.insert(list.end(), &rest[3 * v], &rest[3 * v] + 3);
+          }
+        for (const auto& [joint, points] : members) groups.push_back({&part, joint, false, corners(points)});
+      } else if (!rest.empty()) {
+        groups.push_back({&part, {}, false, corners(rest)});
+      }
+    }
+    return groups;
+  }
+
+  void place_probes(const std::vector<Rigid>& groups, double time, std::vector<double>& out) {
+    pose_.evaluate(time);
+    const std::vector<std::vector<Affine>> skins = posed_skins();
+    out.clear();
+    for (const Rigid& group : groups) {
+      const Part& part = *group.part;
+      if (group.morphs) {
+        out.resize(out.size() + 3 * part.vertex_count());
+        bake_part(part, skins, out.data() + out.size() - 3 * part.vertex_count());
+        continue;
+      }
+      const Affine& move = group.joint ? skins[*part.skin][*group.joint] : pose_.global(part.node);
+      for (std::size_t i = 0; i < group.corners.size(); i += 3) {
+        const auto p = move.apply(&group.corners[i]);
+        out.insert(out.end(), p.begin(), p.end());
+      }
+    }
+  }
+
   /// Bind space for skinned parts, scene space under the file's own pose for the rest.
   std::vector<double> rest_positions() const {
     Pose own(document_, nullptr);
@@ -223,28 +332,40 @@ class Baker {
     return rest;
   }
 
-  void bake_keyframe(double* out) const {
-    std::vector<std::vector<Affine>> skins;  // joint space to scene space, after the inverse bind
+  /// Joint space to scene space, after the inverse bind: [skin][joint].
+  std::vector<std::vector<Affine>> posed_skins() const {
+    std::vector<std::vector<Affine>> skins;
     for (std::size_t s = 0; s < document_.skins.size(); ++s) {
       skins.emplace_back();
       const auto& joints = document_.skins[s].joints;
       for (std::size_t j = 0; j < joints.size(); ++j)
         skins[s].push_back(pose_.global(joints[j]) * inverse_binds_[s][j]);
     }
-    std::vector<double> morphed;
-    for (const Part& part : parts_) {
-      morphed = part.rest;
-      const std::vector<double>& weights = pose_.weights(part.node);
-      for (std::size_t t = 0; t < part.targets.size(); ++t) {
-        if (weights[t] == 0) continue;
-        for (std::size_t i = 0; i < part.targets[t].size(); ++i)
-          morphed[i] += weights[t] * part.targets[t][i];
-      }
-      for (std::size_t v = 0; v < part.vertex_count(); ++v) {
-        const Affine transform = part.skin ? blended(part, v, skins[*part.skin]) : pose_.global(part.node);
-        const auto p = transform.apply(&morphed[3 * v]);
-        std::copy(p.begin(), p.end(), out + 3 * (part.first_vertex + v));
-      }
+    return skins;
+  }
+
+  void bake_keyframe(double* out) const {
+    const std::vector<std::vector<Affine>> skins = posed_skins();
+    for (const Part& part : parts_) bake_part(part, skins, out + 3 * part.first_vertex);
+  }
+
+  std::vector<double> morphed(const Part& part) const {
+    std::vector<double> positions = part.rest;
+    const std::vector<double>& weights = pose_.weights(part.node);
+    for (std::size_t t = 0; t < part.targets.size(); ++t) {
+      if (weights[t] == 0) continue;
+      for (std::size_t i = 0; i < part.targets[t].size(); ++i)
+        positions[i] += weights[t] * part.targets[t][i];
+    }
+    return positions;
+  }
+
+  void bake_part(const Part& part, const std::vector<std::vector<Affine>>& skins, double* out) const {
+    const std::vector<double> positions = morphed(part);
+    for (std::size_t v = 0; v < part.vertex_count(); ++v) {
+      const Affine transform = part.skin ? blended(part, v, skins[*part.skin]) : pose_.global(part.node);
+      const auto p = transform.apply(&positions[3 * v]);
+      std::copy(p.begin(), p.end(), out + 3 * v);
     }
   }
 

@@ -7,6 +7,10 @@
 
 namespace kbvh::io {
 
+/// How far a baked vertex may be from where the animation has it, between keyframes: as part of the diagonal
+/// of the body's box at its first key.
+inline constexpr double gltf_tolerance = 1e-3;
+
 /// Reads a glTF 2.0 file (.gltf or .glb) and bakes one animation into keyframes in scene space.
 ///
 /// Geometry: all triangles (lists, strips, fans) of all meshes below the default scene's nodes (or all root
@@ -15,10 +19,12 @@ namespace kbvh::io {
 /// baked positions are equal at all keyframes become one.
 ///
 /// Motion: node translation, rotation, scale, morph weights and skins, with LINEAR, STEP and CUBICSPLINE
-/// samplers, evaluated at the union of the key times of all samplers that the clip uses; between two
-/// keyframes the baked motion is linear, where the original may turn or jump. Skin weights are scaled to sum
-/// 1 (a vertex without any weight follows its first joint). Without an animation: one keyframe at time 0. All
-/// arithmetic in double.
+/// samplers, evaluated at the union of the key times of all samplers that the clip uses. Between keyframes
+/// the baked motion is linear: where turns and splines are further than `gltf_tolerance` from that,
+/// keyframes are added (`added_keyframes` counts). A STEP sampler jumps: a keyframe at the double before its
+/// key has the positions before the jump (`jumps` counts). Skin weights are scaled to sum 1 (a vertex without
+/// any weight follows its first joint). Without an animation: one keyframe at time 0. All arithmetic in
+/// double.
 ///
 /// `clip`: an animation's name, or else its index; empty takes the only one. Buffers: the binary chunk,
 /// base64, or files in or below the folder of `file`. Compressed geometry (Draco, meshopt) is refused.

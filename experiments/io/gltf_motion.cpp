@@ -126,6 +126,14 @@ const double* Track::value(std::size_t key) const {
                                                        : &values_[key * width_];
 }
 
+std::vector<double> Track::jumps() const {
+  std::vector<double> jumps;
+  if (interpolation_ != Interpolation::step) return jumps;
+  for (std::size_t k = 1; k < times_.size(); ++k)
+    if (!std::equal(value(k), value(k) + width_, value(k - 1))) jumps.push_back(times_[k]);
+  return jumps;
+}
+
 void Track::evaluate(double time, double* out) const {
   const auto after = std::upper_bound(times_.begin(), times_.end(), time);
   const std::size_t key = after == times_.begin() ? 0 : static_cast<std::size_t>(after - times_.begin()) - 1;
@@ -172,7 +180,7 @@ Pose::Pose(const Document& document, const Animation* animation)
   }
   if (animation == nullptr) return;
   std::set<std::pair<std::uint32_t, Path>> seen;
-  std::set<double> times;
+  std::set<double> times, jumps;
   for (const Channel& channel : animation->channels) {
     if (!seen.insert({channel.node, channel.path}).second) {
       fail(document.file, channel.place,
@@ -192,8 +200,16 @@ Pose::Pose(const Document& document, const Animation* animation)
     }
     tracks_.push_back({channel.path, channel.node, Track(document, channel, width)});
     times.insert(tracks_.back().track.times().begin(), tracks_.back().track.times().end());
+    const std::vector<double> own = tracks_.back().track.jumps();
+    jumps.insert(own.begin(), own.end());
   }
   times_.assign(times.begin(), times.end());
+  jumps_.assign(jumps.begin(), jumps.end());
+}
+
+bool Pose::morphs(std::size_t node) const {
+  return std::any_of(tracks_.begin(), tracks_.end(),
+                     [&](const Bound& bound) { return bound.path == Path::weights && bound.node == node; });
 }
 
 std::size_t Pose::merged_keyframes() const {

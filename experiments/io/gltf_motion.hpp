@@ -35,6 +35,9 @@ class Track {
   const std::vector<double>& times() const { return times_; }  ///< strictly increasing
   std::size_t merged() const { return merged_; }               ///< keys that repeated their predecessor
 
+  /// The keys at which a value is replaced by another one without a way between them.
+  std::vector<double> jumps() const;
+
   /// The value at a time, held constant beyond the ends. `out` has `width` numbers. Rotations come out with
   /// length one.
   void evaluate(double time, double* out) const;
@@ -59,6 +62,12 @@ class Pose {
   /// The union of all key times, increasing. Empty without an animation.
   const std::vector<double>& times() const { return times_; }
 
+  /// Those of them at which a property jumps, increasing.
+  const std::vector<double>& jumps() const { return jumps_; }
+
+  /// Does the animation change the morph weights of a node?
+  bool morphs(std::size_t node) const;
+
   /// Keys of samplers that repeated their predecessor in time and value.
   std::size_t merged_keyframes() const;
 
@@ -77,7 +86,7 @@ class Pose {
 
   const Document* document_;
   std::vector<Bound> tracks_;
-  std::vector<double> times_;
+  std::vector<double> times_, jumps_;
   std::vector<Node> nodes_;  // as in the file, with the animated properties of the last evaluate()
   std::vector<std::vector<double>> weights_;
   std::vector<Affine> globals_;

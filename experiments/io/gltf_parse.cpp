@@ -5,6 +5,7 @@
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/gltf_container.hpp"
 #include "experiments/io/gltf_document.hpp"
+#include "experiments/io/json_text.hpp"
 
 namespace kbvh::io::gltf {
 namespace {
@@ -133,7 +134,7 @@ class Parser {
   }
 
   Document parse() {
-    const Json json = parse_json();
+    const Json json = parse_json_text(container_.json, document_.file.string());
     const Value root(document_.file, json, "");
     if (!json.is_object()) root.reject_value("an object");
     check_version(root);
@@ -153,20 +154,6 @@ class Parser {
   }
 
  private:
-  Json parse_json() const {
-    try {
-      return Json::parse(container_.json);
-    } catch (const Json::exception& error) {
-      // "[json.exception.parse_error.101] parse error at line 1, column 2: ...": the bracket means nothing to
-      // a user.
-      const std::string text = error.what();
-      const std::size_t end = text.find("] ");
-      std::string what = text.substr(end == std::string::npos ? 0 : end + 2, 200);
-      for (char& c : what) c = c >= 32 && c < 127 ? c : '?';
-      fail(document_.file, "JSON", what);
-    }
-  }
-
   void check_version(const Value& root) const {
     const Value version = root.at("asset").at("version");
     if (!version.text().starts_with("2.")) version.reject(printable(version.text()) + ", only 2.x is known");

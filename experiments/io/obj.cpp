@@ -17,11 +17,10 @@ namespace {
 class ObjReader {
  public:
   explicit ObjReader(const std::filesystem::path& file)
-      : file_(file), bytes_(read_file(file)), surfaces_(file) {}
+      : file_(file), bytes_(read_text(file)), surfaces_(file) {}
 
   AnimatedMesh read() {
     std::string_view rest = bytes_;
-    if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
     std::size_t next_line = 1;
     std::string joined;
     while (!rest.empty()) {
@@ -30,7 +29,7 @@ class ObjReader {
       if (ends_in_backslash(line)) {
         joined.clear();
         while (ends_in_backslash(line)) {
-          line.remove_suffix(line.ends_with('\r') ? 2 : 1);
+          line.remove_suffix(1);
           joined.append(line).push_back(' ');
           line = cut_line(rest, next_line);
         }
@@ -56,9 +55,7 @@ class ObjReader {
     return line;
   }
 
-  static bool ends_in_backslash(std::string_view line) {
-    return line.ends_with('\\') || line.ends_with("\\\r");
-  }
+  static bool ends_in_backslash(std::string_view line) { return line.ends_with('\\'); }
 
   std::string place() const { return "line " + std::to_string(line_); }
 

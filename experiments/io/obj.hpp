@@ -9,7 +9,7 @@ namespace kbvh::io {
 /// (polygons are not cut into triangles), one keyframe at time 0. A file with B-spline or NURBS surfaces
 /// (obj_surfaces.hpp) and no face gives their control nets; one with nothing but vertices a cloud of points.
 /// Texture coordinates, normals, groups, materials, lines, curves and vertex colours are skipped. Indices may
-/// be negative (relative) or point forward.
+/// be negative (relative) or point forward. Lines end in '\n', "\r\n" or '\r'.
 ///
 /// This is a reader of our own, not tinyobjloader, because that one (2.0rc10) reads "nan", a missing or a
 /// misspelt coordinate as 0 without a word, drops faces of two vertices, wraps large indices, and rounds two

@@ -67,10 +67,15 @@ class PlyReader {
   void read_header() {
     std::size_t number = 0;
     bool has_format = false;
+    if (bytes_.starts_with("\xEF\xBB\xBFply")) at_ = 3;  // a byte order mark
+    if (at_ == 0 && !bytes_.starts_with("ply")) refuse_utf16(bytes_, file_.string());
+    // The first line says how lines end. The byte after the last one may be any: it is data.
+    const std::size_t after = at_ + 3;
+    if (after + 1 < bytes_.size() && bytes_[after] == '\r' && bytes_[after + 1] != '\n') line_end_ = '\r';
     for (;;) {
-      const std::size_t end = bytes_.find('\n', at_);
+      const std::size_t end = bytes_.find(line_end_, at_);
       const std::string place = "line " + std::to_string(++number);
-      if (number == 1 && !std::string_view(bytes_).starts_with("ply")) {
+      if (number == 1 && !std::string_view(bytes_).substr(at_).starts_with("ply")) {
         fail(file_, place,
              printable(std::string_view(bytes_).substr(0, std::min<std::size_t>(end, 8))) +
                  " instead of 'ply'");
@@ -307,7 +312,7 @@ class PlyReader {
   std::string_view take_token(const Element& element, std::uint64_t i) {
     constexpr std::string_view blanks = " \t\r\n\v\f";
     while (at_ < bytes_.size() && blanks.find(bytes_[at_]) != std::string_view::npos) {
-      if (bytes_[at_++] == '\n') ++line_;
+      if (bytes_[at_++] == line_end_) ++line_;
     }
     if (at_ == bytes_.size()) truncated(element, i);
     const std::size_t begin = at_;
@@ -389,6 +394,7 @@ class PlyReader {
   std::filesystem::path file_;
   std::string bytes_;
   std::size_t at_ = 0;
+  char line_end_ = '\n';  // of "\r\n" the second
   std::size_t line_ = 1;  // of ascii bodies
   Format format_ = Format::ascii;
   std::vector<Element> elements_;

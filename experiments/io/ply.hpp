@@ -9,7 +9,8 @@ namespace kbvh::io {
 /// the list "vertex_indices" (or "vertex_index") of the element "face" as one primitive each, polygons kept
 /// whole, and "tristrips", if there are any, cut into triangles (-1 starts a new strip). All else is skipped;
 /// a file without faces is a cloud of points, one primitive for each vertex.
-/// Vertices keep their order. One keyframe at time 0.
+/// Lines end as the first one does: in '\n', "\r\n" or '\r'. Vertices keep their order. One keyframe at time
+/// 0.
 ///
 /// A reader of our own: assimp reorders vertices, and Debian has no small library that reports where a file
 /// is broken. Throws InputError with the header line, or the element and its number (from 0). Does not call

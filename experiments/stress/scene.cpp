@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/judge/range_watch.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/json_reader.hpp"
 
@@ -86,6 +87,7 @@ Playable<S> playable(const StressScene& stress) {
       playback.evaluate_all();
       playback.change_plans(t, step->changes);
     }
+    check_played(result.scene, result.script, result.frames);
   } catch (const std::invalid_argument& problem) {
     throw Refused(problem.what());
   }

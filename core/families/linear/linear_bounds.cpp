@@ -7,6 +7,7 @@
 
 #include "core/families/linear/moved_boxes.hpp"
 #include "core/families/wide/kernels/bounds.hpp"
+#include "core/geometry/predicates.hpp"
 
 namespace kbvh {
 
@@ -22,10 +23,12 @@ Box<S> swept(const LinearSide<S>& side) {
   return box;
 }
 
+/// Does the body stay near the admissible range until this end? Beyond it differences of boxes could
+/// overflow.
 template <class S>
-bool finite_root(const LinearEnd<S>& end) {
-  return std::all_of(end.own, end.own + 3, [](S x) { return std::isfinite(x); }) &&
-         std::all_of(end.own + 4, end.own + 7, [](S x) { return std::isfinite(x); });
+bool admissible_root(const LinearEnd<S>& end) {
+  const auto near = [](S x) { return std::abs(x) <= 2 * admissible_magnitude<S>; };
+  return std::all_of(end.own, end.own + 3, near) && std::all_of(end.own + 4, end.own + 7, near);
 }
 
 constexpr std::uint32_t none_used = ~std::uint32_t(0);
@@ -170,7 +173,7 @@ bool LinearBounds<S>::make_end(Segment& segment, const SegmentMotion<S>& motion,
   Refit refit = begin_end(segment, motion, body, end, t);
   proceed(body, refit, refit.left);
   if (hierarchy(body).empty()) return true;
-  return finite_root(segment.sides[body].at[end]);
+  return admissible_root(segment.sides[body].at[end]);
 }
 
 template <class S>
@@ -297,7 +300,7 @@ void LinearBounds<S>::go_on() {
   choose_segment(segment, motion_, t);
   for (std::uint32_t body = 0; body < body_count(); ++body) {
     if (!begin_side(segment, before, motion_, body, t, Before::ends)) continue;
-    // A line without end may leave the range of numbers: then less of it.
+    // A line without end may leave the admissible range: then less of it.
     while (!make_end(segment, motion_, body, 1, segment.end) && segment.end > segment.begin) {
       segment.end = segment.begin + (segment.end - segment.begin) / 2;
       for (std::uint32_t other = 0; other < body; ++other)
@@ -354,10 +357,10 @@ bool LinearBounds<S>::go_ahead(std::uint64_t nodes) {
       return true;
     } else {
       ahead_.finished = true;
-      const auto is_finite = [&](const LinearSide<S>& side) {
-        return side.hierarchy().empty() || finite_root(side.at[1]);
+      const auto is_admissible = [&](const LinearSide<S>& side) {
+        return side.hierarchy().empty() || admissible_root(side.at[1]);
       };
-      if (!std::all_of(segment.sides.begin(), segment.sides.end(), is_finite)) {
+      if (!std::all_of(segment.sides.begin(), segment.sides.end(), is_admissible)) {
         forget_ahead();  // less of it is to be taken, as `go_on` does
         return false;
       }
