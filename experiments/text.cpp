@@ -1,5 +1,6 @@
 #include "experiments/text.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -47,6 +48,64 @@ std::optional<std::pair<std::string, std::string>> parse_assignment(std::string_
   const std::size_t at = text.find('=');
   if (at == std::string_view::npos || at == 0) return {};
   return std::pair{std::string(text.substr(0, at)), std::string(text.substr(at + 1))};
+}
+
+namespace {
+
+std::string folded(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) c = c == '-' ? '_' : c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
+  return result;
+}
+
+/// Computes the optimal string alignment distance: three rows of the table at a time.
+std::size_t edits_between(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    before = std::move(last);
+    last = std::move(row);
+    row.assign(b.size() + 1, i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t changed = a[i - 1] == b[j - 1] ? 0 : 1;
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + changed});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+std::optional<std::string> nearest_of(std::string_view word, const std::vector<std::string>& known) {
+  constexpr std::size_t longest_name = 100;  // the table is as large as the product of both lengths
+  if (word.empty() || word.size() > longest_name) return {};
+  const std::string wanted = folded(word);
+  const std::string* nearest = nullptr;
+  const std::string* continued = nullptr;
+  std::size_t fewest = std::max<std::size_t>(1, wanted.size() / 3) + 1, continuations = 0;
+  for (const std::string& candidate : known) {
+    if (candidate.size() > longest_name) continue;
+    const std::string other = folded(candidate);
+    const std::size_t edits = edits_between(wanted, other);
+    // A word of one or two letters is not a misspelling of one that shares no letter with it.
+    if (edits < fewest && edits < std::max(wanted.size(), other.size())) {
+      fewest = edits;
+      nearest = &candidate;
+    }
+    if (wanted.size() >= 3 && other.starts_with(wanted)) {
+      ++continuations;
+      continued = &candidate;
+    }
+  }
+  if (nearest == nullptr && continuations == 1) nearest = continued;
+  return nearest == nullptr ? std::nullopt : std::optional(*nearest);
+}
+
+std::string suggestion(std::string_view word, const std::vector<std::string>& known) {
+  const std::optional<std::string> nearest = nearest_of(word, known);
+  return nearest ? "; did you mean '" + *nearest + "'?" : "";
 }
 
 std::uint64_t hash_of(std::string_view text, std::uint64_t seed) {

@@ -26,6 +26,15 @@ std::optional<std::uint64_t> parse_whole(std::string_view text);
 /// "key=value" at its first '='; nothing if there is none or the key is empty.
 std::optional<std::pair<std::string, std::string>> parse_assignment(std::string_view text);
 
+/// The first of `known` with the fewest edits (a character inserted, deleted, replaced, or two neighbours
+/// swapped) from `word`, or nothing if that takes more than a third of the word's characters: then it is no
+/// misspelling. Letter case does not count, nor does '-' instead of '_'. A word that is the beginning of
+/// exactly one of them (three characters or more) is taken for that one.
+std::optional<std::string> nearest_of(std::string_view word, const std::vector<std::string>& known);
+
+/// "; did you mean 'sphere'?" if `nearest_of` finds one, else "": the end of a message about an unknown name.
+std::string suggestion(std::string_view word, const std::vector<std::string>& known);
+
 /// 64 bits of FNV-1a with a final mix: for keys of configurations, not for secrets.
 std::uint64_t hash_of(std::string_view text, std::uint64_t seed = 0);
 

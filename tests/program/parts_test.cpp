@@ -52,6 +52,27 @@ TEST(Text, Assignments) {
   EXPECT_FALSE(parse_assignment("=value"));
 }
 
+TEST(Text, NearestNames) {
+  const std::vector<std::string> known{"bottom_up", "bottom_up_budget", "top_down", "sphere", "uv_sphere",
+                                       "interval_join", "l"};
+  for (const auto& [word, meant] : std::vector<std::pair<std::string, std::string>>{
+           {"botom_up", "bottom_up"},
+           {"bottom-up", "bottom_up"},
+           {"Bottom_Up", "bottom_up"},
+           {"topdown", "top_down"},
+           {"shpere", "sphere"},
+           {"spere", "sphere"},
+           {"bottom_up", "bottom_up"},
+           {"interval", "interval_join"},
+           {"L", "l"}})
+    EXPECT_EQ(nearest_of(word, known).value_or("nothing"), meant) << word;
+  for (const char* word : {"", "x", "cloth", "bo", "rebuild", "/tmp/mesh.obj"})
+    EXPECT_FALSE(nearest_of(word, known)) << word << ": " << *nearest_of(word, known);
+  EXPECT_FALSE(nearest_of(std::string(100000, 'a'), {std::string(100000, 'a')}));
+  EXPECT_EQ(suggestion("shpere", known), "; did you mean 'sphere'?");
+  EXPECT_EQ(suggestion("cloth", known), "");
+}
+
 TEST(Text, Numbers) {
   EXPECT_EQ(parse_number("-1.5e3"), -1500);
   for (const char* wrong : {"", "1 ", " 1", "1x", "nan", "inf", "1e999", "0x10"})
