@@ -109,7 +109,8 @@ void JsonReader::finish() const {
   for (const auto& [key, value] : value_->items())
     if (!known_.contains(key))
       throw io::InputError(place_ + ": there is no key '" + key + "'; known are " +
-                           joined({known_.begin(), known_.end()}));
+                           joined({known_.begin(), known_.end()}) +
+                           suggestion(key, {known_.begin(), known_.end()}));
 }
 
 void JsonReader::fail(const std::string& key, const std::string& what) const {
