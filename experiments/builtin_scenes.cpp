@@ -163,7 +163,7 @@ const BuiltinScene& find_builtin_scene(const std::string& name) {
     if (scene.name == name) return scene;
     known.push_back(scene.name);
   }
-  throw io::InputError("there is no built-in scene '" + name + "'; known are " + joined(known));
+  throw io::InputError(no_such("built-in scene", name, known));
 }
 
 }  // namespace kbvh::experiments

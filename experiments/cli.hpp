@@ -22,16 +22,16 @@ void add_theory(CLI::App& program, Action& action);
 void add_stress(CLI::App& program, Action& action);
 void add_ccd(CLI::App& program, Action& action);
 
-/// Runs a program of PATH and waits for it; its exit code. Throws io::InputError if it cannot be started.
+/// Runs a program of PATH, prints what it prints, and waits for it; its exit code. Throws io::InputError if
+/// it cannot be started.
 int run_and_wait(std::vector<std::string> words);
 
 /// `run` and `bench` as said on the command line. Strings are kept as given, until `plan_of` turns them into
 /// the plan that a file would hold.
 struct StudyOptions {
-  std::string plan_file, out, scene, builder, name, order, clip, script;
-  std::vector<std::string> bodies, strategies, scalars, params, studies;
+  std::string plan_file, out, scene, name, clip, script;
+  std::vector<std::string> bodies, strategies, scalars, params, studies, orders, builders;
   std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
-  std::vector<std::string> builders;
   std::uint64_t obstacle = 0, keyframes = 0, repetitions = 0, frames_limit = 0, oracle_every = 0;
   bool print_plan = false, self = false, continuous = false;
 };

@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <memory>
 
 #include "experiments/cli.hpp"
+#include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/record.hpp"
 #include "experiments/shape_bodies.hpp"
@@ -88,7 +88,7 @@ void print_json() {
   for (const ShapeKind& shape : shape_kinds())
     shapes.push_back({{"name", shape.name}, {"meaning", shape.meaning}});
   const json all{{"strategies", strategies}, {"scenes", scenes}, {"shapes", shapes}};
-  std::printf("%s\n", all.dump(2).c_str());
+  print(all.dump(2) + "\n");
 }
 
 void print_strategy(const Info& info) {
@@ -114,20 +114,18 @@ void print_strategy(const Info& info) {
     text += fmt::format("    {}={} ({}): {}\n", parameter.name, parameter.default_value, allowed,
                         parameter.meaning);
   }
-  std::fputs(text.c_str(), stdout);
+  print(text);
 }
 
 void print_text() {
-  std::puts("Strategies");
+  print("Strategies\n");
   for (const StrategyEntry& entry : registry()) print_strategy(entry.info);
-  std::vector<std::vector<std::string>> rows;
-  std::puts("\nBuilt-in scenes (--scene)");
+  print("\nBuilt-in scenes (--scene)\n");
   for (const BuiltinScene& scene : builtin_scenes())
-    std::printf("%-17s %s\n", scene.name.c_str(), scene.meaning.c_str());
-  std::puts(
-      "\nShapes (--body shape:key=value,...); those at rest also take keyframes, rate, and step or turns");
-  for (const ShapeKind& shape : shape_kinds())
-    std::printf("%-17s %s\n", shape.name.c_str(), shape.meaning.c_str());
+    print(fmt::format("{:<17} {}\n", scene.name, scene.meaning));
+  print(
+      "\nShapes (--body shape:key=value,...); those at rest also take keyframes, rate, and step or turns\n");
+  for (const ShapeKind& shape : shape_kinds()) print(fmt::format("{:<17} {}\n", shape.name, shape.meaning));
 }
 
 }  // namespace

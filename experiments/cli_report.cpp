@@ -1,5 +1,7 @@
+#include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -7,8 +9,10 @@
 #include <system_error>
 
 #include "experiments/cli.hpp"
+#include "experiments/cli_options.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/io/animated_mesh.hpp"
+#include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
 
@@ -36,15 +40,36 @@ int report(const std::string& out, const std::string& title) {
   return code == wrong_use ? wrong_use : internal_error;
 }
 
+/// Prints what is read, until its end.
+void pass_on(int descriptor) {
+  char bytes[4096];
+  for (;;) {
+    const ssize_t n = ::read(descriptor, bytes, sizeof bytes);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return;
+    print({bytes, std::size_t(n)});
+  }
+}
+
 }  // namespace
 
 int run_and_wait(std::vector<std::string> words) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
+  // What the program prints comes through here, so that a full disk is told of in one way.
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), "pipe");
+  posix_spawn_file_actions_t actions;
+  ::posix_spawn_file_actions_init(&actions);
+  ::posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
   pid_t child = 0;
-  if (const int error = ::posix_spawnp(&child, arguments[0], nullptr, nullptr, arguments.data(), environ))
-    throw io::InputError("cannot start " + words[0] + ": " + std::strerror(error));
+  const int error = ::posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+  ::posix_spawn_file_actions_destroy(&actions);
+  ::close(ends[1]);
+  if (error == 0) pass_on(ends[0]);
+  ::close(ends[0]);
+  if (error != 0) throw io::InputError("cannot start " + words[0] + ": " + std::strerror(error));
   int status = 0;
   while (::waitpid(child, &status, 0) < 0)
     if (errno != EINTR) throw std::system_error(errno, std::generic_category(), "waitpid");
@@ -55,8 +80,8 @@ void add_report(CLI::App& program, Action& action) {
   CLI::App* command = program.add_subcommand("report", "tables and figures of a result folder");
   command->footer(examples);
   auto out = std::make_shared<std::string>(), title = std::make_shared<std::string>();
-  command->add_option("--out", *out, "folder with results.jsonl")->required();
-  command->add_option("--title", *title, "of the report");
+  add_text(*command, "--out", *out, "folder with results.jsonl")->required();
+  add_text(*command, "--title", *title, "of the report");
   command->callback([&action, out, title] { action = [out, title] { return report(*out, *title); }; });
 }
 

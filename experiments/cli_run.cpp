@@ -1,10 +1,11 @@
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 
 #include "experiments/cli.hpp"
+#include "experiments/cli_options.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/json_reader.hpp"
+#include "experiments/output.hpp"
 #include "experiments/plan.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
@@ -54,7 +55,9 @@ void choose_clip(json& scene, const std::string& clip) {
     body["clip"] = clip;
     used = true;
   }
-  if (!used) throw io::InputError("--clip: no --body is a glTF file without a clip of its own");
+  if (!used)
+    throw io::InputError("--clip: " + io::printable(clip) +
+                         " is for glTF files without a clip of their own, and no --body is one");
 }
 
 json scene_of(const StudyOptions& options) {
@@ -73,7 +76,7 @@ json scene_of(const StudyOptions& options) {
   if (!options.name.empty()) scene["name"] = options.name;
   if (!options.script.empty()) scene["script"] = options.script;
   if (options.self) scene["self"] = true;
-  if (!options.order.empty()) scene["order"] = split(options.order, ',');
+  if (!options.orders.empty()) scene["order"] = options.orders;
   return scene;
 }
 
@@ -89,7 +92,7 @@ int run_study(const StudyOptions& options, Harness harness) {
     const json said = plan_of(options);
     if (options.print_plan) {
       read_plan(said, "command line", {});
-      std::printf("%s\n", said.dump(2).c_str());
+      print(said.dump(2) + "\n");
       return success;
     }
     plan = read_plan(said, "command line", {});
@@ -104,7 +107,7 @@ int run_study(const StudyOptions& options, Harness harness) {
       if (!options.studies.empty()) keep_studies(said, options.studies, options.plan_file);
     }
     if (options.print_plan) {
-      std::printf("%s\n", said.dump(2).c_str());
+      print(said.dump(2) + "\n");
       return success;
     }
     plan = read_plan(said, options.plan_file, std::filesystem::path(options.plan_file).parent_path());
@@ -112,7 +115,8 @@ int run_study(const StudyOptions& options, Harness harness) {
   const StudyOutcome outcome = run_plan(plan, harness, options.out);
   if (!options.out.empty())
     say(counted(outcome.measured, "configuration") + " measured, " + std::to_string(outcome.skipped) +
-        " were in " + (std::filesystem::path(options.out) / "results.jsonl").string() + " already");
+        (outcome.skipped == 1 ? " was in " : " were in ") +
+        (std::filesystem::path(options.out) / "results.jsonl").string() + " already");
   if (outcome.refused == 0) return success;
   say(counted(outcome.refused, "configuration") + " in which a strategy breaks what it guarantees");
   return guarantee_broken;
@@ -120,60 +124,45 @@ int run_study(const StudyOptions& options, Harness harness) {
 
 void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
   std::vector<CLI::Option*> said_by_plan{
-      command.add_option("--scene", o->scene, "built-in scene (default: tablecloth); `kbvh list` shows them"),
-      command.add_option("--body", o->bodies, "a body from a file or by formula; repeatable, see below")
-          ->take_all()
-          ->expected(1),
-      command.add_option("--clip", o->clip,
-                         "animation of glTF bodies: its name or index; also as clip= in --body"),
-      command.add_option("--name", o->name, "name of the scene in results"),
-      command
-          .add_option("--triangles", o->triangles,
-                      "of the built-in scene's moving body (2000); a list sweeps")
-          ->delimiter(','),
-      command
-          .add_option("--obstacle", o->obstacle,
-                      "triangles of the body beside it (a table: 2048; else as many, up to 20000)")
-          ->check(CLI::PositiveNumber),
-      command.add_option("--keyframes", o->keyframes, "of a built-in scene (60)")->check(CLI::PositiveNumber),
-      command.add_option("--seed", o->seeds, "of what chance decides (1); a list sweeps")->delimiter(','),
-      command.add_option("--script", o->script,
-                         "changes of plans while the scene runs: a file, see RESULTS.md"),
+      add_text(command, "--scene", o->scene, "built-in scene (default: tablecloth); `kbvh list` shows them"),
+      add_texts(command, "--body", o->bodies, "a body from a file or by formula; repeatable, see below"),
+      add_text(command, "--clip", o->clip,
+               "animation of glTF bodies: its name or index; also as clip= in --body"),
+      add_text(command, "--name", o->name, "name of the scene in results"),
+      add_wholes(command, "--triangles", o->triangles, ranges::triangles,
+                 "of the built-in scene's moving body (2000); a list sweeps"),
+      add_whole(command, "--obstacle", o->obstacle, ranges::triangles,
+                "triangles of the body beside it (a table: 2048; else as many, up to 20000)"),
+      add_whole(command, "--keyframes", o->keyframes, ranges::keyframes, "of a built-in scene (60)"),
+      add_wholes(command, "--seed", o->seeds, ranges::any, "of what chance decides (1); a list sweeps"),
+      add_text(command, "--script", o->script,
+               "changes of plans while the scene runs: a file, see RESULTS.md"),
       command.add_flag(
           "--continuous", o->continuous,
           "contacts of vertices and faces, and of edges, between keyframes: exact, l does not apply"),
       command.add_flag("--self", o->self,
                        "pairs within every body, too, of primitives that share no vertex; of one: self=true"),
-      command.add_option("--order", o->order, "vertex order: given, shuffled, renumbered; a list sweeps"),
-      command
-          .add_option("--strategies", o->strategies,
-                      "ids, family:NAME, default (all that promise something) or all; !x: but not x")
-          ->delimiter(','),
-      command.add_option("--param", o->params, "key=value or strategy.key=value; a list of values sweeps")
-          ->take_all()
-          ->expected(1),
-      command.add_option("--builder", o->builders, "median, sah, morton (each strategy's own best)")
-          ->delimiter(','),
-      command.add_option("--width", o->widths, "children per node: 2, 4, 8")->delimiter(','),
-      command.add_option("--leaf-size", o->leaf_sizes, "most primitives per leaf: 1 to 16")->delimiter(','),
-      command.add_option("--l", o->l, "frames for each keyframe interval (10); a list sweeps")
-          ->delimiter(','),
-      command.add_option("--scalar", o->scalars, "float, double (float)")->delimiter(',')};
-  command.add_option("--repetitions", o->repetitions, "timed clips of each contestant (3)")
-      ->check(CLI::PositiveNumber);
-  command.add_option("--frames-limit", o->frames_limit, "only so many first frames")
-      ->check(CLI::PositiveNumber);
-  command
-      .add_option("--oracle-every", o->oracle_every,
-                  "compare only every n-th frame (and the last) with the truth (1)")
-      ->check(CLI::PositiveNumber);
-  command.add_option("--out", o->out, "folder to which results are appended (none: the table only)");
-  CLI::Option* plan = command.add_option("--plan", o->plan_file, "a study as a file, see RESULTS.md");
-  command
-      .add_option("--study", o->studies,
-                  "only the studies of this name, without the plan's targets; repeatable")
-      ->take_all()
-      ->expected(1)
+      add_words(command, "--order", o->orders, "vertex order: given, shuffled, renumbered; a list sweeps"),
+      add_words(command, "--strategies", o->strategies,
+                "ids, family:NAME, default (all that promise something) or all; !x: but not x"),
+      add_texts(command, "--param", o->params, "key=value or strategy.key=value; a list of values sweeps"),
+      add_words(command, "--builder", o->builders, "median, sah, morton (each strategy's own best)"),
+      add_wholes(command, "--width", o->widths, ranges::width, "children per node: 2, 4, 8"),
+      add_wholes(command, "--leaf-size", o->leaf_sizes, ranges::leaf_size,
+                 "most primitives per leaf: 1 to 16"),
+      add_wholes(command, "--l", o->l, ranges::frames_per_keyframe,
+                 "frames for each keyframe interval (10); a list sweeps"),
+      add_words(command, "--scalar", o->scalars, "float, double (float)")};
+  add_whole(command, "--repetitions", o->repetitions, ranges::repetitions,
+            "timed clips of each contestant (3)");
+  add_whole(command, "--frames-limit", o->frames_limit, ranges::positive,
+            "only so many first frames (intervals with --continuous)");
+  add_whole(command, "--oracle-every", o->oracle_every, ranges::positive,
+            "compare only every n-th frame or interval (and the last) with the truth (1)");
+  add_text(command, "--out", o->out, "folder to which results are appended (none: the table only)");
+  CLI::Option* plan = add_text(command, "--plan", o->plan_file, "a study as a file, see RESULTS.md");
+  add_texts(command, "--study", o->studies,
+            "only the studies of this name, without the plan's targets; repeatable")
       ->needs(plan);
   command.add_flag("--print-plan", o->print_plan, "print the plan file that says the same, and stop");
   for (CLI::Option* option : said_by_plan) plan->excludes(option);
@@ -207,7 +196,7 @@ void keep_studies(json& plan, const std::vector<std::string>& names, const std::
   }
   for (const std::string& name : names)
     if (std::find(known.begin(), known.end(), name) == known.end())
-      throw io::InputError(place + ": there is no study '" + name + "'; known are " + joined(known));
+      throw io::InputError(place + ": " + no_such("study", name, known));
   if (several) plan["studies"] = kept;
   plan.erase("targets");
 }

@@ -1,11 +1,12 @@
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 
 #include "experiments/cli.hpp"
+#include "experiments/cli_options.hpp"
 #include "experiments/io/obj.hpp"
+#include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
 #include "experiments/scene_card.hpp"
@@ -49,26 +50,42 @@ io::AnimatedMesh snapshot(const std::vector<io::AnimatedMesh>& bodies, std::size
   return all;
 }
 
+bool is_obj(const SceneOptions& options) {
+  return std::filesystem::path(options.out).extension() == ".obj";
+}
+
+/// Complains about a --frame that no file would show.
+void check_frame(const LoadedScene& scene, const SceneOptions& options) {
+  if (options.frame == 0) return;
+  if (!is_obj(options)) throw io::InputError("--frame: goes with --out FILE.obj, which shows one keyframe");
+  std::size_t keyframes = 0;
+  for (const io::AnimatedMesh& body : scene.meshes)
+    keyframes = std::max(keyframes, body.keyframe_times.size());
+  if (options.frame >= keyframes)
+    throw io::InputError("--frame: " + std::to_string(options.frame) +
+                         " is not before the end, the scene has " + counted(keyframes, "keyframe") +
+                         ", from 0");
+}
+
 void write(const LoadedScene& scene, const SceneOptions& options) {
   const std::filesystem::path out = options.out;
-  if (out.extension() == ".obj")
+  if (is_obj(options))
     io::save_obj(snapshot(scene.meshes, options.frame), out);
   else
     export_scene(scene, out, 0);
 }
 
-void print(const std::vector<BodyCard>& list) {
+void print_cards(const std::vector<BodyCard>& list) {
   for (const BodyCard& c : list) {
-    std::string text =
-        fmt::format("{}: {}, {}, {}", c.name, counted(c.primitives, "primitive"),
-                    std::to_string(c.vertices) + " vertices", counted(c.keyframes, "keyframe"));
+    std::string text = fmt::format("{}: {}, {}, {}", c.name, counted(c.primitives, "primitive"),
+                                   counted(c.vertices, "vertex"), counted(c.keyframes, "keyframe"));
     if (c.keyframes > 1)
       text += fmt::format(
           " in {:.3g} s\n    {:.2f}% of the sides of {} nodes change their realiser per keyframe (at most "
           "{:.2f}%)\n"
           "    a vertex moves by {:.2f} edges per keyframe (at most {:.2f})",
           c.seconds, 100 * c.sides_changed, c.nodes, 100 * c.most_sides_changed, c.mean_step, c.largest_step);
-    std::printf("%s\n", text.c_str());
+    print(text + "\n");
   }
 }
 
@@ -81,13 +98,14 @@ int show(const SceneOptions& options) {
     line.show(what + ": " + std::to_string(int(100 * fraction)) + " %");
   });
   line.clear();
+  check_frame(scene, options);
   if (!options.out.empty()) write(scene, options);
   const std::vector<BodyCard> list = cards(scene);
   if (!options.as_json) {
-    print(list);
+    print_cards(list);
     return success;
   }
-  std::printf("%s\n", as_json(options.name, list).dump(2).c_str());
+  print(as_json(options.name, list).dump(2) + "\n");
   return success;
 }
 
@@ -97,17 +115,16 @@ void add_scene(CLI::App& program, Action& action) {
   CLI::App* command = program.add_subcommand("scene", "what a built-in scene is, and its meshes as files");
   command->footer(examples);
   auto o = std::make_shared<SceneOptions>();
-  command->add_option("name", o->name, "`kbvh list` shows them")->required();
-  command->add_option("--triangles", o->scene.triangles, "of the moving body (2000)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--obstacle", o->scene.obstacle_triangles, "triangles of the body beside it")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--keyframes", o->scene.keyframes, "(60)")->check(CLI::PositiveNumber);
-  command->add_option("--seed", o->scene.seed, "of what chance decides (1)");
-  command->add_option("--full-triangles", o->scene.full_triangles,
-                      "garments: most triangles that are simulated in full; above, a second level refines");
-  command->add_option("--frame", o->frame, "keyframe of the OBJ file, from 0");
-  command->add_option("--out", o->out, "OBJ file or folder to write");
+  add_text(*command, "name", o->name, "`kbvh list` shows them")->required();
+  add_whole(*command, "--triangles", o->scene.triangles, ranges::triangles, "of the moving body (2000)");
+  add_whole(*command, "--obstacle", o->scene.obstacle_triangles, ranges::triangles,
+            "triangles of the body beside it");
+  add_whole(*command, "--keyframes", o->scene.keyframes, {1, ranges::keyframes.most}, "(60)");
+  add_whole(*command, "--seed", o->scene.seed, ranges::any, "of what chance decides (1)");
+  add_whole(*command, "--full-triangles", o->scene.full_triangles, ranges::triangles,
+            "garments: most triangles that are simulated in full; above, a second level refines");
+  add_whole(*command, "--frame", o->frame, ranges::any, "keyframe of the OBJ file, from 0");
+  add_text(*command, "--out", o->out, "OBJ file or folder to write");
   command->add_flag("--json", o->as_json, "for programs");
   command->callback([&action, o] { action = [o] { return show(*o); }; });
 }

@@ -1,10 +1,13 @@
-#include <cstdio>
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <memory>
 #include <set>
 
 #include "experiments/cli.hpp"
+#include "experiments/cli_options.hpp"
 #include "experiments/io/bytes.hpp"
+#include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
 #include "experiments/stress/runner.hpp"
@@ -60,7 +63,7 @@ int run_repro(const StressArguments& arguments, bool others) {
     specs = contestants_of(arguments);
   } else {
     ContestantSpec spec;
-    spec.entry = &find_strategy(repro.strategy);
+    spec.entry = &strategy_named(repro.strategy);
     const Info& info = spec.entry->info;
     spec.given = repro.params;
     spec.params = Params(info.id, info.parameters, repro.params).values();
@@ -74,8 +77,8 @@ int run_repro(const StressArguments& arguments, bool others) {
   bool failed = false;
   for (std::size_t i = 0; i < specs.size(); ++i) {
     failed |= results[i].failed();
-    std::printf("%s, %s: %s%s%s\n", specs[i].label.c_str(), repro.scalar.c_str(), name(results[i].outcome),
-                results[i].what.empty() ? "" : ": ", results[i].what.c_str());
+    print(specs[i].label + ", " + repro.scalar + ": " + name(results[i].outcome) +
+          (results[i].what.empty() ? "" : ": " + results[i].what) + "\n");
   }
   return failed ? guarantee_broken : success;
 }
@@ -90,7 +93,7 @@ std::string file_name(const stress::Repro& repro, std::set<std::string>& taken) 
 int run(const StressArguments& arguments, bool strategies_named) {
   if (arguments.list) {
     for (const stress::Family& family : stress::families())
-      std::printf("%-22s %s\n", family.name.c_str(), family.meaning.c_str());
+      print(fmt::format("{:<22} {}\n", family.name, family.meaning));
     return success;
   }
   if (!arguments.repro.empty()) return run_repro(arguments, strategies_named);
@@ -101,6 +104,9 @@ int run(const StressArguments& arguments, bool strategies_named) {
   options.contestants = contestants_of(arguments);
   options.scenes = arguments.scenes;
   options.seed = arguments.seed;
+  for (const std::string& scalar : arguments.scalars)
+    if (scalar != "float" && scalar != "double")
+      throw io::InputError("--scalars: expected float or double, got " + io::printable(scalar));
   options.scalars = arguments.scalars;
   options.l = arguments.l;
   options.many_keyframes = arguments.many_keyframes;
@@ -117,7 +123,7 @@ int run(const StressArguments& arguments, bool strategies_named) {
   stress::StressReport report =
       stress::run_stress(options, [&](const std::string& what) { progress.show(what); });
   progress.clear();
-  std::fputs(stress_table(report).c_str(), stdout);
+  print(stress_table(report));
   std::set<std::string> taken;
   for (stress::StressFailure& failure : report.failures) {
     const stress::Repro& repro = failure.repro;
@@ -147,28 +153,22 @@ void add_stress(CLI::App& program, Action& action) {
   command->footer(examples);
   auto a = std::make_shared<StressArguments>();
   CLI::Option* strategies =
-      command->add_option("--strategies", a->strategies, "as for run: ids, family:NAME, default, all, !ID")
-          ->delimiter(',');
-  command->add_option("--families", a->families, "of scenes (all)")->delimiter(',');
-  command->add_option("--scenes", a->scenes, "to be made, in turn of the families (100)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--seed", a->seed, "another one, other scenes (1)");
-  command->add_option("--scalars", a->scalars, "float, double (both)")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"float", "double"}));
-  command->add_option("--l", a->l, "frames for each keyframe interval (1,7,100)")
-      ->delimiter(',')
-      ->check(CLI::Range(1u, 100000u));
-  command->add_option("--param", a->params, "key=value or strategy.key=value; a list of values sweeps");
-  command->add_option("--many-keyframes", a->many_keyframes, "of the longest scene (100000)")
-      ->check(CLI::Range(100u, 10000000u));
-  command->add_option("--seconds", a->seconds, "processor time of a strategy on a scene; more hangs (100)")
-      ->check(CLI::PositiveNumber);
+      add_words(*command, "--strategies", a->strategies, "as for run: ids, family:NAME, default, all, !ID");
+  add_words(*command, "--families", a->families, "of scenes (all)");
+  add_whole(*command, "--scenes", a->scenes, {1, 10000000}, "to be made, in turn of the families (100)");
+  add_whole(*command, "--seed", a->seed, ranges::any, "another one, other scenes (1)");
+  add_words(*command, "--scalars", a->scalars, "float, double (both)");
+  add_wholes(*command, "--l", a->l, {1, 100000}, "frames for each keyframe interval (1,7,100)");
+  add_texts(*command, "--param", a->params, "key=value or strategy.key=value; a list of values sweeps");
+  add_whole(*command, "--many-keyframes", a->many_keyframes, {100, 10000000},
+            "of the longest scene (100000)");
+  add_number(*command, "--seconds", a->seconds, 0.001, 1e6,
+             "processor time of a strategy on a scene; more hangs (100)");
   command->add_flag("--plain", a->plain, "every strategy in its usual configuration only");
   command->add_flag("--no-shrink", a->no_shrink, "leave failures as large as they are");
   command->add_flag("--list", a->list, "show the families");
-  command->add_option("--repro", a->repro, "play the scene of this file, by whom it names or --strategies");
-  command->add_option("--out", a->out, "folder for stress.json and repro files (none: the table only)");
+  add_text(*command, "--repro", a->repro, "play the scene of this file, by whom it names or --strategies");
+  add_text(*command, "--out", a->out, "folder for stress.json and repro files (none: the table only)");
   command->callback([&action, a, strategies] {
     const bool named = strategies->count() > 0;
     action = [a, named] { return run(*a, named); };

@@ -1,11 +1,13 @@
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 
+#include "experiments/builtin_scenes.hpp"
 #include "experiments/cli.hpp"
+#include "experiments/cli_options.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/machine.hpp"
+#include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
 #include "experiments/text.hpp"
@@ -33,6 +35,7 @@ struct TheoryArguments {
 
 int run(const TheoryArguments& arguments) {
   theory::TheoryOptions options = arguments.full ? theory::full_theory() : theory::quick_theory();
+  for (const std::string& scene : arguments.scenes) find_builtin_scene(scene);
   if (!arguments.scenes.empty()) options.scenes = arguments.scenes;
   if (!arguments.sizes.empty()) options.sizes = arguments.sizes;
   if (arguments.keyframes > 0) options.keyframes = arguments.keyframes;
@@ -50,7 +53,7 @@ int run(const TheoryArguments& arguments) {
   const theory::TheoryReport report =
       theory::run_theory(options, store, [&](const std::string& what) { progress.show(what); });
   progress.clear();
-  std::fputs(theory::claims_table(report.claims).c_str(), stdout);
+  print(theory::claims_table(report.claims));
   for (const std::string& note : report.notes) say(note);
   if (!arguments.out.empty()) {
     const std::filesystem::path file = folder / "theory.json";
@@ -71,16 +74,14 @@ void add_theory(CLI::App& program, Action& action) {
   CLI::App* command = program.add_subcommand("theory", "hold the paper's claims against exact counts");
   command->footer(examples);
   auto a = std::make_shared<TheoryArguments>();
-  command->add_option("--scenes", a->scenes, "built-in scenes; `kbvh list` shows them")->delimiter(',');
-  command->add_option("--sizes", a->sizes, "triangles of each; six or more for a fit (250 to 8000)")
-      ->delimiter(',')
-      ->check(CLI::Range(1u, 1u << 24));
-  command->add_option("--keyframes", a->keyframes, "of built-in scenes (30)")->check(CLI::Range(2, 100000));
-  command->add_option("--exact-limit", a->exact_limit, "most triangles held against exact envelopes (500)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--instants", a->instants, "audited between keyframes (200)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--out", a->out, "folder for theory.json and figures (none: the table only)");
+  add_words(*command, "--scenes", a->scenes, "built-in scenes; `kbvh list` shows them");
+  add_wholes(*command, "--sizes", a->sizes, {1, 1u << 24},
+             "triangles of each; six or more for a fit (250 to 8000)");
+  add_whole(*command, "--keyframes", a->keyframes, {2, 100000}, "of built-in scenes (30)");
+  add_whole(*command, "--exact-limit", a->exact_limit, {1, 1u << 24},
+            "most triangles held against exact envelopes (500)");
+  add_whole(*command, "--instants", a->instants, {1, 1000000}, "audited between keyframes (200)");
+  add_text(*command, "--out", a->out, "folder for theory.json and figures (none: the table only)");
   command->add_flag("--no-figures", a->no_figures, "leave out the figures, which take Python and matplotlib");
   CLI::Option* quick = command->add_flag("--quick", a->quick, "what CI runs: the default");
   command->add_flag("--full", a->full, "up to 580k triangles, exact up to 16k, whole sequences: hours")

@@ -20,7 +20,8 @@ std::string text(const Contact& contact) {
 }
 
 /// Compares sorted contacts with the truth.
-void compare(const ContactBuffer& found, const ContactBuffer& truth, Verification& result) {
+void compare(const ContactBuffer& found, const ContactBuffer& truth, std::size_t interval,
+             Verification& result) {
   ContactBuffer missed, extra;
   std::set_difference(truth.begin(), truth.end(), found.begin(), found.end(), std::back_inserter(missed));
   std::set_difference(found.begin(), found.end(), truth.begin(), truth.end(), std::back_inserter(extra));
@@ -30,10 +31,11 @@ void compare(const ContactBuffer& found, const ContactBuffer& truth, Verificatio
   result.extra += extra.size();
   for (std::size_t i = 1; i < found.size(); ++i) result.repeated += found[i] == found[i - 1] ? 1 : 0;
   if (!result.first_violation.empty()) return;
+  const std::string place = "interval " + std::to_string(interval) + ": ";
   if (!missed.empty())
-    result.first_violation = "contact " + text(missed[0]) + " is missed";
+    result.first_violation = place + "contact " + text(missed[0]) + " is missed";
   else if (!extra.empty())
-    result.first_violation = "contact " + text(extra[0]) + " is reported too often, or is none";
+    result.first_violation = place + "contact " + text(extra[0]) + " is reported too often, or is none";
 }
 
 }  // namespace
@@ -75,7 +77,7 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
         measured.verification.candidates += session.contacts(knots_[k + 1], contacts_, ignored);
         if (k % oracle_every != 0 && k + 1 != truth_.size()) continue;
         std::sort(contacts_.begin(), contacts_.end());
-        compare(contacts_, truth_[k], measured.verification);
+        compare(contacts_, truth_[k], k, measured.verification);
       }
       measured.counters = session.strategy().counters();
       entrant.impacts = session.impact_stats();

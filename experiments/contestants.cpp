@@ -4,6 +4,8 @@
 #include <set>
 
 #include "core/scene/self_pairs.hpp"
+#include "experiments/io/bytes.hpp"
+#include "experiments/text.hpp"
 
 namespace kbvh::experiments {
 
@@ -29,18 +31,18 @@ struct Selected {
 std::vector<Selected> selected(const std::string& id) {
   std::vector<Selected> list;
   const bool by_family = id.starts_with(family_prefix);
-  if (is_id(id)) return {{&find_strategy(id), true}};
-  std::string known;
+  if (is_id(id)) return {{&strategy_named(id), true}};
+  std::vector<std::string> known;
   for (const StrategyEntry& entry : registry()) {
-    if (known.find(entry.info.family) == std::string::npos)
-      known += (known.empty() ? "" : ", ") + entry.info.family;
+    if (std::find(known.begin(), known.end(), entry.info.family) == known.end())
+      known.push_back(entry.info.family);
     const bool wanted = id == "all" || (id == "default" && entry.info.guarantee != Guarantee::approximate) ||
                         (by_family && entry.info.family == id.substr(family_prefix.size()));
     if (wanted) list.push_back({&entry, false});
   }
   if (list.empty())
-    throw ConfigError("there is no strategy of the family '" + id.substr(family_prefix.size()) +
-                      "'; families are " + known);
+    throw ConfigError(
+        no_such("family of strategies", id.substr(family_prefix.size()), known, "`kbvh list` shows them"));
   return list;
 }
 
@@ -97,6 +99,24 @@ std::string label_of(const ContestantSpec& spec) {
   return extras.empty() ? info.id : info.id + " [" + extras + "]";
 }
 
+[[noreturn]] void refuse_parameter(const Info& info, const std::string& key) {
+  std::vector<std::string> known;
+  for (const Parameter& parameter : info.parameters) known.push_back(parameter.name);
+  throw ConfigError("'" + info.id + "' has no parameter " + io::printable(key) + "; it has " +
+                    (known.empty() ? "none" : joined(known)) + suggestion(key, known));
+}
+
+/// Complains about a common parameter that no strategy of the list has.
+[[noreturn]] void refuse_common_parameter(const std::vector<ContestantSpec>& list, const std::string& name) {
+  const bool qualified = name.find('.') != std::string::npos;
+  std::vector<std::string> known;
+  for (const ContestantSpec& spec : list)
+    for (const Parameter& parameter : spec.entry->info.parameters)
+      known.push_back((qualified ? spec.entry->info.id + "." : "") + parameter.name);
+  throw ConfigError("the parameter " + io::printable(name) + " belongs to none of the chosen strategies" +
+                    suggestion(name, known));
+}
+
 void add_configurations(std::vector<ContestantSpec>& list, const Selected& choice, const Sweep& params,
                         const BuilderRequest& builder, std::vector<std::string>& notes) {
   const Info& info = choice.entry->info;
@@ -114,6 +134,8 @@ void add_configurations(std::vector<ContestantSpec>& list, const Selected& choic
           notes.push_back(std::string(problem.what()) + ": left out");
           continue;
         }
+        for (const auto& [key, values] : params)
+          if (!has_parameter(info, key)) refuse_parameter(info, key);
         for (const auto& given : combinations(params)) {
           spec.given = given;
           spec.params = Params(info.id, info.parameters, given).values();
@@ -132,6 +154,51 @@ const StrategyEntry* known_strategy(const std::string& id) {
   for (const StrategyEntry& entry : registry())
     if (entry.info.id == id) return &entry;
   return nullptr;
+}
+
+const StrategyEntry& strategy_named(const std::string& id) {
+  if (const StrategyEntry* entry = known_strategy(id)) return *entry;
+  std::vector<std::string> known;
+  for (const StrategyEntry& entry : registry()) known.push_back(entry.info.id);
+  throw ConfigError(no_such("strategy", id, known, "`kbvh list` shows them"));
+}
+
+namespace {
+
+/// Two bodies of one triangle each, one of which moves.
+template <class S>
+Scene<S> two_triangles() {
+  Scene<S> scene;
+  scene.name = "two triangles";
+  for (const S height : {S(0), S(1)}) {
+    Body<S> body;
+    body.primitives.add(std::vector<std::uint32_t>{0, 1, 2});
+    std::vector<S> positions;
+    for (const S step : {S(0), height})
+      positions.insert(positions.end(), {0, 0, height + step, 1, 0, height + step, 0, 1, height + step});
+    body.plans = FlightPlans<S>(3, {0.0, 1.0}, std::move(positions));
+    scene.bodies.push_back(std::move(body));
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  return scene;
+}
+
+template <class S>
+void try_parameters_as(const ContestantSpec& spec) {
+  const Scene<S> scene = two_triangles<S>();
+  const Session<S> session(scene, spec.contestant(), CountingPolicy::silent);
+}
+
+}  // namespace
+
+void try_parameters(const std::vector<ContestantSpec>& list) {
+  for (const ContestantSpec& spec : list) {
+    if (spec.given.empty()) continue;
+    if (spec.entry->info.has_float)
+      try_parameters_as<float>(spec);
+    else
+      try_parameters_as<double>(spec);
+  }
 }
 
 std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests, const Sweep& common,
@@ -156,8 +223,7 @@ std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests,
       add_configurations(list, choice, params, request.builder.empty() ? builder : request.builder, notes);
     }
   }
-  if (!unused.empty())
-    throw ConfigError("the parameter '" + *unused.begin() + "' belongs to none of the chosen strategies");
+  if (!unused.empty()) refuse_common_parameter(list, *unused.begin());
   if (list.empty()) throw ConfigError("no strategy is left: " + (notes.empty() ? "none chosen" : notes[0]));
   return list;
 }

@@ -42,6 +42,13 @@ struct ContestantSpec {
 /// The entry of a strategy, or nullptr if this program has none of that id.
 const StrategyEntry* known_strategy(const std::string& id);
 
+/// The entry of a strategy. Throws ConfigError with the nearest id if there is none.
+const StrategyEntry& strategy_named(const std::string& id);
+
+/// Makes each contestant with parameters of its own once, on two triangles. Throws ConfigError for a value
+/// that only the strategy itself can refuse.
+void try_parameters(const std::vector<ContestantSpec>& list);
+
 /// Everything the requests stand for, in order, each configuration once. `common` parameters are "key" (for
 /// every strategy that has it) or "strategy.key"; `builder` is for every request without one of its own.
 /// What "all", "default" and "family:" bring along is left out, with a sentence in `notes`, if it cannot take

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "experiments/io/animated_mesh.hpp"
+#include "experiments/ranges.hpp"
 
 namespace kbvh::experiments {
 
@@ -24,12 +25,18 @@ class JsonReader {
   std::optional<double> number(const std::string& key);
   /// A whole number within [least, most].
   std::optional<std::uint64_t> whole(const std::string& key, std::uint64_t least, std::uint64_t most);
+  std::optional<std::uint64_t> whole(const std::string& key, const WholeRange& range) {
+    return whole(key, range.least, range.most);
+  }
   std::optional<bool> truth(const std::string& key);
   /// The elements of a list; a value that is no list counts as a list of one; empty if there is no such
   /// member. An empty list is an error.
   std::vector<nlohmann::json> list(const std::string& key);
   std::vector<std::string> words(const std::string& key);
   std::vector<std::uint64_t> wholes(const std::string& key, std::uint64_t least, std::uint64_t most);
+  std::vector<std::uint64_t> wholes(const std::string& key, const WholeRange& range) {
+    return wholes(key, range.least, range.most);
+  }
   /// Exactly `size` numbers.
   std::optional<std::vector<double>> numbers(const std::string& key, std::size_t size);
 

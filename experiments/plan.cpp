@@ -42,12 +42,12 @@ BuilderRequest read_builder(const json& object, const std::string& place) {
       keys.fail("method", problem.what());
     }
   }
-  for (const std::uint64_t width : keys.wholes("width", 2, 8)) {
+  for (const std::uint64_t width : keys.wholes("width", ranges::width)) {
     if (width != 2 && width != 4 && width != 8)
       keys.fail("width", "expected 2, 4 or 8, got " + std::to_string(width));
     request.widths.push_back(std::uint32_t(width));
   }
-  for (const std::uint64_t size : keys.wholes("leaf_size", 1, 16))
+  for (const std::uint64_t size : keys.wholes("leaf_size", ranges::leaf_size))
     request.leaf_sizes.push_back(std::uint32_t(size));
   keys.finish();
   return request;
@@ -86,7 +86,7 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
   }
   if (const json* params = keys.find("params")) study.params = read_params(*params, place + ": params");
   if (const json* builder = keys.find("builder")) study.builder = read_builder(*builder, place + ": builder");
-  if (const auto l = keys.wholes("l", 1, 1000000); !l.empty()) {
+  if (const auto l = keys.wholes("l", ranges::frames_per_keyframe); !l.empty()) {
     study.per_keyframe.clear();
     for (const std::uint64_t frames : l) study.per_keyframe.push_back(std::uint32_t(frames));
   }
@@ -96,10 +96,11 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
         keys.fail("scalars", "expected float or double, got '" + scalar + "'");
     study.scalars = scalars;
   }
-  if (const auto count = keys.whole("repetitions", 1, 10000)) study.repetitions = std::uint32_t(*count);
-  if (const auto limit = keys.whole("frames_limit", 0, ~std::uint64_t(0))) study.frames_limit = *limit;
+  if (const auto count = keys.whole("repetitions", ranges::repetitions))
+    study.repetitions = std::uint32_t(*count);
+  if (const auto limit = keys.whole("frames_limit", ranges::any)) study.frames_limit = *limit;
   if (const auto continuous = keys.truth("continuous")) study.continuous = *continuous;
-  if (const auto every = keys.whole("oracle_every", 1, ~std::uint64_t(0))) study.oracle_every = *every;
+  if (const auto every = keys.whole("oracle_every", ranges::positive)) study.oracle_every = *every;
 }
 
 }  // namespace

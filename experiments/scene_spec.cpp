@@ -245,12 +245,12 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
       keys.fail("script", "the scene '" + base.builtin + "' records its own");
     base.script = read_script_spec(*script, place + ": script", folder);
   }
-  auto triangles = keys.wholes("triangles", 1, 1u << 27);
-  auto seeds = keys.wholes("seed", 0, ~std::uint64_t(0));
+  auto triangles = keys.wholes("triangles", ranges::triangles);
+  auto seeds = keys.wholes("seed", ranges::any);
   auto orders = keys.words("order");
   base.options.keyframes =
-      std::uint32_t(keys.whole("keyframes", 2, 1000000).value_or(base.options.keyframes));
-  base.options.obstacle_triangles = std::uint32_t(keys.whole("obstacle", 1, 1u << 27).value_or(0));
+      std::uint32_t(keys.whole("keyframes", ranges::keyframes).value_or(base.options.keyframes));
+  base.options.obstacle_triangles = std::uint32_t(keys.whole("obstacle", ranges::triangles).value_or(0));
   keys.finish();
   if (triangles.empty()) triangles = {base.options.triangles};
   if (seeds.empty()) seeds = {base.options.seed};
@@ -378,11 +378,11 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     io::take_as(mesh, body.as);
     const std::string source = body.shape.is_null() ? body.file.string() : mesh.name;
     if (mesh.degenerate_primitives > 0)
-      loaded.notes.push_back(source + ": " + std::to_string(mesh.degenerate_primitives) +
-                             " degenerate primitives at the first keyframe, kept");
+      loaded.notes.push_back(source + ": " + counted(mesh.degenerate_primitives, "degenerate primitive") +
+                             " at the first keyframe, kept");
     if (mesh.merged_keyframes > 0)
-      loaded.notes.push_back(source + ": " + std::to_string(mesh.merged_keyframes) +
-                             " keyframes repeat time and positions of the one before, merged");
+      loaded.notes.push_back(source + ": merged " + counted(mesh.merged_keyframes, "keyframe") +
+                             " with time and positions of the one before");
     if (mesh.added_keyframes > 0)
       loaded.notes.push_back(source + ": " + counted(mesh.added_keyframes, "keyframe") +
                              " added between those of the file, so that straight lines follow its turns and "

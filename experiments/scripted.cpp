@@ -75,6 +75,15 @@ ScriptSpec::Step read_step(const json& value, const std::string& place) {
   return step;
 }
 
+/// The text of a script's file; throws io::InputError that begins with `place` if it cannot be read.
+std::string text_of(const std::filesystem::path& file, const std::string& place) {
+  try {
+    return io::read_file(file);
+  } catch (const io::InputError& problem) {
+    throw io::InputError(place + ": " + problem.what());
+  }
+}
+
 }  // namespace
 
 ScriptSpec read_script_spec(const json& value, const std::string& place,
@@ -82,7 +91,7 @@ ScriptSpec read_script_spec(const json& value, const std::string& place,
   if (value.is_string()) {
     const std::filesystem::path said = value.get<std::string>();
     const std::filesystem::path file = said.is_absolute() || folder.empty() ? said : folder / said;
-    const json inner = parse_json(io::read_file(file), file.string());
+    const json inner = parse_json(text_of(file, place), file.string());
     if (inner.is_string()) throw io::InputError(file.string() + ": expected the steps of a script");
     return read_script_spec(inner, file.string(), file.parent_path());
   }

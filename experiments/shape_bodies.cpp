@@ -13,7 +13,7 @@ namespace {
 using scenes::Point;
 
 std::uint32_t triangles(JsonReader& keys) {
-  return std::uint32_t(keys.whole("triangles", 1, 1u << 27).value_or(2000));
+  return std::uint32_t(keys.whole("triangles", ranges::triangles).value_or(2000));
 }
 
 Point point(JsonReader& keys, const std::string& key, const Point& otherwise) {
@@ -85,7 +85,7 @@ io::AnimatedMesh waving_sheet(JsonReader& keys) {
 }
 
 io::AnimatedMesh random_soup(JsonReader& keys) {
-  const std::uint64_t seed = keys.whole("seed", 0, ~std::uint64_t(0)).value_or(1);
+  const std::uint64_t seed = keys.whole("seed", ranges::any).value_or(1);
   return scenes::random_soup(triangles(keys), seed, keyframes(keys, 60), rate(keys));
 }
 

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <cstdio>
 #include <map>
 #include <memory>
 #include <set>
@@ -11,6 +10,7 @@
 #include "experiments/contact_measurement.hpp"
 #include "experiments/environment.hpp"
 #include "experiments/machine.hpp"
+#include "experiments/output.hpp"
 #include "experiments/progress.hpp"
 #include "experiments/record.hpp"
 #include "experiments/results.hpp"
@@ -66,8 +66,7 @@ class Runner {
     if (plan.targets.empty()) return;
     const json rows = target_rows(plan, groups_);
     if (store_) write_targets(store_->folder(), rows);
-    std::printf("%s\n", targets_table(rows).c_str());
-    std::fflush(stdout);
+    print(targets_table(rows) + "\n");
   }
 
   StudyOutcome outcome() const { return outcome_; }
@@ -89,9 +88,20 @@ class Runner {
     progress_.clear();
   }
 
+  /// A scene of one body has times, but its query has nothing to find, which is seldom meant.
+  template <class S>
+  void warn_of_no_pairs(const Scene<S>& scene) {
+    if (!scene.pairs.empty()) return;
+    note("warning: " + scene.name +
+         " has one body, so there are no pairs of bodies, and nothing is found or compared; pairs within it "
+         "are "
+         "asked for by --self (in a plan: \"self\": true)");
+  }
+
   template <class S>
   void scene(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded) {
     const Scene<S> scene = assemble<S>(loaded);
+    warn_of_no_pairs(scene);
     const PlanScript<S> script = script_of(scene, loaded, making_);
     if (study.continuous) {
       contact_group(study, contestants, loaded, scene, script);
@@ -199,8 +209,8 @@ class Runner {
       records.push_back(std::move(record));
     }
     if (skipped > 0)
-      note(title + ", " + scalar + ": " + std::to_string(skipped) + " of " + std::to_string(records.size()) +
-           " configurations are in the results already, not measured again");
+      note(title + ", " + scalar + ": " + std::to_string(skipped) + " of " +
+           counted(records.size(), "configuration") + " in the results already, not measured again");
     play_all(measurement, study.repetitions, title, scalar);
     for (std::size_t i = 0; i < measurement.size(); ++i) {
       json& record = records[record_of[i]];
@@ -213,8 +223,7 @@ class Runner {
     outcome_.skipped += skipped;
     groups_.push_back({about_scene, records});
     progress_.clear();
-    std::printf("%s\n", results_table(records).c_str());
-    std::fflush(stdout);
+    print(results_table(records) + "\n");
   }
 
   template <class M>
@@ -281,6 +290,7 @@ StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::
   std::vector<std::string> notes;
   for (const Study& study : plan.studies)
     contestants.push_back(expand(study.strategies, study.params, study.builder, notes));
+  for (const auto& list : contestants) try_parameters(list);
   check_target_contestants(plan, contestants);
   for (const std::string& text : std::set<std::string>(notes.begin(), notes.end())) say("note: " + text);
   Runner runner(harness, out);

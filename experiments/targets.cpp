@@ -73,7 +73,7 @@ Target read_target(const json& value, const std::string& place) {
   target.scalar = needed_word(keys, "scalar");
   if (target.scalar != "float" && target.scalar != "double")
     keys.fail("scalar", "expected float or double, got '" + target.scalar + "'");
-  target.per_keyframe = std::uint32_t(needed(keys, "l", keys.whole("l", 1, 1000000)));
+  target.per_keyframe = std::uint32_t(needed(keys, "l", keys.whole("l", ranges::frames_per_keyframe)));
   target.at_least = needed(keys, "at_least", keys.number("at_least"));
   target.aim = needed(keys, "aim", keys.number("aim"));
   if (target.at_least <= 0) keys.fail("at_least", fmt::format("must be above 0, got {}", target.at_least));
@@ -182,7 +182,7 @@ void check_selector(const Plan& plan, const TargetSelector& selector, const std:
   if (entry == nullptr) {
     if (asked_for_if_there(plan, selector.strategy)) return;
     try {
-      find_strategy(selector.strategy);
+      strategy_named(selector.strategy);
     } catch (const ConfigError& problem) {
       throw io::InputError(place + ": strategy: " + problem.what());
     }

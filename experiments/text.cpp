@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "experiments/io/bytes.hpp"
+
 namespace kbvh::experiments {
 
 std::vector<std::string> split(std::string_view text, char separator) {
@@ -27,7 +29,18 @@ std::string joined(const std::vector<std::string>& words, std::string_view separ
 }
 
 std::string counted(std::uint64_t count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+  return std::to_string(count) + " " + (count == 1 ? noun : plural(noun));
+}
+
+std::string plural(const std::string& noun) {
+  const auto ends = [&](std::string_view ending) { return noun.ends_with(ending); };
+  const auto stem = [&](std::size_t without) { return noun.substr(0, noun.size() - without); };
+  const bool vowel_before_y =
+      noun.size() > 1 && std::string_view("aeiou").find(noun[noun.size() - 2]) != std::string_view::npos;
+  if (ends("y") && !vowel_before_y) return stem(1) + "ies";
+  if (ends("vertex")) return stem(2) + "ices";
+  if (ends("s") || ends("x") || ends("ch") || ends("sh")) return noun + "es";
+  return noun + "s";
 }
 
 std::optional<double> parse_number(std::string_view text) {
@@ -101,6 +114,15 @@ std::optional<std::string> nearest_of(std::string_view word, const std::vector<s
   }
   if (nearest == nullptr && continuations == 1) nearest = continued;
   return nearest == nullptr ? std::nullopt : std::optional(*nearest);
+}
+
+std::string no_such(const std::string& kind, std::string_view word, const std::vector<std::string>& known,
+                    const std::string& otherwise) {
+  constexpr std::size_t line = 120;
+  const std::string all = joined(known);
+  const std::string begin = "there is no " + kind + " " + io::printable(word), end = suggestion(word, known);
+  if (all.size() <= line || otherwise.empty()) return begin + "; known are " + all + end;
+  return begin + (end.empty() ? "; " + otherwise : end);
 }
 
 std::string suggestion(std::string_view word, const std::vector<std::string>& known) {

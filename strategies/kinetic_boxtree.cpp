@@ -2,6 +2,7 @@
 // other sides inherited, valid at every time, updated at events only; parts that have degenerated can be
 // rebuilt.
 
+#include <cmath>
 #include <numeric>
 #include <variant>
 
@@ -14,6 +15,15 @@
 namespace kbvh {
 namespace {
 
+/// The parameter check_every. Throws ConfigError unless it is a whole number that a counter can reach.
+std::uint64_t chosen_frames_per_check(const Params& params) {
+  const double wanted = params.number("check_every");
+  if (!(wanted <= 1e15) || wanted != std::floor(wanted))
+    throw ConfigError("kinetic_boxtree: check_every must be a whole number from 1 to 1e15, got " +
+                      params.word("check_every"));
+  return std::uint64_t(wanted);
+}
+
 template <class S, class Count>
 class KineticBox final : public Strategy<S> {
  public:
@@ -25,7 +35,7 @@ class KineticBox final : public Strategy<S> {
         leaf_boxes_(params.word("leaf_boxes") == "tight" ? LeafBoxes::tight : LeafBoxes::inherited),
         rebuilds_(params.word("rebuild") != "never"),
         threshold_(params.number("degradation")),
-        frames_per_check_(std::uint64_t(params.number("check_every"))) {
+        frames_per_check_(chosen_frames_per_check(params)) {
     if (rebuilds_) method_ = build_method(params.word("rebuild"));
     for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
     if (rebuilds_) degradations_.resize(topologies.size());

@@ -8,6 +8,7 @@
 #include "core/geometry/predicates.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/stress/family_parts.hpp"
+#include "experiments/text.hpp"
 
 namespace kbvh::experiments::stress {
 
@@ -461,12 +462,12 @@ const std::vector<Family>& families() {
 }
 
 const Family& find_family(const std::string& name) {
-  std::string known;
+  std::vector<std::string> known;
   for (const Family& family : families()) {
     if (family.name == name) return family;
-    known += (known.empty() ? "" : ", ") + family.name;
+    known.push_back(family.name);
   }
-  throw io::InputError("there is no family '" + name + "'; families are " + known);
+  throw io::InputError(no_such("family", name, known, "`kbvh stress --list` shows them"));
 }
 
 StressScene make_scene(const Family& family, const FamilySetting& setting) {

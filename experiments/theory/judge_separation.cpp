@@ -99,12 +99,16 @@ Claim judge_list_size(const std::vector<ListSizeRun>& sizes) {
   for (const ListSizeRun& run : sizes) families[run.scene].push_back(&run);
   std::vector<std::string> exponents, faster;
   double most = 0;
-  for (const auto& [scene, runs] : families) {
+  for (auto& [scene, runs] : families) {
+    std::sort(runs.begin(), runs.end(), [](auto a, auto b) { return a->polygons < b->polygons; });
     std::vector<double> m, list;
     for (const ListSizeRun* run : runs) {
+      most = std::max(most, double(run->list) / double(run->polygons));
+      // Requests below a shape's smallest size make the same scene, which is one point; none has no
+      // logarithm.
+      if (run->list == 0 || (!m.empty() && m.back() == double(run->polygons))) continue;
       m.push_back(double(run->polygons));
       list.push_back(double(run->list));
-      most = std::max(most, double(run->list) / double(run->polygons));
     }
     if (m.size() < 4) continue;
     const PowerFit fit = fit_power(m, list);
@@ -114,12 +118,12 @@ Claim judge_list_size(const std::vector<ListSizeRun>& sizes) {
     exponents.push_back(fmt::format("{} {:.2f} ({:.2f} to {:.2f})", scene, fit.exponent, fit.low, fit.high));
     if (fit.low > 1 + tolerance) faster.push_back(scene);
   }
-  if (exponents.empty()) return undecided(claim, "No list was made at four sizes or more.");
+  if (exponents.empty()) return undecided(claim, "No list was made at four different sizes or more.");
   claim.criteria.push_back({"scenes that grow faster", double(faster.size()), Relation::at_most,
                             double(exponents.size()) - 1, 0, always});
   claim.measured = "exponents: " + joined(exponents, "; ");
   claim.why = fmt::format("With m polygons in all, the list has at most {:.3g} m entries, and {}.", most,
-                          faster.empty() ? "in none of " + std::to_string(exponents.size()) + " families" +
+                          faster.empty() ? "in none of " + counted(exponents.size(), "family") +
                                                " does it grow significantly faster than m"
                                          : "it grows significantly faster than m in " + joined(faster));
   return claim;

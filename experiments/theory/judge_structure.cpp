@@ -106,10 +106,10 @@ Claim judge_compact(const std::vector<CountRun>& counts) {
       fmt::format("at most {:.3g} events per node on average, {} at one; {} to {} bytes per polygon", most,
                   of_node, number(std::round(fewest_bytes)), number(std::round(most_bytes)));
   claim.why = fmt::format(
-      "Over {} in {} families the queue never held more than {:.3g} events per node and no node had more "
+      "Over {} in {} the queue never held more than {:.3g} events per node and no node had more "
       "than {}; between the sizes of a family bytes per polygon vary by a factor of at most {:.3f}, {} "
       "linear space.",
-      counted(counts.size(), "clip"), scene_count(counts), most, of_node, spread,
+      counted(counts.size(), "clip"), counted(scene_count(counts), "family"), most, of_node, spread,
       spread <= 1.1 ? "which is" : "which is not");
   return claim;
 }

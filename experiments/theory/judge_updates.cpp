@@ -39,15 +39,19 @@ std::vector<GrowthFit> fit_growth(const std::vector<CountRun>& counts, std::size
     GrowthFit fit;
     fit.scene = scene;
     std::vector<double> x, y;
+    bool all_with_events = true;
     for (const CountRun* run : runs) {
-      if (run->events == 0) break;
+      // Shapes have a smallest size: requests below it make the same scene, which is one point.
+      if (!fit.vertices.empty() && fit.vertices.back() == run->vertices) continue;
+      all_with_events = all_with_events && run->events > 0;
+      if (!all_with_events) break;
       fit.triangles.push_back(run->triangles);
       fit.vertices.push_back(run->vertices);
       fit.events.push_back(run->events);
       x.push_back(n_log_n(double(run->vertices)));
       y.push_back(double(run->events));
     }
-    if (x.size() < std::max<std::size_t>(fewest, 3) || x.size() < runs.size()) continue;
+    if (x.size() < std::max<std::size_t>(fewest, 3) || !all_with_events) continue;
     const PowerFit power = fit_power(x, y);
     const ProportionalFit line = fit_proportional(x, y);
     fit.exponent = power.exponent, fit.low = power.low, fit.high = power.high;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <tuple>
 
 #include "experiments/contestants.hpp"
 #include "experiments/json_reader.hpp"
@@ -52,19 +53,46 @@ TEST(Text, Assignments) {
   EXPECT_FALSE(parse_assignment("=value"));
 }
 
+TEST(Text, Counts) {
+  for (const auto& [count, noun, text] :
+       std::vector<std::tuple<std::uint64_t, std::string, std::string>>{{0, "frame", "0 frames"},
+                                                                        {1, "frame", "1 frame"},
+                                                                        {1, "query", "1 query"},
+                                                                        {2, "query", "2 queries"},
+                                                                        {3, "body", "3 bodies"},
+                                                                        {2, "key", "2 keys"},
+                                                                        {1, "vertex", "1 vertex"},
+                                                                        {4, "vertex", "4 vertices"},
+                                                                        {2, "mesh", "2 meshes"},
+                                                                        {2, "box", "2 boxes"},
+                                                                        {2, "control net", "2 control nets"}})
+    EXPECT_EQ(counted(count, noun), text);
+}
+
+TEST(Text, UnknownNames) {
+  EXPECT_EQ(no_such("scene", "shrit", {"shirt", "dress"}),
+            "there is no scene 'shrit'; known are shirt, dress; did you mean 'shirt'?");
+  EXPECT_EQ(no_such("scene", "cloth", {"shirt", "dress"}),
+            "there is no scene 'cloth'; known are shirt, dress");
+  const std::vector<std::string> many(30, "long_name");
+  EXPECT_EQ(no_such("scene", "cloth", many, "`x` shows them"), "there is no scene 'cloth'; `x` shows them");
+  EXPECT_EQ(no_such("scene", "long_nam", many, "`x` shows them"),
+            "there is no scene 'long_nam'; did you mean 'long_name'?");
+}
+
 TEST(Text, NearestNames) {
-  const std::vector<std::string> known{"bottom_up", "bottom_up_budget", "top_down", "sphere", "uv_sphere",
-                                       "interval_join", "l"};
-  for (const auto& [word, meant] : std::vector<std::pair<std::string, std::string>>{
-           {"botom_up", "bottom_up"},
-           {"bottom-up", "bottom_up"},
-           {"Bottom_Up", "bottom_up"},
-           {"topdown", "top_down"},
-           {"shpere", "sphere"},
-           {"spere", "sphere"},
-           {"bottom_up", "bottom_up"},
-           {"interval", "interval_join"},
-           {"L", "l"}})
+  const std::vector<std::string> known{"bottom_up", "bottom_up_budget", "top_down", "sphere",
+                                       "uv_sphere", "interval_join",    "l"};
+  for (const auto& [word, meant] :
+       std::vector<std::pair<std::string, std::string>>{{"botom_up", "bottom_up"},
+                                                        {"bottom-up", "bottom_up"},
+                                                        {"Bottom_Up", "bottom_up"},
+                                                        {"topdown", "top_down"},
+                                                        {"shpere", "sphere"},
+                                                        {"spere", "sphere"},
+                                                        {"bottom_up", "bottom_up"},
+                                                        {"interval", "interval_join"},
+                                                        {"L", "l"}})
     EXPECT_EQ(nearest_of(word, known).value_or("nothing"), meant) << word;
   for (const char* word : {"", "x", "cloth", "bo", "rebuild", "/tmp/mesh.obj"})
     EXPECT_FALSE(nearest_of(word, known)) << word << ": " << *nearest_of(word, known);
@@ -121,7 +149,8 @@ TEST(Plan, ErrorsNameFileKeyAndValue) {
   EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
             "p.json: there is no key 'repetition'; known are builder, continuous, description, frames_limit, "
             "l, name, "
-            "oracle_every, params, repetitions, scalars, scenes, strategies, studies, targets");
+            "oracle_every, params, repetitions, scalars, scenes, strategies, studies, targets; did you mean "
+            "'repetitions'?");
   EXPECT_TRUE(contains(plan_complaint("{\n  \"scenes\": ]\n}"), "p.json: line 2, column 13"));
   EXPECT_TRUE(contains(plan_complaint("[]"), "p.json: expected an object"));
   EXPECT_TRUE(contains(plan_complaint("{}"), "p.json: scenes: is missing"));
@@ -268,8 +297,9 @@ TEST(Contestants, WrongUseIsRefused) {
   const auto refused = [&](const std::string& id, const Sweep& params, const BuilderRequest& builder) {
     return complaint<ConfigError>([&] { expand({{id, {}, {}}}, params, builder, notes); });
   };
-  EXPECT_TRUE(contains(refused("bottom_upp", {}, {}), "there is no strategy 'bottom_upp'; known are "));
-  EXPECT_TRUE(contains(refused("family:none", {}, {}), "no strategy of the family 'none'"));
+  EXPECT_TRUE(contains(refused("bottom_upp", {}, {}),
+                       "there is no strategy 'bottom_upp'; did you mean 'bottom_up'?"));
+  EXPECT_TRUE(contains(refused("family:none", {}, {}), "there is no family of strategies 'none'"));
   EXPECT_TRUE(contains(refused("bottom_up", {{"speed", {"1"}}}, {}), "'speed' belongs to none"));
   EXPECT_TRUE(contains(refused("bottom_up", {{"rebuild.x", {"1"}}}, {}), "'rebuild.x' belongs to none"));
   EXPECT_TRUE(contains(refused("bottom_up_period", {}, {{}, {8}, {}}), "nodes of width 8"));

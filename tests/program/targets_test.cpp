@@ -124,9 +124,10 @@ TEST(Targets, ScenesMustBeMeasuredAndToldApart) {
 }
 
 TEST(Targets, SidesMustBeMeasuredTogether) {
-  EXPECT_NE(with("/numerator/strategy", "nobody")
-                .find("p.json: targets[0]: numerator: strategy: there is no strategy 'nobody'; known are"),
-            std::string::npos);
+  EXPECT_NE(
+      with("/numerator/strategy", "nobody")
+          .find("p.json: targets[0]: numerator: strategy: there is no strategy 'nobody'; `kbvh list` shows"),
+      std::string::npos);
   EXPECT_EQ(with("/numerator/strategy", "rebuild"),
             "p.json: targets[0]: no study has both rebuild and bottom_up on 'sheet' in float at l = 2");
   EXPECT_EQ(with("/denominator/builder", {{"leaf_size", 16}, {"width", {2, 4}}}),

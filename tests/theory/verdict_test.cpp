@@ -168,6 +168,13 @@ TEST(Verdict, NumberOfEvents) {
   };
   ASSERT_EQ(fit_growth(good, 6).size(), 1u);
   EXPECT_TRUE(fit_growth(good, 7).empty());
+  // Shapes have a smallest size: two requests below it are one size, in whatever order they come.
+  const std::vector<CountRun> same(6, count_run(250));
+  EXPECT_TRUE(fit_growth(same, 6).empty());
+  std::vector<CountRun> repeated = good;
+  repeated.insert(repeated.begin(), count_run(8000));
+  ASSERT_EQ(fit_growth(repeated, 6).size(), 1u);
+  EXPECT_EQ(fit_growth(repeated, 6)[0].exponent, fit_growth(good, 6)[0].exponent);
   expect_flip(good, holds, fails, judge,
               [](CountRun& r) { r.values = std::uint64_t(2 * r.breakpoint_bound); });
   ExactRun over = exact_run();
@@ -273,6 +280,10 @@ TEST(Verdict, SeparationLists) {
   for (std::size_t i = 0; i < 4; ++i) sizes[i].list *= sizes[i].polygons;
   EXPECT_EQ(judge_list_size(sizes).verdict(), fails);
   EXPECT_EQ(judge_list_size({sizes[0]}).verdict(), Verdict::not_decided);
+  const std::vector<ListSizeRun> same(6, sizes[0]);
+  EXPECT_EQ(judge_list_size(same).verdict(), Verdict::not_decided);
+  for (ListSizeRun& run : sizes) run.list = 0;
+  EXPECT_EQ(judge_list_size(sizes).verdict(), Verdict::not_decided);
 }
 
 // ---- Constructed scenes ----------------------------------------------------------------------------------

@@ -1,0 +1,378 @@
+// Options of every subcommand: what is wrong is refused in one sentence, and nothing that is printed gets
+// lost.
+#include <cstdlib>
+#include <map>
+#include <sstream>
+
+#include "binary.hpp"
+#include "experiments/program.hpp"
+
+namespace kbvh::experiments {
+namespace {
+
+/// What an option takes, and so what it must refuse.
+enum class Kind {
+  number,  ///< whole numbers, lists of them, or a time: all nonsense
+  names,   ///< words or files that must exist: all nonsense
+  free,    ///< a folder or name of the user's own: only empty values, forgotten ones, repeated ones
+  several  ///< of these any number is right: only empty and forgotten ones
+};
+
+struct Option {
+  std::string name;
+  Kind kind;
+  std::string right;  ///< a value that is fine
+};
+
+const std::vector<Option> study_options{{"--scene", Kind::names, "turning_box"},
+                                        {"--body", Kind::several, "sphere"},
+                                        {"--clip", Kind::names, "Run"},
+                                        {"--name", Kind::free, "mine"},
+                                        {"--triangles", Kind::number, "20"},
+                                        {"--obstacle", Kind::number, "20"},
+                                        {"--keyframes", Kind::number, "3"},
+                                        {"--seed", Kind::number, "1"},
+                                        {"--script", Kind::names, "script"},
+                                        {"--order", Kind::names, "given"},
+                                        {"--strategies", Kind::names, "all"},
+                                        {"--param", Kind::names, "threads=1"},
+                                        {"--builder", Kind::names, "sah"},
+                                        {"--width", Kind::number, "8"},
+                                        {"--leaf-size", Kind::number, "4"},
+                                        {"--l", Kind::number, "10"},
+                                        {"--scalar", Kind::names, "float"},
+                                        {"--repetitions", Kind::number, "3"},
+                                        {"--frames-limit", Kind::number, "3"},
+                                        {"--oracle-every", Kind::number, "3"},
+                                        {"--out", Kind::free, "out"},
+                                        {"--plan", Kind::names, "plan.json"},
+                                        {"--study", Kind::several, "small"}};
+
+const std::map<std::string, std::vector<Option>> all_options{
+    {"list", {}},
+    {"run", study_options},
+    {"bench", study_options},
+    {"report", {{"--out", Kind::free, "out"}, {"--title", Kind::free, "mine"}}},
+    {"scene",
+     {{"--triangles", Kind::number, "20"},
+      {"--obstacle", Kind::number, "20"},
+      {"--keyframes", Kind::number, "3"},
+      {"--seed", Kind::number, "1"},
+      {"--full-triangles", Kind::number, "20"},
+      {"--frame", Kind::number, "1"},
+      {"--out", Kind::free, "out"}}},
+    {"theory",
+     {{"--scenes", Kind::names, "turning_box"},
+      {"--sizes", Kind::number, "20"},
+      {"--keyframes", Kind::number, "3"},
+      {"--exact-limit", Kind::number, "20"},
+      {"--instants", Kind::number, "20"},
+      {"--out", Kind::free, "out"}}},
+    {"stress",
+     {{"--strategies", Kind::names, "all"},
+      {"--families", Kind::names, "tiny"},
+      {"--scenes", Kind::number, "1"},
+      {"--seed", Kind::number, "1"},
+      {"--scalars", Kind::names, "float"},
+      {"--l", Kind::number, "1"},
+      {"--param", Kind::several, "threads=1"},
+      {"--many-keyframes", Kind::number, "100"},
+      {"--seconds", Kind::number, "1"},
+      {"--repro", Kind::names, "repro.json"},
+      {"--out", Kind::free, "out"}}},
+    {"ccd", {{"--seconds", Kind::number, "1"}, {"--out", Kind::free, "out"}}}};
+
+const std::vector<std::string> nonsense{"-1",
+                                        "99999999999999999999999999",
+                                        "1e30",
+                                        "-1e-30",
+                                        "nan",
+                                        "inf",
+                                        "-inf",
+                                        "abc",
+                                        "0x10",
+                                        " 3",
+                                        "3 ",
+                                        "+3",
+                                        "1,,2",
+                                        ",",
+                                        "{}",
+                                        "3;4",
+                                        "\x1b[31m",
+                                        "a\nb",
+                                        "\xc3\xa9",
+                                        std::string(1000, '9'),
+                                        std::string(1000, 'x')};
+
+/// The program inside of this process, in a folder of its own: a thousand starts of the binary would take
+/// minutes.
+class Options : public Binary {
+ protected:
+  void SetUp() override {
+    before_ = std::filesystem::current_path();
+    std::filesystem::current_path(folder_.path());
+    ::setenv("KBVH_CACHE", (folder_ / "cache").c_str(), 1);
+  }
+  void TearDown() override { std::filesystem::current_path(before_); }
+
+  Outcome called(const std::vector<std::string>& words) {
+    std::vector<const char*> arguments{"kbvh"};
+    for (const std::string& word : words) arguments.push_back(word.c_str());
+    arguments.push_back(nullptr);
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const int code = run_program(int(arguments.size()) - 1, arguments.data());
+    std::string err = testing::internal::GetCapturedStderr();
+    return {code, testing::internal::GetCapturedStdout(), err};
+  }
+
+  /// Expects exit code 2, and one short sentence that names the option, by its own name or its key in plans,
+  /// and the value.
+  void refused(const std::vector<std::string>& words, const std::string& option, const std::string& value) {
+    const Outcome outcome = called(words);
+    std::string command = "kbvh";
+    for (const std::string& word : words) command += " '" + word.substr(0, 50) + "'";
+    const std::string& said = outcome.err;
+    EXPECT_EQ(outcome.code, 2) << command << "\n" << said;
+    EXPECT_EQ(outcome.out, "") << command;
+    EXPECT_LE(said.size(), 301u) << command << "\n" << said;
+    EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << command << "\n" << said;
+    EXPECT_EQ(said.find('\x1b'), std::string::npos) << command;
+    EXPECT_EQ(said.find("internal error"), std::string::npos) << command << "\n" << said;
+    // Nonsense that would be cut or replaced is looked for by its second character.
+    const bool plain = value.size() < 30 && value.find_first_of("\x1b\n\xc3") == std::string::npos;
+    const bool named = said.find(plain ? value : value.substr(1, 1)) != std::string::npos;
+    EXPECT_TRUE(named || said.find(R"('?)") != std::string::npos) << command << "\n" << said;
+    std::string key = option.substr(option.find_first_not_of('-'));
+    for (char& c : key) c = c == '-' ? '_' : c;
+    if (key == "body" || key == "param" || key == "repro" || key == "plan" || key == "strategies") return;
+    // Keys of plans are singular or plural as they like.
+    if (key.size() > 4 && key.ends_with("ies")) key.resize(key.size() - 3);
+    if (key.size() > 2 && key.ends_with("s")) key.resize(key.size() - 1);
+    std::string text = said;
+    for (char& c : text) c = c == '-' ? '_' : c;
+    EXPECT_NE(text.find(key), std::string::npos) << command << "\n" << said;
+  }
+
+  std::filesystem::path before_;
+};
+
+TEST_F(Options, TableHasAll) {
+  for (const auto& [command, options] : all_options) {
+    std::istringstream help(called({command, "--help"}).out);
+    for (std::string line; std::getline(help, line);) {
+      const std::size_t at = line.find("--");
+      // Flags have no type after their name.
+      if (!line.starts_with("  --") || line.find(" TEXT") == std::string::npos) {
+        if (!line.starts_with("  --") ||
+            (line.find(" UINT") == std::string::npos && line.find(" FLOAT") == std::string::npos))
+          continue;
+      }
+      const std::string name = line.substr(at, line.find(' ', at) - at);
+      EXPECT_TRUE(
+          std::any_of(options.begin(), options.end(), [&](const Option& o) { return o.name == name; }))
+          << command << " " << name;
+    }
+  }
+}
+
+TEST_F(Options, NonsenseIsRefusedInOneSentence) {
+  for (const auto& [command, options] : all_options)
+    for (const Option& option : options) {
+      std::vector<std::string> words{command};
+      if (command == "scene") words.push_back("turning_box");
+      if (option.name == "--study") words.insert(words.end(), {"--plan", "plan.json"});
+      const auto with = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> all = words;
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+      };
+      refused(with({option.name, ""}), option.name, "empty");
+      refused(with({option.name + "="}), option.name, "empty");
+      refused(with({option.name, "--help-me"}), option.name, "--help-me");
+      if (option.kind != Kind::several && option.name != "--param")
+        refused(with({option.name, option.right, option.name, option.right}), option.name, option.right);
+      if (option.kind == Kind::free || option.kind == Kind::several) continue;
+      for (const std::string& value : nonsense) refused(with({option.name, value}), option.name, value);
+      refused(with({option.name + "=-1"}), option.name, "-1");
+    }
+}
+
+TEST_F(Options, NumbersAreReadStrictly) {
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"run", "--repetitions", "0"},
+       "--repetitions: expected a whole number from 1 to 10000, got '0' (try --help)"},
+      {{"run", "--l", "-1"}, "--l: expected a whole number from 1 to 1000000, got '-1' (try --help)"},
+      {{"run", "--seed", "-1"}, "--seed: expected a whole number from 0 to 2^64 - 1, got '-1' (try --help)"},
+      {{"run", "--l", "1,3,1"}, "--l: '1' is given twice (try --help)"},
+      {{"run", "--l", "1,,3"}, "--l: has an empty part between commas in '1,,3' (try --help)"},
+      {{"run", "--scalar", "float,float"}, "--scalar: 'float' is given twice (try --help)"},
+      {{"run", "--width", "3"}, "command line: builder: width: expected 2, 4 or 8, got 3"},
+      {{"ccd", "--seconds", "1e300"},
+       "--seconds: expected a number from 0 to 3600, got '1e300' (try --help)"},
+      {{"run", "--out", ""}, "--out: is empty, but needs a value (try --help)"},
+      {{"run", "--plan", ""}, "--plan: is empty, but needs a value (try --help)"},
+      {{"run", "--out", "--l", "3"}, "--out: needs a value, got the option '--l' (try --help)"},
+      {{"scene", "turning_box", "--frame", "3"},
+       "--frame: goes with --out FILE.obj, which shows one keyframe"},
+      {{"scene", "turning_box", "--triangles", "20", "--keyframes", "3", "--frame", "3", "--out", "a.obj"},
+       "--frame: 3 is not before the end, the scene has 3 keyframes, from 0"}};
+  for (const auto& [words, message] : cases) {
+    const Outcome outcome = called(words);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_EQ(outcome.err, "kbvh: " + message + "\n");
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
+  // Decimal, whatever it begins with, and up to the largest.
+  const Outcome right =
+      called({"run", "--print-plan", "--l", "010,2", "--l=3", "--seed", "18446744073709551615"});
+  ASSERT_EQ(right.code, 0) << right.err;
+  const json plan = json::parse(right.out);
+  EXPECT_EQ(plan.at("l"), json({10, 2, 3}));
+  EXPECT_EQ(plan.at("scenes")[0].at("seed"), json({~std::uint64_t(0)}));
+}
+
+TEST_F(Options, MisspeltNamesGetASuggestion) {
+  write_text(folder_ / "plan.json", R"({"scenes": "turning_box", "repetition": 3})");
+  write_text(folder_ / "params.json",
+             R"({"scenes": "turning_box", "strategies": [{"id": "bottom_up", "params": {"thread": 1}}]})");
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"rn"}, "'run'"},
+      {{"lst"}, "'list'"},
+      {{"run", "--triangle", "3"}, "'--triangles'"},
+      {{"run", "--strategy=bottom_up"}, "'--strategies'"},
+      {{"theory", "--size", "3"}, "'--sizes'"},
+      {{"run", "--leaf_size", "3"}, "'--leaf-size'"},
+      {{"run", "--scene", "tableclot"}, "'tablecloth'"},
+      {{"scene", "waving-sheet"}, "'waving_sheet'"},
+      {{"theory", "--scenes", "turning_boxes"}, "'turning_box'"},
+      {{"run", "--strategies", "botom_up"}, "'bottom_up'"},
+      {{"run", "--strategies", "family:kinetik"}, "'kinetic'"},
+      {{"stress", "--families", "spike"}, "'spikes'"},
+      {{"stress", "--strategies", "kinetic_abb"}, "'kinetic_aabb'"},
+      {{"run", "--strategies", "bottom_up", "--param", "thread=2"}, "'threads'"},
+      {{"run", "--strategies", "bottom_up", "--param", "bottom_up.thread=2"}, "'threads'"},
+      {{"run", "--plan", "params.json"}, "'threads'"},
+      {{"run", "--plan", "plan.json"}, "'repetitions'"}};
+  for (const auto& [words, name] : cases) {
+    const Outcome outcome = called(words);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_NE(outcome.err.find("did you mean " + name + "?"), std::string::npos) << outcome.err;
+    EXPECT_LE(outcome.err.size(), 301u) << outcome.err;
+  }
+  EXPECT_EQ(called({"run", "--strategies", "nobody"}).err,
+            "kbvh: there is no strategy 'nobody'; `kbvh list` shows them\n");
+}
+
+TEST_F(Options, ParametersAreRefusedBeforeAnythingIsMeasured) {
+  const std::pair<std::string, std::string> cases[] = {
+      {"interval_join.pieces=1.5", "pieces must be a whole number from 1 to 64, got 1.5"},
+      {"interval_join.remember_mb=1e7", "remember_mb must be from 0 to a million, got 1e7"},
+      {"bottom_up.threads=2.5", "threads must be a whole number from 1 to 1024, got 2.5"},
+      {"bottom_up_budget.box_tests=1e300", "box_tests must be a whole number from 1 to 1e15, got 1e300"},
+      {"bottom_up_budget.box_tests=2.5", "box_tests must be a whole number from 1 to 1e15, got 2.5"},
+      {"kinetic_boxtree.check_every=1e300", "check_every must be a whole number from 1 to 1e15, got 1e300"},
+      {"bottom_up.threads=", "threads"},
+      {"bottom_up.threads=nan", "'nan'"},
+      {"bottom_up.threads=1e999", "'1e999'"}};
+  for (const auto& [parameter, message] : cases) {
+    const Outcome outcome =
+        called({"run", "--scene", "turning_box", "--triangles", "20", "--keyframes", "3", "--strategies",
+                "rebuild,interval_join,bottom_up,bottom_up_budget,kinetic_boxtree", "--param", parameter});
+    EXPECT_EQ(outcome.code, 2) << parameter;
+    EXPECT_EQ(outcome.out, "") << parameter;
+    EXPECT_NE(outcome.err.find(message), std::string::npos) << outcome.err;
+  }
+}
+
+// ---- Standard output
+// ---------------------------------------------------------------------------------------
+
+const std::string clips = "--scene waving_sheet --triangles 100 --keyframes 3 --repetitions 1 ";
+
+class StandardOutput : public Binary {
+ protected:
+  /// Runs the program with its standard output somewhere else.
+  Outcome to(const std::string& redirection, const std::string& arguments) {
+    const std::string command = "cd '" + folder_.path().string() +
+                                "' && ( KBVH_CACHE=cache '" KBVH_PROGRAM "' " + arguments +
+                                "; echo $? >code ) 2>err " + redirection;
+    EXPECT_EQ(std::system(command.c_str()), 0) << command;
+    return {std::stoi(text_of_file(folder_ / "code")), "", text_of_file(folder_ / "err")};
+  }
+};
+
+TEST_F(StandardOutput, AFullDiskIsNoticed) {
+  std::filesystem::create_directories(folder_ / "vertex-face");
+  write_text(folder_ / "vertex-face" / "data.csv",
+             "1,4,1,4,1,1\n0,1,0,1,0,1\n1,1,0,1,0,1\n0,1,1,1,0,1\n"
+             "1,4,1,4,-1,1\n0,1,0,1,0,1\n1,1,0,1,0,1\n0,1,1,1,0,1\n");
+  // Shapes have a least number of triangles, so these sizes are one scene, whose growth cannot be fitted.
+  const std::string small_theory =
+      "theory --scenes turning_box,expanding_sphere --sizes 2,3,4,5,6,7 --keyframes 2";
+  const std::string cases[] = {"--help",
+                               "--version",
+                               "run --help",
+                               "list",
+                               "list --json",
+                               "run --print-plan",
+                               "bench --print-plan",
+                               "run " + tiny + "--strategies bottom_up --out out",
+                               "bench " + tiny + "--strategies bottom_up",
+                               "scene turning_box --triangles 20 --keyframes 2",
+                               "scene turning_box --triangles 20 --keyframes 2 --json",
+                               small_theory,
+                               "stress --list",
+                               "stress --scenes 1 --families tiny --strategies bottom_up --plain",
+                               "ccd . --seconds 0"};
+  for (const std::string& arguments : cases) {
+    const Outcome outcome = to(">/dev/full", arguments);
+    EXPECT_EQ(outcome.code, 3) << arguments;
+    EXPECT_NE(outcome.err.find("kbvh: standard output cannot be written: No space left on device\n"),
+              std::string::npos)
+        << arguments << "\n"
+        << outcome.err;
+  }
+  EXPECT_EQ(records().size(), 1u) << "what was measured is kept";
+  const Outcome report = to(">/dev/full", "report --out out");
+  EXPECT_EQ(report.code, 3) << report.err;
+  EXPECT_NE(report.err.find("kbvh: standard output cannot be written"), std::string::npos) << report.err;
+  EXPECT_EQ(report.err.find("Exception"), std::string::npos) << report.err;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / "report.html"));
+}
+
+TEST_F(StandardOutput, AClosedPipeLosesNothing) {
+  const Outcome outcome = to("| true", "run " + clips + "--l 1,2,3 --strategies bottom_up --out out");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err.find("standard output"), std::string::npos) << outcome.err;
+  EXPECT_EQ(records().size(), 3u);
+}
+
+TEST_F(StandardOutput, AClosedStreamIsNotAFileOfResults) {
+  const Outcome outcome = to(">&-", "run " + clips + "--l 1,2 --strategies bottom_up --out out");
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  EXPECT_NE(outcome.err.find("standard output cannot be written: Bad file descriptor"), std::string::npos)
+      << outcome.err;
+  EXPECT_EQ(records().size(), 2u);
+  EXPECT_EQ(kbvh("run " + clips + "--l 1,2 --strategies bottom_up --out out").code, 0);
+}
+
+TEST_F(Binary, ASceneWithoutPairsSaysSo) {
+  const Outcome alone =
+      kbvh("run --body sphere:triangles=20,step=0:0:0.1,keyframes=3 --strategies bottom_up --repetitions 1");
+  EXPECT_EQ(alone.code, 0);
+  EXPECT_NE(alone.err.find("has one body, so there are no pairs of bodies, and nothing is found or compared"),
+            std::string::npos)
+      << alone.err;
+  EXPECT_NE(alone.err.find("--self"), std::string::npos) << alone.err;
+  const Outcome rests =
+      kbvh("run --body sphere:triangles=20 --body box:triangles=12 --strategies bottom_up --repetitions 1");
+  EXPECT_EQ(rests.err, "");
+  const Outcome self = kbvh(
+      "run --self --body sphere:triangles=20,step=0:0:0.1,keyframes=3 --strategies bottom_up --repetitions "
+      "1");
+  EXPECT_EQ(self.err, "");
+}
+
+}  // namespace
+}  // namespace kbvh::experiments
