@@ -66,7 +66,8 @@ def main(arguments: list[str]) -> int:
             print(f"decided in {folder} only: {', '.join(claims)}")
     if found.open:
         print(f"decided in neither: {', '.join(found.open)}")
-    print(f"{len(found.same)} verdicts are the same, {len(found.different)} differ")
+    same, different = len(found.same), len(found.different)
+    print(f"{same} {'verdict is' if same == 1 else 'verdicts are'} the same, {different} {'differs' if different == 1 else 'differ'}")
     return 1 if found.different else 0
 
 

@@ -89,9 +89,10 @@ CLI::Option* add_texts(CLI::App& command, const std::string& name, std::vector<s
     target = given;
     return true;
   };
-  // An option takes one value each time; a positional argument has nothing that begins the next.
   CLI::Option* option = command.add_option(name, read, meaning)->take_all()->type_name("TEXT");
-  return option->expected(1, name.starts_with("-") ? 1 : many_values);
+  // An option takes one value each time; a positional argument has nothing that begins the next.
+  if (name.starts_with("-")) return option->expected(1);
+  return option->expected(1, many_values)->allow_extra_args();
 }
 
 CLI::Option* add_words(CLI::App& command, const std::string& name, std::vector<std::string>& target,

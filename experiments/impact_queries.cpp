@@ -72,7 +72,8 @@ std::optional<double> exact_quotient(const std::string& top, const std::string& 
 std::vector<fs::path> files_in(const fs::path& folder, const std::string& extension) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file() && entry.path().extension() == extension) files.push_back(entry.path());
+    if (std::error_code error; entry.is_regular_file(error) && entry.path().extension() == extension)
+      files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   return files;
 }
@@ -206,7 +207,11 @@ ImpactQuery FramePair::query(const Listed& pair) const {
   return query;
 }
 
-std::vector<ImpactQueries> find_impact_queries(const fs::path& path) {
+namespace {
+
+/// As `find_impact_queries`; `above` are the folders that `path` is in, so that a link to one of them ends
+/// nothing.
+std::vector<ImpactQueries> find_below(const fs::path& path, std::vector<fs::path>& above) {
   std::vector<ImpactQueries> found;
   if (!fs::exists(path)) io::fail(path, "", "does not exist");
   if (fs::is_directory(path) && is_frame_pair(path)) {
@@ -217,19 +222,35 @@ std::vector<ImpactQueries> find_impact_queries(const fs::path& path) {
         if (listed.kind == kind) found.back().queries.push_back(pair.query(listed));
     }
   } else if (fs::is_directory(path)) {
+    std::error_code error;  // of a link that leads nowhere, which is no folder
     std::vector<fs::path> inside;
     for (const auto& entry : fs::directory_iterator(path))
-      if (entry.is_directory() || entry.path().extension() == ".csv") inside.push_back(entry.path());
+      if (entry.is_directory(error) || entry.path().extension() == ".csv") inside.push_back(entry.path());
+    above.push_back(fs::canonical(path));
     std::sort(inside.begin(), inside.end());
-    for (const fs::path& next : inside)
-      for (ImpactQueries& queries : find_impact_queries(next)) {
+    for (const fs::path& next : inside) {
+      if (std::find(above.begin(), above.end(), fs::canonical(next)) != above.end()) continue;
+      for (ImpactQueries& queries : find_below(next, above)) {
         queries.name = path.filename().string() + "/" + queries.name;
         found.push_back(std::move(queries));
       }
+    }
+    above.pop_back();
   } else {
     found.push_back(read_impact_queries(path));
   }
   return found;
+}
+
+}  // namespace
+
+std::vector<ImpactQueries> find_impact_queries(const fs::path& path) {
+  std::vector<fs::path> above;
+  try {
+    return find_below(path, above);
+  } catch (const fs::filesystem_error& problem) {
+    io::fail(problem.path1(), "", problem.code().message());
+  }
 }
 
 }  // namespace kbvh::experiments

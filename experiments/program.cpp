@@ -57,8 +57,11 @@ std::string unexpected(const CLI::App& program) {
   for (const std::string& word : extras) {
     if (!word.starts_with("-")) continue;
     const std::string option = word.substr(0, word.find('='));
-    return name + " has no option " + io::printable(option) + suggestion(option, options_of(command)) +
-           " (try " + name + " --help)";
+    const std::vector<std::string> known = options_of(command);
+    if (std::find(known.begin(), known.end(), option) != known.end())
+      return option + " belongs behind the command, as in " + name + " " + option;
+    return name + " has no option " + io::printable(option) + suggestion(option, known) + " (try " + name +
+           " --help)";
   }
   return name + " cannot use the word " + io::printable(extras.empty() ? "" : extras.front()) + " (try " +
          name + " --help)";

@@ -213,6 +213,7 @@ TEST_F(Options, NumbersAreReadStrictly) {
       {{"run", "--out", ""}, "--out: is empty, but needs a value (try --help)"},
       {{"run", "--plan", ""}, "--plan: is empty, but needs a value (try --help)"},
       {{"run", "--out", "--l", "3"}, "--out: needs a value, got the option '--l' (try --help)"},
+      {{"--json", "list"}, "--json belongs behind the command, as in kbvh list --json"},
       {{"scene", "turning_box", "--frame", "3"},
        "--frame: goes with --out FILE.obj, which shows one keyframe"},
       {{"scene", "turning_box", "--triangles", "20", "--keyframes", "3", "--frame", "3", "--out", "a.obj"},
@@ -283,6 +284,26 @@ TEST_F(Options, ParametersAreRefusedBeforeAnythingIsMeasured) {
     EXPECT_EQ(outcome.out, "") << parameter;
     EXPECT_NE(outcome.err.find(message), std::string::npos) << outcome.err;
   }
+}
+
+TEST_F(Options, QueriesOfSeveralPathsAndOfFoldersThatHoldThemselves) {
+  const std::string one =
+      "1,4,1,4,1,1\n0,1,0,1,0,1\n1,1,0,1,0,1\n0,1,1,1,0,1\n1,4,1,4,-1,1\n0,1,0,1,0,1\n1,1,0,1,0,1\n0,1,1,1,0,"
+      "1\n";
+  std::filesystem::create_directories("all/vf");
+  write_text("all/vf/one.csv", one);
+  std::filesystem::create_directory_symlink("..", "all/vf/up");
+  for (const auto& [paths, files] : std::vector<std::pair<std::vector<std::string>, std::size_t>>{
+           {{"all"}, 1}, {{"all/vf/one.csv", "all"}, 2}}) {
+    std::vector<std::string> words{"ccd", "--seconds", "0", "--out", "out"};
+    words.insert(words.begin() + 1, paths.begin(), paths.end());
+    const Outcome outcome = called(words);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(json::parse(text_of_file("out/ccd.json")).at("files").size(), files) << outcome.err;
+  }
+  std::filesystem::remove("all/vf/up");
+  std::filesystem::create_directory_symlink("nowhere", "all/vf/nowhere");
+  EXPECT_EQ(called({"ccd", "all", "--seconds", "0"}).code, 0);
 }
 
 // ---- Standard output

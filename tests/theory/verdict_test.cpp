@@ -282,7 +282,7 @@ TEST(Verdict, SeparationLists) {
   EXPECT_EQ(judge_list_size({sizes[0]}).verdict(), Verdict::not_decided);
   const std::vector<ListSizeRun> same(6, sizes[0]);
   EXPECT_EQ(judge_list_size(same).verdict(), Verdict::not_decided);
-  for (ListSizeRun& run : sizes) run.list = 0;
+  for (ListSizeRun& size : sizes) size.list = 0;
   EXPECT_EQ(judge_list_size(sizes).verdict(), Verdict::not_decided);
 }
 
