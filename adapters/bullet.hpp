@@ -53,14 +53,13 @@ class Contestant : public Strategy<float> {
 
   Contestant(const SceneView<float>& scene, const SampledMotion<float>& motion)
       : Strategy<float>(scene, motion), moves_(scene.body_count()) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
-      moves_[body] = scene.moving(body);
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
-    }
   }
 
   void reset(double t) final {
     this->start_at(t);
+    for (std::uint32_t body = 0; body < moves_.size(); ++body) moves_[body] = this->scene_.moving(body);
     update_all();
     count_.table = {};
   }

@@ -132,7 +132,10 @@ class EmbreeRefit final : public Strategy<S> {
 
   void reset(double t) override {
     this->start_at(t);
-    for (BodyState& state : bodies_) update(state);
+    for (BodyState& state : bodies_) {
+      state.moves = this->scene_.moving(state.body);
+      update(state);
+    }
     count_.table = {};
   }
 

@@ -82,7 +82,10 @@ class Fcl final : public Strategy<S> {
 
   void reset(double t) override {
     this->start_at(t);
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
+      bodies_[body].moves = this->scene_.moving(body);
+      update(body);
+    }
     count_.table = {};
   }
 

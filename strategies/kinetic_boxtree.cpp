@@ -39,6 +39,7 @@ class KineticBox final : public Strategy<S> {
     this->start_at(t);
     on_forest([&](auto& forest) { forest.reset(t); });
     new_frame();
+    plans_changed_ = false;
     frames_ = 0;
     for (std::uint32_t body = 0; body < degradations_.size(); ++body)
       on_forest([&](auto& forest) {

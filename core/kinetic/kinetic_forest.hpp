@@ -20,12 +20,15 @@ class KineticForest {
   KineticForest(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, Count& count,
                 Observer observer = {})
       : clock_(plans_of(scene, motion)), queue_(clock_, slots_of(topologies)), count_(&count) {
+    if (scene.body_count() > Event::most_bodies)
+      throw std::length_error("a scene of " + std::to_string(scene.body_count()) +
+                              " bodies, but events number " + std::to_string(Event::most_bodies));
     std::uint32_t first_slot = 0;
     trees_.reserve(topologies.size());
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const auto slots = std::uint32_t(Tree::slot_count(topologies[body]));
-      trees_.emplace_back(std::move(topologies[body]), scene.primitives(body), std::uint16_t(body),
-                          first_slot, clock_, queue_, count, observer);
+      trees_.emplace_back(std::move(topologies[body]), scene.primitives(body), body, first_slot, clock_,
+                          queue_, count, observer);
       first_slot += slots;
     }
   }

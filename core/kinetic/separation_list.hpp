@@ -57,7 +57,7 @@ class SeparationList {
     std::uint32_t next[2], previous[2];  ///< among the pairs linked from a, and from b
     std::uint32_t place = none;          ///< among the overlapping leaves of the body pair
     std::uint32_t depth = 0;
-    std::uint16_t bodies = 0;  ///< index of the body pair
+    std::uint32_t bodies = 0;  ///< index of the body pair
     bool used = false, overlapping = false;
     bool dirty = false;  ///< has a node with other children, while a change of geometry is followed
   };
@@ -69,7 +69,7 @@ class SeparationList {
 
   /// An overlap that is over: of which body pair, and until when at the latest.
   struct EndedLeafPair {
-    std::uint16_t bodies;
+    std::uint32_t bodies;
     LeafPair leaf;
     double until;
   };
@@ -99,7 +99,7 @@ class SeparationList {
     time_ = t;
     for (auto& leaves : leaves_) leaves.clear();
     for (auto& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
-    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) {
+    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i) {
       roots_[i] = none;
       self_roots_[i].clear();
       if (both_have_nodes(i)) start_pair(i, Instant<S>::at(t));
@@ -165,13 +165,13 @@ class SeparationList {
     time_ = t;
     work_done_ = {};
     read_trees(forest);
-    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) remove_self_pairs(i);
+    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i) remove_self_pairs(i);
     remove_changed(nodes);
     for (const std::uint32_t slot : tops_) {
       work_.assign(1, slot);
       settle_new(now);
     }
-    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i)
+    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i)
       if (roots_[i] == none && self_roots_[i].empty() && both_have_nodes(i)) start_pair(i, now);
     std::sort(boxes.begin(), boxes.end());
     boxes.erase(std::unique(boxes.begin(), boxes.end()), boxes.end());
@@ -232,12 +232,12 @@ class SeparationList {
       if (own.first_pair.size() < own.topology->size()) own.first_pair.resize(own.topology->size(), none);
     }
   }
-  bool both_have_nodes(std::uint16_t bodies) const {
+  bool both_have_nodes(std::uint32_t bodies) const {
     return !bodies_[body_pairs_[bodies].first].topology->empty() &&
            !bodies_[body_pairs_[bodies].second].topology->empty();
   }
   /// Makes the list of a body pair that has none.
-  void start_pair(std::uint16_t bodies, const Instant<S>& now) {
+  void start_pair(std::uint32_t bodies, const Instant<S>& now) {
     if (body_pairs_[bodies].first == body_pairs_[bodies].second) {
       start_self_pairs(bodies, now);
       return;
@@ -249,7 +249,7 @@ class SeparationList {
   }
 
   /// Each two children of each inner node, in a block for each.
-  void start_self_pairs(std::uint16_t bodies, const Instant<S>& now) {
+  void start_self_pairs(std::uint32_t bodies, const Instant<S>& now) {
     const Topology& topology = *bodies_[body_pairs_[bodies].first].topology;
     std::vector<std::uint32_t> inner;
     if (!topology.nodes[0].is_leaf()) inner.push_back(0);
@@ -272,7 +272,7 @@ class SeparationList {
     settle_new(now);
   }
   /// Removes all pairs within a body, as far as there are any.
-  void remove_self_pairs(std::uint16_t bodies) {
+  void remove_self_pairs(std::uint32_t bodies) {
     for (const std::uint32_t block : self_roots_[bodies]) {
       for (std::uint32_t slot = block; slot < block + block_ && pairs_[slot].used; ++slot) {
         unsettle(slot);
@@ -321,7 +321,7 @@ class SeparationList {
     for (const std::uint32_t slot : tops_) unsettle(slot);
     for (const auto& changed : nodes)
       if (changed.gone) bodies_[changed.body].gone[changed.node] = 0;
-    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) {
+    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i) {
       const std::uint32_t root = roots_[i];
       if (root == none || both_have_nodes(i)) continue;
       // The body's last node was its root, so this pair is one of them, and the only one of its list.
@@ -380,7 +380,7 @@ class SeparationList {
     return std::uint32_t(block);
   }
 
-  void insert(std::uint32_t slot, std::uint16_t bodies, std::uint32_t a, std::uint32_t b,
+  void insert(std::uint32_t slot, std::uint32_t bodies, std::uint32_t a, std::uint32_t b,
               std::uint32_t father, std::uint32_t depth) {
     Pair& pair = pairs_[slot];
     pair = {};
