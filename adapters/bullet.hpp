@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/hierarchy/near_bodies.hpp"
 #include "core/registry.hpp"
 
 #ifdef BT_USE_DOUBLE_PRECISION
@@ -52,7 +53,9 @@ class Contestant : public Strategy<float> {
   static constexpr Foresight foresight = Foresight::none;
 
   Contestant(const SceneView<float>& scene, const SampledMotion<float>& motion)
-      : Strategy<float>(scene, motion), moves_(scene.body_count()) {
+      : Strategy<float>(scene, motion),
+        near_bodies_(scene.pairs(), scene.body_count()),
+        moves_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
   }
@@ -83,6 +86,7 @@ class Contestant : public Strategy<float> {
     count_.add(Counter::vertex_reads, 3 * primitives);
   }
 
+  NearBodies near_bodies_;
   std::vector<std::uint8_t> moves_;
   Count count_;
 };

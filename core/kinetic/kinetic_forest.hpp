@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "core/kinetic/event_queue.hpp"
@@ -56,13 +57,14 @@ class KineticForest {
 
   /// Follows changes of plans at t that the motion shows already; of each body's tree once.
   void plans_changed(double t, std::span<const PlanChange<S>> changes) {
-    for (std::uint32_t body = 0; body < trees_.size(); ++body) {
+    changes_.clear();
+    for (const PlanChange<S>& change : changes) changes_.emplace_back(change.body, change.vertex);
+    std::sort(changes_.begin(), changes_.end());
+    changes_.erase(std::unique(changes_.begin(), changes_.end()), changes_.end());
+    for (std::size_t i = 0; i < changes_.size();) {
+      const std::uint32_t body = changes_[i].first;
       changed_.clear();
-      for (const PlanChange<S>& change : changes)
-        if (change.body == body) changed_.push_back(change.vertex);
-      if (changed_.empty()) continue;
-      std::sort(changed_.begin(), changed_.end());
-      changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+      for (; i < changes_.size() && changes_[i].first == body; ++i) changed_.push_back(changes_[i].second);
       trees_[body].plans_changed(t, changed_);
     }
   }
@@ -80,6 +82,7 @@ class KineticForest {
     }
   }
 
+  std::uint32_t size() const { return std::uint32_t(trees_.size()); }
   Tree& tree(std::uint32_t body) { return trees_[body]; }
   const Tree& tree(std::uint32_t body) const { return trees_[body]; }
   Clock& clock() { return clock_; }
@@ -110,7 +113,8 @@ class KineticForest {
   Queue queue_;
   Count* count_;
   std::vector<Tree> trees_;
-  std::vector<std::uint32_t> changed_;  ///< vertices of one body
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> changes_;  ///< body, vertex
+  std::vector<std::uint32_t> changed_;                            ///< vertices of one body
 };
 
 }  // namespace kbvh

@@ -17,7 +17,7 @@ struct ListEdit {
   std::uint64_t decided = 0;  ///< decided anew: new ones, those with other children, those with other boxes
 };
 
-/// The separation list of kinetic incremental collision detection (Z&W s.7), for every body pair of a scene:
+/// The separation list of kinetic incremental collision detection (Z&W s.7), for body pairs of a scene:
 /// the pairs of boxes at which a simultaneous traversal would stop now, kept from event to event.
 ///
 /// The pairs form a tree: a pair's father is the pair of their fathers (a leaf against an inner node
@@ -39,6 +39,10 @@ struct ListEdit {
 /// Within one body, a node with itself always overlaps and needs no event: below it stand the pairs of two of
 /// its children, one for each two, which are roots of the tree of pairs; they keep the list at least as long
 /// as the tree has inner nodes. A leaf with itself is in no list.
+///
+/// Body pairs have numbers. A list of all pairs of a scene numbers them as the scene does; of many pairs
+/// those are entered that may meet (`enter`), and those that are apart can be taken out again (`leave`):
+/// their numbers are used again.
 ///
 /// Boxes are compared on the flight plans with the margin of OverlapClock: the list may hold a pair of boxes
 /// that are apart by some ulps, and misses none whose rounded boxes touch.
@@ -74,37 +78,69 @@ class SeparationList {
     double until;
   };
 
+  /// Which body pairs a list begins with.
+  enum class BodyPairs : std::uint8_t { all, none };
+
   template <class Forest>
-  SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count, int look_ahead)
-      : clock_(look_ahead), queue_(clock_, 0), count_(&count), leaves_(scene.pairs().size()) {
+  SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count, int look_ahead,
+                 BodyPairs pairs)
+      : clock_(look_ahead), queue_(clock_, 0), count_(&count) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const auto& tree = forest.tree(body);
       bodies_.push_back({&tree.topology(), nullptr, &forest.clock().plans(body), {}, {}});
       block_ = std::max(block_, tree.topology().width * tree.topology().width);
     }
     read_trees(forest);
-    for (const BodyPair& pair : scene.pairs()) body_pairs_.push_back(pair);
-    roots_.resize(body_pairs_.size(), none);
-    self_roots_.resize(body_pairs_.size());
+    if (pairs == BodyPairs::none) return;
+    for (const BodyPair& pair : scene.pairs()) number(pair);
   }
   SeparationList(const SeparationList&) = delete;
   SeparationList& operator=(const SeparationList&) = delete;
 
   /// Starts over at t by one traversal.
   void reset(double t) {
-    queue_.clear();
-    pairs_.clear();
-    free_blocks_.clear();
-    list_size_ = 0;
+    clear();
     time_ = t;
-    for (auto& leaves : leaves_) leaves.clear();
-    for (auto& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
-    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i) {
-      roots_[i] = none;
-      self_roots_[i].clear();
+    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i)
       if (both_have_nodes(i)) start_pair(i, Instant<S>::at(t));
-    }
   }
+
+  /// Enters a body pair at `now`, decided by one traversal; returns its number.
+  std::uint32_t enter(const BodyPair& pair, const Instant<S>& now) {
+    time_ = now.begin;
+    end_ = now.end;
+    const std::uint32_t bodies = number(pair);
+    if (both_have_nodes(bodies)) start_pair(bodies, now);
+    return bodies;
+  }
+  /// Takes out a pair of two bodies whose boxes are apart. Returns whether it did: not while its roots
+  /// overlap.
+  bool leave(std::uint32_t bodies) {
+    const std::uint32_t root = roots_[bodies];
+    if (root != none) {
+      if (pairs_[root].overlapping) return false;
+      list_changed(-1);
+      remove(root);
+      free_blocks_.push_back(root);
+      roots_[bodies] = none;
+    }
+    body_pairs_[bodies] = unused;
+    free_numbers_.push_back(bodies);
+    return true;
+  }
+  /// Takes out all body pairs.
+  void leave_all() {
+    clear();
+    body_pairs_.clear();
+    roots_.clear();
+    self_roots_.clear();
+    leaves_.clear();
+    free_numbers_.clear();
+  }
+  /// Numbers of body pairs, some of which may not be in use.
+  std::uint32_t body_pair_count() const { return std::uint32_t(body_pairs_.size()); }
+  bool is_entered(std::uint32_t bodies) const { return body_pairs_[bodies].first != unused.first; }
+  const BodyPair& body_pair(std::uint32_t bodies) const { return body_pairs_[bodies]; }
 
   bool due(double t) const { return !queue_.empty() && clock_.due(queue_.top(), t); }
   bool empty() const { return queue_.empty(); }
@@ -197,6 +233,7 @@ class SeparationList {
     ended_.clear();
     recording_ = true;
   }
+  bool is_recording() const { return recording_; }
   /// The overlaps that ended since `start_spans`; those that last are the leaf pairs.
   std::span<const EndedLeafPair> stop_spans() {
     recording_ = false;
@@ -211,10 +248,12 @@ class SeparationList {
             4;
     for (const auto& body : bodies_) total += body.first_pair.size() * 4 + body.gone.size();
     for (const auto& leaves : leaves_) total += leaves.capacity() * sizeof(LeafPair);
-    return total;
+    return total + body_pairs_.capacity() * (sizeof(BodyPair) + sizeof(leaves_[0]) + sizeof(self_roots_[0]));
   }
 
  private:
+  static constexpr BodyPair unused{none, none};
+
   struct BodyBoxes {
     const Topology* topology;
     const std::uint32_t* realisers;
@@ -232,8 +271,31 @@ class SeparationList {
       if (own.first_pair.size() < own.topology->size()) own.first_pair.resize(own.topology->size(), none);
     }
   }
+  void clear() {
+    queue_.clear();
+    pairs_.clear();
+    free_blocks_.clear();
+    list_size_ = 0;
+    for (auto& leaves : leaves_) leaves.clear();
+    for (auto& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
+    std::fill(roots_.begin(), roots_.end(), none);
+    for (auto& roots : self_roots_) roots.clear();
+  }
+  std::uint32_t number(const BodyPair& pair) {
+    if (!free_numbers_.empty()) {
+      const std::uint32_t bodies = free_numbers_.back();
+      free_numbers_.pop_back();
+      body_pairs_[bodies] = pair;
+      return bodies;
+    }
+    body_pairs_.push_back(pair);
+    roots_.push_back(none);
+    self_roots_.emplace_back();
+    leaves_.emplace_back();
+    return std::uint32_t(body_pairs_.size() - 1);
+  }
   bool both_have_nodes(std::uint32_t bodies) const {
-    return !bodies_[body_pairs_[bodies].first].topology->empty() &&
+    return is_entered(bodies) && !bodies_[body_pairs_[bodies].first].topology->empty() &&
            !bodies_[body_pairs_[bodies].second].topology->empty();
   }
   /// Makes the list of a body pair that has none.
@@ -533,7 +595,8 @@ class SeparationList {
   Queue<OverlapClock<S>> queue_;
   Count* count_;
   std::vector<BodyBoxes> bodies_;
-  std::vector<BodyPair> body_pairs_;
+  std::vector<BodyPair> body_pairs_;  ///< by number
+  std::vector<std::uint32_t> free_numbers_;
   std::uint32_t block_ = 4;  ///< most children of a pair
   std::vector<Pair> pairs_;  ///< in blocks of siblings; the used ones come first in a block
   std::vector<std::uint32_t> free_blocks_;
