@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/contract/registry.hpp"
+#include "core/families/wide/near_bodies.hpp"
 
 #ifdef BT_USE_DOUBLE_PRECISION
 #error "these adapters are for Bullet in float"
@@ -52,15 +53,16 @@ class Contestant : public Strategy<float> {
   static constexpr Foresight foresight = Foresight::none;
 
   Contestant(const SceneView<float>& scene, const SampledMotion<float>& motion)
-      : Strategy<float>(scene, motion), moves_(scene.body_count()) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
-      moves_[body] = scene.moving(body);
+      : Strategy<float>(scene, motion),
+        near_bodies_(scene.pairs(), scene.body_count()),
+        moves_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
-    }
   }
 
   void reset(double t) final {
     this->start_at(t);
+    for (std::uint32_t body = 0; body < moves_.size(); ++body) moves_[body] = this->scene_.moving(body);
     update_all();
     count_.table = {};
   }
@@ -84,6 +86,7 @@ class Contestant : public Strategy<float> {
     count_.add(Counter::vertex_reads, 3 * primitives);
   }
 
+  NearBodies near_bodies_;
   std::vector<std::uint8_t> moves_;
   Count count_;
 };

@@ -45,12 +45,24 @@ class BulletDbvt final : public Contestant<Count> {
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     hits_.out = &out;
-    for (const BodyPair& pair : this->scene_.pairs()) {
+    std::uint64_t tests = 0;
+    const auto box_of = [&](std::uint32_t body) {
+      Box<double> box;
+      const btDbvtNode* root = bodies_[body].tree.m_root;
+      for (int axis = 0; axis < 3 && root != nullptr; ++axis) {
+        box.lower[axis] = double(root->volume.Mins()[axis]);
+        box.upper[axis] = double(root->volume.Maxs()[axis]);
+      }
+      return box;
+    };
+    for (const std::uint32_t i : this->near_bodies_.find(box_of, tests)) {
+      const BodyPair& pair = this->scene_.pairs()[i];
       hits_.bodies = pair;
       // As collideTT, with a stack that stays allocated.
       bodies_[pair.first].tree.collideTTpersistentStack(bodies_[pair.first].tree.m_root,
                                                         bodies_[pair.second].tree.m_root, hits_);
     }
+    this->count_.add(Counter::box_tests, tests);
     return {};
   }
 

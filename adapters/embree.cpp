@@ -43,6 +43,7 @@
 
 #include "core/base/assert.hpp"
 #include "core/contract/registry.hpp"
+#include "core/families/wide/near_bodies.hpp"
 
 namespace kbvh {
 namespace {
@@ -116,7 +117,8 @@ class EmbreeRefit final : public Strategy<S> {
               const Params& params)
       : Strategy<S>(scene, motion),
         refits_(params.word("geometry") == "triangles" ? Refits::triangles : Refits::boxes),
-        bodies_(scene.body_count()) {
+        bodies_(scene.body_count()),
+        near_bodies_(scene.pairs(), scene.body_count()) {
     const KeepFloatingPointState keep;
     device_.reset(rtcNewDevice("threads=1,set_affinity=0"));
     if (!device_)
@@ -132,7 +134,10 @@ class EmbreeRefit final : public Strategy<S> {
 
   void reset(double t) override {
     this->start_at(t);
-    for (BodyState& state : bodies_) update(state);
+    for (BodyState& state : bodies_) {
+      state.moves = this->scene_.moving(state.body);
+      update(state);
+    }
     count_.table = {};
   }
 
@@ -151,7 +156,22 @@ class EmbreeRefit final : public Strategy<S> {
       }
     collected_.out = &out;
     collected_.thread = std::this_thread::get_id();
-    for (const BodyPair& pair : this->scene_.pairs()) {
+    std::uint64_t tests = 0;
+    const auto box_of = [&](std::uint32_t body) {
+      Box<double> box;
+      if (!bodies_[body].boxes.scene) return box;
+      RTCBounds bounds;
+      rtcGetSceneBounds(bodies_[body].boxes.scene.get(), &bounds);
+      box.lower[0] = double(bounds.lower_x);
+      box.lower[1] = double(bounds.lower_y);
+      box.lower[2] = double(bounds.lower_z);
+      box.upper[0] = double(bounds.upper_x);
+      box.upper[1] = double(bounds.upper_y);
+      box.upper[2] = double(bounds.upper_z);
+      return box;
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
+      const BodyPair& pair = this->scene_.pairs()[i];
       if (!bodies_[pair.first].boxes.scene || !bodies_[pair.second].boxes.scene) continue;
       collected_.bodies = pair;
       collected_.a = &bodies_[pair.first];
@@ -160,7 +180,7 @@ class EmbreeRefit final : public Strategy<S> {
       append_overlapping(collected_, collected_.from_others);
       collected_.from_others.clear();
     }
-    count_.add(Counter::box_tests, std::exchange(collected_.box_tests, 0));
+    count_.add(Counter::box_tests, tests + std::exchange(collected_.box_tests, 0));
     check();
     return {};
   }
@@ -389,6 +409,7 @@ class EmbreeRefit final : public Strategy<S> {
   std::atomic<std::int64_t> memory_{0};  // outlives the device
   DevicePointer device_;
   std::vector<BodyState> bodies_;
+  NearBodies near_bodies_;
   Collected collected_;
   Count count_;
 

@@ -30,6 +30,7 @@
 
 #include "core/continuous/impact.hpp"
 #include "core/contract/registry.hpp"
+#include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/lane_box.hpp"
 
 namespace kbvh {
@@ -62,28 +63,24 @@ class Fcl final : public Strategy<S> {
 
   Fcl(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*none*/,
       const Params& /*params*/)
-      : Strategy<S>(scene, motion), bodies_(scene.body_count()) {
+      : Strategy<S>(scene, motion),
+        bodies_(scene.body_count()),
+        near_bodies_(scene.pairs(), scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
       build(body);
     }
-    for (const BodyPair& pair : scene.pairs()) {
-      if (!bodies_[pair.first].model || !bodies_[pair.second].model) continue;
-      auto node = std::make_unique<LeafCollector<Own>>();
-      fcl::Transform3<Own> here = fcl::Transform3<Own>::Identity();
-      if (!fcl::detail::initialize(*node, *bodies_[pair.first].model, here, *bodies_[pair.second].model, here,
-                                   fcl::CollisionRequest<Own>(), result_))
-        throw std::runtime_error("FCL refuses to traverse bodies " + std::to_string(pair.first) + " and " +
-                                 std::to_string(pair.second));
-      node->bodies = pair;
-      node->enable_statistics = Count::enabled;
-      collectors_.push_back(std::move(node));
-    }
+    if (near_bodies_.searches()) return;  // one node for each pair of bodies would be too much
+    for (const BodyPair& pair : scene.pairs())
+      if (bodies_[pair.first].model && bodies_[pair.second].model) collectors_.push_back(collector(pair));
   }
 
   void reset(double t) override {
     this->start_at(t);
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
+      bodies_[body].moves = this->scene_.moving(body);
+      update(body);
+    }
     count_.table = {};
   }
 
@@ -94,12 +91,16 @@ class Fcl final : public Strategy<S> {
   }
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
-    for (const auto& node : collectors_) {
-      node->out = &out;
-      node->num_bv_tests = 0;
-      fcl::detail::collide<Own>(node.get());
-      count_.add(Counter::box_tests, std::uint64_t(node->num_bv_tests));
-    }
+    for (const auto& node : collectors_) collide(*node, out);
+    if (!near_bodies_.searches()) return {};
+    std::uint64_t tests = 0;
+    const auto box_of = [&](std::uint32_t body) {
+      const Model* model = bodies_[body].model.get();
+      return model == nullptr ? Box<double>{} : box_in(*model, 0);
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests))
+      collide(*collector(this->scene_.pairs()[i]), out);
+    count_.add(Counter::box_tests, tests);
     return {};
   }
 
@@ -179,6 +180,34 @@ class Fcl final : public Strategy<S> {
       add(vector(box.lower));
       add(vector(box.upper));
     }
+  }
+
+  /// FCL's traversal of two bodies that both have triangles.
+  std::unique_ptr<LeafCollector<Own>> collector(const BodyPair& pair) {
+    auto node = std::make_unique<LeafCollector<Own>>();
+    fcl::Transform3<Own> here = fcl::Transform3<Own>::Identity();
+    if (!fcl::detail::initialize(*node, *bodies_[pair.first].model, here, *bodies_[pair.second].model, here,
+                                 fcl::CollisionRequest<Own>(), result_))
+      throw std::runtime_error("FCL refuses to traverse bodies " + std::to_string(pair.first) + " and " +
+                               std::to_string(pair.second));
+    node->bodies = pair;
+    node->enable_statistics = Count::enabled;
+    return node;
+  }
+  void collide(LeafCollector<Own>& node, PairBuffer& out) {
+    node.out = &out;
+    node.num_bv_tests = 0;
+    fcl::detail::collide<Own>(&node);
+    count_.add(Counter::box_tests, std::uint64_t(node.num_bv_tests));
+  }
+  static Box<double> box_in(const Model& model, int node) {
+    Box<double> box;
+    const auto& bounds = model.getBV(node).bv;
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lower[axis] = double(bounds.min_[axis]);
+      box.upper[axis] = double(bounds.max_[axis]);
+    }
+    return box;
   }
 
   void build(std::uint32_t body) {
@@ -270,6 +299,7 @@ class Fcl final : public Strategy<S> {
   }
 
   std::vector<BodyState> bodies_;
+  NearBodies near_bodies_;
   fcl::CollisionResult<Own> result_;  // stays empty: no leaf is tested by FCL
   std::vector<std::unique_ptr<LeafCollector<Own>>> collectors_;
   Count count_;

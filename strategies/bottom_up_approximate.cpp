@@ -35,6 +35,7 @@ class BottomUpApproximate final : public StoredHierarchyStrategy<S, Count> {
 
   void reset(double t) override {
     this->start_at(t);
+    this->near_bodies_.start_over();
     for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) {
       this->hierarchies_[body].positions_changed();
       update(body);

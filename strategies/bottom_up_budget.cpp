@@ -28,24 +28,9 @@ class BottomUpBudget final : public StoredHierarchyStrategy<S, Count> {
                  const Params& params)
       : Base(scene, motion, std::move(topologies), params), box_tests_(chosen_box_tests(params)) {}
 
-  /// The budget is for the frame, so body pairs share it; what it leaves undone is counted in the status.
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
-    QueryStatus status;
-    std::uint64_t tests = 0;
-    const std::uint64_t most = std::min(box_tests_, budget.box_tests);
-    for (const BodyPair& pair : this->scene_.pairs()) {
-      if (tests >= most) {
-        ++status.pending;
-        continue;
-      }
-      auto &a = this->hierarchies_[pair.first], &b = this->hierarchies_[pair.second];
-      status.pending += this->query_
-                            .run(a, pair.first, b, pair.second, this->scene_, this->sampled_,
-                                 Budget{most - tests}, out, tests)
-                            .pending;
-    }
-    this->count_.add(Counter::box_tests, tests);
-    return status;
+  /// What the budget leaves undone is counted in the status.
+  QueryStatus candidates_at(double t, PairBuffer& out, const Budget& budget) override {
+    return Base::candidates_at(t, out, {std::min(box_tests_, budget.box_tests)});
   }
 
  private:

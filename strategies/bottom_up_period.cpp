@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/contract/registry.hpp"
+#include "core/families/wide/near_bodies.hpp"
 
 namespace kbvh {
 namespace {
@@ -28,7 +29,9 @@ class BottomUpPeriod final : public Strategy<S> {
   static constexpr Foresight foresight = Foresight::none;
   BottomUpPeriod(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                  const Params& /*params*/)
-      : Strategy<S>(scene, motion), topologies_(std::move(topologies)) {
+      : Strategy<S>(scene, motion),
+        near_bodies_(scene.pairs(), scene.body_count()),
+        topologies_(std::move(topologies)) {
     for (const Topology& topology : topologies_)
       roots_.push_back(topology.empty() ? nullptr : link(topology, 0));
   }
@@ -36,6 +39,7 @@ class BottomUpPeriod final : public Strategy<S> {
   void reset(double t) override {
     this->start_at(t);
     plans_changed_ = false;
+    near_bodies_.start_over();
     for (std::uint32_t body = 0; body < roots_.size(); ++body) update(body);
     count_.table = {};
   }
@@ -47,9 +51,16 @@ class BottomUpPeriod final : public Strategy<S> {
   }
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
-    for (const BodyPair& pair : this->scene_.pairs())
+    std::uint64_t tests = 0;
+    const auto box_of = [&](std::uint32_t body) {
+      return roots_[body] == nullptr ? Box<double>{} : to_double(roots_[body]->box);
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
+      const BodyPair& pair = this->scene_.pairs()[i];
       if (roots_[pair.first] != nullptr && roots_[pair.second] != nullptr)
         check(*roots_[pair.first], *roots_[pair.second], pair, out);
+    }
+    count_.add(Counter::box_tests, tests);
     return {};
   }
 
@@ -63,7 +74,9 @@ class BottomUpPeriod final : public Strategy<S> {
     return view;
   }
 
-  std::size_t bytes() const override { return nodes_.size() * (sizeof(Node) + sizeof(void*)); }
+  std::size_t bytes() const override {
+    return near_bodies_.bytes() + nodes_.size() * (sizeof(Node) + sizeof(void*));
+  }
 
  protected:
   Counters counted() const override { return count_.table; }
@@ -130,6 +143,7 @@ class BottomUpPeriod final : public Strategy<S> {
     }
   }
 
+  NearBodies near_bodies_;
   Topologies topologies_;
   std::vector<std::unique_ptr<Node>> nodes_;
   std::vector<Node*> roots_;

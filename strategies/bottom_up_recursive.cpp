@@ -4,6 +4,7 @@
 // (`bottom_up_period` links its nodes by pointers besides).
 
 #include "core/contract/registry.hpp"
+#include "core/families/wide/near_bodies.hpp"
 
 namespace kbvh {
 namespace {
@@ -31,7 +32,7 @@ class BottomUpRecursive final : public Strategy<S> {
   static constexpr Foresight foresight = Foresight::none;
   BottomUpRecursive(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                     const Params& /*params*/)
-      : Strategy<S>(scene, motion) {
+      : Strategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const std::uint32_t nodes = topologies[body].size();
       bodies_.push_back({std::move(topologies[body]), std::vector<Box<S>>(nodes), &scene.primitives(body),
@@ -42,6 +43,7 @@ class BottomUpRecursive final : public Strategy<S> {
   void reset(double t) override {
     this->start_at(t);
     plans_changed_ = false;
+    near_bodies_.start_over();
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
     count_.table = {};
   }
@@ -53,10 +55,16 @@ class BottomUpRecursive final : public Strategy<S> {
   }
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
-    for (const BodyPair& pair : this->scene_.pairs()) {
+    std::uint64_t tests = 0;
+    const auto box_of = [&](std::uint32_t body) {
+      return bodies_[body].topology.empty() ? Box<double>{} : to_double(bodies_[body].boxes[0]);
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
+      const BodyPair& pair = this->scene_.pairs()[i];
       const Body &a = bodies_[pair.first], &b = bodies_[pair.second];
       if (!a.topology.empty() && !b.topology.empty()) check(pair, a, 0, b, 0, out);
     }
+    count_.add(Counter::box_tests, tests);
     return {};
   }
 
@@ -71,7 +79,7 @@ class BottomUpRecursive final : public Strategy<S> {
   }
 
   std::size_t bytes() const override {
-    std::size_t total = 0;
+    std::size_t total = near_bodies_.bytes();
     for (const Body& body : bodies_) total += body.topology.bytes() + body.boxes.size() * sizeof(Box<S>);
     return total;
   }
@@ -142,6 +150,7 @@ class BottomUpRecursive final : public Strategy<S> {
       }
   }
 
+  NearBodies near_bodies_;
   std::vector<Body> bodies_;
   Count count_;
   bool plans_changed_ = false;

@@ -31,9 +31,9 @@ class BruteForce final : public Strategy<S> {
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
+    std::uint64_t tests = 0;
     for (const BodyPair& pair : this->scene_.pairs()) {
       const auto &a = boxes_[pair.first], &b = boxes_[pair.second];
-      std::uint64_t tests = 0;
       for (std::uint32_t i = 0; i < a.size(); ++i) {
         if (tests >= budget.box_tests) {
           status.pending += a.size() - i;
@@ -45,8 +45,8 @@ class BruteForce final : public Strategy<S> {
             out.push_back({pair.first, i, pair.second, j});
         tests += b.size() - first;
       }
-      count_.add(Counter::box_tests, tests);
     }
+    count_.add(Counter::box_tests, tests);
     return status;
   }
 

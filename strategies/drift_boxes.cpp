@@ -11,12 +11,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/contract/registry.hpp"
 #include "core/families/drift/drift_body.hpp"
 #include "core/families/drift/drift_model.hpp"
 #include "core/families/drift/near_pairs.hpp"
 #include "core/families/wide/kernels/bounds.hpp"
+#include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/predicates.hpp"
 
 namespace kbvh {
@@ -37,7 +39,8 @@ class DriftStrategy : public Strategy<S> {
         checks_(params.word("candidates") == "boxes"),
         hierarchies_(scene.body_count()),
         bodies_(scene.body_count()),
-        near_(scene.pairs().size()),
+        rows_(scene.body_count()),
+        near_bodies_(scene.pairs(), scene.body_count()),
         pair_is_near_(scene.pairs().size(), 0) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), kernels_);
@@ -60,8 +63,16 @@ class DriftStrategy : public Strategy<S> {
       remember(index);
     }
     // A body that rests again may have been moved by plans of its own before.
-    for (auto& near : near_) near.forget();
-    std::fill(pair_is_near_.begin(), pair_is_near_.end(), 1);
+    for (auto& rows : rows_) rows.positions_changed();
+    near_bodies_.start_over();
+    // What meets at this frame, or all where these are few; the next frame asks anew.
+    if (near_bodies_.searches()) {
+      take_near([&](std::uint32_t body) { return bodies_[body].box; });
+    } else {
+      near_pairs_.resize(pair_is_near_.size());
+      std::iota(near_pairs_.begin(), near_pairs_.end(), 0U);
+      std::fill(pair_is_near_.begin(), pair_is_near_.end(), 1);
+    }
     frames_ = 0;
     period_ = 0;
     plain_left_ = 1;
@@ -83,11 +94,10 @@ class DriftStrategy : public Strategy<S> {
     std::uint64_t tests = 0;
     const std::size_t before = out.size();
     if (search_due_) search(tests);
-    for (std::size_t i = 0; i < near_.size(); ++i) {
-      if (pair_is_near_[i] == 0) continue;
-      const BodyPair pair = this->scene_.pairs()[i];
+    for (std::size_t k = 0; k < near_pairs_.size(); ++k) {
+      const BodyPair pair = this->scene_.pairs()[near_pairs_[k]];
       if (period_ > 0)
-        tests += read(i, pair, out);
+        tests += read(lists_of_[k], pair, out);
       else
         query_.run(hierarchies_[pair.first], pair.first, hierarchies_[pair.second], pair.second, this->scene_,
                    this->sampled_, {}, out, tests);
@@ -132,8 +142,10 @@ class DriftStrategy : public Strategy<S> {
     std::size_t total = 0;
     for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
     for (const auto& body : bodies_) total += body.before.capacity() * sizeof(S);
-    for (const auto& near : near_) total += near.bytes();
-    return total;
+    for (const auto& lists : lists_of_) total += lists.bytes();
+    for (const auto& rows : rows_) total += rows.bytes();
+    return total + work_.bytes() + near_bodies_.bytes() + pair_is_near_.size() +
+           near_pairs_.capacity() * sizeof(std::uint32_t);
   }
 
  protected:
@@ -218,23 +230,40 @@ class DriftStrategy : public Strategy<S> {
     begin_period();
   }
 
-  bool covered() const {
-    for (std::size_t i = 0; i < near_.size(); ++i) {
-      const Body &a = bodies_[this->scene_.pairs()[i].first], &b = bodies_[this->scene_.pairs()[i].second];
-      if (pair_is_near_[i] == 0) {
-        if (overlap(a.box, b.box)) return false;
-        continue;
-      }
-      if (!keeps_to_reach(a, b)) return false;
-    }
-    return true;
+  bool covered() {
+    for (const std::uint32_t i : near_pairs_)
+      if (!keeps_to_reach(bodies_[this->scene_.pairs()[i].first], bodies_[this->scene_.pairs()[i].second]))
+        return false;
+    return !meets_newly();
   }
-  bool meets_newly() const {
-    for (std::size_t i = 0; i < near_.size(); ++i) {
+  bool meets_newly() {
+    const auto box_of = [&](std::uint32_t body) {
+      return hierarchies_[body].empty() ? Box<double>{} : bodies_[body].box;
+    };
+    std::uint64_t tests = 0;
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
       const BodyPair pair = this->scene_.pairs()[i];
       if (pair_is_near_[i] == 0 && overlap(bodies_[pair.first].box, bodies_[pair.second].box)) return true;
     }
     return false;
+  }
+  /// Near are the pairs of bodies whose boxes overlap, as box_of(body) says.
+  template <class BoxOf>
+  void take_near(const BoxOf& box_of) {
+    for (const std::uint32_t i : near_pairs_) pair_is_near_[i] = 0;
+    near_pairs_.clear();
+    const auto box_or_none = [&](std::uint32_t body) {
+      return hierarchies_[body].empty() ? Box<double>{} : box_of(body);
+    };
+    std::uint64_t tests = 0;
+    for (const std::uint32_t i : near_bodies_.find(box_or_none, tests)) {
+      const BodyPair pair = this->scene_.pairs()[i];
+      if (hierarchies_[pair.first].empty() || hierarchies_[pair.second].empty() ||
+          !overlap(box_of(pair.first), box_of(pair.second)))
+        continue;
+      pair_is_near_[i] = 1;
+      near_pairs_.push_back(i);
+    }
   }
 
   void begin_period() {
@@ -292,15 +321,20 @@ class DriftStrategy : public Strategy<S> {
   /// leaves; the largest of all pairs.
   double step() const {
     double largest = 0;
-    for (const BodyPair& pair : this->scene_.pairs()) {
-      const Body &a = bodies_[pair.first], &b = bodies_[pair.second];
+    const auto step_of = [](const Body& a, const Body& b) {
       double sum = 0;
       for (int axis = 0; axis < 3; ++axis)
         sum += std::max(0.0, a.rate_high[axis]) + std::max(0.0, -a.rate_low[axis]) +
                std::max(0.0, b.rate_high[axis]) + std::max(0.0, -b.rate_low[axis]);
       const double size = a.leaf_size + b.leaf_size;
-      if (size > 0) largest = std::max(largest, sum / 6 / size);
-    }
+      return size > 0 ? sum / 6 / size : 0;
+    };
+    if (near_bodies_
+            .searches())  // no pair has more than the larger of what its bodies would have with their like
+      for (const Body& body : bodies_) largest = std::max(largest, step_of(body, body));
+    else
+      for (const BodyPair& pair : this->scene_.pairs())
+        largest = std::max(largest, step_of(bodies_[pair.first], bodies_[pair.second]));
     return largest;
   }
 
@@ -312,14 +346,10 @@ class DriftStrategy : public Strategy<S> {
 
   /// Bodies that may meet while they keep to their margins.
   void find_near() {
+    take_near([&](std::uint32_t body) { return bodies_[body].swept(); });
     for (Body& body : bodies_) body.near = false;
-    for (std::size_t i = 0; i < near_.size(); ++i) {
-      const BodyPair pair = this->scene_.pairs()[i];
-      const bool near = !hierarchies_[pair.first].empty() && !hierarchies_[pair.second].empty() &&
-                        overlap(bodies_[pair.first].swept(), bodies_[pair.second].swept());
-      pair_is_near_[i] = near ? 1 : 0;
-      if (near) bodies_[pair.first].near = bodies_[pair.second].near = true;
-    }
+    for (const std::uint32_t i : near_pairs_)
+      bodies_[this->scene_.pairs()[i].first].near = bodies_[this->scene_.pairs()[i].second].near = true;
   }
 
   void make_boxes(std::uint32_t index) {
@@ -351,14 +381,14 @@ class DriftStrategy : public Strategy<S> {
   }
 
   /// The candidates of two bodies from their list; returns the box tests made.
-  std::uint64_t read(std::size_t i, const BodyPair& pair, PairBuffer& out) {
+  std::uint64_t read(const NearPairs<S>& lists, const BodyPair& pair, PairBuffer& out) {
     // At the frame of the search the list begins with what overlaps, exactly.
     const double fraction = frames_ == 0 ? 0 : used_reach(bodies_[pair.first], bodies_[pair.second]);
     if (!checks_ || frames_ == 0) {
-      near_[i].read(fraction, out);
+      lists.read(fraction, out);
       return 0;
     }
-    return near_[i].read_meeting(fraction, now(pair.first), now(pair.second), out);
+    return lists.read_meeting(fraction, now(pair.first), now(pair.second), work_, out);
   }
   PrimitivesNow<S> now(std::uint32_t index) const {
     const Primitives& primitives = this->scene_.primitives(index);
@@ -368,20 +398,22 @@ class DriftStrategy : public Strategy<S> {
   void search(std::uint64_t& tests) {
     std::uint64_t made = 0;
     DriftCounts counts;
-    for (std::size_t i = 0; i < near_.size(); ++i) {
-      near_[i].clear();
-      if (pair_is_near_[i] == 0) continue;
-      const BodyPair pair = this->scene_.pairs()[i];
+    if (lists_of_.size() < near_pairs_.size()) lists_of_.resize(near_pairs_.size());
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index)
+      if (may_move(index)) rows_[index].positions_changed();
+    for (std::size_t k = 0; k < near_pairs_.size(); ++k) {
+      const BodyPair pair = this->scene_.pairs()[near_pairs_[k]];
       const Body &a = bodies_[pair.first], &b = bodies_[pair.second];
       S within[6];
       double mean = 0;
-      for (std::size_t k = 0; k < 6; ++k) {
-        within[k] = reach(a, b, k);
-        mean += double(within[k]) / 6;
+      for (std::size_t face = 0; face < 6; ++face) {
+        within[face] = reach(a, b, face);
+        mean += double(within[face]) / 6;
       }
-      near_[i].build(side(pair.first), side(pair.second), pair.first, pair.second, within, made);
-      counts.overlapping += double(near_[i].overlapping());
-      counts.listed += double(near_[i].count());
+      NearPairs<S>& lists = lists_of_[k];
+      lists.build(side(pair.first), side(pair.second), pair.first, pair.second, within, work_, made);
+      counts.overlapping += double(lists.overlapping());
+      counts.listed += double(lists.count());
       const double size = a.leaf_size + b.leaf_size;
       if (size > 0) counts.reach = std::max(counts.reach, mean / size);
     }
@@ -396,7 +428,7 @@ class DriftStrategy : public Strategy<S> {
     search_due_ = false;
   }
   NearSide<S> side(std::uint32_t index) {
-    return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin, !may_move(index)};
+    return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin, &rows_[index]};
   }
 
   /// Mean side of the leaves' boxes.
@@ -418,8 +450,12 @@ class DriftStrategy : public Strategy<S> {
   bool checks_;
   std::vector<WideHierarchy<S>> hierarchies_;
   std::vector<Body> bodies_;
-  std::vector<NearPairs<S>> near_;  ///< one for each pair of bodies
+  std::vector<NearLeafRows<S>> rows_;  ///< by body
+  NearBodies near_bodies_;
+  std::vector<std::uint32_t> near_pairs_;  ///< of bodies: indices into the scene's, ascending
   std::vector<std::uint8_t> pair_is_near_;
+  std::vector<NearPairs<S>> lists_of_;  ///< [near pair], and more if there were more before
+  NearWork<S> work_;
   WideQuery<S> query_;
   DriftModel model_;
   int frames_ = 0;      ///< since positions were remembered

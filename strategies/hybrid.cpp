@@ -72,16 +72,20 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
-    for (const BodyPair& pair : this->scene_.pairs()) {
+    this->for_near_bodies(tests, [&](const BodyPair& pair) {
+      if (tests >= budget.box_tests) {
+        ++status.pending;
+        return;
+      }
       const LazySide a = side(pair.first), b = side(pair.second);
       auto& query = this->query_;
-      query.start_lazy(a, b, budget);
+      query.start_lazy(a, b, rest_of(budget, tests));
       while (const auto wanted = query.proceed(a, b, this->scene_, this->sampled_, out, tests)) {
         if (wanted.first != wanted.none) make_current(pair.first, wanted.first);
         if (wanted.second != wanted.none) make_current(pair.second, wanted.second);
       }
       status.pending += query.lazy_status().pending;
-    }
+    });
     this->count_.add(Counter::box_tests, tests);
     return status;
   }

@@ -60,6 +60,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
 
   void reset(double t) override {
     this->start_at(t);
+    this->near_bodies_.start_over();
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
       Body& body = bodies_[index];
       this->hierarchies_[index].positions_changed();
@@ -94,16 +95,22 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     for (Body& body : bodies_) body.tests = 0;
-    for (const BodyPair& pair : this->scene_.pairs()) {
+    std::uint64_t all = 0;
+    this->for_near_bodies(all, [&](const BodyPair& pair) {
+      if (all >= budget.box_tests) {
+        ++status.pending;
+        return;
+      }
       std::uint64_t tests = 0;
       status.pending += this->query_
                             .run(this->hierarchies_[pair.first], pair.first, this->hierarchies_[pair.second],
-                                 pair.second, this->scene_, this->sampled_, budget, out, tests)
+                                 pair.second, this->scene_, this->sampled_, rest_of(budget, all), out, tests)
                             .pending;
       bodies_[pair.first].tests += tests;
       bodies_[pair.second].tests += tests;
-      this->count_.add(Counter::box_tests, tests);
-    }
+      all += tests;
+    });
+    this->count_.add(Counter::box_tests, all);
     for (std::uint32_t index = 0; index < bodies_.size(); ++index)
       if (!bodies_[index].looked) bodies_[index].query_takes_all = this->sampled_.all_current(index);
     return status;

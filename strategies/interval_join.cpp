@@ -8,17 +8,19 @@
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/linear_bounds.hpp"
 #include "core/families/linear/span_answers.hpp"
+#include "core/families/wide/swept_hierarchies.hpp"
 
 namespace kbvh {
 namespace {
 
-/// The joins of one segment, one for each pair of bodies, and what is known of their pairs of triangles.
+/// The joins of one segment, and what is known of their pairs of triangles: a join for each pair of bodies,
+/// or, where these are many, two for all of them, with span tests and without.
 template <class S>
 struct Joins {
   std::vector<IntervalJoin<S>> joins;
   std::vector<SpanAnswers<S>> answers;
 
-  explicit Joins(std::size_t pairs) : joins(pairs), answers(pairs) {}
+  explicit Joins(std::size_t count) : joins(count), answers(count) {}
   std::size_t bytes() const {
     std::size_t total = 0;
     for (const auto& join : joins) total += join.bytes();
@@ -32,8 +34,8 @@ struct Joins {
 struct WorkAhead {
   enum class Stage : std::uint8_t { nothing, bounds, joins, answers, done };
   Stage stage = Stage::nothing;
-  std::size_t pair = 0;  ///< of bodies
-  bool begun = false;    ///< with that pair
+  std::size_t join = 0;  ///< the next one
+  bool begun = false;    ///< with that join
   bool joins_begun = false;
   double since = 0;  ///< time at which it was begun
   double done = 0;
@@ -54,13 +56,18 @@ class IntervalJoinStrategy final : public Strategy<S> {
       : Strategy<S>(scene, motion),
         motion_(motion),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), linear_settings(params)),
-        now_(scene.pairs().size()),
-        next_(scene.pairs().size()),
-        by_spans_(scene.pairs().size(), params.word("triangle_tests") == "spans"),
+        together_(scene.pairs().size() > most_joins),
+        now_(together_ ? 2 : scene.pairs().size()),
+        next_(now_.joins.size()),
+        by_spans_(now_.joins.size(), false),
         updates_(scene.body_count()) {
-    for (std::size_t i = 0; i < scene.pairs().size(); ++i)
-      for (const std::uint32_t body : {scene.pairs()[i].first, scene.pairs()[i].second})
-        if (!all_triangles(scene.primitives(body))) by_spans_[i] = false;
+    const bool spans = params.word("triangle_tests") == "spans";
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      decidable_.push_back(spans && all_triangles(scene.primitives(body)));
+    if (together_)
+      by_spans_[0] = spans;
+    else
+      for (std::size_t i = 0; i < scene.pairs().size(); ++i) by_spans_[i] = is_decidable(scene.pairs()[i]);
     any_by_spans_ = std::find(by_spans_.begin(), by_spans_.end(), true) != by_spans_.end();
   }
 
@@ -71,6 +78,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
     bounds_.start();
     new_segment();
     before_ = t;
+    plans_changed_ = false;
     count_.table = {};
     first_fetch_ = this->sampled_.fetched();
   }
@@ -124,6 +132,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
 
   void start_sweep(double t) override {
     this->stand_at(t);
+    if (plans_changed_) return;  // lines may have no end: the sweep's own ends are known when it is over
     bounds_.enter();
     if constexpr (Count::enabled) updates_.add_to(count_, bounds_);
     ahead_ = {};
@@ -134,17 +143,20 @@ class IntervalJoinStrategy final : public Strategy<S> {
   }
 
   /// All pairs of the segment, whenever their boxes overlap in it.
-  void swept_pairs(double t0, double t1, std::span<const S* const> /*before*/, PairBuffer& out) override {
+  void swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) override {
     this->stand_at(t0);
     this->move_to(t1);
+    if (plans_changed_) return sweep_both_ends(before, out);
     if (!(bounds_.begin() <= t0 && t1 <= bounds_.end()))
       throw std::invalid_argument("contacts are asked for across a knot of a plan");
     for (std::size_t i = 0; i < sweeps_.size(); ++i) {
-      const BodyPair& pair = this->scene_.pairs()[i];
-      sweeps_[i].join(bounds_.segment(), this->scene_, pair.first, pair.second);
+      sweeps_[i].join(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i));
       count_.add(Counter::box_tests, sweeps_[i].tests());
-      for (const JoinedPair& found : sweeps_[i].pairs())
-        out.push_back({pair.first, found.primitive_a, pair.second, found.primitive_b});
+      const auto pairs = sweeps_[i].pairs();
+      for (std::size_t k = 0; k < pairs.size(); ++k) {
+        const BodyPair bodies = sweeps_[i].bodies_of(k);
+        out.push_back({bodies.first, pairs[k].primitive_a, bodies.second, pairs[k].primitive_b});
+      }
     }
   }
 
@@ -152,6 +164,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
     this->stand_at(t);
     bounds_.plans_changed();
     new_segment();
+    plans_changed_ = true;
   }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
@@ -161,7 +174,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
   std::size_t bytes() const override {
     std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes();
     for (const auto& sweep : sweeps_) total += sweep.bytes();
-    return total;
+    return total + (swept_ ? swept_->bytes() : 0);
   }
 
  protected:
@@ -182,6 +195,37 @@ class IntervalJoinStrategy final : public Strategy<S> {
   /// What the parts of the work cost, in box tests of the join: measured once, and only for evenness.
   static constexpr double node_cost = 35, answer_cost = 5;
 
+  /// Beyond so many pairs of bodies they are joined together: a join by itself takes some kilobytes.
+  static constexpr std::size_t most_joins = 16;
+
+  bool is_decidable(const BodyPair& pair) const { return decidable_[pair.first] && decidable_[pair.second]; }
+  /// The pairs of bodies of one join, of those that meet within the segment. Valid until the next call.
+  std::span<const BodyPair> bodies_of_join(const LinearSegment<S>& segment, std::size_t join) {
+    const auto all = this->scene_.pairs();
+    if (!together_) return all.subspan(join, 1);
+    joined_bodies_.clear();
+    for (const std::uint32_t i : segment.near_pairs)
+      if ((join == 0) == is_decidable(all[i])) joined_bodies_.push_back(all[i]);
+    return joined_bodies_;
+  }
+
+  /// Once plans have changed: boxes around both ends, as a refit makes them.
+  void sweep_both_ends(std::span<const S* const> before, PairBuffer& out) {
+    if (!swept_)
+      swept_.emplace(
+          this->scene_, [&](std::uint32_t body) -> const auto& { return bounds_.hierarchy(body); });
+    swept_->refit(before, this->sampled_);
+    std::uint64_t tests = 0;
+    swept_->pairs(query_, out, tests);
+    count_.add(Counter::box_tests, tests);
+    for (std::uint32_t body = 0; body < bounds_.body_count(); ++body) {
+      const std::uint64_t nodes = bounds_.hierarchy(body).topology().size();
+      count_.add(Counter::nodes_visited, nodes);
+      count_.add(Counter::values_written, 6 * nodes);
+      count_.add(Counter::vertex_reads, 2 * bounds_.hierarchy(body).leaf_vertex_count());
+    }
+  }
+
   void new_segment() {
     if constexpr (Count::enabled) updates_.add_to(count_, bounds_);
     joined_ = false;
@@ -197,8 +241,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
   }
   void join() {
     for (std::size_t i = 0; i < now_.joins.size(); ++i) {
-      const BodyPair& pair = this->scene_.pairs()[i];
-      now_.joins[i].join(bounds_.segment(), this->scene_, pair.first, pair.second);
+      now_.joins[i].join(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i));
       if (by_spans_[i]) now_.answers[i].start(now_.joins[i]);
       count_.add(Counter::box_tests, now_.joins[i].tests());
     }
@@ -238,17 +281,16 @@ class IntervalJoinStrategy final : public Strategy<S> {
     constexpr std::size_t leaf_pairs = 128, tests_at_once = 4096, answers_at_once = 256;
     const double wanted = share >= 1 ? std::numeric_limits<double>::infinity() : share * all_work();
     while (ahead_.done < wanted && (ahead_.stage == Stage::joins || ahead_.stage == Stage::answers)) {
-      if (ahead_.pair == next_.joins.size()) {
-        ahead_.pair = 0;
+      if (ahead_.join == next_.joins.size()) {
+        ahead_.join = 0;
         ahead_.stage = ahead_.stage == Stage::joins ? Stage::answers : Stage::done;
         continue;
       }
-      const std::size_t i = ahead_.pair;
+      const std::size_t i = ahead_.join;
       IntervalJoin<S>& join = next_.joins[i];
       if (ahead_.stage == Stage::joins) {
-        const BodyPair& pair = this->scene_.pairs()[i];
         ahead_.joins_begun = true;
-        if (!ahead_.begun) join.start(segment, this->scene_, pair.first, pair.second, leaf_pairs);
+        if (!ahead_.begun) join.start(segment, this->scene_, bodies_of_join(segment, i), leaf_pairs);
         const std::uint64_t before = ahead_.begun ? join.tests() : 0;
         ahead_.begun = !join.go_on(tests_at_once);
         ahead_.done += double(join.tests() - before);
@@ -258,19 +300,25 @@ class IntervalJoinStrategy final : public Strategy<S> {
         ahead_.begun = by_spans_[i] && !next_.answers[i].go_on(segment, this->scene_, join, answers_at_once);
         if (by_spans_[i]) ahead_.done += answer_cost * answers_at_once;
       }
-      if (!ahead_.begun) ++ahead_.pair;
+      if (!ahead_.begun) ++ahead_.join;
     }
   }
 
   Motion motion_;
   LinearBounds<S> bounds_;
+  bool together_;  ///< pairs of bodies: by_spans_[0] says of those that it can decide, [1] of the others
   Joins<S> now_, next_;
   WorkAhead ahead_;
-  double before_ = 0;                    ///< time of the frame before
-  std::vector<IntervalJoin<S>> sweeps_;  ///< the same for contacts, once they are asked for
-  std::vector<bool> by_spans_;
+  double before_ = 0;                         ///< time of the frame before
+  std::vector<IntervalJoin<S>> sweeps_;       ///< the same for contacts, once they are asked for
+  std::optional<SweptHierarchies<S>> swept_;  ///< the same after changes of plans
+  WideQuery<S> query_;
+  bool plans_changed_ = false;
+  std::vector<bool> by_spans_;   ///< by join
+  std::vector<bool> decidable_;  ///< by body: triangles only, and asked for
+  std::vector<BodyPair> joined_bodies_;
   bool any_by_spans_ = false, joined_ = false;
-  /// What was read for one pair of bodies.
+  /// What was read from one join.
   struct Block {
     std::size_t certain, open;
   };

@@ -9,6 +9,7 @@
 #include "core/contract/registry.hpp"
 #include "core/families/boxtree/boxtree_degradation.hpp"
 #include "core/families/boxtree/kinetic_boxtree.hpp"
+#include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/topology/leaf_pairs.hpp"
 
@@ -32,6 +33,7 @@ class KineticBox final : public Strategy<S> {
   KineticBox(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
              const Params& params)
       : Strategy<S>(scene, motion),
+        near_bodies_(scene.pairs(), scene.body_count()),
         leaf_boxes_(params.word("leaf_boxes") == "tight" ? LeafBoxes::tight : LeafBoxes::inherited),
         rebuilds_(params.word("rebuild") != "never"),
         threshold_(params.number("degradation")),
@@ -49,8 +51,10 @@ class KineticBox final : public Strategy<S> {
 
   void reset(double t) override {
     this->start_at(t);
+    near_bodies_.start_over();
     on_forest([&](auto& forest) { forest.reset(t); });
     new_frame();
+    plans_changed_ = false;
     frames_ = 0;
     for (std::uint32_t body = 0; body < degradations_.size(); ++body)
       on_forest([&](auto& forest) {
@@ -75,25 +79,39 @@ class KineticBox final : public Strategy<S> {
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
+    BoxTests tests;
     on_forest([&](auto& forest) {
-      for (const BodyPair& pair : this->scene_.pairs()) {
+      const auto box_of = [&](std::uint32_t body) -> Box<double> {
+        const auto& tree = forest.tree(body);
+        if (tree.topology().empty()) return {};
+        auto own = boxes(tree, body);
+        own.ensure(0);
+        return to_double(own(0));
+      };
+      for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
+        const BodyPair& pair = this->scene_.pairs()[i];
+        if (tests.made >= budget.box_tests) {
+          ++status.pending;
+          continue;
+        }
         const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
-        LeafPairs<S, Count> several(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
-                                    b.topology(), count_, out);
+        LeafPairs<S, BoxTests> several(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
+                                       b.topology(), tests, out);
         // Inherited boxes of leaves are not tight: primitives have to show that theirs overlap.
         const auto leaves = [&](std::uint32_t leaf_a, std::uint32_t leaf_b) {
           const TopologyNode na = a.topology().nodes[leaf_a], nb = b.topology().nodes[leaf_b];
           if (leaf_boxes_ == LeafBoxes::inherited && na.count() == 1 && nb.count() == 1) {
-            count_.add(Counter::box_tests);
+            tests.add(Counter::box_tests);
             if (!tight_box(a, na, pair.first).overlaps(tight_box(b, nb, pair.second))) return;
           }
           several(leaf_a, leaf_b);
         };
         status.pending += traverse(a.topology(), boxes(a, pair.first), b.topology(), boxes(b, pair.second),
-                                   stack_, count_, budget, leaves)
+                                   stack_, tests, rest_of(budget, tests.made), leaves)
                               .pending;
       }
     });
+    count_.add(Counter::box_tests, tests.made);
     return status;
   }
 
@@ -140,6 +158,7 @@ class KineticBox final : public Strategy<S> {
 
   std::size_t bytes() const override {
     std::size_t total = on_forest([](auto& forest) { return forest.bytes(); });
+    total += near_bodies_.bytes();
     for (const auto& cache : caches_) total += cache.bytes();
     for (const auto& degradation : degradations_) total += degradation.bytes();
     return total;
@@ -208,6 +227,7 @@ class KineticBox final : public Strategy<S> {
   std::variant<std::unique_ptr<KineticBoxForest<S, AvlQueue<S>, Count>>,
                std::unique_ptr<KineticBoxForest<S, BinaryHeapQueue<S>, Count>>>
       forest_;
+  NearBodies near_bodies_;
   std::vector<BoxCache<S>> caches_;
   std::vector<NodePair> stack_;
   std::vector<std::uint32_t> order_;

@@ -25,6 +25,7 @@ class KineticCalendar final : public RealiserStrategy<S, Count> {
 
   void reset(double t) override {
     this->start_at(t);
+    this->near_bodies_.start_over();
     for (std::uint32_t body = 0; body < trees_.size(); ++body) {
       trees_[body].reset(this->bodies_[body].hierarchy, this->bodies_[body].realisers);
       this->new_frame(body);
@@ -42,8 +43,11 @@ class KineticCalendar final : public RealiserStrategy<S, Count> {
 
   void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
     this->stand_at(t);
+    body_changed_.assign(trees_.size(), 0);
+    for (const PlanChange<S>& change : changes) body_changed_[change.body] = 1;
     for (std::uint32_t body = 0; body < trees_.size(); ++body) {
-      trees_[body].plans_changed(this->bodies_[body].hierarchy, this->bodies_[body].realisers, changes);
+      if (body_changed_[body] != 0)
+        trees_[body].plans_changed(this->bodies_[body].hierarchy, this->bodies_[body].realisers, changes);
       this->new_frame(body);  // realisers may differ now
     }
   }
@@ -72,6 +76,7 @@ class KineticCalendar final : public RealiserStrategy<S, Count> {
 
  private:
   std::vector<CalendarTree<S>> trees_;
+  std::vector<std::uint8_t> body_changed_;
 };
 
 }  // namespace

@@ -47,6 +47,7 @@ class Envelopes final : public RealiserStrategy<S, Count> {
 
   void reset(double t) override {
     this->start_at(t);
+    this->near_bodies_.start_over();
     for (std::uint32_t body = 0; body < states_.size(); ++body) {
       states_[body].known = Known::nothing;
       begin_segment(body);

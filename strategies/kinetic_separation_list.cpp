@@ -50,14 +50,13 @@ class KineticSeparationList final : public Strategy<S> {
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
     on_collision([&](auto& collision) {
-      for (std::size_t i = 0; i < this->scene_.pairs().size(); ++i) {
-        const BodyPair& pair = this->scene_.pairs()[i];
+      for_body_pairs(collision, [&](std::uint32_t i, const BodyPair& pair) {
         LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first,
                                    collision.forest().tree(pair.first).topology(), pair.second,
                                    collision.forest().tree(pair.second).topology(), count_, out);
         for (const auto& leaf : collision.list().leaf_pairs(i)) leaves(leaf.a, leaf.b);
         for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) { leaves(leaf, leaf); });
-      }
+      });
     });
     return {};
   }
@@ -71,13 +70,13 @@ class KineticSeparationList final : public Strategy<S> {
       collision.advance(t1);
       for (const auto& ended : list.stop_spans())
         append_spans(collision, ended.bodies, ended.leaf, t0, std::min(ended.until, t1), out);
-      for (std::size_t i = 0; i < this->scene_.pairs().size(); ++i) {
+      for_body_pairs(collision, [&](std::uint32_t i, const BodyPair& pair) {
         using Leaf = std::remove_cvref_t<decltype(list.leaf_pairs(i)[0])>;
         for (const auto& leaf : list.leaf_pairs(i)) append_spans(collision, i, leaf, t0, t1, out);
-        for_leaves_with_themselves(collision, this->scene_.pairs()[i], [&](std::uint32_t leaf) {
+        for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) {
           append_spans(collision, i, Leaf{leaf, leaf, 0, t0}, t0, t1, out);
         });
-      }
+      });
     });
   }
 
@@ -89,19 +88,19 @@ class KineticSeparationList final : public Strategy<S> {
       auto& list = collision.list();
       list.start_spans(t0);
       collision.advance(t1);
-      const auto ended = list.stop_spans();
-      for (std::size_t i = 0; i < this->scene_.pairs().size(); ++i) {
-        const BodyPair& pair = this->scene_.pairs()[i];
-        swept_leaves_.clear();
-        for (const auto& leaf : list.leaf_pairs(i)) swept_leaves_.emplace_back(leaf.a, leaf.b);
-        for (const auto& leaf : ended)
-          if (leaf.bodies == i) swept_leaves_.emplace_back(leaf.leaf.a, leaf.leaf.b);
-        for_leaves_with_themselves(collision, pair,
-                                   [&](std::uint32_t leaf) { swept_leaves_.emplace_back(leaf, leaf); });
-        std::sort(swept_leaves_.begin(), swept_leaves_.end());
-        swept_leaves_.erase(std::unique(swept_leaves_.begin(), swept_leaves_.end()), swept_leaves_.end());
-        for (const auto& [a, b] : swept_leaves_) append_leaves(collision, pair, a, b, out);
-      }
+      swept_leaves_.clear();
+      for (const auto& ended : list.stop_spans())
+        swept_leaves_.push_back({ended.bodies, ended.leaf.a, ended.leaf.b});
+      for_body_pairs(collision, [&](std::uint32_t i, const BodyPair& pair) {
+        for (const auto& leaf : list.leaf_pairs(i)) swept_leaves_.push_back({i, leaf.a, leaf.b});
+        for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) {
+          swept_leaves_.push_back({i, leaf, leaf});
+        });
+      });
+      std::sort(swept_leaves_.begin(), swept_leaves_.end());
+      swept_leaves_.erase(std::unique(swept_leaves_.begin(), swept_leaves_.end()), swept_leaves_.end());
+      for (const SweptLeaves& swept : swept_leaves_)
+        append_leaves(collision, list.body_pair(swept.bodies), swept.a, swept.b, out);
     });
   }
 
@@ -148,6 +147,19 @@ class KineticSeparationList final : public Strategy<S> {
     return std::visit([&](const auto& collision) -> decltype(auto) { return work(*collision); }, collision_);
   }
 
+  /// Two leaves, and the number of their bodies in the list.
+  struct SweptLeaves {
+    std::uint32_t bodies, a, b;
+    auto operator<=>(const SweptLeaves&) const = default;
+  };
+
+  /// Calls work(number, pair) for each body pair of the list.
+  template <class System, class Work>
+  static void for_body_pairs(const System& collision, const Work& work) {
+    const auto& list = collision.list();
+    for (std::uint32_t i = 0; i < list.body_pair_count(); ++i)
+      if (list.is_entered(i)) work(i, list.body_pair(i));
+  }
   /// Within one body the list has no leaf with itself.
   template <class System, class Work>
   void for_leaves_with_themselves(const System& collision, const BodyPair& pair, const Work& work) const {
@@ -183,9 +195,9 @@ class KineticSeparationList final : public Strategy<S> {
 
   /// Every primitive pair of two leaves for as long as the leaves overlap.
   template <class System, class LeafPair>
-  void append_spans(const System& collision, std::size_t body_pair, const LeafPair& leaf, double t0,
+  void append_spans(const System& collision, std::uint32_t body_pair, const LeafPair& leaf, double t0,
                     double end, SpanBuffer& out) const {
-    const BodyPair& pair = this->scene_.pairs()[body_pair];
+    const BodyPair& pair = collision.list().body_pair(body_pair);
     const Topology& a = collision.forest().tree(pair.first).topology();
     const Topology& b = collision.forest().tree(pair.second).topology();
     const TopologyNode na = a.nodes[leaf.a], nb = b.nodes[leaf.b];
@@ -201,7 +213,7 @@ class KineticSeparationList final : public Strategy<S> {
   }
 
   Count count_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> swept_leaves_;
+  std::vector<SweptLeaves> swept_leaves_;
   std::variant<std::unique_ptr<Collision<AvlEventQueue>>, std::unique_ptr<Collision<BinaryHeapEventQueue>>>
       collision_;
   std::uint64_t first_step_ = 0, first_fetch_ = 0;

@@ -41,12 +41,18 @@ class LinearBoundsStrategy final : public Strategy<S> {
   QueryStatus candidates_at(double t, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
-    for (const BodyPair& pair : this->scene_.pairs())
+    for (const std::uint32_t i : bounds_.segment().near_pairs) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      if (tests >= budget.box_tests) {
+        ++status.pending;
+        continue;
+      }
       status.pending += query_
                             .run_at(bounds_.hierarchy(pair.first), moment(pair.first, t), pair.first,
                                     bounds_.hierarchy(pair.second), moment(pair.second, t), pair.second,
-                                    this->scene_, this->sampled_, budget, out, tests)
+                                    this->scene_, this->sampled_, rest_of(budget, tests), out, tests)
                             .pending;
+    }
     count_.add(Counter::box_tests, tests);
     return status;
   }

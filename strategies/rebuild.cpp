@@ -23,6 +23,13 @@ class Rebuild final : public StoredHierarchyStrategy<S, Count> {
     }
   }
 
+  /// As for any other frame: what was built later is not to be seen.
+  void reset(double t) override {
+    Base::reset(t);
+    for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) update(body);
+    this->count_.table = {};
+  }
+
   /// A body at rest is built anew, too.
   void geometry_changed(double /*t*/, const GeometryChange<S>& change) override {
     this->plans_changed_ = true;

@@ -55,8 +55,14 @@ std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playb
     Box<S> box;
     std::uint32_t primitive;
   };
+  std::vector<std::vector<Box<S>>> boxes_of(scene.bodies.size());
+  std::vector<Box<S>> whole(scene.bodies.size());
+  for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+    boxes_of[body] = primitive_boxes(scene.bodies[body].primitives, playback.positions(body));
+    for (const Box<S>& box : boxes_of[body]) whole[body].extend(box);
+  }
   const auto sorted_items = [&](std::uint32_t body, int axis, const Box<S>& window) {
-    const auto boxes = primitive_boxes(scene.bodies[body].primitives, playback.positions(body));
+    const auto& boxes = boxes_of[body];
     std::vector<Item> items;
     for (std::uint32_t p = 0; p < boxes.size(); ++p)
       if (overlap(boxes[p], window)) items.push_back({boxes[p], p});
@@ -65,13 +71,11 @@ std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playb
     return items;
   };
   for (const BodyPair& pair : scene.pairs) {
+    const Box<S>&whole_a = whole[pair.first], &whole_b = whole[pair.second];
+    if (!overlap(whole_a, whole_b)) continue;
     const Body<S>&a = scene.bodies[pair.first], &b = scene.bodies[pair.second];
     const S* positions_a = playback.positions(pair.first);
     const S* positions_b = playback.positions(pair.second);
-    Box<S> whole_a, whole_b;
-    for (const auto& box : primitive_boxes(a.primitives, positions_a)) whole_a.extend(box);
-    for (const auto& box : primitive_boxes(b.primitives, positions_b)) whole_b.extend(box);
-    if (!overlap(whole_a, whole_b)) continue;
     int axis = 0;
     for (int d = 1; d < 3; ++d)
       if (double(whole_a.upper[d]) - double(whole_a.lower[d]) >

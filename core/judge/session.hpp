@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -56,12 +57,12 @@ class Session {
   void reset(double t) {
     check_time(t, "cannot start");
     playback_.restore_plans();
-    changed_ = geometry_changed_;  // of what the constructor's scene says
     if (geometry_changed_) {
       changing_.emplace(*original_);
       playback_.seek(overlaid_keyframes(*original_).front());
       make_strategy();
-      geometry_changed_ = changed_ = false;
+      finder_.reset();
+      geometry_changed_ = false;
     }
     watch_.start(playback_);
     playback_.seek(t);
@@ -98,13 +99,20 @@ class Session {
     strategy_->spans(from, t, out);
   }
   /// Moves to t and appends the contacts of features on the way, for strategies that declare contacts: every
-  /// vertex moves on a straight line from its present position to that at t. To be called from one time of
-  /// `overlaid_keyframes` to the next, beginning after `reset`, without frames between. The narrow phase
-  /// counts as triangle tests. Throws std::invalid_argument unless all bodies consist of triangles, and
-  /// std::logic_error after changes of plans or geometry, of which it knows nothing. Returns the pairs of
-  /// primitives that came to the narrow phase.
+  /// vertex moves on a straight line from its present position to that at t. To be called after `reset` and
+  /// then again and again, no further than to `next_knot` at a time, without frames between; plans and
+  /// geometry may change between two calls (edges are numbered anew then, as of the present geometry). The
+  /// narrow phase counts as triangle tests. Throws std::invalid_argument, with nothing changed, unless all
+  /// bodies consist of triangles, and if t is beyond the next knot or not after the present time. Returns the
+  /// pairs of primitives that came to the narrow phase.
   std::size_t contacts(double t, ContactBuffer& out, PhaseTimes& times) {
-    if (changed_) throw std::logic_error("contacts are not found after changes of plans or geometry");
+    if (!info_->can.contacts) throw std::logic_error("'" + info_->id + "' does not declare contacts");
+    if (!(t > playback_.time()) || !std::isfinite(t))
+      throw std::invalid_argument("contacts from t = " + std::to_string(playback_.time()) +
+                                  " to t = " + std::to_string(t) + ", which is not later");
+    if (const double knot = next_knot(); t > knot)
+      throw std::invalid_argument("contacts to t = " + std::to_string(t) + " across the knot of a plan at " +
+                                  std::to_string(knot));
     if (!finder_) finder_.emplace(*scene_);
     playback_.evaluate_all();
     finder_->start(playback_);
@@ -120,6 +128,14 @@ class Session {
     timed(times.triangle_tests, [&] { finder_->find(playback_, swept_, out); });
     return swept_.size();
   }
+  /// The first time after the present one at which the plan of any vertex has a knot; infinite if none has.
+  /// O(bodies + plans of their own).
+  double next_knot() const {
+    double knot = std::numeric_limits<double>::infinity();
+    for (std::uint32_t body = 0; body < playback_.body_count(); ++body)
+      knot = std::min(knot, playback_.plans(body).lines_end(playback_.time()));
+    return knot;
+  }
   /// How contacts were decided; after the first call of `contacts`.
   ImpactStats impact_stats() const { return finder_ ? finder_->stats() : ImpactStats{}; }
   /// The pairs of the last call of `contacts`.
@@ -130,7 +146,6 @@ class Session {
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
     if (changing_) changing_->check_plans(changes);
     playback_.change_plans(playback_.time(), changes);
-    changed_ = true;
     for (const PlanChange<S>& change : changes) watch_.changed(playback_, change.body, change.vertex);
     timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });
   }
@@ -140,7 +155,8 @@ class Session {
   void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
     if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
     changing_->apply(change, playback_);
-    geometry_changed_ = changed_ = true;
+    geometry_changed_ = true;
+    finder_.reset();  // its features are those of before
     watch_.added(playback_, change);
     timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
   }
@@ -183,7 +199,7 @@ class Session {
   Playback<S> playback_;
   RangeWatch<S> watch_;
   std::unique_ptr<Strategy<S>> strategy_;
-  bool geometry_changed_ = false, changed_ = false;
+  bool geometry_changed_ = false;
   std::optional<ContactFinder<S>> finder_;
   std::vector<const S*> before_;
   PairBuffer swept_;

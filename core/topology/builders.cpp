@@ -1,5 +1,7 @@
 #include "core/topology/builders.hpp"
 
+#include "core/topology/topology_edit.hpp"
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -337,20 +339,6 @@ class MedianTree {
   BinaryBuilder<S>* builder_;
   BuilderConfig config_;
 };
-
-bool is_perfect(const Topology& topology) {
-  int leaf_depth = -1;
-  for (std::uint32_t i = 0; i < topology.size(); ++i) {
-    const TopologyNode node = topology.nodes[i];
-    if (node.is_leaf()) {
-      if (leaf_depth >= 0 && topology.depths[i] != leaf_depth) return false;
-      leaf_depth = topology.depths[i];
-    } else if (i != 0 && node.count() != topology.width) {
-      return false;
-    }
-  }
-  return true;
-}
 
 }  // namespace
 

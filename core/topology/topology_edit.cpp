@@ -284,11 +284,24 @@ void TopologyEditor::place(Topology& topology, std::uint32_t node, std::span<Pla
   place(topology, pair + 1, leaves.subspan(half), edit);
 }
 
+bool is_perfect(const Topology& topology) {
+  int leaf_depth = -1;
+  for (std::uint32_t i = 0; i < topology.size(); ++i) {
+    const TopologyNode node = topology.nodes[i];
+    if (node.is_leaf()) {
+      if (leaf_depth >= 0 && topology.depths[i] != leaf_depth) return false;
+      leaf_depth = topology.depths[i];
+    } else if (i != 0 && node.count() != topology.width) {
+      return false;
+    }
+  }
+  return true;
+}
+
 Topology compacted(const Topology& topology, std::vector<std::uint32_t>& order) {
   Topology result;
   result.width = topology.width;
   result.leaf_size = topology.leaf_size;
-  result.perfect = topology.perfect;
   order.clear();
   if (topology.empty()) return result;
   const auto add = [&](std::uint32_t old, std::uint32_t parent, std::uint8_t depth) {
@@ -314,6 +327,7 @@ Topology compacted(const Topology& topology, std::vector<std::uint32_t>& order) 
     for (std::uint32_t i = 0; i < old.count(); ++i) add(old.first() + i, node, below(result.depths[node]));
     for (std::uint32_t i = old.count(); i-- > 0;) open.push_back(first + i);
   }
+  result.perfect = is_perfect(result);
   return result;
 }
 

@@ -126,6 +126,9 @@ std::uint32_t leaf_for(const Topology& topology, const Box<S>& box, BoxOf&& box_
   return node;
 }
 
+/// Whether `Topology::perfect` is to be said of a topology that is laid out as a built one. O(nodes).
+bool is_perfect(const Topology& topology);
+
 /// The same hierarchy laid out as a builder does it: depth first, siblings in a row, no holes, exact depths.
 /// order[i] is the id that node i had.
 Topology compacted(const Topology& topology, std::vector<std::uint32_t>& order);

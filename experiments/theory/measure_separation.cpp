@@ -37,7 +37,7 @@ class ListAudit {
   /// Entries that are in one and not in the other.
   std::uint64_t differences(std::uint64_t& entries) {
     std::uint64_t wrong = 0;
-    for (std::uint16_t i = 0; i < view_.pairs().size(); ++i) {
+    for (std::uint32_t i = 0; i < view_.pairs().size(); ++i) {
       fresh_.clear();
       std::set<Entry> kept, leaves;
       descend(view_.pairs()[i], 0, 0);

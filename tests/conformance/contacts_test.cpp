@@ -232,7 +232,7 @@ TEST(ContactScenes, PiecesOfSegmentsMakeNoDifference) {
   }
 }
 
-// Contacts, then frames from the first on, then contacts again; and none after a change of plans.
+// Contacts, then frames from the first on, then contacts again.
 TEST(ContactScenes, ResetComesBetweenContactsAndFrames) {
   const auto test = synthetic_scene<float>("self_rolled_cloth");
   const Truth<float> truth = truth_of(test.scene);
@@ -257,13 +257,92 @@ TEST(ContactScenes, ResetComesBetweenContactsAndFrames) {
         EXPECT_EQ(pairs, brute_force_pairs(test.scene, playback)) << entry.info.id << " at " << t;
       }
     }
-    if (!entry.info.can.plan_changes) continue;
-    const PlanChange<float> change{};
-    session.reset(truth.knots[0]);
-    session.change_plans({&change, 1}, ignored);
-    ContactBuffer found;
-    EXPECT_THROW(session.contacts(truth.knots[1], found, ignored), std::logic_error) << entry.info.id;
   }
+}
+
+/// Plans change at every stop, some to lines without an end and some with knots of their own; geometry does
+/// at every second one, for those that can follow. A second scene and playback make the same changes, for the
+/// truth.
+template <class S>
+void expect_contacts_while_changing(const StrategyEntry& entry, const std::string& name, std::size_t& total) {
+  const auto test = synthetic_scene<S>(name);
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  PhaseTimes ignored;
+  for (int round = 0; round < 2; ++round) {
+    ChangingScene<S> mirror(test.scene);
+    Playback<S> playback(test.scene);
+    Random random(7);
+    const double end = overlaid_keyframes(test.scene).back();
+    double t = overlaid_keyframes(test.scene).front();
+    session.reset(t);
+    for (int stop = 0; t < end && stop < 40; ++stop) {
+      const std::string where = entry.info.id + " on " + name + ", stop " + std::to_string(stop);
+      playback.seek(t);
+      playback.evaluate_all();
+      if (entry.info.can.plan_changes && stop % 3 != 2) {
+        std::vector<PlanChange<S>> changes;
+        for (std::uint32_t i = 0; i < 6; ++i) {
+          PlanChange<S> change{.body = random.below(2), .vertex = 5 * i + random.below(5)};
+          for (S& v : change.velocity) v = S(0.4 * random.unit());
+          if (i % 2 == 0) {
+            change.times = {t + 0.17};
+            for (int axis = 0; axis < 3; ++axis) change.positions.push_back(S(0.7 * random.unit()));
+          }
+          changes.push_back(change);
+        }
+        session.change_plans(changes, ignored);
+        playback.change_plans(t, changes);
+      }
+      if (entry.info.can.geometry_changes && stop % 4 == 1) {
+        GeometryChange<S> change;
+        change.removed_primitives = {{0, std::uint32_t(stop)}};
+        const std::uint32_t first = mirror.scene().bodies[0].plans.vertex_count();
+        for (int i = 0; i < 3; ++i) {
+          typename GeometryChange<S>::NewVertex vertex;
+          for (S& x : vertex.position) x = S(0.8 * random.unit());
+          for (S& v : vertex.plan.velocity) v = S(0.5 * random.unit());
+          change.vertices.push_back(vertex);
+        }
+        change.primitives = {{0, {first, first + 1, first + 2}}};
+        session.change_geometry(change, ignored);
+        mirror.apply(change, playback);
+      }
+      const double next = std::min({session.next_knot(), t + 0.3, end});
+      EXPECT_THROW(
+          {
+            ContactBuffer none;
+            session.contacts(session.next_knot() + 1, none, ignored);
+          },
+          std::invalid_argument)
+          << where;
+      ContactFinder<S> finder(mirror.scene());
+      playback.evaluate_all();
+      finder.start(playback);
+      playback.seek(next);
+      playback.evaluate_all();
+      ContactBuffer truth, found;
+      finder.find_by_sweep(playback, truth);
+      session.contacts(next, found, ignored);
+      std::sort(truth.begin(), truth.end());
+      std::sort(found.begin(), found.end());
+      ASSERT_EQ(found.size(), truth.size()) << where;
+      ASSERT_TRUE(found == truth) << where;
+      total += found.size();
+      t = next;
+    }
+  }
+}
+
+TEST(ContactScenes, AreFoundWhilePlansAndGeometryChange) {
+  std::size_t total = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (!entry.info.can.contacts) continue;
+    for (const char* name : {"soups", "self_rolled_cloth"}) {
+      if (entry.factory<float>() != nullptr) expect_contacts_while_changing<float>(entry, name, total);
+      if (entry.factory<double>() != nullptr) expect_contacts_while_changing<double>(entry, name, total);
+    }
+  }
+  EXPECT_GT(total, 1000u);
 }
 
 TEST(Registry, ContactsAreDeclaredOrRefused) {

@@ -58,7 +58,7 @@ class Auditor {
 
   /// Compares list and traversal at t, which no event is at; says what differs, or nothing.
   std::string compare(double t) {
-    for (std::uint16_t i = 0; i < scene_.pairs().size(); ++i) {
+    for (std::uint32_t i = 0; i < scene_.pairs().size(); ++i) {
       std::set<ListEntry> fresh, kept;
       const auto& body_pair = scene_.pairs()[i];
       if (!collision_.forest().tree(body_pair.first).topology().empty() &&

@@ -37,6 +37,94 @@ TEST(EveryStrategy, ASilentInstanceCountsNothing) {
   EXPECT_GT(found, 0u);
 }
 
+/// Copies of two grids that cut each other, far apart from the other copies; their pairs alone.
+Scene<float> couples(std::uint32_t count) {
+  Scene<float> scene;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    scene.bodies.push_back(
+        grid<float>(8, 4.0 * i, 0, 3, [](std::uint32_t k) { return 0.1 * std::sin(0.9 * k); }));
+    scene.bodies.push_back(grid<float>(8, 4.0 * i + 0.1, 0.01, 1, [](std::uint32_t) { return 0.0; }));
+    scene.pairs.push_back({2 * i, 2 * i + 1});
+  }
+  return scene;
+}
+
+// A budget is for a frame, not for a pair of bodies. Without one, or with enough, an answer is complete.
+TEST(EveryStrategy, ABudgetIsForAFrame) {
+  const Scene<float> one = couples(1), many = couples(12);
+  std::size_t with_budget = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (entry.factory<float>() == nullptr || entry.info.guarantee == Guarantee::approximate) continue;
+    const auto query = [&](const Scene<float>& scene, std::uint64_t most, std::uint64_t& tests,
+                           std::size_t& pairs) {
+      Session<float> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+      PhaseTimes times;
+      PairBuffer found;
+      session.reset(0);
+      session.advance(0.5, times);
+      const std::uint64_t before = session.strategy().counters()[Counter::box_tests];
+      const QueryStatus status = session.query(found, times, Budget{most});
+      tests = session.strategy().counters()[Counter::box_tests] - before;
+      pairs = found.size();
+      return status;
+    };
+    std::uint64_t tests_one = 0, tests_all = 0, tests = 0;
+    std::size_t pairs_one = 0, pairs_all = 0, pairs = 0;
+    const std::uint64_t unlimited = Budget{}.box_tests;
+    EXPECT_TRUE(query(one, unlimited, tests_one, pairs_one).complete()) << entry.info.id;
+    EXPECT_TRUE(query(many, unlimited, tests_all, pairs_all).complete()) << entry.info.id;
+    EXPECT_EQ(pairs_all, 12 * pairs_one) << entry.info.id;
+    if (!entry.info.can.time_budget) {
+      // Those that do not honour a budget answer all the same.
+      EXPECT_TRUE(query(many, 1, tests, pairs).complete()) << entry.info.id;
+      EXPECT_EQ(pairs, pairs_all) << entry.info.id;
+      continue;
+    }
+    ++with_budget;
+    const QueryStatus status = query(many, 2 * tests_one, tests, pairs);
+    EXPECT_FALSE(status.complete()) << entry.info.id << ": the budget of two couples sufficed for twelve";
+    EXPECT_LE(tests, 4 * tests_one) << entry.info.id << ": " << tests << " tests, of " << tests_all;
+    EXPECT_LE(pairs, 4 * pairs_one) << entry.info.id;
+    EXPECT_TRUE(query(many, tests_all + 12, tests, pairs).complete()) << entry.info.id;
+    EXPECT_EQ(pairs, pairs_all) << entry.info.id;
+  }
+  EXPECT_GT(with_budget, 8u);
+}
+
+// What plans did before a reset is forgotten: the same clip costs the same again.
+TEST(EveryStrategy, CountsTheSameAfterAReset) {
+  const Scene<float> scene = grids<float>(12, 0.2, [](std::uint32_t i) { return 0.1 * std::sin(1.3 * i); });
+  for (const StrategyEntry& entry : registry()) {
+    if (entry.factory<float>() == nullptr || !entry.info.can.plan_changes) continue;
+    std::vector<std::map<std::string, std::string>> variants{{}};
+    if (entry.info.id == "kinetic_boxtree") variants.push_back({{"rebuild", "median"}, {"check_every", "1"}});
+    for (const auto& params : variants) {
+      Session<float> session(scene, {&entry, params, entry.info.topology.preferred},
+                             CountingPolicy::counting);
+      PhaseTimes times;
+      PairBuffer pairs;
+      const auto play = [&](bool changes) {
+        session.reset(0);
+        const std::vector<PlanChange<float>> up{{.body = 1, .vertex = 3, .velocity = {0, 0, 0.5F}}};
+        if (changes) session.change_plans(up, times);
+        for (const double t : {0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75}) {
+          session.advance(t, times);
+          session.query(pairs, times);
+        }
+        return session.strategy().counters();
+      };
+      const Counters first = play(false);
+      play(true);
+      const Counters again = play(false);
+      for (std::size_t c = 0; c < first.values.size(); ++c)
+        if (Counter(c) != Counter::bytes) {
+          EXPECT_EQ(first.values[c], again.values[c])
+              << entry.info.id << (params.empty() ? "" : " with rebuild=median") << ", " << name(Counter(c));
+        }
+    }
+  }
+}
+
 TEST(EveryStrategy, RefusesTimesThatAreNone) {
   const Scene<float> scene = grids<float>(12, 0.2, [](std::uint32_t i) { return 0.1 * std::sin(1.3 * i); });
   constexpr double infinity = std::numeric_limits<double>::infinity();

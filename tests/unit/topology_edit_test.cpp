@@ -191,6 +191,27 @@ TEST(TopologyEdit, NodesAreUsedAgain) {
   EXPECT_LE(edited.topology().primitives.size(), 2u * 51u);
 }
 
+// A primitive goes and comes back: the tree is as perfect as it was, and said to be.
+TEST(Compacted, SaysWhatIsPerfectNow) {
+  std::vector<Box<double>> boxes(8);
+  for (std::uint32_t i = 0; i < boxes.size(); ++i) {
+    const double at[3] = {double(i), 0, 0};
+    boxes[i].extend(at);
+  }
+  Topology topology =
+      build_topology<double>(boxes, {.method = BuildMethod::median, .width = 2, .leaf_size = 1});
+  ASSERT_TRUE(topology.perfect);
+  TopologyEditor editor(topology, 8);
+  TopologyEdit edit;
+  std::vector<std::uint32_t> order;
+  const std::uint32_t neighbour =
+      topology.parents[editor.leaf_of(3)] == topology.parents[editor.leaf_of(2)] ? 2 : 4;
+  editor.remove(topology, 3, edit);
+  EXPECT_FALSE(compacted(topology, order).perfect);
+  editor.insert(topology, editor.leaf_of(neighbour), 3, edit);
+  EXPECT_TRUE(compacted(topology, order).perfect);
+}
+
 TEST(ListPool, KeepsListsApart) {
   const std::vector<std::uint32_t> offsets{0, 2, 2, 5};
   ListPool pool(offsets, {1, 2, 3, 4, 5});

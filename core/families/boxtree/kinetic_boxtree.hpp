@@ -45,7 +45,7 @@ template <class S, class Queue, class Count, class Observer = NoObserver, class 
 class KineticBoxTree {
  public:
   /// Throws std::invalid_argument if the topology is not binary.
-  KineticBoxTree(Topology topology, const Primitives& primitives, std::uint16_t body,
+  KineticBoxTree(Topology topology, const Primitives& primitives, std::uint32_t body,
                  std::uint32_t first_slot, EventClock<S>& clock, Queue& queue, Count& count,
                  Observer observer = {})
       : topology_(std::move(topology)),
@@ -328,8 +328,8 @@ class KineticBoxTree {
     bool found = false;
     event.winner = winner;
     event.slot = slot;
-    event.body = body_;
-    event.side = std::uint8_t(side);
+    event.body = body_ % Event::most_bodies;
+    event.side = side & 7U;
     event.depth = topology_.depths[node];
     withdraw(slot);  // the queue must not hold this slot while the clock learns its new crossing
     std::optional<Crossing<S>> own, earliest_own;
@@ -366,8 +366,8 @@ class KineticBoxTree {
     event.winner = winner;
     event.loser = after;
     event.slot = slot;
-    event.body = body_;
-    event.side = std::uint8_t(side);
+    event.body = body_ % Event::most_bodies;
+    event.side = side & 7U;
     event.depth = topology_.depths[node];
     std::optional<Crossing<S>> own, next_own;
     count_->add(Counter::certificates_made);
@@ -515,7 +515,7 @@ class KineticBoxTree {
   Topology topology_;
   Topology original_;  ///< what starting over starts with; empty as long as nothing was rebuilt
   BoxTreeLeaves leaves_;
-  std::uint16_t body_;
+  std::uint32_t body_;
   CertificateSlots slots_;
   EventClock<S>* clock_;
   Queue* queue_;

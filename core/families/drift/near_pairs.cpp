@@ -13,47 +13,38 @@ constexpr std::size_t chunk_room = 2048;
 }  // namespace
 
 template <class S>
-NearLeaves<S> NearPairs<S>::leaves(const NearSide<S>& side, Leaves& own) {
+NearLeaves<S> NearPairs<S>::leaves(const NearSide<S>& side) {
+  NearLeafRows<S>& own = *side.rows;
   const std::size_t count = side.hierarchy->leaf_count();
-  if (own.stamps.size() != count) {
-    own.stamps.assign(count, 0);
-    own.rows.resize(count * lane_scalars(std::max(4u, side.hierarchy->padded_leaf_size())));
-    own.stamp = 1;
-  } else if (!side.same && ++own.stamp == 0) {
-    std::fill(own.stamps.begin(), own.stamps.end(), 0);
-    own.stamp = 1;
+  if (own.stamps_.size() != count) {
+    own.stamps_.assign(count, 0);
+    own.rows_.resize(count * lane_scalars(std::max(4u, side.hierarchy->padded_leaf_size())));
+    own.stamp_ = 1;
   }
   NearLeaves<S> result{
-      side.hierarchy->leaf_lists(), own.rows.data(), own.stamps.data(), own.stamp, side.positions, {}};
+      side.hierarchy->leaf_lists(), own.rows_.data(), own.stamps_.data(), own.stamp_, side.positions, {}};
   std::copy_n(side.margin, 6, result.margin);
   return result;
 }
 
 template <class S>
-void NearPairs<S>::forget() {
-  for (Leaves& own : leaves_) {
-    std::fill(own.stamps.begin(), own.stamps.end(), 0);
-    own.stamp = 1;
-  }
-}
-
-template <class S>
 void NearPairs<S>::build(const NearSide<S>& a, const NearSide<S>& b, std::uint32_t body_a,
-                         std::uint32_t body_b, const S (&reach)[6], std::uint64_t& tests) {
+                         std::uint32_t body_b, const S (&reach)[6], NearWork<S>& work, std::uint64_t& tests) {
   WideHierarchy<S>&hierarchy_a = *a.hierarchy, &hierarchy_b = *b.hierarchy;
   const std::uint32_t width = hierarchy_a.topology().width;
   kernels_ = hierarchy_a.kernels();
-  stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
-  leaf_pairs_.resize(2 * leaf_pair_room);
+  work.stack.resize(std::max<std::size_t>(work.stack.size(), 1024));
+  work.leaf_pairs.resize(2 * leaf_pair_room);
   const auto no_limit = Budget{}.box_tests;
-  WideTraversal state{stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pair_room, 1, no_limit};
+  WideTraversal state{work.stack.data(), 0, work.stack.size(), work.leaf_pairs.data(), 0,
+                      leaf_pair_room,    1, no_limit};
   if (overlap(hierarchy_a.box(0), hierarchy_b.box(0))) state.stack[state.depth++] = {0, 0};
   LeafNear<S> near{hierarchy_a.arrays(),
                    hierarchy_b.arrays(),
-                   leaves(a, leaves_[0]),
-                   leaves(b, leaves_[1]),
+                   leaves(a),
+                   leaves(b),
                    {},
-                   leaf_pairs_.data(),
+                   work.leaf_pairs.data(),
                    0,
                    0,
                    nullptr,
@@ -71,26 +62,26 @@ void NearPairs<S>::build(const NearSide<S>& a, const NearSide<S>& b, std::uint32
     near.next = 0;
     near.count = state.found;
     while (near.next < near.count) {
-      if (found_.size() < near.found + chunk_room) found_.resize(2 * near.found + chunk_room);
-      near.out = found_.data();
-      near.out_room = found_.size();
+      if (work.found.size() < near.found + chunk_room) work.found.resize(2 * near.found + chunk_room);
+      near.out = work.found.data();
+      near.out_room = work.found.size();
       pairs_of_leaves(near);
     }
     state.found = 0;
     if (state.depth + wide_step >= state.stack_room) {
-      stack_.resize(2 * stack_.size());
-      state.stack = stack_.data();
-      state.stack_room = stack_.size();
+      work.stack.resize(2 * work.stack.size());
+      state.stack = work.stack.data();
+      state.stack_room = work.stack.size();
     }
   }
   tests += state.tests + near.tests;
-  sort(near.found, body_a, body_b);
+  sort({work.found.data(), near.found}, body_a, body_b);
 }
 
 template <class S>
-void NearPairs<S>::sort(std::size_t found, std::uint32_t body_a, std::uint32_t body_b) {
+void NearPairs<S>::sort(std::span<const NearPair> found, std::uint32_t body_a, std::uint32_t body_b) {
   std::uint32_t place[buckets] = {};
-  for (std::size_t i = 0; i < found; ++i) ++place[bucket(found_[i].ratio)];
+  for (const NearPair& pair : found) ++place[bucket(pair.ratio)];
   std::uint32_t sum = 0;
   for (std::uint32_t k = 0; k < buckets; ++k) {
     const std::uint32_t count = place[k];
@@ -98,9 +89,9 @@ void NearPairs<S>::sort(std::size_t found, std::uint32_t body_a, std::uint32_t b
     sum += count;
     bucket_end_[k] = sum;
   }
-  pairs_.resize(found);
-  for (std::size_t i = 0; i < found; ++i)
-    pairs_[place[bucket(found_[i].ratio)]++] = {body_a, found_[i].primitive_a, body_b, found_[i].primitive_b};
+  pairs_.resize(found.size());
+  for (const NearPair& pair : found)
+    pairs_[place[bucket(pair.ratio)]++] = {body_a, pair.primitive_a, body_b, pair.primitive_b};
 }
 
 template <class S>
@@ -118,13 +109,13 @@ void NearPairs<S>::read(double fraction, PairBuffer& out) const {
 
 template <class S>
 std::size_t NearPairs<S>::read_meeting(double fraction, const PrimitivesNow<S>& a, const PrimitivesNow<S>& b,
-                                       PairBuffer& out) {
+                                       NearWork<S>& work, PairBuffer& out) const {
   const std::size_t end = bucket_end_[bucket(float(fraction))];
   const NearKernels<S>& kernels = near_kernels<S>(kernels_);
-  chunk_.resize(chunk_room);
+  work.chunk.resize(chunk_room);
   for (std::size_t first = 0; first < end; first += chunk_room) {
     const std::size_t count = std::min(chunk_room, end - first);
-    append(chunk_.data(), kernels.meeting(pairs_.data() + first, count, a, b, chunk_.data()), out);
+    append(work.chunk.data(), kernels.meeting(pairs_.data() + first, count, a, b, work.chunk.data()), out);
   }
   return end;
 }
@@ -137,11 +128,7 @@ void NearPairs<S>::clear() {
 
 template <class S>
 std::size_t NearPairs<S>::bytes() const {
-  std::size_t total = 0;
-  for (const Leaves& own : leaves_)
-    total += own.rows.size() * sizeof(S) + own.stamps.size() * sizeof(std::uint32_t);
-  return total + stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
-         found_.capacity() * sizeof(NearPair) + (pairs_.capacity() + chunk_.capacity()) * sizeof(FoundPair);
+  return sizeof(*this) + pairs_.capacity() * sizeof(FoundPair);
 }
 
 template class NearPairs<float>;

@@ -7,6 +7,7 @@
 #include "core/contract/strategy.hpp"
 #include "core/families/envelope/kernels/wide_realisers.hpp"
 #include "core/families/envelope/segment_envelope.hpp"
+#include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 #include "core/motion/round_positions.hpp"
 
@@ -20,7 +21,7 @@ template <class S, class Count>
 class RealiserStrategy : public Strategy<S> {
  public:
   RealiserStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies)
-      : Strategy<S>(scene, motion), motion_(motion) {
+      : Strategy<S>(scene, motion), motion_(motion), near_bodies_(scene.pairs(), scene.body_count()) {
     bodies_.resize(scene.body_count());
     for (std::uint32_t index = 0; index < scene.body_count(); ++index) {
       Body& body = bodies_[index];
@@ -36,11 +37,20 @@ class RealiserStrategy : public Strategy<S> {
     QueryStatus status;
     std::uint64_t tests = 0;
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) make_visited(index);
-    for (const BodyPair& pair : this->scene_.pairs()) {
+    const auto box_of = [&](std::uint32_t body) {
+      const auto& hierarchy = bodies_[body].hierarchy;
+      return hierarchy.empty() ? Box<double>{} : to_double(hierarchy.box(0));
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      if (tests >= budget.box_tests) {
+        ++status.pending;
+        continue;
+      }
       Body &a = bodies_[pair.first], &b = bodies_[pair.second];
       const typename WideQuery<S>::LazySide side_a{&a.hierarchy, pair.first, a.stale.data()},
           side_b{&b.hierarchy, pair.second, b.stale.data()};
-      query_.start_lazy(side_a, side_b, budget);
+      query_.start_lazy(side_a, side_b, rest_of(budget, tests));
       using Wanted = typename WideQuery<S>::Wanted;
       while (const Wanted wanted = query_.proceed(side_a, side_b, this->scene_, this->sampled_, out, tests)) {
         if (wanted.first != Wanted::none) make_wanted(pair.first, wanted.first);
@@ -72,7 +82,7 @@ class RealiserStrategy : public Strategy<S> {
   }
 
   std::size_t bytes() const override {
-    std::size_t total = 0;
+    std::size_t total = near_bodies_.bytes();
     for (const Body& body : bodies_)
       total += body.hierarchy.bytes() +
                (body.realisers.size() + body.visited.capacity()) * sizeof(std::uint32_t) + body.stale.size();
@@ -108,6 +118,7 @@ class RealiserStrategy : public Strategy<S> {
   }
 
   SegmentMotion<S> motion_;
+  NearBodies near_bodies_;
   std::vector<Body> bodies_;
   Count count_;
 

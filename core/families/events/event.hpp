@@ -26,10 +26,12 @@ inline bool is_upper(Side side) {
 struct Event {
   double hint = 0, error = 0, begin = 0, end = 0;
   std::uint32_t winner = 0, loser = 0;
-  std::uint32_t slot = 0;  ///< which certificate: unique in the whole queue
-  std::uint16_t body = 0;
-  std::uint8_t side = 0;
-  std::uint8_t depth = 0;  ///< of the node; deeper events of one instant come first
+  std::uint32_t slot = 0;       ///< which certificate: unique in the whole queue
+  std::uint32_t body : 21 = 0;  ///< below most_bodies
+  std::uint32_t side : 3 = 0;
+  std::uint32_t depth : 8 = 0;  ///< of the node; deeper events of one instant come first
+
+  static constexpr std::uint32_t most_bodies = 1U << 21;
 };
 static_assert(sizeof(Event) == 48);
 

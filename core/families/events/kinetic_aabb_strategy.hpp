@@ -5,6 +5,7 @@
 #include "core/contract/strategy.hpp"
 #include "core/families/events/kinetic_forest.hpp"
 #include "core/families/events/realiser_boxes.hpp"
+#include "core/families/wide/near_bodies.hpp"
 #include "core/topology/leaf_pairs.hpp"
 
 namespace kbvh {
@@ -22,7 +23,7 @@ class KineticAabbStrategy : public Strategy<S> {
   /// `queue` is the index among Queues of the one to use.
   KineticAabbStrategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                       std::size_t queue)
-      : Strategy<S>(scene, motion) {
+      : Strategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
     for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
     std::size_t index = 0;
     (void)((index++ == queue &&
@@ -33,6 +34,7 @@ class KineticAabbStrategy : public Strategy<S> {
 
   void reset(double t) override {
     this->start_at(t);
+    near_bodies_.start_over();
     on_forest([&](auto& forest) { forest.reset(t); });
     // What starting costs is not what running costs: counts begin here.
     count_.table = {};
@@ -49,17 +51,32 @@ class KineticAabbStrategy : public Strategy<S> {
 
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
+    BoxTests tests;
     on_forest([&](auto& forest) {
-      for (const BodyPair& pair : this->scene_.pairs()) {
+      const auto box_of = [&](std::uint32_t body) -> Box<double> {
+        const auto& tree = forest.tree(body);
+        if (tree.topology().empty()) return {};
+        RealiserBoxes<S> boxes(tree.realisers(0), this->sampled_, body, caches_[body]);
+        boxes.ensure(0);
+        return to_double(boxes(0));
+      };
+      for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
+        const BodyPair& pair = this->scene_.pairs()[i];
+        if (tests.made >= budget.box_tests) {
+          ++status.pending;
+          continue;
+        }
         const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
-        LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
-                                   b.topology(), count_, out);
+        LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
+                                      b.topology(), tests, out);
         RealiserBoxes<S> boxes_a(a.realisers(0), this->sampled_, pair.first, caches_[pair.first]);
         RealiserBoxes<S> boxes_b(b.realisers(0), this->sampled_, pair.second, caches_[pair.second]);
-        status.pending +=
-            traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack_, count_, budget, leaves).pending;
+        status.pending += traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack_, tests,
+                                   rest_of(budget, tests.made), leaves)
+                              .pending;
       }
     });
+    count_.add(Counter::box_tests, tests.made);
     return status;
   }
 
@@ -96,7 +113,7 @@ class KineticAabbStrategy : public Strategy<S> {
   std::size_t bytes() const override {
     std::size_t total = on_forest([](auto& forest) { return forest.bytes(); });
     for (const auto& cache : caches_) total += cache.bytes();
-    return total;
+    return total + near_bodies_.bytes();
   }
 
  protected:
@@ -121,6 +138,7 @@ class KineticAabbStrategy : public Strategy<S> {
 
   Count count_;
   std::variant<std::unique_ptr<Forest<Queues>>...> forest_;
+  NearBodies near_bodies_;
   std::vector<BoxCache<S>> caches_;
   std::vector<NodePair> stack_;
   std::uint64_t first_step_ = 0, first_fetch_ = 0;

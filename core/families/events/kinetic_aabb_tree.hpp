@@ -57,7 +57,7 @@ struct NoObserver {
 template <class S, class Queue, class Count, class Observer = NoObserver>
 class KineticAabbTree {
  public:
-  KineticAabbTree(Topology topology, const Primitives& primitives, std::uint16_t body,
+  KineticAabbTree(Topology topology, const Primitives& primitives, std::uint32_t body,
                   std::uint32_t first_slot, typename Queue::ClockType& clock, Queue& queue, Count& count,
                   Observer observer = {})
       : topology_(std::move(topology)),
@@ -250,8 +250,8 @@ class KineticAabbTree {
     bool found = false;
     event.winner = winner;
     event.slot = slot;
-    event.body = body_;
-    event.side = std::uint8_t(side);
+    event.body = body_ % Event::most_bodies;
+    event.side = side & 7U;
     event.depth = topology_.depths[node];
     // The queue must not hold this slot while the clock learns its new crossing.
     discard(slot);
@@ -381,10 +381,10 @@ class KineticAabbTree {
       for (Side side = 0; side < 6; ++side) {
         const std::uint32_t old = realiser(node, side);
         bool concerned = (moved_[node] & other_candidates) != 0 || changed(old);
-        for (std::uint32_t c = 0; !concerned && c < candidate_count(node); ++c) {
-          const std::uint32_t child = topology_.nodes[node].first() + c;
-          concerned = changed(candidate(node, side, c)) || side_moved(child, side);
-        }
+        const TopologyNode content = topology_.nodes[node];
+        for (std::uint32_t c = 0; !concerned && c < candidate_count(node); ++c)
+          concerned = changed(candidate(node, side, c)) ||
+                      (!content.is_leaf() && side_moved(content.first() + c, side));
         if (!concerned) continue;
         count_->add(Counter::nodes_visited);
         const bool still_there = old_is_candidate(node, side, old);
@@ -406,7 +406,7 @@ class KineticAabbTree {
 
   Topology topology_;
   ListPool leaf_vertices_;
-  std::uint16_t body_;
+  std::uint32_t body_;
   CertificateSlots slots_;
   typename Queue::ClockType* clock_;
   Queue* queue_;

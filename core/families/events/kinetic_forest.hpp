@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "core/contract/strategy.hpp"
@@ -20,12 +21,15 @@ class KineticForest {
   KineticForest(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, Count& count,
                 Observer observer = {})
       : clock_(plans_of(scene, motion)), queue_(clock_, slots_of(topologies)), count_(&count) {
+    if (scene.body_count() > Event::most_bodies)
+      throw std::length_error("a scene of " + std::to_string(scene.body_count()) +
+                              " bodies, but events number " + std::to_string(Event::most_bodies));
     std::uint32_t first_slot = 0;
     trees_.reserve(topologies.size());
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const auto slots = std::uint32_t(Tree::slot_count(topologies[body]));
-      trees_.emplace_back(std::move(topologies[body]), scene.primitives(body), std::uint16_t(body),
-                          first_slot, clock_, queue_, count, observer);
+      trees_.emplace_back(std::move(topologies[body]), scene.primitives(body), body, first_slot, clock_,
+                          queue_, count, observer);
       first_slot += slots;
     }
   }
@@ -53,13 +57,14 @@ class KineticForest {
 
   /// Follows changes of plans at t that the motion shows already; of each body's tree once.
   void plans_changed(double t, std::span<const PlanChange<S>> changes) {
-    for (std::uint32_t body = 0; body < trees_.size(); ++body) {
+    changes_.clear();
+    for (const PlanChange<S>& change : changes) changes_.emplace_back(change.body, change.vertex);
+    std::sort(changes_.begin(), changes_.end());
+    changes_.erase(std::unique(changes_.begin(), changes_.end()), changes_.end());
+    for (std::size_t i = 0; i < changes_.size();) {
+      const std::uint32_t body = changes_[i].first;
       changed_.clear();
-      for (const PlanChange<S>& change : changes)
-        if (change.body == body) changed_.push_back(change.vertex);
-      if (changed_.empty()) continue;
-      std::sort(changed_.begin(), changed_.end());
-      changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+      for (; i < changes_.size() && changes_[i].first == body; ++i) changed_.push_back(changes_[i].second);
       trees_[body].plans_changed(t, changed_);
     }
   }
@@ -77,6 +82,7 @@ class KineticForest {
     }
   }
 
+  std::uint32_t size() const { return std::uint32_t(trees_.size()); }
   Tree& tree(std::uint32_t body) { return trees_[body]; }
   const Tree& tree(std::uint32_t body) const { return trees_[body]; }
   Clock& clock() { return clock_; }
@@ -107,7 +113,8 @@ class KineticForest {
   Queue queue_;
   Count* count_;
   std::vector<Tree> trees_;
-  std::vector<std::uint32_t> changed_;  ///< vertices of one body
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> changes_;  ///< body, vertex
+  std::vector<std::uint32_t> changed_;                            ///< vertices of one body
 };
 
 }  // namespace kbvh

@@ -51,27 +51,43 @@ std::size_t IntervalJoin<S>::Columns::bytes() const {
 }
 
 template <class S>
-void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>& scene, std::uint32_t body_a,
-                            std::uint32_t body_b, std::size_t leaf_pairs) {
-  body_a_ = body_a;
-  body_b_ = body_b;
+void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                            std::span<const BodyPair> bodies, std::size_t leaf_pairs) {
+  segment_ = &segment;
+  scene_ = scene;
+  bodies_.assign(bodies.begin(), bodies.end());
+  found_.clear();
+  leaf_pairs_room_ = leaf_pairs;
+  node_tests_ = 0;
   reading_ = false;
   throughout_ = count_ = 0;
   traversal_ = {};
   leaf_join_ = {};
-  const LinearSide<S>&a = segment.sides[body_a], &b = segment.sides[body_b];
-  done_ = a.hierarchy().empty() || b.hierarchy().empty() || a.apart || b.apart;
+  leaf_join_.throughout = found_throughout_.view(0, false);
+  leaf_join_.partly = found_partly_.view(0, true);
+  done_ = bodies_.empty();
   if (done_) return sort_by_begin();
-  const bool self = body_a == body_b;
+  begin_bodies();
+}
+
+/// Sets out to join the next pair of bodies.
+template <class S>
+void IntervalJoin<S>::begin_bodies() {
+  const BodyPair bodies = bodies_[found_.size()];
+  traversal_ = {};
+  const LinearSide<S>&a = segment_->sides[bodies.first], &b = segment_->sides[bodies.second];
+  if (a.hierarchy().empty() || b.hierarchy().empty() || a.apart || b.apart) return;
+  self_ = bodies.first == bodies.second;
   const std::uint32_t width = a.hierarchy().topology().width;
   const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(a.hierarchy().kernels());
-  traverse_ = self ? kernels.self(width) : kernels.join(width);
+  traverse_ = self_ ? kernels.self(width) : kernels.join(width);
   join_leaves_ =
       kernels.leaf_join(std::max({4u, a.hierarchy().padded_leaf_size(), b.hierarchy().padded_leaf_size()}));
-  neighbours_ = self && !with_neighbours_ ? &scene.primitives(body_a) : nullptr;
+  neighbours_ = self_ && !with_neighbours_ ? &scene_->primitives(bodies.first) : nullptr;
   stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
-  leaf_pairs_.resize(std::max(leaf_pairs_.size(), 2 * leaf_pairs));
-  traversal_ = {stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pairs, 1, Budget{}.box_tests};
+  leaf_pairs_.resize(std::max(leaf_pairs_.size(), 2 * leaf_pairs_room_));
+  traversal_ = {stack_.data(),    0, stack_.size(),     leaf_pairs_.data(), 0,
+                leaf_pairs_room_, 1, Budget{}.box_tests};
   // A root that is a leaf lies in a node's only lane, so that the roots are compared with each other there.
   traversal_.stack[traversal_.depth++] = {0, 0};
   leaf_join_ = {width,
@@ -84,34 +100,46 @@ void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>&
                 leaf_pairs_.data(),
                 0,
                 0,
-                found_throughout_.view(0, false),
-                found_partly_.view(0, true),
-                0};
+                leaf_join_.throughout,
+                leaf_join_.partly,
+                leaf_join_.tests};
+}
+
+template <class S>
+void IntervalJoin<S>::end_bodies() {
+  found_.push_back({leaf_join_.throughout.found, leaf_join_.partly.found});
+  node_tests_ += traversal_.tests;
+  traversal_ = {};
 }
 
 template <class S>
 bool IntervalJoin<S>::go_on(std::uint64_t box_tests) {
   if (done_) return true;
   const std::uint64_t before = tests();
-  while (traversal_.depth > 0) {
-    const std::uint64_t made = tests() - before;
-    if (made >= box_tests) return false;
-    const std::uint64_t left = box_tests - made, most = Budget{}.box_tests;
-    traversal_.test_limit = left < most - traversal_.tests ? traversal_.tests + left : most;
-    traverse_(leaf_join_.a, leaf_join_.ends_a, leaf_join_.b, leaf_join_.ends_b, traversal_);
-    leaf_join_.next = 0;
-    if (body_a_ == body_b_) {
-      take_self_leaves(different_leaves_first(leaf_pairs_.data(), traversal_.found), LeavesOf::two);
-      take_self_leaves(traversal_.found, LeavesOf::one);
-    } else {
-      take_leaves(traversal_.found);
+  for (;;) {
+    while (traversal_.depth > 0) {
+      const std::uint64_t made = tests() - before;
+      if (made >= box_tests) return false;
+      const std::uint64_t left = box_tests - made, most = Budget{}.box_tests;
+      traversal_.test_limit = left < most - traversal_.tests ? traversal_.tests + left : most;
+      traverse_(leaf_join_.a, leaf_join_.ends_a, leaf_join_.b, leaf_join_.ends_b, traversal_);
+      leaf_join_.next = 0;
+      if (self_) {
+        take_self_leaves(different_leaves_first(leaf_pairs_.data(), traversal_.found), LeavesOf::two);
+        take_self_leaves(traversal_.found, LeavesOf::one);
+      } else {
+        take_leaves(traversal_.found);
+      }
+      traversal_.found = 0;
+      if (traversal_.depth + wide_step >= traversal_.stack_room) {
+        stack_.resize(2 * stack_.size());
+        traversal_.stack = stack_.data();
+        traversal_.stack_room = stack_.size();
+      }
     }
-    traversal_.found = 0;
-    if (traversal_.depth + wide_step >= traversal_.stack_room) {
-      stack_.resize(2 * stack_.size());
-      traversal_.stack = stack_.data();
-      traversal_.stack_room = stack_.size();
-    }
+    end_bodies();
+    if (found_.size() == bodies_.size()) break;
+    begin_bodies();
   }
   done_ = true;
   sort_by_begin();
@@ -151,12 +179,24 @@ void IntervalJoin<S>::sort_by_begin() {
   }
   count_ = throughout_ + partly;
   if (sorted_.size() < count_) sorted_.resize(count_);
-  for (std::size_t i = 0; i < throughout_; ++i)
+  const bool several = bodies_.size() > 1;
+  if (several && bodies_of_.size() < count_) bodies_of_.resize(sorted_.size());
+  std::uint32_t bodies = 0;
+  for (std::size_t i = 0; i < throughout_; ++i) {
     sorted_[i] = {found_throughout_.primitive_a[i], found_throughout_.primitive_b[i], 0, 1};
-  for (std::size_t i = 0; i < partly; ++i)
-    sorted_[place[FractionBuckets::of(found_partly_.begin[i])]++] = {
-        found_partly_.primitive_a[i], found_partly_.primitive_b[i], found_partly_.begin[i],
-        found_partly_.end[i]};
+    if (!several) continue;
+    while (i >= found_[bodies].throughout) ++bodies;
+    bodies_of_[i] = bodies;
+  }
+  bodies = 0;
+  for (std::size_t i = 0; i < partly; ++i) {
+    const std::uint32_t to = place[FractionBuckets::of(found_partly_.begin[i])]++;
+    sorted_[to] = {found_partly_.primitive_a[i], found_partly_.primitive_b[i], found_partly_.begin[i],
+                   found_partly_.end[i]};
+    if (!several) continue;
+    while (i >= found_[bodies].partly) ++bodies;
+    bodies_of_[to] = bodies;
+  }
 }
 
 template <class S>
@@ -168,8 +208,10 @@ void IntervalJoin<S>::start_reading() {
     next_ending_.resize(count_);
     place_.resize(count_);
   }
-  for (std::size_t i = 0; i < throughout_; ++i)
-    alive_[i] = {body_a_, sorted_[i].primitive_a, body_b_, sorted_[i].primitive_b};
+  for (std::size_t i = 0; i < throughout_; ++i) {
+    const BodyPair bodies = bodies_of(i);
+    alive_[i] = {bodies.first, sorted_[i].primitive_a, bodies.second, sorted_[i].primitive_b};
+  }
   next_ = alive_count_ = std::uint32_t(throughout_);
   waiting_.clear();
   std::fill(std::begin(ending_), std::end(ending_), none);
@@ -183,7 +225,8 @@ void IntervalJoin<S>::begin_pair(std::uint32_t index) {
   next_ending_[index] = ending_[bucket];
   ending_[bucket] = index;
   place_[index] = place;
-  alive_[place] = {body_a_, pair.primitive_a, body_b_, pair.primitive_b};
+  const BodyPair bodies = bodies_of(index);
+  alive_[place] = {bodies.first, pair.primitive_a, bodies.second, pair.primitive_b};
   alive_places_[place] = index;
 }
 
@@ -234,8 +277,10 @@ template <class S>
 std::size_t IntervalJoin<S>::bytes() const {
   return stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
          found_throughout_.bytes() + found_partly_.bytes() + sorted_.capacity() * sizeof(JoinedPair) +
-         alive_.capacity() * sizeof(PrimitivePair) +
-         (waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() + place_.capacity()) *
+         alive_.capacity() * sizeof(PrimitivePair) + bodies_.capacity() * sizeof(BodyPair) +
+         found_.capacity() * sizeof(Found) +
+         (bodies_of_.capacity() + waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() +
+          place_.capacity()) *
              sizeof(std::uint32_t);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,7 +22,9 @@ struct FractionBuckets {
 };
 
 /// The pairs of primitives of two bodies whose linear boxes overlap within a segment, with the fractions at
-/// which they begin and cease to: one traversal for a whole segment, from which frames are read.
+/// which they begin and cease to: one traversal for a whole segment, from which frames are read. Or the same
+/// of many pairs of bodies together, one traversal each: they share all buffers, and a frame reads them as
+/// one.
 template <class S>
 class IntervalJoin {
  public:
@@ -29,17 +32,21 @@ class IntervalJoin {
   /// vertex, unless `keep_neighbours` was called. Allocates only where there are more pairs than ever before.
   void join(const LinearSegment<S>& segment, const SceneView<S>& scene, std::uint32_t body_a,
             std::uint32_t body_b) {
-    start(segment, scene, body_a, body_b, leaf_pairs_at_once);
+    const BodyPair bodies{body_a, body_b};
+    join(segment, scene, {&bodies, 1});
+  }
+  void join(const LinearSegment<S>& segment, const SceneView<S>& scene, std::span<const BodyPair> bodies) {
+    start(segment, scene, bodies, leaf_pairs_at_once);
     go_on(std::numeric_limits<std::uint64_t>::max());
   }
   /// The same in parts: `go_on` works until it has made so many box tests, or somewhat more, and returns
   /// whether all is done. The segment's boxes and positions stay in use until then. Pairs of leaves are
   /// looked at when there are `leaf_pairs` of them.
-  void start(const LinearSegment<S>& segment, const SceneView<S>& scene, std::uint32_t body_a,
-             std::uint32_t body_b, std::size_t leaf_pairs);
+  void start(const LinearSegment<S>& segment, const SceneView<S>& scene, std::span<const BodyPair> bodies,
+             std::size_t leaf_pairs);
   bool go_on(std::uint64_t box_tests);
   /// Box tests that the join has made so far.
-  std::uint64_t tests() const { return traversal_.tests + leaf_join_.tests; }
+  std::uint64_t tests() const { return node_tests_ + traversal_.tests + leaf_join_.tests; }
   /// Pairs of leaves that are collected before they are turned into pairs of primitives: few enough to stay
   /// in the cache.
   static constexpr std::size_t leaf_pairs_at_once = 2048;
@@ -58,8 +65,10 @@ class IntervalJoin {
   /// first of those.
   std::size_t from_begin() const { return bucket_end_[0]; }
   std::size_t throughout() const { return throughout_; }
-  std::uint32_t body_a() const { return body_a_; }
-  std::uint32_t body_b() const { return body_b_; }
+  /// The bodies of one of `pairs`, by its place there.
+  BodyPair bodies_of(std::size_t pair) const {
+    return bodies_.size() == 1 ? bodies_[0] : bodies_[bodies_of_[pair]];
+  }
 
   std::size_t bytes() const;
 
@@ -73,6 +82,12 @@ class IntervalJoin {
     JoinColumns view(std::size_t found, bool timed);
     std::size_t bytes() const;
   };
+  /// How many pairs were found with one pair of bodies, and all before it.
+  struct Found {
+    std::size_t throughout, partly;
+  };
+  void begin_bodies();
+  void end_bodies();
   void take_leaves(std::size_t end);
   void take_self_leaves(std::size_t end, LeavesOf leaves);
   void sort_by_begin();
@@ -80,7 +95,13 @@ class IntervalJoin {
   void begin_pair(std::uint32_t index);
   void end_pair(std::uint32_t index);
 
-  std::uint32_t body_a_ = 0, body_b_ = 0;
+  const LinearSegment<S>* segment_ = nullptr;
+  std::optional<SceneView<S>> scene_;
+  std::vector<BodyPair> bodies_;  ///< that are joined
+  std::vector<Found> found_;      ///< [pair of bodies] of those that are done
+  std::size_t leaf_pairs_room_ = 0;
+  std::uint64_t node_tests_ = 0;  ///< of pairs of bodies that are done
+  bool self_ = false;             ///< the present pair is one body
   bool with_neighbours_ = false, done_ = true;
   WideTraversal traversal_{};
   WideLeafJoin<S> leaf_join_{};
@@ -91,6 +112,7 @@ class IntervalJoin {
   std::vector<LeafSlot> leaf_pairs_;
   Columns found_throughout_, found_partly_;
   std::vector<JoinedPair> sorted_;          ///< there may be more than there are pairs
+  std::vector<std::uint32_t> bodies_of_;    ///< [sorted_] index into bodies_, where there are several
   std::size_t throughout_ = 0, count_ = 0;  ///< in sorted_: from begin to end, and all
   bool reading_ = false;
   std::uint32_t bucket_end_[FractionBuckets::count] = {};  ///< in sorted_

@@ -41,6 +41,7 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
       motion_(motion),
       cuts_(settings.cuts),
       memory_(scene.body_count(), settings.remembered_bytes),
+      near_bodies_(scene.pairs(), scene.body_count()),
       bodies_(scene.body_count()),
       counts_(scene.body_count()),
       ahead_counts_(scene.body_count()),
@@ -190,6 +191,7 @@ void LinearBounds<S>::start() {
   last_ = motion_.time();
   step_ = 0;
   foreseen_ = 1;
+  near_bodies_.start_over();
   std::fill(counts_.begin(), counts_.end(), Counts{});
   restart();
 }
@@ -431,7 +433,15 @@ template <class S>
 void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
   for (LinearSide<S>& side : segment.sides) make_margin(side);
   std::fill(near_.begin(), near_.end(), 0);
-  for (const BodyPair& pair : scene_.pairs()) {
+  const auto box_of = [&](std::uint32_t body) {
+    const LinearSide<S>& side = segment.sides[body];
+    return side.hierarchy().empty() ? Box<double>{} : to_double(swept(side));
+  };
+  std::uint64_t tests = 0;
+  const auto near = near_bodies_.find(box_of, tests);
+  segment.near_pairs.assign(near.begin(), near.end());
+  for (const std::uint32_t i : near) {
+    const BodyPair& pair = scene_.pairs()[i];
     const LinearSide<S>&a = segment.sides[pair.first], &b = segment.sides[pair.second];
     if (a.hierarchy().empty() || b.hierarchy().empty() || !overlap(swept(a), swept(b))) continue;
     near_[pair.first] = near_[pair.second] = 1;
@@ -479,9 +489,12 @@ AuditView LinearBounds<S>::audit_view(std::uint32_t body, double t) const {
 
 template <class S>
 std::size_t LinearBounds<S>::bytes() const {
-  std::size_t total =
-      memory_.bytes() + (middle_lanes_.size() + middle_own_.size() + middle_room_.capacity()) * sizeof(S);
+  std::size_t total = memory_.bytes() + near_bodies_.bytes() +
+                      (middle_lanes_.size() + middle_own_.size() + middle_room_.capacity()) * sizeof(S);
   for (const LinearBody<S>& body : bodies_) total += body.bytes();
+  for (const Segment& segment : segments_)
+    total +=
+        segment.near_pairs.capacity() * sizeof(std::uint32_t) + segment.sides.size() * sizeof(LinearSide<S>);
   return total;
 }
 

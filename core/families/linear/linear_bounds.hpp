@@ -8,6 +8,7 @@
 #include "core/families/linear/bounds_memory.hpp"
 #include "core/families/linear/linear_segment.hpp"
 #include "core/families/linear/linear_settings.hpp"
+#include "core/families/wide/near_bodies.hpp"
 
 namespace kbvh {
 
@@ -130,6 +131,7 @@ class LinearBounds {
   SegmentMotion<S> motion_;
   SegmentCuts cuts_;
   BoundsMemory<S> memory_;
+  NearBodies near_bodies_;
   bool whole_ = false;          ///< segments are not to be cut
   double last_ = 0, step_ = 0;  ///< time of the last frame, and from the one before
   double foreseen_ = 1;         ///< frames that a segment without an end is made for

@@ -88,6 +88,8 @@ template <class S>
 struct LinearSegment {
   double begin = 0, end = 0;  ///< the end may be infinite if nothing moves
   std::vector<LinearSide<S>> sides;
+  /// Indices of the scene's pairs of bodies that meet within the segment, ascending; all where these are few.
+  std::vector<std::uint32_t> near_pairs;
 
   /// Where in the segment a time lies, from 0 to 1.
   S fraction(double t) const {

@@ -89,21 +89,34 @@ template <class S>
 void SpanAnswers<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>& scene,
                              const IntervalJoin<S>& join, float fraction, float share) {
   if (due_.empty()) return;
-  const LinearSide<S>&a = segment.sides[join.body_a()], &b = segment.sides[join.body_b()];
-  const std::uint32_t* const corners_a = scene.primitives(join.body_a()).vertices.data();
-  const std::uint32_t* const corners_b = scene.primitives(join.body_b()).vertices.data();
+  BodyPair bodies = join.bodies_of(due_[0]);
+  const LinearSide<S>*a = nullptr, *b = nullptr;
+  const std::uint32_t *corners_a = nullptr, *corners_b = nullptr;
+  S margin = 0;  // the largest: a larger one leaves more open, and decides nothing wrongly
+  const auto take_bodies = [&](const BodyPair& next) {
+    bodies = next;
+    a = &segment.sides[bodies.first];
+    b = &segment.sides[bodies.second];
+    corners_a = scene.primitives(bodies.first).vertices.data();
+    corners_b = scene.primitives(bodies.second).vertices.data();
+    margin = std::max(margin, a->margin + b->margin);
+  };
+  take_bodies(bodies);
   const auto pairs = join.pairs();
   tries_.resize(due_.size());
   verdicts_.resize(due_.size());
   for (std::size_t k = 0; k < due_.size(); ++k) {
     const JoinedPair pair = pairs[due_[k]];
+    if (const BodyPair own = join.bodies_of(due_[k]);
+        own.first != bodies.first || own.second != bodies.second)
+      take_bodies(own);
     SpanPair<S>& span = tries_[k];
     for (std::size_t c = 0; c < 3; ++c) {
       const std::size_t va = std::size_t(3) * corners_a[std::size_t(3) * pair.primitive_a + c];
       const std::size_t vb = std::size_t(3) * corners_b[std::size_t(3) * pair.primitive_b + c];
       for (int end = 0; end < 2; ++end) {
-        span.corner[end][c] = a.at[end].positions + va;
-        span.corner[end][c + 3] = b.at[end].positions + vb;
+        span.corner[end][c] = a->at[end].positions + va;
+        span.corner[end][c + 3] = b->at[end].positions + vb;
       }
     }
     // Lines go on beyond the span: a little more of it holds the frame's time, which the fraction is not.
@@ -113,8 +126,7 @@ void SpanAnswers<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>
   // A body's margin is 8 ulps of its largest coordinate. Positions of frames differ from the plans, and so do
   // the ends that are read here, by half an ulp each; interpolation in S adds two and a half at each of two
   // corners, their difference another one, products some more.
-  const S margin = a.margin + b.margin;
-  span_test_kernels<S>(a.hierarchy().kernels())
+  span_test_kernels<S>(a->hierarchy().kernels())
       .decide(tries_.data(), tries_.size(), {.gap = 2 * margin, .component = margin}, verdicts_.data());
   attempts_ += tries_.size();
   std::size_t left = 0;
@@ -162,8 +174,10 @@ std::size_t SpanAnswers<S>::read(const LinearSegment<S>& segment, const SceneVie
   out.resize(before + intersecting_.size() + open_.size());
   PrimitivePair* to = out.data() + before;
   for (const std::vector<Item>* list : {&intersecting_, &open_})
-    for (const Item item : *list)
-      *to++ = {join.body_a(), pairs[item.pair].primitive_a, join.body_b(), pairs[item.pair].primitive_b};
+    for (const Item item : *list) {
+      const BodyPair bodies = join.bodies_of(item.pair);
+      *to++ = {bodies.first, pairs[item.pair].primitive_a, bodies.second, pairs[item.pair].primitive_b};
+    }
   return open_.size();
 }
 

@@ -13,7 +13,7 @@ namespace kbvh {
 /// What is apart is not looked at again before its span is over, what intersects is only read out, and the
 /// rest is a candidate at each frame for as long as a quarter would have lasted.
 ///
-/// Both bodies must consist of triangles only, the corners of primitive p at 3 p, 3 p + 1 and 3 p + 2 of
+/// All bodies of the join must consist of triangles only, the corners of primitive p at 3 p, 3 p + 1 and 3 p + 2 of
 /// `Primitives::vertices` (`all_triangles`).
 template <class S>
 class SpanAnswers {

@@ -1,11 +1,21 @@
 #pragma once
+#include <algorithm>
+#include <limits>
+#include <vector>
 #include "core/families/separation/separation_list.hpp"
+#include "core/families/wide/near_bodies.hpp"
 
 namespace kbvh {
 
 /// Kinetic incremental collision detection (Z&W s.7): the kinetic AABB trees of a scene, and the separation
 /// lists of its body pairs on top, advanced together in the exact order of their events. `Queue` is a queue
 /// over a clock (event_queue.hpp); trees and lists have one each, whose tops are compared exactly.
+///
+/// In scenes of many body pairs the list holds those that may meet within a window of time: bodies have a
+/// bound on the way of any vertex, and what is further apart than both can go does not meet. At the end of a
+/// window another one is opened, as an event of its own. A window is halved as long as it holds many more
+/// pairs than there are bodies and pairs that meet when it begins, and the next one is twice as long where it
+/// holds few.
 template <class S, template <class> class Queue, class Count>
 class KineticCollision {
  public:
@@ -14,21 +24,36 @@ class KineticCollision {
 
   KineticCollision(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                    Count& count, int look_ahead = OverlapClock<S>::usual_look_ahead)
-      : forest_(scene, motion, std::move(topologies), count, ChangedBoxes{&changed_, &nodes_}),
-        list_(scene, forest_, count, look_ahead) {}
+      : motion_(motion),
+        near_bodies_(scene.pairs(), scene.body_count()),
+        body_pairs_(scene.pairs()),
+        count_(&count),
+        forest_(scene, motion, std::move(topologies), count, ChangedBoxes{&changed_, &nodes_}),
+        list_(scene, forest_, count, look_ahead,
+              near_bodies_.searches() ? List::BodyPairs::none : List::BodyPairs::all),
+        number_of_(near_bodies_.searches() ? body_pairs_.size() : 0, List::none) {}
   KineticCollision(const KineticCollision&) = delete;  // the trees point to `changed_` and `nodes_`
   KineticCollision& operator=(const KineticCollision&) = delete;
 
   void reset(double t) {
     forest_.reset(t);
     changed_.clear();
-    list_.reset(t);
+    if (!near_bodies_.searches()) {
+      list_.reset(t);
+      return;
+    }
+    near_bodies_.start_over();
+    list_.leave_all();
+    for (const std::uint32_t i : entered_) number_of_[i] = List::none;
+    entered_.clear();
+    window_ = 0;
+    open_window(t);
   }
   /// Handles every event up to and including t.
   void advance(double t) {
     while (due(t)) handle_next();
   }
-  bool due(double t) const { return forest_.due(t) || list_.due(t); }
+  bool due(double t) const { return forest_.due(t) || list_.due(t) || window_end_ < t; }
   /// Is the first event of all one of a tree? At one instant trees come first: the list is then decided with
   /// their new realisers.
   bool tree_is_first() const {
@@ -50,6 +75,10 @@ class KineticCollision {
   }
   /// Handles the first event of all; `due` for some time.
   void handle_next() {
+    if (window_end_ < never && !forest_.due(window_end_) && !list_.due(window_end_)) {
+      open_window(window_end_);
+      return;
+    }
     if (!tree_is_first()) {
       list_.handle_next();
       return;
@@ -66,6 +95,7 @@ class KineticCollision {
     changed_.clear();
     forest_.plans_changed(t, changes);
     list_.boxes_changed(changed_, Instant<S>::at(t));
+    if (near_bodies_.searches()) open_window(t);
   }
 
   /// Follows a change of geometry at t that scene and motion show already: first the trees, each edit as it
@@ -75,7 +105,9 @@ class KineticCollision {
     changed_.clear();
     nodes_.clear();
     forest_.geometry_changed(t, scene, motion, changes);
-    return list_.geometry_changed(t, forest_, nodes_, changed_);
+    const ListEdit edit = list_.geometry_changed(t, forest_, nodes_, changed_);
+    if (near_bodies_.searches()) open_window(t);
+    return edit;
   }
 
   Forest& forest() { return forest_; }
@@ -83,13 +115,110 @@ class KineticCollision {
   List& list() { return list_; }
   const List& list() const { return list_; }
   std::uint64_t queue_steps() const { return forest_.queue().steps() + list_.steps(); }
-  std::size_t bytes() const { return forest_.bytes() + list_.bytes(); }
+  std::size_t bytes() const {
+    return forest_.bytes() + list_.bytes() + near_bodies_.bytes() + boxes_.capacity() * sizeof(boxes_[0]) +
+           (number_of_.capacity() + entered_.capacity()) * sizeof(std::uint32_t);
+  }
 
  private:
+  static constexpr double never = std::numeric_limits<double>::infinity();
+  static constexpr int most_halvings = 40;
+
+  /// The box of a body at t, by the realisers of its root: larger than that by more than all roundings here
+  /// and by more than the margin with which the list compares boxes.
+  Box<double> root_box(std::uint32_t body, double t) const {
+    Box<double> box;
+    const auto& tree = forest_.tree(body);
+    if (tree.topology().empty()) return box;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const bool upper : {false, true}) {
+        const std::uint32_t vertex = tree.realiser(0, Side(2 * axis + (upper ? 1 : 0)));
+        const Piece<S> piece = forest_.clock().plans(body).piece_after(vertex, axis, t);
+        const double x0 = double(piece.x0), x1 = double(piece.x1);
+        const double way = piece.kind == PieceKind::ray
+                               ? x1 * (t - piece.t0)
+                               : (x1 - x0) * ((t - piece.t0) / (piece.t1 - piece.t0));
+        const double margin =
+            margin_of(std::max({std::abs(x0), std::abs(x1), std::abs(x0 + way), std::abs(way)}));
+        (upper ? box.upper : box.lower)[axis] = x0 + way + (upper ? margin : -margin);
+      }
+    return box;
+  }
+  static double margin_of(double largest) {
+    return 32 * double(std::numeric_limits<S>::epsilon()) * largest +
+           32 * double(std::numeric_limits<S>::min());
+  }
+  /// A box that holds the body, and the list's margin, from t, when it has `box`, until `end`.
+  Box<double> swept(std::uint32_t body, Box<double> box, double t, double end) const {
+    if (box.empty()) return box;
+    const double way = motion_.displacement_bound(body, t, end);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double farther = way + margin_of(way);
+      box.lower[axis] -= farther;
+      box.upper[axis] += farther;
+    }
+    return box;
+  }
+
+  /// Every event up to t has been handled: enters the body pairs that may meet from t until the window's end,
+  /// and takes out those that do not.
+  void open_window(double t) {
+    boxes_.resize(forest_.size());
+    for (std::uint32_t body = 0; body < boxes_.size(); ++body) boxes_[body] = root_box(body, t);
+    std::uint64_t tests = 0;
+    const std::size_t meeting =
+        near_bodies_.find([&](std::uint32_t body) { return boxes_[body]; }, tests).size();
+    const std::size_t many = 4 * (meeting + boxes_.size());
+    if (window_ == 0) window_ = first_window(t);
+    for (int halvings = 0;; ++halvings) {
+      window_end_ = window_ < never ? t + window_ : never;
+      if (!(window_end_ > t)) window_end_ = std::nextafter(t, never);
+      near_bodies_.find([&](std::uint32_t body) { return swept(body, boxes_[body], t, window_end_); }, tests);
+      if (near_bodies_.last().size() <= many || halvings == most_halvings) break;
+      window_ = window_ < never ? window_ / 2 : first_window(t);
+    }
+    const auto near = near_bodies_.last();
+    if (2 * near.size() < many) window_ *= 2;
+    count_->add(Counter::box_tests, tests);
+    std::size_t next = 0;
+    still_.clear();
+    for (const std::uint32_t i : entered_) {
+      while (next < near.size() && near[next] < i) ++next;
+      if ((next < near.size() && near[next] == i) || list_.is_recording() || !list_.leave(number_of_[i]))
+        still_.push_back(i);
+      else
+        number_of_[i] = List::none;
+    }
+    for (const std::uint32_t i : near) {
+      if (number_of_[i] != List::none) continue;
+      number_of_[i] = list_.enter(body_pairs_[i], Instant<S>::at(t));
+      still_.push_back(i);
+    }
+    std::sort(still_.begin(), still_.end());
+    entered_.swap(still_);
+  }
+  /// Until the first knot of any plan, or for a second.
+  double first_window(double t) const {
+    double end = never;
+    for (std::uint32_t body = 0; body < boxes_.size(); ++body)
+      end = std::min(end, motion_.plans(body).lines_end(t));
+    return end < never ? end - t : 1;
+  }
+
+  ClipMotion<S> motion_;
+  NearBodies near_bodies_;
+  std::span<const BodyPair> body_pairs_;  ///< of the scene
+  Count* count_;
   std::vector<ChangedBoxes::Box> changed_;
   std::vector<ChangedBoxes::Node> nodes_;
   Forest forest_;
   List list_;
+  // Only where there are many body pairs:
+  double window_ = 0, window_end_ = never;  ///< seconds; and when the present one ends
+  std::vector<Box<double>> boxes_;          ///< of the bodies when a window begins
+  std::vector<std::uint32_t> number_of_;    ///< [pair of the scene] in the list, or none
+  std::vector<std::uint32_t> entered_;      ///< pairs of the scene that are in the list, ascending
+  std::vector<std::uint32_t> still_;
 };
 
 }  // namespace kbvh

@@ -17,7 +17,7 @@ struct ListEdit {
   std::uint64_t decided = 0;  ///< decided anew: new ones, those with other children, those with other boxes
 };
 
-/// The separation list of kinetic incremental collision detection (Z&W s.7), for every body pair of a scene:
+/// The separation list of kinetic incremental collision detection (Z&W s.7), for body pairs of a scene:
 /// the pairs of boxes at which a simultaneous traversal would stop now, kept from event to event.
 ///
 /// The pairs form a tree: a pair's father is the pair of their fathers (a leaf against an inner node
@@ -40,6 +40,10 @@ struct ListEdit {
 /// its children, one for each two, which are roots of the tree of pairs; they keep the list at least as long
 /// as the tree has inner nodes. A leaf with itself is in no list.
 ///
+/// Body pairs have numbers. A list of all pairs of a scene numbers them as the scene does; of many pairs
+/// those are entered that may meet (`enter`), and those that are apart can be taken out again (`leave`):
+/// their numbers are used again.
+///
 /// Boxes are compared on the flight plans with the margin of OverlapClock: the list may hold a pair of boxes
 /// that are apart by some ulps, and misses none whose rounded boxes touch.
 template <class S, template <class> class Queue, class Count>
@@ -57,7 +61,7 @@ class SeparationList {
     std::uint32_t next[2], previous[2];  ///< among the pairs linked from a, and from b
     std::uint32_t place = none;          ///< among the overlapping leaves of the body pair
     std::uint32_t depth = 0;
-    std::uint16_t bodies = 0;  ///< index of the body pair
+    std::uint32_t bodies = 0;  ///< index of the body pair
     bool used = false, overlapping = false;
     bool dirty = false;  ///< has a node with other children, while a change of geometry is followed
   };
@@ -69,42 +73,74 @@ class SeparationList {
 
   /// An overlap that is over: of which body pair, and until when at the latest.
   struct EndedLeafPair {
-    std::uint16_t bodies;
+    std::uint32_t bodies;
     LeafPair leaf;
     double until;
   };
 
+  /// Which body pairs a list begins with.
+  enum class BodyPairs : std::uint8_t { all, none };
+
   template <class Forest>
-  SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count, int look_ahead)
-      : clock_(look_ahead), queue_(clock_, 0), count_(&count), leaves_(scene.pairs().size()) {
+  SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count, int look_ahead,
+                 BodyPairs pairs)
+      : clock_(look_ahead), queue_(clock_, 0), count_(&count) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const auto& tree = forest.tree(body);
       bodies_.push_back({&tree.topology(), nullptr, &forest.clock().plans(body), {}, {}});
       block_ = std::max(block_, tree.topology().width * tree.topology().width);
     }
     read_trees(forest);
-    for (const BodyPair& pair : scene.pairs()) body_pairs_.push_back(pair);
-    roots_.resize(body_pairs_.size(), none);
-    self_roots_.resize(body_pairs_.size());
+    if (pairs == BodyPairs::none) return;
+    for (const BodyPair& pair : scene.pairs()) number(pair);
   }
   SeparationList(const SeparationList&) = delete;
   SeparationList& operator=(const SeparationList&) = delete;
 
   /// Starts over at t by one traversal.
   void reset(double t) {
-    queue_.clear();
-    pairs_.clear();
-    free_blocks_.clear();
-    list_size_ = 0;
+    clear();
     time_ = t;
-    for (auto& leaves : leaves_) leaves.clear();
-    for (auto& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
-    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) {
-      roots_[i] = none;
-      self_roots_[i].clear();
+    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i)
       if (both_have_nodes(i)) start_pair(i, Instant<S>::at(t));
-    }
   }
+
+  /// Enters a body pair at `now`, decided by one traversal; returns its number.
+  std::uint32_t enter(const BodyPair& pair, const Instant<S>& now) {
+    time_ = now.begin;
+    end_ = now.end;
+    const std::uint32_t bodies = number(pair);
+    if (both_have_nodes(bodies)) start_pair(bodies, now);
+    return bodies;
+  }
+  /// Takes out a pair of two bodies whose boxes are apart. Returns whether it did: not while its roots
+  /// overlap.
+  bool leave(std::uint32_t bodies) {
+    const std::uint32_t root = roots_[bodies];
+    if (root != none) {
+      if (pairs_[root].overlapping) return false;
+      list_changed(-1);
+      remove(root);
+      free_blocks_.push_back(root);
+      roots_[bodies] = none;
+    }
+    body_pairs_[bodies] = unused;
+    free_numbers_.push_back(bodies);
+    return true;
+  }
+  /// Takes out all body pairs.
+  void leave_all() {
+    clear();
+    body_pairs_.clear();
+    roots_.clear();
+    self_roots_.clear();
+    leaves_.clear();
+    free_numbers_.clear();
+  }
+  /// Numbers of body pairs, some of which may not be in use.
+  std::uint32_t body_pair_count() const { return std::uint32_t(body_pairs_.size()); }
+  bool is_entered(std::uint32_t bodies) const { return body_pairs_[bodies].first != unused.first; }
+  const BodyPair& body_pair(std::uint32_t bodies) const { return body_pairs_[bodies]; }
 
   bool due(double t) const { return !queue_.empty() && clock_.due(queue_.top(), t); }
   bool empty() const { return queue_.empty(); }
@@ -165,13 +201,13 @@ class SeparationList {
     time_ = t;
     work_done_ = {};
     read_trees(forest);
-    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) remove_self_pairs(i);
+    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i) remove_self_pairs(i);
     remove_changed(nodes);
     for (const std::uint32_t slot : tops_) {
       work_.assign(1, slot);
       settle_new(now);
     }
-    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i)
+    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i)
       if (roots_[i] == none && self_roots_[i].empty() && both_have_nodes(i)) start_pair(i, now);
     std::sort(boxes.begin(), boxes.end());
     boxes.erase(std::unique(boxes.begin(), boxes.end()), boxes.end());
@@ -197,6 +233,7 @@ class SeparationList {
     ended_.clear();
     recording_ = true;
   }
+  bool is_recording() const { return recording_; }
   /// The overlaps that ended since `start_spans`; those that last are the leaf pairs.
   std::span<const EndedLeafPair> stop_spans() {
     recording_ = false;
@@ -211,10 +248,12 @@ class SeparationList {
             4;
     for (const auto& body : bodies_) total += body.first_pair.size() * 4 + body.gone.size();
     for (const auto& leaves : leaves_) total += leaves.capacity() * sizeof(LeafPair);
-    return total;
+    return total + body_pairs_.capacity() * (sizeof(BodyPair) + sizeof(leaves_[0]) + sizeof(self_roots_[0]));
   }
 
  private:
+  static constexpr BodyPair unused{none, none};
+
   struct BodyBoxes {
     const Topology* topology;
     const std::uint32_t* realisers;
@@ -232,12 +271,35 @@ class SeparationList {
       if (own.first_pair.size() < own.topology->size()) own.first_pair.resize(own.topology->size(), none);
     }
   }
-  bool both_have_nodes(std::uint16_t bodies) const {
-    return !bodies_[body_pairs_[bodies].first].topology->empty() &&
+  void clear() {
+    queue_.clear();
+    pairs_.clear();
+    free_blocks_.clear();
+    list_size_ = 0;
+    for (auto& leaves : leaves_) leaves.clear();
+    for (auto& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
+    std::fill(roots_.begin(), roots_.end(), none);
+    for (auto& roots : self_roots_) roots.clear();
+  }
+  std::uint32_t number(const BodyPair& pair) {
+    if (!free_numbers_.empty()) {
+      const std::uint32_t bodies = free_numbers_.back();
+      free_numbers_.pop_back();
+      body_pairs_[bodies] = pair;
+      return bodies;
+    }
+    body_pairs_.push_back(pair);
+    roots_.push_back(none);
+    self_roots_.emplace_back();
+    leaves_.emplace_back();
+    return std::uint32_t(body_pairs_.size() - 1);
+  }
+  bool both_have_nodes(std::uint32_t bodies) const {
+    return is_entered(bodies) && !bodies_[body_pairs_[bodies].first].topology->empty() &&
            !bodies_[body_pairs_[bodies].second].topology->empty();
   }
   /// Makes the list of a body pair that has none.
-  void start_pair(std::uint16_t bodies, const Instant<S>& now) {
+  void start_pair(std::uint32_t bodies, const Instant<S>& now) {
     if (body_pairs_[bodies].first == body_pairs_[bodies].second) {
       start_self_pairs(bodies, now);
       return;
@@ -249,7 +311,7 @@ class SeparationList {
   }
 
   /// Each two children of each inner node, in a block for each.
-  void start_self_pairs(std::uint16_t bodies, const Instant<S>& now) {
+  void start_self_pairs(std::uint32_t bodies, const Instant<S>& now) {
     const Topology& topology = *bodies_[body_pairs_[bodies].first].topology;
     std::vector<std::uint32_t> inner;
     if (!topology.nodes[0].is_leaf()) inner.push_back(0);
@@ -272,7 +334,7 @@ class SeparationList {
     settle_new(now);
   }
   /// Removes all pairs within a body, as far as there are any.
-  void remove_self_pairs(std::uint16_t bodies) {
+  void remove_self_pairs(std::uint32_t bodies) {
     for (const std::uint32_t block : self_roots_[bodies]) {
       for (std::uint32_t slot = block; slot < block + block_ && pairs_[slot].used; ++slot) {
         unsettle(slot);
@@ -321,7 +383,7 @@ class SeparationList {
     for (const std::uint32_t slot : tops_) unsettle(slot);
     for (const auto& changed : nodes)
       if (changed.gone) bodies_[changed.body].gone[changed.node] = 0;
-    for (std::uint16_t i = 0; i < body_pairs_.size(); ++i) {
+    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i) {
       const std::uint32_t root = roots_[i];
       if (root == none || both_have_nodes(i)) continue;
       // The body's last node was its root, so this pair is one of them, and the only one of its list.
@@ -380,7 +442,7 @@ class SeparationList {
     return std::uint32_t(block);
   }
 
-  void insert(std::uint32_t slot, std::uint16_t bodies, std::uint32_t a, std::uint32_t b,
+  void insert(std::uint32_t slot, std::uint32_t bodies, std::uint32_t a, std::uint32_t b,
               std::uint32_t father, std::uint32_t depth) {
     Pair& pair = pairs_[slot];
     pair = {};
@@ -533,7 +595,8 @@ class SeparationList {
   Queue<OverlapClock<S>> queue_;
   Count* count_;
   std::vector<BodyBoxes> bodies_;
-  std::vector<BodyPair> body_pairs_;
+  std::vector<BodyPair> body_pairs_;  ///< by number
+  std::vector<std::uint32_t> free_numbers_;
   std::uint32_t block_ = 4;  ///< most children of a pair
   std::vector<Pair> pairs_;  ///< in blocks of siblings; the used ones come first in a block
   std::vector<std::uint32_t> free_blocks_;

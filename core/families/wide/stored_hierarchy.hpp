@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "core/contract/strategy.hpp"
+#include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 #include "core/geometry/lane_box.hpp"
@@ -22,7 +23,7 @@ class StoredHierarchyStrategy : public Strategy<S> {
  public:
   StoredHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                           const Params& /*params*/, KernelSet kernels = active_kernel_set())
-      : Strategy<S>(scene, motion) {
+      : Strategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
     hierarchies_.resize(scene.body_count());
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), kernels);
@@ -33,6 +34,7 @@ class StoredHierarchyStrategy : public Strategy<S> {
   void reset(double t) override {
     this->start_at(t);
     plans_changed_ = false;
+    near_bodies_.start_over();
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
       hierarchies_[body].positions_changed();
       refit(body);
@@ -52,11 +54,15 @@ class StoredHierarchyStrategy : public Strategy<S> {
   QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
-    for (const BodyPair& pair : this->scene_.pairs())
-      status.pending += query_
-                            .run(hierarchies_[pair.first], pair.first, hierarchies_[pair.second], pair.second,
-                                 this->scene_, this->sampled_, budget, out, tests)
-                            .pending;
+    for_near_bodies(tests, [&](const BodyPair& pair) {
+      status.pending +=
+          tests >= budget.box_tests
+              ? 1
+              : query_
+                    .run(hierarchies_[pair.first], pair.first, hierarchies_[pair.second], pair.second,
+                         this->scene_, this->sampled_, rest_of(budget, tests), out, tests)
+                    .pending;
+    });
     count_.add(Counter::box_tests, tests);
     return status;
   }
@@ -77,7 +83,7 @@ class StoredHierarchyStrategy : public Strategy<S> {
   std::size_t bytes() const override {
     std::size_t total = 0;
     for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
-    return total + (swept_ ? swept_->bytes() : 0);
+    return total + near_bodies_.bytes() + (swept_ ? swept_->bytes() : 0);
   }
 
  protected:
@@ -87,6 +93,7 @@ class StoredHierarchyStrategy : public Strategy<S> {
   /// What a strategy that declares geometry changes does when they come, unless it builds anew.
   void edit_geometry(const GeometryChange<S>& change) {
     plans_changed_ = true;  // new vertices have plans of their own
+    swept_.reset();         // on the topologies of before
     for (const BodyChange& own : body_changes(this->scene_, change)) {
       WideHierarchy<S>& hierarchy = hierarchies_[own.body];
       const Primitives& primitives = this->scene_.primitives(own.body);
@@ -106,7 +113,9 @@ class StoredHierarchyStrategy : public Strategy<S> {
   void sweep(double t0, double t1, std::span<const S* const> before, PairBuffer& out) {
     this->stand_at(t0);
     this->move_to(t1);
-    if (!swept_) swept_.emplace(this->scene_, hierarchies_);
+    if (!swept_)
+      swept_.emplace(
+          this->scene_, [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
     swept_->refit(before, this->sampled_);
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
       const std::uint64_t nodes = hierarchies_[body].topology().size();
@@ -118,10 +127,20 @@ class StoredHierarchyStrategy : public Strategy<S> {
     swept_->pairs(query_, out, tests);
     count_.add(Counter::box_tests, tests);
   }
+  /// Calls work(pair) for each pair of the scene's bodies whose boxes overlap, or for all where these are
+  /// few.
+  template <class Work>
+  void for_near_bodies(std::uint64_t& tests, Work&& work) {
+    const auto box_of = [&](std::uint32_t body) {
+      return hierarchies_[body].empty() ? Box<double>{} : to_double(hierarchies_[body].box(0));
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) work(this->scene_.pairs()[i]);
+  }
   void refit(std::uint32_t body) { hierarchies_[body].refit(this->sampled_.positions(body)); }
   Counters counted() const override { return count_.table; }
 
   std::vector<WideHierarchy<S>> hierarchies_;
+  NearBodies near_bodies_;
   WideQuery<S> query_;
   Count count_;
   bool plans_changed_ = false;

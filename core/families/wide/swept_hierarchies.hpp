@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 
 namespace kbvh {
@@ -13,10 +14,15 @@ namespace kbvh {
 template <class S>
 class SweptHierarchies {
  public:
-  /// On the topologies of other hierarchies of the scene's bodies.
-  SweptHierarchies(const SceneView<S>& scene, const std::vector<WideHierarchy<S>>& hierarchies)
-      : scene_(scene), hierarchies_(hierarchies.size()), positions_(hierarchies.size()) {
+  /// On the topologies of other hierarchies of the scene's bodies: hierarchy_of(body).
+  template <class HierarchyOf>
+  SweptHierarchies(const SceneView<S>& scene, const HierarchyOf& hierarchy_of)
+      : scene_(scene),
+        near_bodies_(scene.pairs(), scene.body_count()),
+        hierarchies_(scene.body_count()),
+        positions_(scene.body_count()) {
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
+      const WideHierarchy<S>& own = hierarchy_of(body);
       const Primitives& primitives = scene.primitives(body);
       const std::uint32_t vertices = scene.vertex_count(body);
       Primitives twice;
@@ -29,7 +35,7 @@ class SweptHierarchies {
       }
       twice.removed = primitives.removed;
       twice.removed_count = primitives.removed_count;
-      hierarchies_[body].assign(hierarchies[body].topology(), twice, hierarchies[body].kernels());
+      hierarchies_[body].assign(own.topology(), twice, own.kernels());
       positions_[body].resize(std::size_t(6) * vertices + 1);
     }
   }
@@ -47,13 +53,18 @@ class SweptHierarchies {
 
   /// Appends the pairs of primitives whose boxes overlap; within a body those that share a vertex, too.
   void pairs(WideQuery<S>& query, PairBuffer& out, std::uint64_t& tests) {
-    for (const BodyPair& pair : scene_.pairs())
+    const auto box_of = [&](std::uint32_t body) {
+      return hierarchies_[body].empty() ? Box<double>{} : to_double(hierarchies_[body].box(0));
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
+      const BodyPair& pair = scene_.pairs()[i];
       query.run_over(hierarchies_[pair.first], pair.first, positions_[pair.first].data(),
                      hierarchies_[pair.second], pair.second, positions_[pair.second].data(), out, tests);
+    }
   }
 
   std::size_t bytes() const {
-    std::size_t total = 0;
+    std::size_t total = near_bodies_.bytes();
     for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
     for (const auto& positions : positions_) total += positions.size() * sizeof(S);
     return total;
@@ -61,6 +72,7 @@ class SweptHierarchies {
 
  private:
   SceneView<S> scene_;
+  NearBodies near_bodies_;
   std::vector<WideHierarchy<S>> hierarchies_;
   std::vector<std::vector<S>> positions_;  ///< [body][before, now][vertex][3], one scalar past the end
 };
