@@ -80,7 +80,7 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
       const LazySide a = side(pair.first), b = side(pair.second);
       auto& query = this->query_;
       query.start_lazy(a, b, rest_of(budget, tests));
-      while (const auto wanted = query.proceed(a, b, this->scene_, this->sampled_, out, tests)) {
+      while (const auto wanted = query.step(a, b, this->scene_, this->sampled_, out, tests)) {
         if (wanted.first != wanted.none) make_current(pair.first, wanted.first);
         if (wanted.second != wanted.none) make_current(pair.second, wanted.second);
       }
@@ -221,7 +221,7 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
     auto& hierarchy = this->hierarchies_[index];
     bounds_kernels<S>(hierarchy.kernels())
         .of_runs(runs.data(), runs.size(), this->sampled_.positions(index),
-                 hierarchy.arrays().own + std::size_t(8) * node);
+                 hierarchy.arrays().node_bounds + std::size_t(8) * node);
     this->count_.add(Counter::vertex_reads, bodies_[index].reads[node]);
   }
 

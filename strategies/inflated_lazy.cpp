@@ -68,11 +68,11 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
       body.tests = 0;
       body.margin = 0;
       body.query_takes_all = false;
-      look(index, WhichStay::none);
+      check_margins(index, WhichStay::none);
       measure_leaves(index);
       if (!may_move(index)) continue;  // boxes of bodies at rest stay tight
       body.margin = wanted_margin(index);
-      if (body.margin > 0) look(index, WhichStay::none);
+      if (body.margin > 0) check_margins(index, WhichStay::none);
     }
     this->count_.table = {};
     first_fetch_ = this->sampled_.fetched();
@@ -149,32 +149,32 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     if (inside && !(kind_ == MarginKind::tuned && too_large(index))) return;
     body.margin = wanted_margin(index);
     this->sampled_.fetch_all(index);
-    look(index, WhichStay::inside_margin);
+    check_margins(index, WhichStay::inside_margin);
   }
 
   void advance_scanning(std::uint32_t index) {
     if (kind_ == MarginKind::tuned) bodies_[index].margin = wanted_margin(index);
     this->sampled_.fetch_all(index);
-    look(index, WhichStay::inside_margin);
+    check_margins(index, WhichStay::inside_margin);
   }
 
   /// Reads all vertices below the leaves; makes boxes anew where the margin is used up.
-  void look(std::uint32_t index, WhichStay stay) {
+  void check_margins(std::uint32_t index, WhichStay stay) {
     auto& hierarchy = this->hierarchies_[index];
     if (hierarchy.empty()) return;
     Body& body = bodies_[index];
     constexpr S infinity = std::numeric_limits<S>::infinity();
-    WideLook<S> state{hierarchy.arrays(),
-                      hierarchy.node_count(),
-                      this->sampled_.positions(index),
-                      body.remade.data(),
-                      body.margin,
-                      infinity,
-                      0,
-                      0,
-                      0,
-                      0,
-                      0};
+    MarginCheck<S> state{hierarchy.arrays(),
+                         hierarchy.node_count(),
+                         this->sampled_.positions(index),
+                         body.remade.data(),
+                         body.margin,
+                         infinity,
+                         0,
+                         0,
+                         0,
+                         0,
+                         0};
     if (stay == WhichStay::inside_margin) {
       // Who looks at every frame makes only what was left: all that the margin allows is used. A body that
       // can skip frames skips more if all have nearly their whole margin; what does not move stays all the

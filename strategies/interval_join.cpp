@@ -7,7 +7,7 @@
 #include "core/contract/registry.hpp"
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/linear_bounds.hpp"
-#include "core/families/linear/span_answers.hpp"
+#include "core/families/linear/triangle_span_filter.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
 
 namespace kbvh {
@@ -18,7 +18,7 @@ namespace {
 template <class S>
 struct Joins {
   std::vector<IntervalJoin<S>> joins;
-  std::vector<SpanAnswers<S>> answers;
+  std::vector<TriangleSpanFilter<S>> answers;
 
   explicit Joins(std::size_t count) : joins(count), answers(count) {}
   std::size_t bytes() const {
@@ -269,7 +269,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
     const double share = share_due(), wanted = share * all_work() - ahead_.done;
     if (share < 1 && !(wanted > 0)) return;
     const double most = share < 1 ? wanted / node_cost : 1e15;
-    if (bounds_.go_ahead(std::uint64_t(most) + 1))
+    if (bounds_.step_ahead(std::uint64_t(most) + 1))
       ahead_.stage = Stage::joins;
     else if (!bounds_.has_ahead())
       ahead_.stage = Stage::nothing;
@@ -292,12 +292,12 @@ class IntervalJoinStrategy final : public Strategy<S> {
         ahead_.joins_begun = true;
         if (!ahead_.begun) join.start(segment, this->scene_, bodies_of_join(segment, i), leaf_pairs);
         const std::uint64_t before = ahead_.begun ? join.tests() : 0;
-        ahead_.begun = !join.go_on(tests_at_once);
+        ahead_.begun = !join.step(tests_at_once);
         ahead_.done += double(join.tests() - before);
         count_.add(Counter::box_tests, join.tests() - before);
       } else {
         if (by_spans_[i] && !ahead_.begun) next_.answers[i].start_ahead(join);
-        ahead_.begun = by_spans_[i] && !next_.answers[i].go_on(segment, this->scene_, join, answers_at_once);
+        ahead_.begun = by_spans_[i] && !next_.answers[i].step(segment, this->scene_, join, answers_at_once);
         if (by_spans_[i]) ahead_.done += answer_cost * answers_at_once;
       }
       if (!ahead_.begun) ++ahead_.join;

@@ -66,11 +66,11 @@ class Envelopes final : public RealiserStrategy<S, Count> {
         refit(body);
       } else if (!(t < state.end)) {
         // A frame that had to make the whole envelope of its own segment leaves the next one to others.
-        if (begin_segment(body)) go_on(body, step);
+        if (begin_segment(body)) work_ahead(body, step);
       } else if (state.known == Known::envelope) {
         state.envelope.advance(t, this->bodies_[body].realisers);
         this->new_frame(body);
-        go_on(body, step);
+        work_ahead(body, step);
       }
     }
   }
@@ -209,7 +209,7 @@ class Envelopes final : public RealiserStrategy<S, Count> {
   }
   /// Does as much for the next segment as leaves the same for each frame until then, if they come at equal
   /// steps.
-  void go_on(std::uint32_t index, double step) {
+  void work_ahead(std::uint32_t index, double step) {
     const State& state = states_[index];
     if (state.next == Next::envelope)
       make_next(index,
@@ -219,7 +219,7 @@ class Envelopes final : public RealiserStrategy<S, Count> {
     State& state = states_[index];
     auto& body = this->bodies_[index];
     const std::uint32_t before = state.envelope.nodes_left();
-    state.envelope.go_on(body.hierarchy, body.realisers, state.at_end, share);
+    state.envelope.step(body.hierarchy, body.realisers, state.at_end, share);
     count_part(index, before, state.envelope.nodes_left());
   }
 

@@ -65,8 +65,9 @@ class MovedBytes final : public Limit<S, Foresight::none> {
                                  std::size_t(3) * this->scene_.vertex_count(body) * sizeof(S));
     sum_ ^= this->kernels_->read(arrays.vertices, hierarchy.listed_vertices() * sizeof(std::uint32_t));
     sum_ ^= this->kernels_->read(arrays.nodes, nodes * sizeof(WideNode));
-    this->kernels_->write(arrays.lanes, nodes * lane_scalars(hierarchy.topology().width) * sizeof(S), sum_);
-    this->kernels_->write(arrays.own, nodes * 8 * sizeof(S), sum_);
+    this->kernels_->write(arrays.child_bounds, nodes * lane_scalars(hierarchy.topology().width) * sizeof(S),
+                          sum_);
+    this->kernels_->write(arrays.node_bounds, nodes * 8 * sizeof(S), sum_);
   }
   std::vector<WideHierarchy<S>> hierarchies_;
   unsigned sum_ = 0;

@@ -214,7 +214,7 @@ class FaultyLazy : public StoredHierarchyStrategy<S, Count> {
     for (const BodyPair& pair : this->scene_.pairs()) {
       const auto a = side(pair.first), b = side(pair.second);
       this->query_.start_lazy(a, b, budget);
-      while (const auto wanted = this->query_.proceed(a, b, this->scene_, this->sampled_, out, tests)) {
+      while (const auto wanted = this->query_.step(a, b, this->scene_, this->sampled_, out, tests)) {
         if (wanted.first != wanted.none) make(pair.first, wanted.first);
         if (wanted.second != wanted.none) make(pair.second, wanted.second);
       }
@@ -244,7 +244,7 @@ class FaultyLazy : public StoredHierarchyStrategy<S, Count> {
     stale_[body].assign(nodes, 1);
     auto arrays = this->hierarchies_[body].arrays();
     const std::size_t row = lane_scalars(this->hierarchies_[body].topology().width);
-    for (std::size_t i = 0; i < nodes * row; ++i) arrays.lanes[i] *= S(0.5);
+    for (std::size_t i = 0; i < nodes * row; ++i) arrays.child_bounds[i] *= S(0.5);
   }
   void make(std::uint32_t body, std::uint32_t node) {
     stale_[body][node] = 0;

@@ -6,7 +6,7 @@
 
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/linear_bounds.hpp"
-#include "core/families/linear/span_answers.hpp"
+#include "core/families/linear/triangle_span_filter.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "core/topology/builders.hpp"
 #include "tests/support/rational_geometry.hpp"
@@ -120,7 +120,7 @@ struct Joiner {
   KernelSet kernels;
   LinearBounds<S> bounds;
   std::vector<IntervalJoin<S>> joins;
-  std::vector<SpanAnswers<S>> answers;
+  std::vector<TriangleSpanFilter<S>> answers;
 
   Joiner(const Scene<S>& scene, const SegmentMotion<S>& motion, const Topologies& topologies, KernelSet set,
          const SegmentCuts& cuts)

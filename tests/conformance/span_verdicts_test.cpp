@@ -48,7 +48,7 @@ std::vector<SpanVerdict> decide(const Joiner<S>& joiner, const Scene<S>& scene, 
         span.corner[end][c + 3] = b.at[end].positions + 3 * vb;
       }
   }
-  const S margin = a.margin + b.margin;  // and the slack that SpanAnswers makes of it
+  const S margin = a.margin + b.margin;  // and the slack that TriangleSpanFilter makes of it
   std::vector<SpanVerdict> verdicts(spans.size());
   span_test_kernels<S>(joiner.kernels)
       .decide(spans.data(), spans.size(), {.gap = 2 * margin, .component = margin}, verdicts.data());

@@ -175,9 +175,9 @@ void check_slices(const Body<S>& body, const BuilderConfig& builder, double slic
       whole.advance(t, at_once);
       sliced.advance(t, present);
       ASSERT_EQ(at_once, present) << "at t = " << t << ", slices of " << slice;
-      if (!last) sliced.go_on(hierarchy, present, at_end, share);
+      if (!last) sliced.step(hierarchy, present, at_end, share);
     }
-    if (!last) sliced.go_on(hierarchy, present, at_end, 1);
+    if (!last) sliced.step(hierarchy, present, at_end, 1);
     whole.advance(times[k + 1], at_once);
     sliced.advance(times[k + 1], present);
     ASSERT_EQ(at_once, present);
@@ -218,7 +218,7 @@ TEST(SegmentEnvelope, WhatIsMadeAtOnceEndsWhatWasBegun) {
     WideRealisers realisers = first;
     envelope.make(hierarchy, realisers, p(0), p(1), 0, 1);
     envelope.start_next(hierarchy, p(1), p(2), 2);
-    envelope.go_on(hierarchy, realisers, at_end, share);
+    envelope.step(hierarchy, realisers, at_end, share);
     WideRealisers jumped = third, expected = third;
     envelope.make(hierarchy, jumped, p(2), p(3), 2, 3);
     fresh.make(hierarchy, expected, p(2), p(3), 2, 3);

@@ -134,10 +134,10 @@ TEST(WideHierarchy, SetBoxIsWhatTheQueryReads) {
   for (std::uint32_t node = 0; node < topology.size(); ++node) set.set_box(node, made.box(node));
   for (std::uint32_t wide = 0; wide < made.node_count(); ++wide) {
     for (std::size_t i = 0; i < lane_scalars(8); ++i)
-      EXPECT_EQ(made.arrays().lanes[wide * lane_scalars(8) + i],
-                set.arrays().lanes[wide * lane_scalars(8) + i]);
+      EXPECT_EQ(made.arrays().child_bounds[wide * lane_scalars(8) + i],
+                set.arrays().child_bounds[wide * lane_scalars(8) + i]);
     for (std::size_t i : {0, 1, 2, 4, 5, 6})
-      EXPECT_EQ(made.arrays().own[8 * wide + i], set.arrays().own[8 * wide + i]);
+      EXPECT_EQ(made.arrays().node_bounds[8 * wide + i], set.arrays().node_bounds[8 * wide + i]);
   }
 }
 

@@ -68,7 +68,7 @@ void NearPairs<S>::build(const NearSide<S>& a, const NearSide<S>& b, std::uint32
       pairs_of_leaves(near);
     }
     state.found = 0;
-    if (state.depth + wide_step >= state.stack_room) {
+    if (state.depth + max_pairs_per_step >= state.stack_room) {
       work.stack.resize(2 * work.stack.size());
       state.stack = work.stack.data();
       state.stack_room = work.stack.size();

@@ -52,7 +52,7 @@ class RealiserStrategy : public Strategy<S> {
           side_b{&b.hierarchy, pair.second, b.stale.data()};
       query_.start_lazy(side_a, side_b, rest_of(budget, tests));
       using Wanted = typename WideQuery<S>::Wanted;
-      while (const Wanted wanted = query_.proceed(side_a, side_b, this->scene_, this->sampled_, out, tests)) {
+      while (const Wanted wanted = query_.step(side_a, side_b, this->scene_, this->sampled_, out, tests)) {
         if (wanted.first != Wanted::none) make_wanted(pair.first, wanted.first);
         if (wanted.second != Wanted::none) make_wanted(pair.second, wanted.second);
       }

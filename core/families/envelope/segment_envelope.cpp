@@ -61,7 +61,7 @@ void SegmentEnvelope<S>::assign(const WideHierarchy<S>& hierarchy, std::uint32_t
   width_ = hierarchy.topology().width;
   const std::size_t nodes = hierarchy.node_count();
   block_ = std::clamp(hierarchy.node_count() / slices, smallest_block, largest_block);
-  own_.assign(8 * nodes, S(0));
+  node_bounds_.assign(8 * nodes, S(0));
   lost_.assign(nodes, 0);
   first_store_.assign(nodes * lane_scalars(width_), 0);
   now_ = making_ = 0;
@@ -109,8 +109,8 @@ void SegmentEnvelope<S>::start(std::uint32_t which, const WideHierarchy<S>& hier
 }
 
 template <class S>
-void SegmentEnvelope<S>::go_on(WideHierarchy<S>& hierarchy, const WideRealisers& realisers,
-                               WideRealisers& at_end, double share) {
+void SegmentEnvelope<S>::step(WideHierarchy<S>& hierarchy, const WideRealisers& realisers,
+                              WideRealisers& at_end, double share) {
   const std::uint32_t nodes = hierarchy.node_count();
   const auto nodes_due = std::uint32_t(std::min(1.0, share / nodes_part) * nodes);
   while (nodes_left_ > nodes - nodes_due) {
@@ -150,8 +150,8 @@ template <class S>
 void SegmentEnvelope<S>::make_block(WideHierarchy<S>& hierarchy, const WideRealisers& realisers) {
   const std::uint32_t begin = next_block(), end = nodes_left_;
   WideArrays<S> arrays = hierarchy.arrays();
-  arrays.lanes = nullptr;
-  arrays.own = own_.data();
+  arrays.child_bounds = nullptr;
+  arrays.node_bounds = node_bounds_.data();
   wide_realiser_kernels<S>(hierarchy.kernels())
       .check(width_)(arrays, realisers.data(), segments_[making_].p1, lost_.data(), begin, end);
   walk_leaves(hierarchy, realisers, begin, end);
@@ -410,7 +410,7 @@ void SegmentEnvelope<S>::advance(double t, WideRealisers& realisers) {
 
 template <class S>
 std::size_t SegmentEnvelope<S>::bytes() const {
-  std::size_t total = own_.size() * sizeof(S) + lost_.size() * sizeof(std::uint64_t) +
+  std::size_t total = node_bounds_.size() * sizeof(S) + lost_.size() * sizeof(std::uint64_t) +
                       first_store_.size() * sizeof(std::uint32_t) + lines_.capacity() * sizeof(Line) +
                       walks_.capacity() * sizeof(Walk);
   for (const Segment& segment : segments_)

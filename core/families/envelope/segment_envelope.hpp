@@ -58,13 +58,12 @@ class SegmentEnvelope {
   void make_empty(double t0, double t1);
 
   /// Makes the envelopes of the segment from `end()` to t1, otherwise as `make` does, but in slices, while
-  /// `advance` goes on with the present one: first `start_next`, then `go_on` as often as wanted, then
+  /// `advance` goes on with the present one: first `start_next`, then `step` as often as wanted, then
   /// `take_next`. Any other segment that is made meanwhile ends that.
   void start_next(const WideHierarchy<S>& hierarchy, const S* p0, const S* p1, double t1);
   /// Does a share of the whole work of this, what was done before included: 1 is all. `realisers` are those
   /// of the present, `at_end`, as large and the same at each call, becomes those at its end.
-  void go_on(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, WideRealisers& at_end,
-             double share);
+  void step(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, WideRealisers& at_end, double share);
   /// Wide nodes of which the sides have not been looked at.
   std::uint32_t nodes_left() const { return nodes_left_; }
   /// The next segment, made to the end, is the present one; realisers have been brought to its begin.
@@ -124,7 +123,7 @@ class SegmentEnvelope {
   std::uint32_t nodes_left_ = 0;            ///< of the segment being made
   std::size_t sorted_ = 0;                  ///< steps done of its sorting, two for each store
   std::size_t carried_ = 0;                 ///< stores of the present segment that its end has
-  AlignedArray<S> own_;                     ///< boxes at the end
+  AlignedArray<S> node_bounds_;             ///< boxes at the end
   std::vector<std::uint64_t> lost_;         ///< by node: active sides
   std::vector<std::uint32_t> first_store_;  ///< by slot, of active sides
   std::vector<Line> lines_;

@@ -75,7 +75,7 @@ template <class S>
 void IntervalJoin<S>::begin_bodies() {
   const BodyPair bodies = bodies_[found_.size()];
   traversal_ = {};
-  const LinearSide<S>&a = segment_->sides[bodies.first], &b = segment_->sides[bodies.second];
+  const BodySegmentBounds<S>&a = segment_->sides[bodies.first], &b = segment_->sides[bodies.second];
   if (a.hierarchy().empty() || b.hierarchy().empty() || a.apart || b.apart) return;
   self_ = bodies.first == bodies.second;
   const std::uint32_t width = a.hierarchy().topology().width;
@@ -113,7 +113,7 @@ void IntervalJoin<S>::end_bodies() {
 }
 
 template <class S>
-bool IntervalJoin<S>::go_on(std::uint64_t box_tests) {
+bool IntervalJoin<S>::step(std::uint64_t box_tests) {
   if (done_) return true;
   const std::uint64_t before = tests();
   for (;;) {
@@ -131,7 +131,7 @@ bool IntervalJoin<S>::go_on(std::uint64_t box_tests) {
         take_leaves(traversal_.found);
       }
       traversal_.found = 0;
-      if (traversal_.depth + wide_step >= traversal_.stack_room) {
+      if (traversal_.depth + max_pairs_per_step >= traversal_.stack_room) {
         stack_.resize(2 * stack_.size());
         traversal_.stack = stack_.data();
         traversal_.stack_room = stack_.size();

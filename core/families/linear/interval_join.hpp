@@ -37,14 +37,14 @@ class IntervalJoin {
   }
   void join(const LinearSegment<S>& segment, const SceneView<S>& scene, std::span<const BodyPair> bodies) {
     start(segment, scene, bodies, leaf_pairs_at_once);
-    go_on(std::numeric_limits<std::uint64_t>::max());
+    step(std::numeric_limits<std::uint64_t>::max());
   }
-  /// The same in parts: `go_on` works until it has made so many box tests, or somewhat more, and returns
+  /// The same in parts: `step` works until it has made so many box tests, or somewhat more, and returns
   /// whether all is done. The segment's boxes and positions stay in use until then. Pairs of leaves are
   /// looked at when there are `leaf_pairs` of them.
   void start(const LinearSegment<S>& segment, const SceneView<S>& scene, std::span<const BodyPair> bodies,
              std::size_t leaf_pairs);
-  bool go_on(std::uint64_t box_tests);
+  bool step(std::uint64_t box_tests);
   /// Box tests that the join has made so far.
   std::uint64_t tests() const { return node_tests_ + traversal_.tests + leaf_join_.tests; }
   /// Pairs of leaves that are collected before they are turned into pairs of primitives: few enough to stay

@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/families/linear/moved_boxes.hpp"
+#include "core/families/linear/translated_boxes.hpp"
 #include "core/families/wide/kernels/bounds.hpp"
 #include "core/geometry/predicates.hpp"
 
@@ -13,12 +13,12 @@ namespace kbvh {
 
 namespace {
 template <class S>
-Box<S> swept(const LinearSide<S>& side) {
+Box<S> swept(const BodySegmentBounds<S>& side) {
   Box<S> box;
-  for (const LinearEnd<S>& end : side.at)
+  for (const EndpointBounds<S>& end : side.at)
     for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] = std::min(box.lower[axis], end.own[axis] - 2 * side.margin);
-      box.upper[axis] = std::max(box.upper[axis], end.own[axis + 4] + 2 * side.margin);
+      box.lower[axis] = std::min(box.lower[axis], end.node_bounds[axis] - 2 * side.margin);
+      box.upper[axis] = std::max(box.upper[axis], end.node_bounds[axis + 4] + 2 * side.margin);
     }
   return box;
 }
@@ -26,9 +26,10 @@ Box<S> swept(const LinearSide<S>& side) {
 /// Does the body stay near the admissible range until this end? Beyond it differences of boxes could
 /// overflow.
 template <class S>
-bool admissible_root(const LinearEnd<S>& end) {
+bool admissible_root(const EndpointBounds<S>& end) {
   const auto near = [](S x) { return std::abs(x) <= 2 * admissible_magnitude<S>; };
-  return std::all_of(end.own, end.own + 3, near) && std::all_of(end.own + 4, end.own + 7, near);
+  return std::all_of(end.node_bounds, end.node_bounds + 3, near) &&
+         std::all_of(end.node_bounds + 4, end.node_bounds + 7, near);
 }
 
 constexpr std::uint32_t none_used = ~std::uint32_t(0);
@@ -91,16 +92,16 @@ template <class S>
 auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t index,
                                 std::uint32_t end, double t) -> Refit {
   LinearBody<S>& body = bodies_[index];
-  LinearSide<S>& side = segment.sides[index];
-  LinearEnd<S>& at = side.at[end];
+  BodySegmentBounds<S>& side = segment.sides[index];
+  EndpointBounds<S>& at = side.at[end];
   const std::size_t nodes = body.hierarchy.node_count();
-  AlignedArray<S>&lanes = body.lanes[at.slot], &own = body.own[at.slot];
+  AlignedArray<S>&lanes = body.child_bounds[at.slot], &own = body.node_bounds[at.slot];
   if (own.size() != 8 * nodes) {
     lanes.assign(nodes * lane_scalars(body.hierarchy.topology().width), std::numeric_limits<S>::infinity());
     own.assign(8 * nodes, S(0));
   }
-  at.lanes = lanes.data();
-  at.own = own.data();
+  at.child_bounds = lanes.data();
+  at.node_bounds = own.data();
   at.positions = motion.positions_on_lines(index, t, body.room[at.slot]);
   at.made = ++body.made;
   if (body.hierarchy.empty()) return {};
@@ -110,13 +111,13 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   const bool whole =
       end == 1 && segment.begin == motion.lines_begin(index) && segment.end == motion.lines_end(index);
   const auto step = whole ? motion.translation(index) : std::optional<Translation<S>>{};
-  std::optional<MovedBoxes<S>> moved;
+  std::optional<TranslatedBoxes<S>> moved;
   if (step) moved.emplace(side.at[0], *step);
   if (moved && moved->excess > 8 * std::numeric_limits<S>::epsilon() * largest_coordinate(side.at[0]))
     moved.reset();
   if (side.apart) {
     if (moved) {
-      moved->move_own(side.at[0].own, own.data());
+      moved->move_own(side.at[0].node_bounds, own.data());
       at.excess = moved->excess;
       ++counts_[index].translated_apart;
       return {};
@@ -134,23 +135,23 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
                                                                  : motion.lines_end(index);
   if (remembers) {
     if (const auto* known = memory_.find(index, knot)) {
-      at.lanes = known->lanes.data();
-      at.own = known->own.data();
+      at.child_bounds = known->lanes.data();
+      at.node_bounds = known->own.data();
       ++left_alone(index).remembered;
       return {};
     }
   }
   if (moved) {
-    moved->move(side.at[0].lanes, side.at[0].own, body.hierarchy.topology().width, nodes, lanes.data(),
-                own.data());
+    moved->move(side.at[0].child_bounds, side.at[0].node_bounds, body.hierarchy.topology().width, nodes,
+                lanes.data(), own.data());
     at.excess = moved->excess;
     ++counts_[index].translated;
     return {};
   }
   if (remembers) {
     if (auto* target = memory_.add(index, knot, lanes.size(), own.size())) {
-      at.lanes = refit.lanes = target->lanes.data();
-      at.own = refit.own = target->own.data();
+      at.child_bounds = refit.child_bounds = target->lanes.data();
+      at.node_bounds = refit.node_bounds = target->own.data();
       refit.remembered = target;
     }
   }
@@ -158,10 +159,11 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
 }
 
 template <class S>
-void LinearBounds<S>::proceed(std::uint32_t body, Refit& refit, std::uint64_t nodes) {
+void LinearBounds<S>::step_refit(std::uint32_t body, Refit& refit, std::uint64_t nodes) {
   if (refit.left == 0) return;
   const std::uint32_t begin = refit.left - std::uint32_t(std::min<std::uint64_t>(refit.left, nodes));
-  bodies_[body].hierarchy.refit_into(refit.lanes, refit.own, refit.positions, begin, refit.left);
+  bodies_[body].hierarchy.refit_into(refit.child_bounds, refit.node_bounds, refit.positions, begin,
+                                     refit.left);
   counts_[body].refitted += refit.left - begin;
   refit.left = begin;
   if (begin == 0 && refit.remembered != nullptr) refit.remembered->complete = true;
@@ -172,13 +174,13 @@ template <class S>
 bool LinearBounds<S>::make_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body,
                                std::uint32_t end, double t) {
   Refit refit = begin_end(segment, motion, body, end, t);
-  proceed(body, refit, refit.left);
+  step_refit(body, refit, refit.left);
   if (hierarchy(body).empty()) return true;
   return admissible_root(segment.sides[body].at[end]);
 }
 
 template <class S>
-void LinearBounds<S>::make_margin(LinearSide<S>& side) const {
+void LinearBounds<S>::make_margin(BodySegmentBounds<S>& side) const {
   S largest = 0;
   if (!side.hierarchy().empty())
     largest = std::max(largest_coordinate(side.at[0]), largest_coordinate(side.at[1]));
@@ -205,7 +207,7 @@ void LinearBounds<S>::plans_changed() {
 template <class S>
 void LinearBounds<S>::restart() {
   for (Segment& segment : segments_)
-    for (LinearSide<S>& side : segment.sides) side.current = side.apart = false;
+    for (BodySegmentBounds<S>& side : segment.sides) side.current = side.apart = false;
   segments_[present_].end = none;
   forget_ahead();
   advance();
@@ -223,7 +225,7 @@ bool LinearBounds<S>::advance() {
   came_ahead_ = false;
   if (end() != none && motion_.time() <= end()) return false;
   if (ahead_exists_ && motion_.time() <= ahead().end) {
-    came_ahead_ = go_ahead(std::numeric_limits<std::uint64_t>::max());
+    came_ahead_ = step_ahead(std::numeric_limits<std::uint64_t>::max());
   }
   if (came_ahead_) {
     present_ = 1 - present_;
@@ -233,7 +235,7 @@ bool LinearBounds<S>::advance() {
     }
     forget_ahead();
   } else {
-    go_on();
+    next_segment();
   }
   return true;
 }
@@ -247,7 +249,7 @@ void LinearBounds<S>::enter() {
   if (cut) {
     restart();
   } else if (end() == none || motion_.time() >= end()) {
-    go_on();
+    next_segment();
   }
 }
 
@@ -256,8 +258,8 @@ void LinearBounds<S>::enter() {
 template <class S>
 bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion,
                                  std::uint32_t body, double t, Before what) {
-  LinearSide<S>& side = segment.sides[body];
-  const LinearSide<S>& old = before.sides[body];
+  BodySegmentBounds<S>& side = segment.sides[body];
+  const BodySegmentBounds<S>& old = before.sides[body];
   side.apart = old.apart;
   side.at_rest = motion.at_rest(body);
   side.current = true;
@@ -291,7 +293,7 @@ bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const 
 }
 
 template <class S>
-void LinearBounds<S>::go_on() {
+void LinearBounds<S>::next_segment() {
   forget_ahead();
   const double t = motion_.time();
   const Segment& before = segments_[present_];
@@ -341,13 +343,13 @@ bool LinearBounds<S>::start_ahead(const SegmentMotion<S>& motion) {
 }
 
 template <class S>
-bool LinearBounds<S>::go_ahead(std::uint64_t nodes) {
+bool LinearBounds<S>::step_ahead(std::uint64_t nodes) {
   constexpr std::uint64_t step = 64;
   const Segment& before = segments_[present_];
   Segment& segment = segments_[1 - present_];
   for (std::uint64_t done = 0; done < nodes;) {
     if (ahead_.refit.left > 0) {
-      proceed(ahead_.body - 1, ahead_.refit, step);
+      step_refit(ahead_.body - 1, ahead_.refit, step);
       done += step;
     } else if (ahead_.body < body_count()) {
       const std::uint32_t body = ahead_.body++;
@@ -359,11 +361,11 @@ bool LinearBounds<S>::go_ahead(std::uint64_t nodes) {
       return true;
     } else {
       ahead_.finished = true;
-      const auto is_admissible = [&](const LinearSide<S>& side) {
+      const auto is_admissible = [&](const BodySegmentBounds<S>& side) {
         return side.hierarchy().empty() || admissible_root(side.at[1]);
       };
       if (!std::all_of(segment.sides.begin(), segment.sides.end(), is_admissible)) {
-        forget_ahead();  // less of it is to be taken, as `go_on` does
+        forget_ahead();  // less of it is to be taken, as `next_segment` does
         return false;
       }
       finish(segment, *ahead_.motion);
@@ -375,7 +377,7 @@ bool LinearBounds<S>::go_ahead(std::uint64_t nodes) {
 template <class S>
 std::uint64_t LinearBounds<S>::nodes_of_segment() const {
   std::uint64_t nodes = 0;
-  for (const LinearSide<S>& side : segment().sides)
+  for (const BodySegmentBounds<S>& side : segment().sides)
     if (!side.at_rest) nodes += side.hierarchy().node_count();
   return nodes;
 }
@@ -409,13 +411,13 @@ double LinearBounds<S>::looseness_in_the_middle() {
   const double t = begin() + (end() - begin()) / 2;
   double tight = 0, linear = 0;
   for (std::uint32_t body = 0; body < body_count(); ++body) {
-    const LinearSide<S>& one = side(body);
+    const BodySegmentBounds<S>& one = side(body);
     if (one.at_rest || one.apart || hierarchy(body).empty()) continue;
     const std::size_t nodes = hierarchy(body).node_count(),
                       scalars = nodes * lane_scalars(hierarchy(body).topology().width);
     middle_lanes_.resize(std::max(middle_lanes_.size(), scalars));
     middle_own_.resize(std::max(middle_own_.size(), 8 * nodes));
-    std::copy_n(one.at[0].lanes, scalars, middle_lanes_.data());  // empty lanes
+    std::copy_n(one.at[0].child_bounds, scalars, middle_lanes_.data());  // empty lanes
     hierarchy(body).refit_into(middle_lanes_.data(), middle_own_.data(),
                                motion_.positions_on_lines(body, t, middle_room_));
     counts_[body].refitted += nodes;
@@ -431,10 +433,10 @@ double LinearBounds<S>::looseness_in_the_middle() {
 /// boxes; those that are apart get one from the next segment on, and keep those they have until then.
 template <class S>
 void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
-  for (LinearSide<S>& side : segment.sides) make_margin(side);
+  for (BodySegmentBounds<S>& side : segment.sides) make_margin(side);
   std::fill(near_.begin(), near_.end(), 0);
   const auto box_of = [&](std::uint32_t body) {
-    const LinearSide<S>& side = segment.sides[body];
+    const BodySegmentBounds<S>& side = segment.sides[body];
     return side.hierarchy().empty() ? Box<double>{} : to_double(swept(side));
   };
   std::uint64_t tests = 0;
@@ -442,12 +444,12 @@ void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
   segment.near_pairs.assign(near.begin(), near.end());
   for (const std::uint32_t i : near) {
     const BodyPair& pair = scene_.pairs()[i];
-    const LinearSide<S>&a = segment.sides[pair.first], &b = segment.sides[pair.second];
+    const BodySegmentBounds<S>&a = segment.sides[pair.first], &b = segment.sides[pair.second];
     if (a.hierarchy().empty() || b.hierarchy().empty() || !overlap(swept(a), swept(b))) continue;
     near_[pair.first] = near_[pair.second] = 1;
   }
   for (std::uint32_t body = 0; body < body_count(); ++body) {
-    LinearSide<S>& side = segment.sides[body];
+    BodySegmentBounds<S>& side = segment.sides[body];
     if (near_[body] == 0) {
       // What rests has its boxes already; a root that is a leaf lies where those of others do.
       side.apart = side.apart || (!side.at_rest && side.hierarchy().topology().size() > 1);
@@ -464,7 +466,7 @@ void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
 
 template <class S>
 std::vector<Box<double>> LinearBounds<S>::boxes_at(std::uint32_t body, double t) const {
-  const LinearSide<S>& one = side(body);
+  const BodySegmentBounds<S>& one = side(body);
   const double s = double(fraction(t)), margin = double(one.margin);
   std::vector<Box<double>> boxes;
   for (std::uint32_t node = 0; node < one.hierarchy().topology().size(); ++node) {
@@ -493,8 +495,8 @@ std::size_t LinearBounds<S>::bytes() const {
                       (middle_lanes_.size() + middle_own_.size() + middle_room_.capacity()) * sizeof(S);
   for (const LinearBody<S>& body : bodies_) total += body.bytes();
   for (const Segment& segment : segments_)
-    total +=
-        segment.near_pairs.capacity() * sizeof(std::uint32_t) + segment.sides.size() * sizeof(LinearSide<S>);
+    total += segment.near_pairs.capacity() * sizeof(std::uint32_t) +
+             segment.sides.size() * sizeof(BodySegmentBounds<S>);
   return total;
 }
 

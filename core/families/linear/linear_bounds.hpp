@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/contract/strategy.hpp"
-#include "core/families/linear/bounds_memory.hpp"
+#include "core/families/linear/bounds_cache.hpp"
 #include "core/families/linear/linear_segment.hpp"
 #include "core/families/linear/linear_settings.hpp"
 #include "core/families/wide/near_bodies.hpp"
@@ -48,9 +48,9 @@ class LinearBounds {
   bool start_ahead(const SegmentMotion<S>& motion);
   /// Makes more of its bounds, as long as less than so many nodes were done by this call. Returns whether all
   /// are there.
-  bool go_ahead(std::uint64_t nodes);
+  bool step_ahead(std::uint64_t nodes);
   bool has_ahead() const { return ahead_exists_; }
-  /// The segment that `go_ahead` has finished.
+  /// The segment that `step_ahead` has finished.
   const LinearSegment<S>& ahead() const { return segments_[1 - present_]; }
   /// Did the last `advance` come into a segment that had been begun ahead?
   bool came_ahead() const { return came_ahead_; }
@@ -61,7 +61,7 @@ class LinearBounds {
   double begin() const { return segment().begin; }
   double end() const { return segment().end; }
   S fraction(double t) const { return segment().fraction(t); }
-  const LinearSide<S>& side(std::uint32_t body) const { return segment().sides[body]; }
+  const BodySegmentBounds<S>& side(std::uint32_t body) const { return segment().sides[body]; }
   WideHierarchy<S>& hierarchy(std::uint32_t body) { return bodies_[body].hierarchy; }
 
   std::uint32_t body_count() const { return std::uint32_t(bodies_.size()); }
@@ -95,7 +95,7 @@ class LinearBounds {
     S *lanes = nullptr, *own = nullptr;
     const S* positions = nullptr;
     std::uint32_t left = 0;  ///< nodes
-    typename BoundsMemory<S>::Boxes* remembered = nullptr;
+    typename BoundsCache<S>::Boxes* remembered = nullptr;
   };
   /// Where the work on the segment ahead is.
   struct Ahead {
@@ -110,7 +110,7 @@ class LinearBounds {
 
   void restart();
   void note_time();
-  void go_on();
+  void next_segment();
   void forget_ahead();
   /// Of what is left alone: in the segment ahead it only counts when that is taken.
   Counts& left_alone(std::uint32_t body) { return ahead_exists_ ? ahead_counts_[body] : counts_[body]; }
@@ -121,16 +121,16 @@ class LinearBounds {
   double looseness_in_the_middle();
   Refit begin_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body, std::uint32_t end,
                   double t);
-  void proceed(std::uint32_t body, Refit& refit, std::uint64_t nodes);
+  void step_refit(std::uint32_t body, Refit& refit, std::uint64_t nodes);
   bool make_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body, std::uint32_t end,
                 double t);
   void finish(Segment& segment, const SegmentMotion<S>& motion);
-  void make_margin(LinearSide<S>& side) const;
+  void make_margin(BodySegmentBounds<S>& side) const;
 
   SceneView<S> scene_;
   SegmentMotion<S> motion_;
   SegmentCuts cuts_;
-  BoundsMemory<S> memory_;
+  BoundsCache<S> memory_;
   NearBodies near_bodies_;
   bool whole_ = false;          ///< segments are not to be cut
   double last_ = 0, step_ = 0;  ///< time of the last frame, and from the one before

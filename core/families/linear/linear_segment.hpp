@@ -11,7 +11,7 @@ namespace kbvh {
 
 /// Boxes of one body at one end of a segment, and the positions that they are of.
 template <class S>
-struct LinearEnd {
+struct EndpointBounds {
   const S *lanes = nullptr, *own = nullptr;  ///< as in WideArrays
   const S* positions = nullptr;              ///< [vertex][3]
   std::uint32_t slot = 0;                    ///< place in LinearBody::rows of what is made from positions
@@ -32,7 +32,7 @@ struct LinearBody {
   std::vector<std::uint32_t> stamps[slots];
   std::uint32_t made = 0;  ///< ends so far
 
-  WideLinearLeaves<S> leaves(const LinearEnd<S>& first, const LinearEnd<S>& last) {
+  WideLinearLeaves<S> leaves(const EndpointBounds<S>& first, const EndpointBounds<S>& last) {
     const std::size_t count = hierarchy.leaf_count();
     for (const std::uint32_t slot : {first.slot, last.slot}) {
       rows[slot].resize(count * lane_scalars(std::max(4u, hierarchy.padded_leaf_size())));
@@ -56,19 +56,21 @@ struct LinearBody {
 
 /// One body over a segment.
 template <class S>
-struct LinearSide {
+struct BodySegmentBounds {
   LinearBody<S>* body = nullptr;
-  LinearEnd<S> at[2];  ///< the same at both ends for a body at rest
+  EndpointBounds<S> at[2];  ///< the same at both ends for a body at rest
   bool at_rest = false, current = false;
   /// It meets no other body's box over this segment: of its boxes nobody reads any but the root's.
   bool apart = false;
   S margin = 0;  ///< by which every box is larger
 
   WideHierarchy<S>& hierarchy() const { return body->hierarchy; }
-  WideEnds<S> ends() const { return {{at[0].lanes, at[1].lanes}, {at[0].own, at[1].own}, margin}; }
+  WideEnds<S> ends() const {
+    return {{at[0].child_bounds, at[1].child_bounds}, {at[0].node_bounds, at[1].node_bounds}, margin};
+  }
   WideLinearLeaves<S> leaves() const { return body->leaves(at[0], at[1]); }
   Box<S> box_at(std::uint32_t end, std::uint32_t node) const {
-    return hierarchy().box_in(at[end].lanes, at[end].own, node);
+    return hierarchy().box_in(at[end].child_bounds, at[end].node_bounds, node);
   }
   /// What is between the ends at a fraction of the segment, without the margin.
   Box<double> box_between(std::uint32_t node, double fraction) const {
@@ -87,7 +89,7 @@ struct LinearSide {
 template <class S>
 struct LinearSegment {
   double begin = 0, end = 0;  ///< the end may be infinite if nothing moves
-  std::vector<LinearSide<S>> sides;
+  std::vector<BodySegmentBounds<S>> sides;
   /// Indices of the scene's pairs of bodies that meet within the segment, ascending; all where these are few.
   std::vector<std::uint32_t> near_pairs;
 

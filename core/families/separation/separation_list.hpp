@@ -20,12 +20,12 @@ struct ListEdit {
 /// The separation list of kinetic incremental collision detection (Z&W s.7), for body pairs of a scene:
 /// the pairs of boxes at which a simultaneous traversal would stop now, kept from event to event.
 ///
-/// The pairs form a tree: a pair's father is the pair of their fathers (a leaf against an inner node
+/// The pairs form a tree: a pair's parent is the pair of their parents (a leaf against an inner node
 /// descends on one side only). Pairs that do not overlap, and overlapping pairs of leaves, are the list;
 /// overlapping inner pairs stand above it. Each has one event in the queue:
 ///   apart: the boxes overlap ("BV-overlap"): an inner pair gets children, which may overlap in their turn;
-///   inner, overlapping: they are apart ("fathers do not overlap"): all below goes. The paper schedules this
-///     with each child and has to insert the father once; here it is the father's own;
+///   inner, overlapping: they are apart ("parents do not overlap"): all below goes. The paper schedules this
+///     with each child and has to insert the parent once; here it is the parent's own;
 ///   leaves, overlapping: they are apart ("leaves do not overlap").
 /// Or, where that is too far ahead, one at which only its next event is looked for (OverlapClock); it is
 /// counted as an operation on the queue.
@@ -56,7 +56,7 @@ class SeparationList {
   /// Two boxes of a body pair and where they stand in the tree of pairs.
   struct Pair {
     std::uint32_t a, b;                  ///< nodes of the first and the second body
-    std::uint32_t father = none;         ///< slot
+    std::uint32_t parent = none;         ///< slot
     std::uint32_t children = none;       ///< first of a block of slots, none of which may be in use
     std::uint32_t next[2], previous[2];  ///< among the pairs linked from a, and from b
     std::uint32_t place = none;          ///< among the overlapping leaves of the body pair
@@ -368,15 +368,15 @@ class SeparationList {
       for (std::uint32_t slot = bodies_[changed.body].first_pair[changed.node]; slot != none;
            slot = pairs_[slot].next[side_of(slot, changed.body, changed.node)]) {
         std::uint32_t top = slot;
-        while (pairs_[top].father != none && has_gone_node(pairs_[top])) top = pairs_[top].father;
+        while (pairs_[top].parent != none && has_gone_node(pairs_[top])) top = pairs_[top].parent;
         if (pairs_[top].dirty) continue;
         pairs_[top].dirty = true;
         linked_.push_back(top);
       }
     tops_.clear();
     for (const std::uint32_t slot : linked_) {
-      std::uint32_t above = pairs_[slot].father;
-      while (above != none && !pairs_[above].dirty) above = pairs_[above].father;
+      std::uint32_t above = pairs_[slot].parent;
+      while (above != none && !pairs_[above].dirty) above = pairs_[above].parent;
       if (above == none) tops_.push_back(slot);
     }
     for (const std::uint32_t slot : linked_) pairs_[slot].dirty = false;
@@ -443,12 +443,12 @@ class SeparationList {
   }
 
   void insert(std::uint32_t slot, std::uint32_t bodies, std::uint32_t a, std::uint32_t b,
-              std::uint32_t father, std::uint32_t depth) {
+              std::uint32_t parent, std::uint32_t depth) {
     Pair& pair = pairs_[slot];
     pair = {};
     pair.a = a;
     pair.b = b;
-    pair.father = father;
+    pair.parent = parent;
     pair.depth = depth;
     pair.bodies = bodies;
     pair.used = true;

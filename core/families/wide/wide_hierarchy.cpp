@@ -107,8 +107,8 @@ template <class S>
 void WideHierarchy<S>::list_vertices() {
   const std::uint32_t width = topology_.width;
   vertices_.clear();
-  lanes_.assign(nodes_.size() * lane_scalars(width), std::numeric_limits<S>::infinity());
-  own_.assign(nodes_.size() * 8, S(0));
+  child_bounds_.assign(nodes_.size() * lane_scalars(width), std::numeric_limits<S>::infinity());
+  node_bounds_.assign(nodes_.size() * 8, S(0));
   // The leaves of each wide node, by lane.
   std::vector<std::uint32_t> leaf_of(nodes_.size() * width, none);
   for (std::uint32_t i = 0; i < topology_.size(); ++i)
@@ -169,18 +169,18 @@ void WideHierarchy<S>::list_leaves(const Primitives& primitives) {
 }
 
 template <class S>
-Box<S> WideHierarchy<S>::box_in(const S* lanes, const S* own, std::uint32_t node) const {
+Box<S> WideHierarchy<S>::box_in(const S* child_bounds, const S* node_bounds, std::uint32_t node) const {
   const Place place = places_[node];
   Box<S> box;
   if (place.node == none) {
     for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] = own[axis];
-      box.upper[axis] = own[axis + 4];
+      box.lower[axis] = node_bounds[axis];
+      box.upper[axis] = node_bounds[axis + 4];
     }
     return box;
   }
   const std::uint32_t width = topology_.width;
-  const S* rows = lanes + place.node * lane_scalars(width) + place.lane;
+  const S* rows = child_bounds + place.node * lane_scalars(width) + place.lane;
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
     box.lower[axis] = rows[axis * width];
     box.upper[axis] = -rows[(axis + 3) * width];
@@ -194,22 +194,22 @@ void WideHierarchy<S>::set_box(std::uint32_t node, const Box<S>& box) {
   const std::uint32_t width = topology_.width;
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
     if (place.node != none) {
-      S* rows = lanes_.data() + place.node * lane_scalars(width) + place.lane;
+      S* rows = child_bounds_.data() + place.node * lane_scalars(width) + place.lane;
       rows[axis * width] = box.lower[axis];
       rows[(axis + 3) * width] = -box.upper[axis];
     }
     // The root's own box is read even if the root is a leaf.
     const std::uint32_t own = place.wide != none ? place.wide : node == 0 ? 0 : none;
     if (own == none) continue;
-    own_[std::size_t(8) * own + axis] = box.lower[axis];
-    own_[std::size_t(8) * own + axis + 4] = box.upper[axis];
+    node_bounds_[std::size_t(8) * own + axis] = box.lower[axis];
+    node_bounds_[std::size_t(8) * own + axis + 4] = box.upper[axis];
   }
 }
 
 template <class S>
 std::size_t WideHierarchy<S>::bytes() const {
   return topology_.bytes() + nodes_.size() * sizeof(WideNode) +
-         (lanes_.size() + own_.size() + rows_.size()) * sizeof(S) +
+         (child_bounds_.size() + node_bounds_.size() + rows_.size()) * sizeof(S) +
          (vertices_.size() + leaf_vertices_.offsets.size() + leaf_vertices_.vertices.size() +
           first_entry_.size() + first_corner_.size() + corners_.size() + primitives_.size() + stamps_.size() +
           fetched_.size() + parent_.size() + listed_.size()) *
@@ -295,7 +295,7 @@ WideTraversal WideQuery<S>::fresh_traversal(const Budget& budget) {
 
 template <class S>
 void WideQuery<S>::grow(WideTraversal& state) {
-  if (state.depth + wide_step < state.stack_room) return;
+  if (state.depth + max_pairs_per_step < state.stack_room) return;
   stack_.resize(2 * stack_.size());
   state.stack = stack_.data();
   state.stack_room = stack_.size();
@@ -316,9 +316,9 @@ void WideQuery<S>::start_lazy(const LazySide& a, const LazySide& b, const Budget
 }
 
 template <class S>
-typename WideQuery<S>::Wanted WideQuery<S>::proceed(const LazySide& a, const LazySide& b,
-                                                    const SceneView<S>& scene, const SampledMotion<S>& motion,
-                                                    PairBuffer& out, std::uint64_t& tests) {
+typename WideQuery<S>::Wanted WideQuery<S>::step(const LazySide& a, const LazySide& b,
+                                                 const SceneView<S>& scene, const SampledMotion<S>& motion,
+                                                 PairBuffer& out, std::uint64_t& tests) {
   const auto traverse = wide_overlap_kernels<S>(a.hierarchy->kernels()).lazy(a.hierarchy->topology().width);
   while (lazy_.depth > 0 && lazy_.tests < lazy_.test_limit) {
     traverse(a.hierarchy->arrays(), b.hierarchy->arrays(), lazy_);

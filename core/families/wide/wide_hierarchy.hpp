@@ -42,12 +42,13 @@ class WideHierarchy {
   void refit_nodes(const S* positions, std::uint32_t begin, std::uint32_t end) {
     refit_(arrays(), positions, begin, end);
   }
-  /// The same into rows and own boxes that lie elsewhere, in the layout of `arrays`.
-  void refit_into(S* lanes, S* own, const S* positions) const {
-    refit_into(lanes, own, positions, 0, node_count());
+  /// The same into rows and node boxes that lie elsewhere, in the layout of `arrays`.
+  void refit_into(S* child_bounds, S* node_bounds, const S* positions) const {
+    refit_into(child_bounds, node_bounds, positions, 0, node_count());
   }
-  void refit_into(S* lanes, S* own, const S* positions, std::uint32_t begin, std::uint32_t end) const {
-    refit_({nodes_.data(), lanes, own, vertices_.data()}, positions, begin, end);
+  void refit_into(S* child_bounds, S* node_bounds, const S* positions, std::uint32_t begin,
+                  std::uint32_t end) const {
+    refit_({nodes_.data(), child_bounds, node_bounds, vertices_.data()}, positions, begin, end);
   }
   std::uint32_t node_count() const { return std::uint32_t(nodes_.size()); }
   /// Ranges of wide nodes that do not depend on each other, and the nodes above them, children first: what
@@ -72,9 +73,9 @@ class WideHierarchy {
   std::uint32_t leaf_vertices_of(std::uint32_t wide) const { return listed_[wide]; }
 
   /// The box of a node of the topology.
-  Box<S> box(std::uint32_t node) const { return box_in(lanes_.data(), own_.data(), node); }
-  /// The same from rows and own boxes that `refit_into` made.
-  Box<S> box_in(const S* lanes, const S* own, std::uint32_t node) const;
+  Box<S> box(std::uint32_t node) const { return box_in(child_bounds_.data(), node_bounds_.data(), node); }
+  /// The same from rows and node boxes that `refit_into` made.
+  Box<S> box_in(const S* child_bounds, const S* node_bounds, std::uint32_t node) const;
   void set_box(std::uint32_t node, const Box<S>& box);
   /// The unique vertices of a leaf, ascending; nothing for an inner node.
   std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const { return leaf_vertices_[node]; }
@@ -89,7 +90,9 @@ class WideHierarchy {
     }
   }
 
-  WideArrays<S> arrays() { return {nodes_.data(), lanes_.data(), own_.data(), vertices_.data()}; }
+  WideArrays<S> arrays() {
+    return {nodes_.data(), child_bounds_.data(), node_bounds_.data(), vertices_.data()};
+  }
   WideLeaves<S> leaves(const S* positions) {
     return {leaf_lists(), rows_.data(), stamps_.data(), stamp_, positions};
   }
@@ -144,7 +147,7 @@ class WideHierarchy {
   std::vector<Subtree> subtrees_;
   std::vector<std::uint32_t> above_subtrees_;
   AlignedArray<WideNode> nodes_;
-  AlignedArray<S> lanes_, own_;
+  AlignedArray<S> child_bounds_, node_bounds_;
   AlignedArray<std::uint32_t> vertices_;
   std::vector<std::uint32_t> first_entry_, first_corner_, corners_, primitives_, stamps_, fetched_;
   AlignedArray<S> rows_;
@@ -190,14 +193,14 @@ class WideQuery {
   };
   /// The same query for hierarchies whose boxes are made when they are first needed:
   ///   query.start_lazy(a, b, budget);
-  ///   while (const auto wanted = query.proceed(a, b, scene, motion, out, tests)) make the boxes of their
+  ///   while (const auto wanted = query.step(a, b, scene, motion, out, tests)) make the boxes of their
   ///   children,
   ///     and take back the marks
   /// Nothing is read that is marked. `run` pays nothing for it: the traversal is another one.
   void start_lazy(const LazySide& a, const LazySide& b, const Budget& budget);
-  Wanted proceed(const LazySide& a, const LazySide& b, const SceneView<S>& scene,
-                 const SampledMotion<S>& motion, PairBuffer& out, std::uint64_t& tests);
-  /// What the budget left undone, once `proceed` waits for nothing.
+  Wanted step(const LazySide& a, const LazySide& b, const SceneView<S>& scene, const SampledMotion<S>& motion,
+              PairBuffer& out, std::uint64_t& tests);
+  /// What the budget left undone, once `step` waits for nothing.
   QueryStatus lazy_status() const { return {lazy_.depth}; }
 
  private:

@@ -83,8 +83,8 @@ void near(LeafNear<S>& shared) {
     const std::uint32_t count_a = lists_a.first_entry[leaf_a + 1] - begin_a;
     const std::uint32_t count_b = lists_b.first_entry[leaf_b + 1] - begin_b;
     // The leaf's box of b is larger by the margin of b, the rows of a are not.
-    const Bounds<S> box_b =
-        bounds_of(lane_box(state.b.lanes + slot_b.node() * std::size_t(6) * width, width, slot_b.lane()));
+    const Bounds<S> box_b = bounds_of(
+        lane_box(state.b.child_bounds + slot_b.node() * std::size_t(6) * width, width, slot_b.lane()));
     unsigned first = widened<S, padded>(rows_a, box_b, state.leaves_a.margin);
     state.tests += count_a + std::uint64_t(unsigned(__builtin_popcount(first))) * count_b;
     for (; first != 0; first &= first - 1) {
@@ -103,10 +103,10 @@ void near(LeafNear<S>& shared) {
 template <class S, std::uint32_t width>
 void widen(WideArrays<S> h, std::uint32_t node_count, const S* margin) {
   for (std::uint32_t n = 0; n < node_count; ++n) {
-    S* rows = h.lanes + std::size_t(n) * 6 * width;
+    S* rows = h.child_bounds + std::size_t(n) * 6 * width;
     for (std::size_t k = 0; k < 6; ++k)
       for (std::size_t i = 0; i < width; ++i) rows[k * width + i] -= margin[k];
-    S* own = h.own + std::size_t(8) * n;
+    S* own = h.node_bounds + std::size_t(8) * n;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       own[axis] -= margin[axis];
       own[axis + 4] += margin[axis + 3];

@@ -77,13 +77,13 @@ void check(WideArrays<S> h, const std::uint32_t* realisers, const S* positions, 
   for (std::uint32_t i = begin; i < end; ++i) {
     const WideNode& node = h.nodes[i];
     if (node.leaf_count != node.count) continue;
-    fit_leaves<S, width>(h, node, positions, rows, h.own + std::size_t(8) * i);
+    fit_leaves<S, width>(h, node, positions, rows, h.node_bounds + std::size_t(8) * i);
     lost[i] = lost_sides<S, width>(realisers + i * scalars, positions, rows);
   }
   for (std::uint32_t i = end; i-- > begin;) {
     const WideNode& node = h.nodes[i];
     if (node.leaf_count == node.count) continue;
-    fit_above<S, width>(h, node, positions, rows, h.own + std::size_t(8) * i);
+    fit_above<S, width>(h, node, positions, rows, h.node_bounds + std::size_t(8) * i);
     lost[i] = lost_sides<S, width>(realisers + i * scalars, positions, rows);
   }
 }
@@ -92,8 +92,8 @@ template <class S, std::uint32_t width>
 void place(WideArrays<S> h, const S* values, std::uint32_t node) {
   constexpr std::size_t scalars = 6 * width;
   const std::uint32_t count = h.nodes[node].count;
-  S* rows = h.lanes + node * scalars;
-  S* own = h.own + std::size_t(8) * node;
+  S* rows = h.child_bounds + node * scalars;
+  S* own = h.node_bounds + std::size_t(8) * node;
   for (std::size_t i = 0; i < 3 * width; ++i) rows[i] = values[i];
   for (std::size_t i = 3 * width; i < scalars; ++i) rows[i] = -values[i];
   if (count != width)

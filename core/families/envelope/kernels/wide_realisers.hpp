@@ -11,8 +11,8 @@ enum class KernelSet : std::uint8_t;
 /// that is readable for empty lanes.
 template <class S>
 struct WideRealiserKernels {
-  /// Makes the boxes of the nodes [begin, end) at `positions`, the last first, into `hierarchy.own`; its
-  /// `lanes` are neither read nor written. `lost[node]`: bit row * width + lane is set where the realiser
+  /// Makes the boxes of the nodes [begin, end) at `positions`, the last first, into `hierarchy.node_bounds`;
+  /// its `lanes` are neither read nor written. `lost[node]`: bit row * width + lane is set where the realiser
   /// does not realise the side there. Children that are nodes must be current or lie in the range, too.
   using Check = void (*)(WideArrays<S> hierarchy, const std::uint32_t* realisers, const S* positions,
                          std::uint64_t* lost, std::uint32_t begin, std::uint32_t end);

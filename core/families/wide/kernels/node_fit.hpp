@@ -115,8 +115,9 @@ template <class S, std::uint32_t width>
       P::store_largest(leaves[lane] + 4, upper);
       boxes[lane] = leaves[lane];
     } else {
-      boxes[lane] = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane - node.leaf_count)
-                                      : empty_box<S>;
+      boxes[lane] = lane < node.count
+                        ? h.node_bounds + std::size_t(8) * (node.first_child + lane - node.leaf_count)
+                        : empty_box<S>;
     }
   }
   NodeFit<S, width> fit;
@@ -128,8 +129,9 @@ template <class S, std::uint32_t width>
 template <class S, std::uint32_t width>
 [[gnu::noinline]] void put_right(const WideArrays<S>& h, const WideNode& node, S* rows, S* own) {
   for (std::uint32_t lane = node.leaf_count; lane < width; ++lane) {
-    const S* box = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane - node.leaf_count)
-                                     : empty_box<S>;
+    const S* box = lane < node.count
+                       ? h.node_bounds + std::size_t(8) * (node.first_child + lane - node.leaf_count)
+                       : empty_box<S>;
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       rows[axis * width + lane] = box[axis];
       rows[(axis + 3) * width + lane] = -box[axis + 4];
@@ -161,7 +163,8 @@ template <class S, std::uint32_t width>
   } else if (node.leaf_count == 0) {
     const S* boxes[width];
     for (std::uint32_t lane = 0; lane < width; ++lane)
-      boxes[lane] = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane) : empty_box<S>;
+      boxes[lane] =
+          lane < node.count ? h.node_bounds + std::size_t(8) * (node.first_child + lane) : empty_box<S>;
     fit.from_boxes(boxes, rows);
     fit.store_own(own);
   } else {

@@ -48,9 +48,9 @@ template <class S>
 }
 
 template <class S, std::uint32_t width>
-void look(WideLook<S>& shared) {
+void check_margins(MarginCheck<S>& shared) {
   constexpr std::size_t row_scalars = std::size_t(6) * width;
-  WideLook<S> state = shared;
+  MarginCheck<S> state = shared;
   const WideArrays<S>& h = state.hierarchy;
   S room = S(__builtin_inf()), room_before = S(__builtin_inf());
   std::uint64_t leaf_boxes = 0, inner_boxes = 0;
@@ -65,7 +65,7 @@ void look(WideLook<S>& shared) {
   for (std::uint32_t i = 0; i < state.node_count; ++i) {
     const WideNode& node = h.nodes[i];
     if (node.leaf_count != node.count) continue;
-    S* rows = h.lanes + i * row_scalars;
+    S* rows = h.child_bounds + i * row_scalars;
     NodeFit<S, width> fit;
     fit.from_lists(h.vertices + node.list, node.length, state.positions, fresh);
     fit.store_own(box);
@@ -80,7 +80,7 @@ void look(WideLook<S>& shared) {
     for (std::size_t k = 0; k < row_scalars; ++k) rows[k] = fresh[k] - state.margin;
     room = smaller(room_of<S, width>(rows, fresh).least, room);
     inflate_box();
-    state.remade[i] = replace_own(h.own + std::size_t(8) * i, inflated) ? 1 : 0;
+    state.remade[i] = replace_own(h.node_bounds + std::size_t(8) * i, inflated) ? 1 : 0;
     leaf_boxes += node.count;
   }
   for (std::uint32_t i = state.node_count; i-- > 0;) {
@@ -89,14 +89,15 @@ void look(WideLook<S>& shared) {
     bool changed = false;
     for (std::uint32_t c = node.first_child; c < node.first_child + (node.count - node.leaf_count); ++c)
       changed |= state.remade[c] != 0;
-    S* rows = h.lanes + i * row_scalars;
-    S* own = h.own + std::size_t(8) * i;
+    S* rows = h.child_bounds + i * row_scalars;
+    S* own = h.node_bounds + std::size_t(8) * i;
     state.remade[i] = 0;
     if (node.leaf_count == 0) {
       if (!changed) continue;
       const S* boxes[width];
       for (std::uint32_t lane = 0; lane < width; ++lane)
-        boxes[lane] = lane < node.count ? h.own + std::size_t(8) * (node.first_child + lane) : empty_box<S>;
+        boxes[lane] =
+            lane < node.count ? h.node_bounds + std::size_t(8) * (node.first_child + lane) : empty_box<S>;
       NodeFit<S, width> fit;
       fit.from_boxes(boxes, rows);
       fit.store_own(inflated);
@@ -150,8 +151,10 @@ void look(WideLook<S>& shared) {
 }  // namespace
 
 namespace kernels::KBVH_KERNELS {
-const WideInflateKernels<float> wide_inflate_float{&look<float, 2>, &look<float, 4>, &look<float, 8>};
-const WideInflateKernels<double> wide_inflate_double{&look<double, 2>, &look<double, 4>, &look<double, 8>};
+const WideInflateKernels<float> wide_inflate_float{&check_margins<float, 2>, &check_margins<float, 4>,
+                                                   &check_margins<float, 8>};
+const WideInflateKernels<double> wide_inflate_double{&check_margins<double, 2>, &check_margins<double, 4>,
+                                                     &check_margins<double, 8>};
 }  // namespace kernels::KBVH_KERNELS
 
 }  // namespace kbvh

@@ -9,7 +9,7 @@ enum class KernelSet : std::uint8_t;
 /// One look at a hierarchy whose leaf boxes were inflated by a margin: which of them still hold their
 /// vertices, with how much room, and which are to be made anew.
 template <class S>
-struct WideLook {
+struct MarginCheck {
   WideArrays<S> hierarchy;
   std::uint32_t node_count;
   const S* positions;    ///< [vertex][3], with one readable number after the last vertex
@@ -29,9 +29,9 @@ template <class S>
 struct WideInflateKernels {
   /// Brings boxes up to date, leaves first, and nothing but those that must change. O(nodes + vertices of
   /// leaves).
-  using Look = void (*)(WideLook<S>& look);
-  Look width2, width4, width8;
-  Look of(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
+  using CheckMargins = void (*)(MarginCheck<S>& check);
+  CheckMargins width2, width4, width8;
+  CheckMargins of(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
 };
 KBVH_DECLARE_KERNELS(WideInflateKernels<float>, wide_inflate_float)
 KBVH_DECLARE_KERNELS(WideInflateKernels<double>, wide_inflate_double)

@@ -23,9 +23,9 @@ struct WideArrays {
   const WideNode* nodes;
   /// [node][6][width]: rows lower x, y, z, -upper x, y, z. Storing -upper makes a union one minimum per row.
   /// Empty lanes hold +infinity, which overlaps nothing.
-  S* lanes;
+  S* child_bounds;
   /// [node][8]: the node's own box as lower x, y, z, unused, upper x, y, z, unused.
-  S* own;
+  S* node_bounds;
   /// [list][length][width]: vertices of the leaves, times 3. Shorter lists, and lanes that are no leaves,
   /// repeat a vertex.
   const std::uint32_t* vertices;
@@ -54,7 +54,7 @@ struct WidePair {
   return width < 8 ? lane : lane < 4 ? 2 * lane : 2 * lane - 7;
 }
 
-/// Scalars per node in WideArrays::lanes.
+/// Scalars per node in WideArrays::child_bounds.
 [[gnu::always_inline]] constexpr std::size_t lane_scalars(std::uint32_t width) {
   return std::size_t(6) * width;
 }

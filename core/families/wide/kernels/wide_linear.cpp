@@ -12,15 +12,15 @@ template <class S, std::uint32_t width>
 void make(const WideMoment<S>& moment, std::uint32_t node) {
   constexpr std::size_t scalars = 6 * width;
   const S margin = moment.ends.margin, s = moment.fraction;
-  const S* first = moment.ends.lanes[0] + node * scalars;
-  const S* last = moment.ends.lanes[1] + node * scalars;
-  S* rows = moment.hierarchy.lanes + node * scalars;
+  const S* first = moment.ends.child_bounds[0] + node * scalars;
+  const S* last = moment.ends.child_bounds[1] + node * scalars;
+  S* rows = moment.hierarchy.child_bounds + node * scalars;
   // Upper bounds are stored with their sign turned: less is larger for every row. Empty lanes become NaN,
   // which overlaps nothing either.
   for (std::size_t i = 0; i < scalars; ++i) rows[i] = first[i] + s * (last[i] - first[i]) - margin;
-  const S* own_first = moment.ends.own[0] + std::size_t(8) * node;
-  const S* own_last = moment.ends.own[1] + std::size_t(8) * node;
-  S* own = moment.hierarchy.own + std::size_t(8) * node;
+  const S* own_first = moment.ends.node_bounds[0] + std::size_t(8) * node;
+  const S* own_last = moment.ends.node_bounds[1] + std::size_t(8) * node;
+  S* own = moment.hierarchy.node_bounds + std::size_t(8) * node;
   for (std::size_t i = 0; i < 8; ++i)
     own[i] = own_first[i] + s * (own_last[i] - own_first[i]) + (i < 4 ? -margin : margin);
 }
@@ -151,13 +151,13 @@ struct SegmentView {
   [[gnu::always_inline]] static bool waits(const WideTraversal&) { return false; }
   [[gnu::always_inline]] static void enter(std::uint32_t, std::uint32_t) {}
   [[gnu::always_inline]] Reach<S> own_b(std::uint32_t node) const {
-    return reach_of(own_box(b.own[0] + std::size_t(8) * node), own_box(b.own[1] + std::size_t(8) * node),
-                    margin);
+    return reach_of(own_box(b.node_bounds[0] + std::size_t(8) * node),
+                    own_box(b.node_bounds[1] + std::size_t(8) * node), margin);
   }
   [[gnu::always_inline]] Reach<S> lane_of(const WideEnds<S>& ends, std::uint32_t node,
                                           std::uint32_t lane) const {
-    return reach_of(lane_box(ends.lanes[0] + node * row_scalars, width, lane),
-                    lane_box(ends.lanes[1] + node * row_scalars, width, lane), margin);
+    return reach_of(lane_box(ends.child_bounds[0] + node * row_scalars, width, lane),
+                    lane_box(ends.child_bounds[1] + node * row_scalars, width, lane), margin);
   }
   [[gnu::always_inline]] Reach<S> lane_a(std::uint32_t node, std::uint32_t lane) const {
     return lane_of(a, node, lane);
@@ -167,7 +167,8 @@ struct SegmentView {
   }
   [[gnu::always_inline]] static unsigned meeting_of(const WideEnds<S>& ends, std::uint32_t node,
                                                     const Reach<S>& box) {
-    return meeting<S, width>(ends.lanes[0] + node * row_scalars, ends.lanes[1] + node * row_scalars, box);
+    return meeting<S, width>(ends.child_bounds[0] + node * row_scalars,
+                             ends.child_bounds[1] + node * row_scalars, box);
   }
   [[gnu::always_inline]] unsigned meeting_a(std::uint32_t node, const Reach<S>& box) const {
     return meeting_of(a, node, box);
@@ -376,8 +377,8 @@ void leaf_join(WideLeafJoin<S>& shared) {
   };
   const auto box_of = [margin, width = state.width](const WideEnds<S>& ends, LeafSlot slot) {
     const std::size_t place = slot.node() * std::size_t(6) * width;
-    return reach_of(lane_box(ends.lanes[0] + place, width, slot.lane()),
-                    lane_box(ends.lanes[1] + place, width, slot.lane()), margin);
+    return reach_of(lane_box(ends.child_bounds[0] + place, width, slot.lane()),
+                    lane_box(ends.child_bounds[1] + place, width, slot.lane()), margin);
   };
   PartlyBatch<S> batch;
   std::size_t made = state.next;

@@ -12,8 +12,8 @@ enum class KernelSet : std::uint8_t;
 /// on every side.
 template <class S>
 struct WideEnds {
-  const S* lanes[2];
-  const S* own[2];
+  const S* child_bounds[2];
+  const S* node_bounds[2];
   S margin;
 };
 

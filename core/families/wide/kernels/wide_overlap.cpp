@@ -55,7 +55,7 @@ void leaf_pairs(WideLeafPairs<S>& shared) {
     const std::uint32_t count_a = lists_a.first_entry[leaf_a + 1] - begin_a;
     const std::uint32_t count_b = lists_b.first_entry[leaf_b + 1] - begin_b;
     const SixSides<S> box_b =
-        lane_box(state.b.lanes + slot_b.node() * std::size_t(6) * width, width, slot_b.lane());
+        lane_box(state.b.child_bounds + slot_b.node() * std::size_t(6) * width, width, slot_b.lane());
     unsigned first = overlapping<S, padded>(rows_a, box_b);
     state.tests += count_a + std::uint64_t(unsigned(__builtin_popcount(first))) * count_b;
     for (; first != 0; first &= first - 1) {

@@ -28,7 +28,7 @@ struct WideTraversal {
   }
 };
 /// One step may push, and find, so many pairs.
-inline constexpr std::size_t wide_step = 64;
+inline constexpr std::size_t max_pairs_per_step = 64;
 
 /// The primitives of a hierarchy's leaves.
 struct WideLeafLists {

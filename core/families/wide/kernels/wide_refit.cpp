@@ -12,13 +12,14 @@ void refit(WideArrays<S> h, const S* positions, std::uint32_t begin, std::uint32
   for (std::uint32_t i = begin; i < end; ++i) {
     const WideNode& node = h.nodes[i];
     if (node.leaf_count != node.count) continue;
-    fit_leaves<S, width>(h, node, positions, h.lanes + std::size_t(i) * 6 * width,
-                         h.own + std::size_t(8) * i);
+    fit_leaves<S, width>(h, node, positions, h.child_bounds + std::size_t(i) * 6 * width,
+                         h.node_bounds + std::size_t(8) * i);
   }
   for (std::uint32_t i = end; i-- > begin;) {
     const WideNode& node = h.nodes[i];
     if (node.leaf_count == node.count) continue;
-    fit_above<S, width>(h, node, positions, h.lanes + std::size_t(i) * 6 * width, h.own + std::size_t(8) * i);
+    fit_above<S, width>(h, node, positions, h.child_bounds + std::size_t(i) * 6 * width,
+                        h.node_bounds + std::size_t(8) * i);
   }
 }
 

@@ -81,8 +81,9 @@ template <class S, class View>
 [[gnu::always_inline]] inline void traverse_pairs(const WideArrays<S>& a, const WideArrays<S>& b, View& view,
                                                   WideTraversal& shared) {
   WideTraversal state = shared;
-  while (state.depth > 0 && state.tests < state.test_limit && state.depth + wide_step < state.stack_room &&
-         state.found + wide_step < state.out_room) {
+  while (state.depth > 0 && state.tests < state.test_limit &&
+         state.depth + max_pairs_per_step < state.stack_room &&
+         state.found + max_pairs_per_step < state.out_room) {
     if (view.waits(state)) break;
     const WidePair pair = state.stack[--state.depth];
     view.enter(pair.first, pair.second);
@@ -123,7 +124,7 @@ struct StoredView {
   static constexpr std::size_t row_scalars = 6 * width;
 
   [[gnu::always_inline]] StoredView(const WideArrays<S>& a, const WideArrays<S>& b)
-      : lanes_a(a.lanes), lanes_b(b.lanes), all_own_b(b.own) {}
+      : lanes_a(a.child_bounds), lanes_b(b.child_bounds), all_own_b(b.node_bounds) {}
   [[gnu::always_inline]] static bool waits(const WideTraversal&) { return false; }
   [[gnu::always_inline]] static void enter(std::uint32_t, std::uint32_t) {}
   [[gnu::always_inline]] SixSides<S> own_b(std::uint32_t node) const {

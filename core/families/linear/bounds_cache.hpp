@@ -11,14 +11,14 @@ namespace kbvh {
 /// Boxes of bodies at ends of a clip's segments, kept to be used again when it plays again. What came first
 /// stays: where not all finds room, a clip that loops would otherwise push out each box before it is wanted.
 template <class S>
-class BoundsMemory {
+class BoundsCache {
  public:
   struct Boxes {
     AlignedArray<S> lanes, own;  ///< as in WideArrays
     bool complete = false;       ///< to be said by whoever fills them in
   };
 
-  BoundsMemory(std::size_t bodies, std::size_t most_bytes) : kept_(bodies), most_bytes_(most_bytes) {}
+  BoundsCache(std::size_t bodies, std::size_t most_bytes) : kept_(bodies), most_bytes_(most_bytes) {}
   bool is_used() const { return most_bytes_ > 0; }
 
   /// Those of a body at t; null if there are none.
@@ -33,8 +33,8 @@ class BoundsMemory {
     if (bytes_ + more > most_bytes_) return nullptr;
     bytes_ += more;
     Boxes& boxes = kept_[body][t];
-    boxes.lanes.assign(lanes, std::numeric_limits<S>::infinity());
-    boxes.own.assign(own, S(0));
+    boxes.child_bounds.assign(lanes, std::numeric_limits<S>::infinity());
+    boxes.node_bounds.assign(own, S(0));
     return &boxes;
   }
   std::size_t bytes() const { return bytes_; }

@@ -13,18 +13,18 @@ namespace kbvh {
 /// What is apart is not looked at again before its span is over, what intersects is only read out, and the
 /// rest is a candidate at each frame for as long as a quarter would have lasted.
 ///
-/// All bodies of the join must consist of triangles only, the corners of primitive p at 3 p, 3 p + 1 and 3 p + 2 of
-/// `Primitives::vertices` (`all_triangles`).
+/// All bodies of the join must consist of triangles only, the corners of primitive p at 3 p, 3 p + 1 and 3 p
+/// + 2 of `Primitives::vertices` (`all_triangles`).
 template <class S>
-class SpanAnswers {
+class TriangleSpanFilter {
  public:
   /// The join is that of a new segment.
   void start(const IntervalJoin<S>& join);
-  /// The same ahead of time: `go_on` asks about so many more of the pairs that overlap at the begin of the
+  /// The same ahead of time: `step` asks about so many more of the pairs that overlap at the begin of the
   /// segment. Returns whether there are no more of them; only then it may be read.
   void start_ahead(const IntervalJoin<S>& join);
-  bool go_on(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
-             std::size_t pairs);
+  bool step(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
+            std::size_t pairs);
 
   /// Appends the pairs that intersect at a fraction of the segment for certain, and after them those that
   /// may; returns how many these are. Fractions never decrease within a segment.
@@ -66,10 +66,10 @@ class SpanAnswers {
   std::uint64_t attempts_ = 0, decided_ = 0;
 };
 
-/// Whether SpanAnswers can take the primitives. O(primitives).
+/// Whether TriangleSpanFilter can take the primitives. O(primitives).
 bool all_triangles(const Primitives& primitives);
 
-extern template class SpanAnswers<float>;
-extern template class SpanAnswers<double>;
+extern template class TriangleSpanFilter<float>;
+extern template class TriangleSpanFilter<double>;
 
 }  // namespace kbvh

@@ -1,4 +1,4 @@
-#include "core/families/linear/span_answers.hpp"
+#include "core/families/linear/triangle_span_filter.hpp"
 
 #include <algorithm>
 
@@ -11,7 +11,7 @@ constexpr float fraction_slack = 0x1p-21F;
 
 /// All pairs wait for their begin; ahead of time those that overlap then are asked about otherwise.
 template <class S>
-void SpanAnswers<S>::begin(const IntervalJoin<S>& join, When when) {
+void TriangleSpanFilter<S>::begin(const IntervalJoin<S>& join, When when) {
   intersecting_.clear();
   open_.clear();
   const auto pairs = join.pairs();
@@ -27,19 +27,19 @@ void SpanAnswers<S>::begin(const IntervalJoin<S>& join, When when) {
 }
 
 template <class S>
-void SpanAnswers<S>::start(const IntervalJoin<S>& join) {
+void TriangleSpanFilter<S>::start(const IntervalJoin<S>& join) {
   begin(join, When::now);
 }
 
 template <class S>
-void SpanAnswers<S>::start_ahead(const IntervalJoin<S>& join) {
+void TriangleSpanFilter<S>::start_ahead(const IntervalJoin<S>& join) {
   begin(join, When::ahead);
   asked_ = 0;
 }
 
 template <class S>
-bool SpanAnswers<S>::go_on(const LinearSegment<S>& segment, const SceneView<S>& scene,
-                           const IntervalJoin<S>& join, std::size_t pairs) {
+bool TriangleSpanFilter<S>::step(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                 const IntervalJoin<S>& join, std::size_t pairs) {
   const std::size_t all = join.from_begin(), end = asked_ + std::min(pairs, all - asked_);
   due_.clear();
   for (; asked_ < end; ++asked_)
@@ -49,7 +49,7 @@ bool SpanAnswers<S>::go_on(const LinearSegment<S>& segment, const SceneView<S>& 
 }
 
 template <class S>
-void SpanAnswers<S>::wait(std::uint32_t pair, float until) {
+void TriangleSpanFilter<S>::wait(std::uint32_t pair, float until) {
   const std::uint32_t bucket = std::max(FractionBuckets::of(std::max(until, 0.0F)), bucket_);
   time_[pair] = until;
   next_[pair] = head_[bucket];
@@ -57,7 +57,7 @@ void SpanAnswers<S>::wait(std::uint32_t pair, float until) {
 }
 
 template <class S>
-void SpanAnswers<S>::collect_due(const IntervalJoin<S>& join, float fraction) {
+void TriangleSpanFilter<S>::collect_due(const IntervalJoin<S>& join, float fraction) {
   due_.clear();
   const std::uint32_t present = FractionBuckets::of(fraction);
   const auto pairs = join.pairs();
@@ -86,11 +86,11 @@ void SpanAnswers<S>::collect_due(const IntervalJoin<S>& join, float fraction) {
 }
 
 template <class S>
-void SpanAnswers<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>& scene,
-                             const IntervalJoin<S>& join, float fraction, float share) {
+void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                    const IntervalJoin<S>& join, float fraction, float share) {
   if (due_.empty()) return;
   BodyPair bodies = join.bodies_of(due_[0]);
-  const LinearSide<S>*a = nullptr, *b = nullptr;
+  const BodySegmentBounds<S>*a = nullptr, *b = nullptr;
   const std::uint32_t *corners_a = nullptr, *corners_b = nullptr;
   S margin = 0;  // the largest: a larger one leaves more open, and decides nothing wrongly
   const auto take_bodies = [&](const BodyPair& next) {
@@ -145,8 +145,8 @@ void SpanAnswers<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>
 
 /// Of what is due first the rest of its span, then a quarter of that.
 template <class S>
-void SpanAnswers<S>::attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene,
-                                 const IntervalJoin<S>& join, float fraction) {
+void TriangleSpanFilter<S>::attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                        const IntervalJoin<S>& join, float fraction) {
   attempt(segment, scene, join, fraction, 1);
   attempt(segment, scene, join, fraction, 0.25F);
   for (const std::uint32_t pair : due_)
@@ -154,8 +154,8 @@ void SpanAnswers<S>::attempt_all(const LinearSegment<S>& segment, const SceneVie
 }
 
 template <class S>
-std::size_t SpanAnswers<S>::read(const LinearSegment<S>& segment, const SceneView<S>& scene,
-                                 const IntervalJoin<S>& join, float fraction, PairBuffer& out) {
+std::size_t TriangleSpanFilter<S>::read(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                        const IntervalJoin<S>& join, float fraction, PairBuffer& out) {
   if (fraction > last_) step_ = fraction - std::max(last_, 0.0F);
   last_ = fraction;
   collect_due(join, fraction);
@@ -182,7 +182,7 @@ std::size_t SpanAnswers<S>::read(const LinearSegment<S>& segment, const SceneVie
 }
 
 template <class S>
-std::size_t SpanAnswers<S>::bytes() const {
+std::size_t TriangleSpanFilter<S>::bytes() const {
   return (intersecting_.capacity() + open_.capacity()) * sizeof(Item) +
          (next_.capacity() + due_.capacity()) * sizeof(std::uint32_t) + time_.capacity() * sizeof(float) +
          tries_.capacity() * sizeof(SpanPair<S>) + verdicts_.capacity();
@@ -195,7 +195,7 @@ bool all_triangles(const Primitives& primitives) {
   return true;
 }
 
-template class SpanAnswers<float>;
-template class SpanAnswers<double>;
+template class TriangleSpanFilter<float>;
+template class TriangleSpanFilter<double>;
 
 }  // namespace kbvh

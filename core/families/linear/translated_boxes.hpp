@@ -10,21 +10,21 @@ namespace kbvh {
 
 /// Of the root's box.
 template <class S>
-S largest_coordinate(const LinearEnd<S>& end) {
+S largest_coordinate(const EndpointBounds<S>& end) {
   S largest = 0;
   for (std::size_t i = 0; i < 8; ++i)
-    if (i % 4 != 3) largest = std::max(largest, std::abs(end.own[i]));
+    if (i % 4 != 3) largest = std::max(largest, std::abs(end.node_bounds[i]));
   return largest;
 }
 
 /// Boxes at the end of a segment over which a body moves as a whole, from those at its begin: all of them, or
 /// only the root's. They hold what those at the begin held, and are larger than tight ones by rounding only.
 template <class S>
-struct MovedBoxes {
+struct TranslatedBoxes {
   S lower[3], upper[3];  ///< what is added
   S excess;              ///< of the result
 
-  MovedBoxes(const LinearEnd<S>& from, const Translation<S>& step) : excess(from.excess) {
+  TranslatedBoxes(const EndpointBounds<S>& from, const Translation<S>& step) : excess(from.excess) {
     S largest = largest_coordinate(from);
     for (std::size_t axis = 0; axis < 3; ++axis)
       largest += std::max(std::abs(step.lower[axis]), std::abs(step.upper[axis]));
