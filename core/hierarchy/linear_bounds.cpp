@@ -5,9 +5,9 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/geometry/predicates.hpp"
 #include "core/hierarchy/moved_boxes.hpp"
 #include "core/kernels/bounds.hpp"
+#include "core/motion/admissible.hpp"
 
 namespace kbvh {
 
@@ -27,7 +27,7 @@ Box<S> swept(const LinearSide<S>& side) {
 /// overflow.
 template <class S>
 bool admissible_root(const LinearEnd<S>& end) {
-  const auto near = [](S x) { return std::abs(x) <= 2 * admissible_magnitude<S>; };
+  const auto near = [](S x) { return std::abs(x) <= 2 * admissible_reach<S>; };
   return std::all_of(end.own, end.own + 3, near) && std::all_of(end.own + 4, end.own + 7, near);
 }
 
