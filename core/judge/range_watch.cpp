@@ -28,7 +28,7 @@ double stays_until(const FlightPlans<S>& plans, std::uint32_t vertex) {
     const Piece<S> line = last_line(plans, vertex, axis);
     const double velocity = double(line.x1), start = double(line.x0);
     if (velocity == 0) continue;
-    const double room = double(admissible_magnitude<S>) - (velocity > 0 ? start : -start);
+    const double room = double(admissible_reach<S>) - (velocity > 0 ? start : -start);
     const double seconds = std::max(0.0, room) / std::abs(velocity) * (1 - 1e-12);
     until = std::min(until, std::nextafter(line.t0 + seconds, -forever));
   }
@@ -44,12 +44,12 @@ void check_vertex(const FlightPlans<S>& plans, std::uint32_t body, std::uint32_t
     // In a wider type: the value may be beyond the range of S, and of double.
     const auto x = static_cast<long double>(line.x0) +
                    static_cast<long double>(line.x1) * (static_cast<long double>(t) - line.t0);
-    if (std::abs(x) <= static_cast<long double>(admissible_magnitude<S>)) continue;
+    if (std::abs(x) <= static_cast<long double>(admissible_reach<S>)) continue;
     const double shown = std::abs(x) < last_double ? double(x) : x > 0 ? forever : -forever;
     throw std::invalid_argument("vertex " + std::to_string(vertex) + " of body " + std::to_string(body) +
                                 " is at " + "xyz"[axis] + " = " + number_text(shown) +
                                 " at t = " + number_text(t) + " s, outside the admissible range (" +
-                                admissible_text<S>() + ")");
+                                (sizeof(S) == 4 ? "8e+30 in float)" : "8e+100 in double)"));
   }
 }
 

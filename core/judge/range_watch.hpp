@@ -8,7 +8,7 @@
 
 namespace kbvh {
 
-/// Knows until when every vertex whose plan has no further knot stays in the admissible range.
+/// Knows until when every vertex whose plan has no further knot stays within admissible_reach.
 template <class S>
 class RangeWatch {
  public:

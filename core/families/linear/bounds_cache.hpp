@@ -14,8 +14,8 @@ template <class S>
 class BoundsCache {
  public:
   struct Boxes {
-    AlignedArray<S> lanes, own;  ///< as in WideArrays
-    bool complete = false;       ///< to be said by whoever fills them in
+    AlignedArray<S> child_bounds, node_bounds;  ///< as in WideArrays
+    bool complete = false;                      ///< to be said by whoever fills them in
   };
 
   BoundsCache(std::size_t bodies, std::size_t most_bytes) : kept_(bodies), most_bytes_(most_bytes) {}
@@ -27,14 +27,14 @@ class BoundsCache {
     return found == kept_[body].end() || !found->second.complete ? nullptr : &found->second;
   }
   /// Room for those of a body at t that are not complete yet; null if there is no more.
-  Boxes* add(std::size_t body, double t, std::size_t lanes, std::size_t own) {
+  Boxes* add(std::size_t body, double t, std::size_t child_bounds, std::size_t node_bounds) {
     if (const auto begun = kept_[body].find(t); begun != kept_[body].end()) return &begun->second;
-    const std::size_t more = (lanes + own) * sizeof(S);
+    const std::size_t more = (child_bounds + node_bounds) * sizeof(S);
     if (bytes_ + more > most_bytes_) return nullptr;
     bytes_ += more;
     Boxes& boxes = kept_[body][t];
-    boxes.child_bounds.assign(lanes, std::numeric_limits<S>::infinity());
-    boxes.node_bounds.assign(own, S(0));
+    boxes.child_bounds.assign(child_bounds, std::numeric_limits<S>::infinity());
+    boxes.node_bounds.assign(node_bounds, S(0));
     return &boxes;
   }
   std::size_t bytes() const { return bytes_; }

@@ -8,6 +8,7 @@
 #include "core/families/linear/translated_boxes.hpp"
 #include "core/families/wide/kernels/bounds.hpp"
 #include "core/geometry/predicates.hpp"
+#include "core/motion/admissible.hpp"
 
 namespace kbvh {
 
@@ -27,7 +28,7 @@ Box<S> swept(const BodySegmentBounds<S>& side) {
 /// overflow.
 template <class S>
 bool admissible_root(const EndpointBounds<S>& end) {
-  const auto near = [](S x) { return std::abs(x) <= 2 * admissible_magnitude<S>; };
+  const auto near = [](S x) { return std::abs(x) <= 2 * admissible_reach<S>; };
   return std::all_of(end.node_bounds, end.node_bounds + 3, near) &&
          std::all_of(end.node_bounds + 4, end.node_bounds + 7, near);
 }
@@ -95,13 +96,14 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   BodySegmentBounds<S>& side = segment.sides[index];
   EndpointBounds<S>& at = side.at[end];
   const std::size_t nodes = body.hierarchy.node_count();
-  AlignedArray<S>&lanes = body.child_bounds[at.slot], &own = body.node_bounds[at.slot];
-  if (own.size() != 8 * nodes) {
-    lanes.assign(nodes * lane_scalars(body.hierarchy.topology().width), std::numeric_limits<S>::infinity());
-    own.assign(8 * nodes, S(0));
+  AlignedArray<S>&child_bounds = body.child_bounds[at.slot], &node_bounds = body.node_bounds[at.slot];
+  if (node_bounds.size() != 8 * nodes) {
+    child_bounds.assign(nodes * lane_scalars(body.hierarchy.topology().width),
+                        std::numeric_limits<S>::infinity());
+    node_bounds.assign(8 * nodes, S(0));
   }
-  at.child_bounds = lanes.data();
-  at.node_bounds = own.data();
+  at.child_bounds = child_bounds.data();
+  at.node_bounds = node_bounds.data();
   at.positions = motion.positions_on_lines(index, t, body.room[at.slot]);
   at.made = ++body.made;
   if (body.hierarchy.empty()) return {};
@@ -117,17 +119,17 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
     moved.reset();
   if (side.apart) {
     if (moved) {
-      moved->move_own(side.at[0].node_bounds, own.data());
+      moved->move_own(side.at[0].node_bounds, node_bounds.data());
       at.excess = moved->excess;
       ++counts_[index].translated_apart;
       return {};
     }
     const VertexRun all{0, scene_.vertex_count(index)};
-    bounds_kernels<S>(body.hierarchy.kernels()).of_runs(&all, 1, at.positions, own.data());
+    bounds_kernels<S>(body.hierarchy.kernels()).of_runs(&all, 1, at.positions, node_bounds.data());
     ++counts_[index].apart;
     return {};
   }
-  Refit refit{lanes.data(), own.data(), at.positions, std::uint32_t(nodes), nullptr};
+  Refit refit{child_bounds.data(), node_bounds.data(), at.positions, std::uint32_t(nodes), nullptr};
   const bool remembers = memory_.is_used() && motion.as_in_the_scene(index);
   // A body at rest is at a keyframe, whenever it is looked at.
   const double knot = !side.at_rest                              ? t
@@ -135,23 +137,23 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
                                                                  : motion.lines_end(index);
   if (remembers) {
     if (const auto* known = memory_.find(index, knot)) {
-      at.child_bounds = known->lanes.data();
-      at.node_bounds = known->own.data();
+      at.child_bounds = known->child_bounds.data();
+      at.node_bounds = known->node_bounds.data();
       ++left_alone(index).remembered;
       return {};
     }
   }
   if (moved) {
     moved->move(side.at[0].child_bounds, side.at[0].node_bounds, body.hierarchy.topology().width, nodes,
-                lanes.data(), own.data());
+                child_bounds.data(), node_bounds.data());
     at.excess = moved->excess;
     ++counts_[index].translated;
     return {};
   }
   if (remembers) {
-    if (auto* target = memory_.add(index, knot, lanes.size(), own.size())) {
-      at.child_bounds = refit.child_bounds = target->lanes.data();
-      at.node_bounds = refit.node_bounds = target->own.data();
+    if (auto* target = memory_.add(index, knot, child_bounds.size(), node_bounds.size())) {
+      at.child_bounds = refit.child_bounds = target->child_bounds.data();
+      at.node_bounds = refit.node_bounds = target->node_bounds.data();
       refit.remembered = target;
     }
   }

@@ -92,7 +92,7 @@ class LinearBounds {
   };
   /// Boxes that are being made, from the last node to the first.
   struct Refit {
-    S *lanes = nullptr, *own = nullptr;
+    S *child_bounds = nullptr, *node_bounds = nullptr;
     const S* positions = nullptr;
     std::uint32_t left = 0;  ///< nodes
     typename BoundsCache<S>::Boxes* remembered = nullptr;

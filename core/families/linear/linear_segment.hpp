@@ -12,11 +12,11 @@ namespace kbvh {
 /// Boxes of one body at one end of a segment, and the positions that they are of.
 template <class S>
 struct EndpointBounds {
-  const S *lanes = nullptr, *own = nullptr;  ///< as in WideArrays
-  const S* positions = nullptr;              ///< [vertex][3]
-  std::uint32_t slot = 0;                    ///< place in LinearBody::rows of what is made from positions
-  std::uint32_t made = 0;                    ///< one number for one set of positions
-  S excess = 0;  ///< at most so much larger is a box than a tight one, on each side
+  const S *child_bounds = nullptr, *node_bounds = nullptr;  ///< as in WideArrays
+  const S* positions = nullptr;                             ///< [vertex][3]
+  std::uint32_t slot = 0;  ///< place in LinearBody::rows of what is made from positions
+  std::uint32_t made = 0;  ///< one number for one set of positions
+  S excess = 0;            ///< at most so much larger is a box than a tight one, on each side
 };
 
 /// A body with linear bounds: its topology, and room for three ends, those of the present segment and the
@@ -25,7 +25,7 @@ template <class S>
 struct LinearBody {
   static constexpr std::uint32_t slots = 3;
   WideHierarchy<S> hierarchy;  ///< its boxes are free to be used
-  AlignedArray<S> lanes[slots], own[slots];
+  AlignedArray<S> child_bounds[slots], node_bounds[slots];
   std::vector<S> room[slots];  ///< for positions that are nowhere else
   /// Rows of the leaves that a join came to, and which positions they are of.
   AlignedArray<S> rows[slots];
@@ -48,7 +48,8 @@ struct LinearBody {
     std::size_t total = hierarchy.bytes();
     for (std::uint32_t slot = 0; slot < slots; ++slot)
       total +=
-          (lanes[slot].size() + own[slot].size() + room[slot].capacity() + rows[slot].size()) * sizeof(S) +
+          (child_bounds[slot].size() + node_bounds[slot].size() + room[slot].capacity() + rows[slot].size()) *
+              sizeof(S) +
           stamps[slot].size() * sizeof(std::uint32_t);
     return total;
   }

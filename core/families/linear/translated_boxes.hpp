@@ -39,15 +39,15 @@ struct TranslatedBoxes {
     }
     excess += width + rounding;
   }
-  void move(const S* from_lanes, const S* from_own, std::size_t width, std::size_t nodes, S* lanes,
-            S* own) const {
+  void move(const S* from_lanes, const S* from_own, std::size_t width, std::size_t nodes, S* child_bounds,
+            S* node_bounds) const {
     for (std::size_t node = 0; node < nodes; ++node)
       for (std::size_t row = 0; row < 6; ++row) {
         const S by = row < 3 ? lower[row] : -upper[row - 3];  // rows have -upper
         const std::size_t first = node * lane_scalars(std::uint32_t(width)) + row * width;
-        for (std::size_t i = first; i < first + width; ++i) lanes[i] = from_lanes[i] + by;
+        for (std::size_t i = first; i < first + width; ++i) child_bounds[i] = from_lanes[i] + by;
       }
-    for (std::size_t node = 0; node < nodes; ++node) move_own(from_own + 8 * node, own + 8 * node);
+    for (std::size_t node = 0; node < nodes; ++node) move_own(from_own + 8 * node, node_bounds + 8 * node);
   }
   void move_own(const S* from, S* to) const {
     for (std::size_t axis = 0; axis < 3; ++axis) {
