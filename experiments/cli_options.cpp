@@ -40,11 +40,10 @@ std::string described(const WholeRange& range) {
                      unlimited ? "2^64 - 1" : std::to_string(range.most));
 }
 
+/// As in plans: values that are given twice count once, where they come first.
 template <class T>
-void refuse_repeated(const std::vector<T>& values, const std::string& name) {
-  for (auto value = values.begin(); value != values.end(); ++value)
-    if (std::find(values.begin(), value, *value) != value)
-      fail(name, io::printable(fmt::format("{}", *value)) + " is given twice");
+void add_once(std::vector<T>& list, T value) {
+  if (std::find(list.begin(), list.end(), value) == list.end()) list.push_back(std::move(value));
 }
 
 }  // namespace
@@ -59,8 +58,7 @@ std::uint64_t whole_number(const std::string& text, const std::string& name, con
 std::vector<std::uint64_t> whole_numbers(const std::vector<std::string>& given, const std::string& name,
                                          const WholeRange& range) {
   std::vector<std::uint64_t> numbers;
-  for (const std::string& part : parts_of(given, name)) numbers.push_back(whole_number(part, name, range));
-  refuse_repeated(numbers, name);
+  for (const std::string& part : parts_of(given, name)) add_once(numbers, whole_number(part, name, range));
   return numbers;
 }
 
@@ -98,8 +96,8 @@ CLI::Option* add_texts(CLI::App& command, const std::string& name, std::vector<s
 CLI::Option* add_words(CLI::App& command, const std::string& name, std::vector<std::string>& target,
                        const std::string& meaning) {
   const CLI::callback_t read = [&target, name](const CLI::results_t& given) {
-    target = parts_of(given, name);
-    refuse_repeated(target, name);
+    target.clear();
+    for (const std::string& word : parts_of(given, name)) add_once(target, word);
     return true;
   };
   return command.add_option(name, read, meaning)

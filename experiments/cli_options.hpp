@@ -19,7 +19,7 @@ CLI::Option* add_text(CLI::App& command, const std::string& name, std::string& t
 CLI::Option* add_texts(CLI::App& command, const std::string& name, std::vector<std::string>& target,
                        const std::string& meaning);
 
-/// Words separated by commas, none of them twice.
+/// Words separated by commas; one that is given twice counts once.
 CLI::Option* add_words(CLI::App& command, const std::string& name, std::vector<std::string>& target,
                        const std::string& meaning);
 
@@ -30,8 +30,7 @@ CLI::Option* add_number(CLI::App& command, const std::string& name, double& targ
 /// The whole number that a text is; throws CLI::ValidationError with `name` and the text.
 std::uint64_t whole_number(const std::string& text, const std::string& name, const WholeRange& range);
 
-/// The same of all parts of `given`, separated by commas; throws also for empty parts and for one given
-/// twice.
+/// The same of all parts of `given`, separated by commas, each once; throws also for empty parts.
 std::vector<std::uint64_t> whole_numbers(const std::vector<std::string>& given, const std::string& name,
                                          const WholeRange& range);
 
@@ -52,7 +51,7 @@ CLI::Option* add_whole(CLI::App& command, const std::string& name, T& target, co
   return command.add_option(name, read, meaning)->expected(1)->take_all()->type_name("UINT");
 }
 
-/// Whole numbers separated by commas, none of them twice.
+/// Whole numbers separated by commas; one that is given twice counts once.
 template <class T>
 CLI::Option* add_wholes(CLI::App& command, const std::string& name, std::vector<T>& target,
                         const WholeRange& range, const std::string& meaning) {

@@ -108,10 +108,11 @@ std::optional<std::vector<double>> JsonReader::numbers(const std::string& key, s
 
 void JsonReader::finish() const {
   for (const auto& [key, value] : value_->items())
-    if (!known_.contains(key))
-      throw io::InputError(place_ + ": there is no key '" + key + "'; known are " +
-                           joined({known_.begin(), known_.end()}) +
-                           suggestion(key, {known_.begin(), known_.end()}));
+    if (!known_.contains(key)) {
+      const std::vector<std::string> known(known_.begin(), known_.end());
+      throw io::InputError(place_ + ": there is no key '" + key + "'; known are " + joined(known) +
+                           suggestion(key, known));
+    }
 }
 
 void JsonReader::fail(const std::string& key, const std::string& what) const {

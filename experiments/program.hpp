@@ -9,7 +9,7 @@ enum ExitCode : int {
   success = 0,
   guarantee_broken = 1,  ///< everything ran, but a contestant's declared guarantee or tightness did not hold
   wrong_use = 2,         ///< wrong command line, plan, parameter or input file; one sentence on stderr
-  internal_error = 3,    ///< anything else
+  internal_error = 3,    ///< anything else, as standard output on a full disk
 };
 
 /// The whole program; `argv` as given to main. Prints results on stdout and everything else on stderr.

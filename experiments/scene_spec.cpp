@@ -109,7 +109,10 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
   }
   body.file = resolved(keys.word("file").value_or(""), folder);
   if (body.file.empty()) keys.fail("file", "is empty");
-  if (const auto motion = keys.word("motion")) body.motion = resolved(*motion, folder);
+  if (const auto motion = keys.word("motion")) {
+    if (motion->empty()) keys.fail("motion", "is empty");
+    body.motion = resolved(*motion, folder);
+  }
   body.clip = keys.word("clip").value_or("");
   body.frames_per_second = keys.number("fps").value_or(0);
   if (body.frames_per_second < 0) keys.fail("fps", "must not be negative");
@@ -185,6 +188,7 @@ json body_from_text(const std::string& text) {
     if (!assignment) throw io::InputError(where + ": expected key=value, got '" + part + "'");
     const auto& [key, value] = *assignment;
     const std::string at = where + ": " + key;
+    if (value.empty()) throw io::InputError(at + ": is empty, but needs a value");
     if (key == "rotate") {
       body[key].push_back(value);
       continue;
