@@ -25,6 +25,7 @@ template <class S>
 struct InflatedBody {
   S margin = 0;          // of the boxes made last
   double leaf_size = 0;  // mean side of a leaf's box at the reset, before inflation
+  double size = 0;       // the same of the root's box
   double room = 0;       // every vertex was at least so far inside all boxes above it, at the last look
   double moved = 0;      // no vertex has moved further since then
   double rounding = 0;   // a stored position differs from the plan by at most this
@@ -216,6 +217,11 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     }
     bodies_[index].leaves = leaves;
     bodies_[index].leaf_size = leaves == 0 ? 0 : sum / double(leaves);
+    if (leaves == 0) return;
+    const Box<S> root = hierarchy.box(0);
+    bodies_[index].size = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      bodies_[index].size += (double(root.upper[axis]) - double(root.lower[axis])) / 3;
   }
 
   S wanted_margin(std::uint32_t index) const {
@@ -234,7 +240,8 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
   // that it does not depend on a machine or its load. A margin of k steps needs one look in k + 1 frames.
   // Where surfaces of leaves with mean side a meet, boxes that are larger by m on every side cost about (1 +
   // m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the rest is leaves that
-  // are opened in vain).
+  // are opened in vain). Among many small bodies a margin finds other neighbours, besides: as many more as
+  // the body's box gets larger, and who met nobody at the last query may meet somebody then.
 
   /// What a look costs, in box tests. Positions count only if the query would not ask for them all anyhow. A
   /// look that is due at every frame only costs what it writes.
@@ -243,9 +250,15 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     const double each = !bounded_ ? writing : bodies_[index].query_takes_all ? reading : reading + evaluating;
     return each * this->scene_.vertex_count(index);
   }
-  static double query_cost(const Body& body, double margin) {
+  double query_cost(const Body& body, double margin) const {
     const double side = 1 + margin / body.leaf_size;
-    return double(body.tests) / (1 + 0.4 * double(body.margin) / body.leaf_size) * side * side;
+    double tests = double(body.tests) / (1 + 0.4 * double(body.margin) / body.leaf_size);
+    if (this->near_bodies_.searches() && body.size > 0) {
+      const auto neighbours = [&](double m) { return std::pow(1 + 2 * m / body.size, 3); };
+      constexpr double one_meeting = 64;
+      tests = std::max(tests, one_meeting) * neighbours(margin) / neighbours(double(body.margin));
+    }
+    return tests * side * side;
   }
   double best_steps(std::uint32_t index) const {
     const Body& body = bodies_[index];

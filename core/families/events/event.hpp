@@ -1,9 +1,10 @@
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "core/motion/exact_piece.hpp"
@@ -58,10 +59,7 @@ class EventClock {
 
   /// The two pieces whose crossing is the event.
   Crossing<S> crossing(const Event& event) const {
-    if (!own_.empty()) {
-      const auto own = own_.find(event.slot);
-      if (own != own_.end()) return own->second;
-    }
+    if (event.slot < place_.size() && place_[event.slot] != none) return own_[place_[event.slot]];
     return keyframed_crossing(event);
   }
 
@@ -156,14 +154,39 @@ class EventClock {
   }
 
   /// Keeps the crossing of the event that is about to be scheduled in a slot; nothing: forgets the one
-  /// before. No event of that slot may be in a queue meanwhile.
+  /// before. No event of that slot may be in a queue meanwhile. Allocates only for more of them than ever
+  /// before, or for a slot beyond all before.
   void remember(std::uint32_t slot, const std::optional<Crossing<S>>& own) {
-    if (own)
-      own_.insert_or_assign(slot, *own);
-    else if (!own_.empty())
-      own_.erase(slot);
+    if (!own) {
+      if (slot >= place_.size() || place_[slot] == none) return;
+      free_.push_back(std::exchange(place_[slot], none));
+      return;
+    }
+    if (slot >= place_.size())
+      place_.resize(std::max<std::size_t>(2 * place_.size(), std::size_t(slot) + 1), none);
+    std::uint32_t& place = place_[slot];
+    if (place == none && free_.empty()) {
+      place = std::uint32_t(own_.size());
+      own_.push_back(*own);
+      free_.reserve(own_.capacity());
+      return;
+    }
+    if (place == none) {
+      place = free_.back();
+      free_.pop_back();
+    }
+    own_[place] = *own;
   }
-  void clear() { own_.clear(); }
+  void clear() {
+    if (own_.empty()) return;
+    own_.clear();
+    free_.clear();
+    std::fill(place_.begin(), place_.end(), none);
+  }
+  std::size_t bytes() const {
+    return own_.capacity() * sizeof(Crossing<S>) +
+           (place_.capacity() + free_.capacity()) * sizeof(std::uint32_t);
+  }
 
  private:
   Crossing<S> keyframed_crossing(const Event& event) const {
@@ -213,7 +236,10 @@ class EventClock {
   }
 
   std::vector<const FlightPlans<S>*> plans_;
-  std::unordered_map<std::uint32_t, Crossing<S>> own_;  ///< by slot: crossings that involve a plan of its own
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+  std::vector<Crossing<S>> own_;      ///< crossings that involve a plan of its own
+  std::vector<std::uint32_t> place_;  ///< [slot] in own_, or none; slots beyond have none
+  std::vector<std::uint32_t> free_;   ///< places that are not in use
 };
 
 }  // namespace kbvh

@@ -90,7 +90,7 @@ class KineticForest {
   Queue& queue() { return queue_; }
   const Queue& queue() const { return queue_; }
   std::size_t bytes() const {
-    std::size_t total = queue_.bytes();
+    std::size_t total = queue_.bytes() + clock_.bytes();
     for (const Tree& tree : trees_) total += tree.bytes();
     return total;
   }

@@ -31,6 +31,8 @@ class RoundedClock {
   /// Nothing: `first_failure` starts from an event's `begin`.
   Crossing<S> crossing(const Event& /*event*/) const { return {}; }
 
+  std::size_t bytes() const { return 0; }
+
   bool earlier(const Event& a, const Event& b) const {
     if (a.hint != b.hint) return a.hint < b.hint;
     if (a.depth != b.depth) return a.depth > b.depth;
