@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Optional
 
+import files
 import text
 from load import ResultError, read_json
 
@@ -46,7 +46,7 @@ def stress(folder: Path) -> Optional[Stress]:
     data = read_json(file, STRESS_SCHEMA, ResultError)
     try:
         return _stress(data)
-    except (KeyError, TypeError) as problem:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as problem:
         raise ResultError(f"{file}: a field is missing or of the wrong kind: {problem}.") from None
 
 
@@ -96,7 +96,7 @@ def ccd(folder: Path) -> Optional[Ccd]:
     if not file.exists():
         return None
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
+        data = files.read_json(file)
         peers = sorted({peer for one in data["files"] for peer in one.get("peers", {})})
         rows = [_queries(one, peers) for one in data["files"]]
         head = ("queries of", "queries", "touch", "missed", "extra", "by the filter", "per second")
