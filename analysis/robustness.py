@@ -62,6 +62,9 @@ def _stress(data: dict[str, Any]) -> Stress:
         f"{options['seed']}, in {text.listing(list(options['scalars']))}, l = {text.listing([str(l) for l in options['l']])}; the "
         f"longest clip has {text.count(options['many_keyframes'])} keyframes. Commit {data['commit'][:12]}."
     )
+    played = int(data.get("played", options["scenes"]))
+    if played < int(options["scenes"]):
+        facts += f" The run was interrupted after {text.count(played)} of them."
     return Stress(
         facts,
         [_line(name, rows) for name, rows in by_strategy.items()],

@@ -13,6 +13,7 @@
 #include "experiments/machine.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
+#include "experiments/results.hpp"
 #include "experiments/table.hpp"
 #include "experiments/text.hpp"
 
@@ -108,6 +109,7 @@ int run(const Arguments& arguments) {
   for (const std::string& path : paths)
     for (ImpactQueries& queries : find_impact_queries(path)) files.push_back(std::move(queries));
   if (files.empty()) throw io::InputError("no queries of continuous collision detection in " + joined(paths));
+  if (!arguments.out.empty()) prepare_folder(arguments.out);
   const std::vector<Peer> others = peers();
   std::vector<std::vector<std::string>> table{
       {"queries of", "queries", "touch", "missed", "extra", "filtered", "per second"}};
@@ -164,9 +166,6 @@ int run(const Arguments& arguments) {
   if (unknown > 0) std::printf("%s without a verdict to compare with.\n", counted(unknown, "query").c_str());
   if (!arguments.out.empty()) {
     const std::filesystem::path folder = arguments.out;
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) throw io::InputError("cannot make " + folder.string() + ": " + error.message());
     const json all{{"commit", commit()}, {"dirty", dirty()}, {"machine", machine()}, {"files", records}};
     io::write_file_atomically(folder / "ccd.json", all.dump(1) + "\n");
   }

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/hasher.hpp"
 #include "core/hierarchy/builders.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/obj.hpp"
 #include "experiments/io/pc2.hpp"
+#include "experiments/text.hpp"
 
 namespace kbvh::experiments {
 
@@ -157,6 +159,30 @@ io::AnimatedMesh thinned(const io::AnimatedMesh& mesh, std::size_t most_keyframe
 
 }  // namespace
 
+std::uint64_t card_hash(const LoadedScene& scene) {
+  Hasher hasher;
+  hasher.mix(std::uint64_t(scene.order));
+  for (const io::AnimatedMesh& mesh : scene.meshes) {
+    hasher.mix(hash_of(mesh.name));
+    hasher.mix(std::uint64_t(mesh.kind));
+    hasher.list(mesh.primitive_offsets);
+    hasher.list(mesh.primitive_vertices);
+    hasher.list(mesh.keyframe_times);
+    hasher.list(mesh.positions);
+  }
+  return hasher.value();
+}
+
+std::string folder_name(const LoadedScene& scene) {
+  std::string name = file_name(scene.name);
+  if (std::size_t end = 100; name.size() > end) {
+    // No half character at the end (in UTF-8 a character goes on with bytes 10xxxxxx).
+    while (end > 0 && (name[end] & 0xc0) == 0x80) --end;
+    name.resize(end);
+  }
+  return name + "-" + hexadecimal(card_hash(scene));
+}
+
 std::string file_name(std::string name) {
   for (char& c : name)
     if (c == '/' || c == '\0') c = '-';
@@ -172,7 +198,10 @@ void export_scene(const LoadedScene& scene, const std::filesystem::path& folder,
     io::save_obj(mesh, folder / (file + ".obj"));
     if (mesh.moving()) io::save_pc2(mesh, folder / (file + ".pc2"), 1);
   }
-  io::write_file_atomically(folder / "card.json", as_json(scene.name, cards(scene)).dump(2) + "\n");
+  nlohmann::json card = as_json(scene.name, cards(scene));
+  card["hash"] = hexadecimal(card_hash(scene));
+  io::write_file_atomically(folder / "card.json",
+                            card.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace kbvh::experiments

@@ -42,8 +42,10 @@ MeasurementStore::MeasurementStore(std::filesystem::path file, std::string progr
   for (std::string line; std::getline(in, line);) {
     // The last line of a run that was stopped may be incomplete.
     const json record = json::parse(line, nullptr, false);
-    if (record.is_object() && record.value("program", "") == program_)
-      kept_[record.value("key", "")] = record["value"];
+    if (!record.is_object() || !record.contains("value")) continue;
+    const auto made_by = record.find("program"), key = record.find("key");
+    if (made_by != record.end() && key != record.end() && *made_by == json(program_) && key->is_string())
+      kept_[key->get<std::string>()] = record["value"];
   }
   // What follows must not be glued to a half line.
   std::ofstream out(file_, std::ios::app);

@@ -96,6 +96,24 @@ TEST(Plan, StudiesInheritAndOverride) {
   EXPECT_EQ(request.builder.methods, std::vector<BuildMethod>{BuildMethod::sah});
 }
 
+TEST(Plan, WhatIsGivenTwiceIsMeasuredOnce) {
+  const Plan plan = read_plan(
+      parse_json(R"({"l": [2, 10, 2], "scalars": ["float", "double", "float"],
+      "scenes": ["tablecloth", "tablecloth", {"builtin": "random_soups", "triangles": [100, 100], "seed": [1, 2, 1],
+                 "order": ["given", "given"]}],
+      "strategies": ["bottom_up", "bottom_up"],
+      "builder": {"width": [8, 8], "leaf_size": [4, 1, 4], "method": ["sah", "sah"]},
+      "params": {"threads": [1, 1.0, "1"]}})",
+                 "p.json"),
+      "p.json", {});
+  const Study& study = plan.studies[0];
+  EXPECT_EQ(study.per_keyframe, (std::vector<std::uint32_t>{2, 10}));
+  EXPECT_EQ(study.scalars, (std::vector<std::string>{"float", "double"}));
+  EXPECT_EQ(study.scenes.size(), 3u);
+  std::vector<std::string> notes;
+  EXPECT_EQ(expand(study.strategies, study.params, study.builder, notes).size(), 2u);
+}
+
 TEST(Plan, ErrorsNameFileKeyAndValue) {
   EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
             "p.json: there is no key 'repetition'; known are builder, continuous, description, frames_limit, "
@@ -317,7 +335,7 @@ TEST(Results, AFolderThatCannotBeMade) {
 }
 
 json example_scene() {
-  return {{"hash", "1"}, {"scalar", "float"}, {"per_keyframe", 10}, {"frames", 591}};
+  return {{"hash", "1"}, {"scalar", "float"}, {"per_keyframe", 10}, {"frames", 591}, {"frame_times", "2"}};
 }
 json example_strategy() {
   return {{"id", "x"}, {"params", {{"queue", "avl"}}}, {"builder", {{"width", 2}}}, {"title", "X"}};
@@ -332,7 +350,7 @@ TEST(Results, KeysAreStableAndSeeWhatMatters) {
   };
   const std::string usual = key(example_scene(), example_strategy());
   // Pinned: a change of this value makes every stored result be measured again.
-  EXPECT_EQ(usual, "c2c743abebce6186");
+  EXPECT_EQ(usual, "10db3bc838d887e1");
   json scene = example_scene(), strategy = example_strategy();
   strategy["title"] = "another title";
   scene["name"] = "another name";
@@ -374,6 +392,22 @@ TEST(Times, QuantilesAreOfTheMedianRepetition) {
   EXPECT_DOUBLE_EQ(record.at("total_worst"), 200);
   EXPECT_EQ(record.at("repetitions").size(), 3u);
   EXPECT_DOUBLE_EQ(record.at("repetitions")[0].at("update"), 151.5);
+}
+
+TEST(Times, MeansHaveEveryPhase) {
+  ClipTimes clip;
+  clip.frames = {{1, 2, 3, 4, 5, 6}, {3, 4, 5, 6, 7, 8}};
+  const PhaseTimes mean = clip.mean();
+  EXPECT_EQ(mean.motion, 2);
+  EXPECT_EQ(mean.update, 3);
+  EXPECT_EQ(mean.traversal, 4);
+  EXPECT_EQ(mean.triangle_tests, 5);
+  EXPECT_EQ(mean.plan_changes, 6);
+  EXPECT_EQ(mean.geometry_changes, 7);
+  EXPECT_DOUBLE_EQ(2 * mean.total(), clip.total());
+  Measured measured;
+  measured.repetitions = {clip};
+  EXPECT_DOUBLE_EQ(times_record(measured).at("repetitions")[0].at("geometry_changes"), 7e3);
 }
 
 json example_record(const std::string& id, const std::string& family, double update) {
