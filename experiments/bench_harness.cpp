@@ -11,6 +11,7 @@
 
 #include "experiments/io/bytes.hpp"
 #include "experiments/json_reader.hpp"
+#include "experiments/results.hpp"
 
 namespace kbvh::experiments {
 
@@ -96,7 +97,7 @@ std::string add_to_benchmark_file(const std::filesystem::path& folder, const jso
   std::string said;
   std::error_code error;
   if (std::filesystem::exists(file, error) && std::filesystem::file_size(file, error) > 0) {
-    json before = json::parse(io::read_file(file), nullptr, false);
+    json before = json_or_nothing(io::read_file(file));
     if (before.is_object() && before.contains("benchmarks") && before["benchmarks"].is_array()) {
       for (const json& run : runs.at("benchmarks")) before["benchmarks"].push_back(run);
       before["context"] = runs.at("context");

@@ -16,6 +16,24 @@ namespace kbvh::experiments {
 
 using nlohmann::json;
 
+json json_or_nothing(std::string_view text) {
+  constexpr int deepest = 100;
+  int depth = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (quoted && c == '\\')
+      ++i;
+    else if (c == '"')
+      quoted = !quoted;
+    else if (!quoted && (c == '[' || c == '{') && ++depth > deepest)
+      return json(json::value_t::discarded);
+    else if (!quoted && (c == ']' || c == '}'))
+      --depth;
+  }
+  return json::parse(text, nullptr, false);
+}
+
 void prepare_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -54,8 +72,7 @@ ResultStore::ResultStore(const std::filesystem::path& folder)
     ++line;
     std::size_t end = text.find('\n', begin);
     if (end == std::string::npos) end = text.size();
-    const json record =
-        json::parse(text.begin() + std::ptrdiff_t(begin), text.begin() + std::ptrdiff_t(end), nullptr, false);
+    const json record = json_or_nothing(std::string_view(text).substr(begin, end - begin));
     const bool blank = begin == end;
     begin = end + 1;
     if (blank) continue;

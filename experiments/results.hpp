@@ -3,9 +3,14 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace kbvh::experiments {
+
+/// The value of a text of a file that this program wrote, or a discarded one (`is_discarded`) for what is no
+/// JSON or is nested deeper than anything that it writes: copying such a value would exhaust the stack.
+nlohmann::json json_or_nothing(std::string_view text);
 
 /// Makes a folder that results are to be written to, and writes and removes a small file there: a folder that
 /// is none, cannot be written or is on a full disk is noticed before hours of work. Throws io::InputError.

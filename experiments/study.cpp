@@ -99,7 +99,6 @@ class Runner {
     } catch (const io::InputError& problem) {
       // Nothing that is measured depends on it.
       note("warning: the report will have no picture of " + loaded.name + ": " + problem.what());
-      return {};
     }
     progress_.clear();
     return hash;
@@ -109,7 +108,7 @@ class Runner {
     std::error_code error;
     if (!std::filesystem::is_regular_file(file, error) || std::filesystem::file_size(file, error) == 0)
       return false;
-    const json card = json::parse(io::read_file(file), nullptr, false);
+    const json card = json_or_nothing(io::read_file(file));
     return card.is_object() && card.contains("bodies") && card.contains("hash") && card.at("hash") == hash;
   }
 

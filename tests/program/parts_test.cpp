@@ -97,15 +97,14 @@ TEST(Plan, StudiesInheritAndOverride) {
 }
 
 TEST(Plan, WhatIsGivenTwiceIsMeasuredOnce) {
-  const Plan plan = read_plan(
-      parse_json(R"({"l": [2, 10, 2], "scalars": ["float", "double", "float"],
+  const Plan plan = read_plan(parse_json(R"({"l": [2, 10, 2], "scalars": ["float", "double", "float"],
       "scenes": ["tablecloth", "tablecloth", {"builtin": "random_soups", "triangles": [100, 100], "seed": [1, 2, 1],
                  "order": ["given", "given"]}],
       "strategies": ["bottom_up", "bottom_up"],
       "builder": {"width": [8, 8], "leaf_size": [4, 1, 4], "method": ["sah", "sah"]},
       "params": {"threads": [1, 1.0, "1"]}})",
-                 "p.json"),
-      "p.json", {});
+                                         "p.json"),
+                              "p.json", {});
   const Study& study = plan.studies[0];
   EXPECT_EQ(study.per_keyframe, (std::vector<std::uint32_t>{2, 10}));
   EXPECT_EQ(study.scalars, (std::vector<std::string>{"float", "double"}));
@@ -326,6 +325,18 @@ TEST(Results, NewestOfAKeyCountsAndNothingIsLost) {
   ResultStore again(folder.path());
   EXPECT_EQ(again.find("a")->at("value"), 2);
   EXPECT_EQ(again.records(), 2u);
+}
+
+TEST(Results, NestingWithoutEndIsNoRecord) {
+  const TemporaryFolder folder;
+  const std::string open(300000, '['), close(300000, ']');
+  write_text(folder / "results.jsonl", open + "\n" + open + close + "\n{\"key\": \"a\", \"x\": " + open +
+                                           close + "}\n{\"key\": \"b\", \"x\": \"[[\\\"[\"}\n");
+  ResultStore store(folder.path());
+  EXPECT_EQ(store.unreadable_lines(), 3u);
+  EXPECT_NE(store.find("b"), nullptr);
+  EXPECT_FALSE(json_or_nothing(std::string(100, '[') + std::string(100, ']')).is_discarded());
+  EXPECT_TRUE(json_or_nothing(std::string(101, '[') + std::string(101, ']')).is_discarded());
 }
 
 TEST(Results, AFolderThatCannotBeMade) {
