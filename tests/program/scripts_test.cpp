@@ -167,7 +167,8 @@ TEST(Scripts, AreReplayedToThoseWhoCanTakeThem) {
     double changes = 0;
     for (const PhaseTimes& frame : measurement[i].repetitions[1].frames) changes += frame.plan_changes;
     EXPECT_GT(changes, 0);
-    // The driver's own part of a change is motion: nobody else evaluates positions while a script is followed.
+    // The driver's own part of a change is motion: nobody else evaluates positions while a script is
+    // followed.
     Session<float> session(scene, spec.contestant(), CountingPolicy::silent);
     session.reset(frames[0]);
     PhaseTimes times;
