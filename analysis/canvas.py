@@ -13,6 +13,7 @@ import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+import files
 from axes import settle
 
 #: Text size and frame of every figure; set only while one is drawn, so that nothing global changes.
@@ -65,8 +66,10 @@ def picture(
         FigureCanvasAgg(figure)
         settle(figure)
         folder.mkdir(parents=True, exist_ok=True)
-        figure.savefig(folder / f"{name}.png", dpi=160)
-        figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None, "Title": title})
+        for kind, said in (("png", {"dpi": 160}), ("pdf", {"metadata": {"CreationDate": None, "Title": title}})):
+            drawn = io.BytesIO()
+            figure.savefig(drawn, format=kind, **said)
+            files.write_whole(folder / f"{name}.{kind}", drawn.getvalue())
         buffer = io.BytesIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     width, height = figure.get_size_inches()

@@ -15,12 +15,14 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Optional
 
+import files
 import text
 from claim_points import SLACK, ClaimError, Looked, Looker, Point, Table
 from load import ResultError, Study, load, read_json
 
 SCHEMA = "kbvh-claims-1"
 THEORY_SCHEMA = "kbvh-theory-1"
+THEORY_FIELDS = ("id", "claim", "citation", "bound", "measured", "verdict", "condition", "why", "criteria")
 FILE = Path(__file__).resolve().parent / "claims.json"
 HOLDS, CONDITION, FAILS, OPEN = "holds", "holds with a condition", "does not hold", "not decided here"
 
@@ -88,7 +90,10 @@ def theory_rows(listed: list[dict[str, Any]], folder: Path) -> list[Row]:
     missing = [f"{path.name} in this folder, which kbvh theory --out writes"]
     if path.exists():
         found = read_json(path, THEORY_SCHEMA, ClaimError)
-        known = {claim["id"]: claim for claim in found["claims"]}
+        try:
+            known = {claim["id"]: {name: claim[name] for name in THEORY_FIELDS} for claim in found["claims"]}
+        except (KeyError, TypeError) as problem:
+            raise ClaimError(f"{path}: a field is missing or of the wrong kind: {problem}.") from None
         missing = [f"the claim in {path.name}"]
     rows = []
     for one in listed:
@@ -345,7 +350,7 @@ def write(claims: Claims, folder: Path) -> Path:
         for row in claims.rows
     ]  # fmt: skip
     whole = {"schema": SCHEMA, "baselines": claims.baselines, "claims": rows}
-    path.write_text(json.dumps(whole, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    files.write_whole(path, json.dumps(whole, indent=1, ensure_ascii=False) + "\n")
     return path
 
 

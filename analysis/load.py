@@ -1,19 +1,23 @@
 """Reads a folder's results.jsonl, checks it, and hands it on as tables. Never writes to it.
 
-The schema is documented in experiments/RESULTS.md. What a measurement cannot do without is refused
-with the line and the field if it is missing; anything else that is missing reads as unknown.
+The schema is documented in experiments/RESULTS.md. A line without what a measurement cannot do without is skipped, with a
+note that names the line and the field; anything else that is missing reads as unknown.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Optional
 
 import numpy as np
 import pandas as pd
+
+import files
+import scene_names
 
 SCHEMA = 1
 FILE_NAME = "results.jsonl"
@@ -37,9 +41,9 @@ class ResultError(Exception):
 def read_json(file: Path, schema: str, error: type[Exception]) -> dict[str, Any]:
     """The object in a JSON file of this schema; raises `error`, with one sentence, if there is none."""
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
+        found = files.read_json(file)
     except (OSError, ValueError) as problem:
-        raise error(f"{file}: {problem}") from problem
+        raise error(f"{file} cannot be read: {problem}.") from problem
     if not isinstance(found, dict) or found.get("schema") != schema:
         raise error(f"{file}: the schema is not {schema}")
     return found
@@ -110,6 +114,8 @@ class _Record:
         value = self.get(path, default)
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ResultError(f"{self.place}: {path} should be a number, but is {json.dumps(value)}.")
+        if value is not default and not abs(value) <= sys.float_info.max:
+            raise ResultError(f"{self.place}: {path} is too large for a number.")
         return float(value)
 
     def flag(self, path: str, default: Any = _MISSING) -> bool:
@@ -123,7 +129,7 @@ def load(folder: Path) -> Study:
     """Reads `folder`/results.jsonl. Raises ResultError."""
     path = folder / FILE_NAME
     try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = path.read_bytes().decode("utf-8", errors="replace").split("\n")
     except FileNotFoundError:
         raise ResultError(f"{path} does not exist: `kbvh run --out {folder}` writes it.") from None
     except OSError as error:
@@ -138,25 +144,35 @@ def load(folder: Path) -> Study:
             continue
         place = f"{path} line {index + 1}"
         try:
-            data = json.loads(line)
-        except json.JSONDecodeError:
+            data = files.parse_json(line)
+        except ValueError:
             why = "it breaks off, as after an interrupted run" if index == last else "it is not JSON"
             notes.append(f"Line {index + 1} of {FILE_NAME} was skipped: {why}.")
             continue
-        if not isinstance(data, dict):
-            raise ResultError(f"{place}: a result is an object, but this is {line.strip()[:40]}.")
+        if not isinstance(data, dict) or "schema" not in data:
+            notes.append(f"Line {index + 1} of {FILE_NAME} was skipped: it is no result.")
+            continue
         record = _Record(data, place)
         schema = record.get("schema")
         if schema != SCHEMA or isinstance(schema, bool):
             raise ResultError(
                 f"{place}: schema {json.dumps(schema)} is not known to this report, which reads schema {SCHEMA}."
             )
-        row = _row(record, index)
-        repetitions += _repetitions(record, index, row)
+        try:
+            row = _row(record, index)
+            times = _repetitions(record, index, row)
+        except ResultError as problem:
+            notes.append(f"Line {index + 1} of {FILE_NAME} was skipped: {str(problem).removeprefix(place).lstrip(':, ')}")
+            continue
+        repetitions += times
         rows.append(row)
+    if not rows and notes:
+        raise ResultError(f"{path} has no result that can be used. {notes[0]}")
     if not rows:
         raise ResultError(f"{path} has no results yet: `kbvh run --out {folder}` adds some.")
     runs = pd.DataFrame(rows)
+    runs["scene"], told_apart = scene_names.told_apart(runs)
+    notes += told_apart
     runs["label"] = _labels(runs)
     runs, dropped = _newest(runs)
     if dropped:
@@ -164,8 +180,9 @@ def load(folder: Path) -> Study:
             f"{dropped} older measurement{'s' if dropped > 1 else ''} of the same configuration"
             f" {'are' if dropped > 1 else 'is'} kept in the file, but not shown: the newest counts."
         )
-    times = pd.DataFrame(repetitions, columns=["run", "repetition", *PHASES])
-    times = times[times["run"].isin(runs["run"])].reset_index(drop=True)
+    measured = pd.DataFrame(repetitions, columns=["run", "repetition", *PHASES])
+    measured = measured.astype({"run": int, "repetition": int, **{name: float for name in PHASES}})
+    times = measured[measured["run"].isin(runs["run"])].reset_index(drop=True)
     return Study(path, _with_times(runs, times), times, notes)
 
 
@@ -206,11 +223,12 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "dirty": record.flag("dirty", False),
         **machine,
         "seed": str(record.get("seed", "")),
-        "scene": _family(record.text("scene.name"), bodies),
+        "scene": scene_names.family(record.text("scene.name"), bodies),
         "scene_name": record.text("scene.name"),
         "origin": record.text("scene.origin", ""),
         "changes": _changes(record),
         "hash": str(record.get("scene.hash", "")),
+        "card": str(record.get("scene.card", "")),
         "scalar": record.text("scene.scalar"),
         "l": record.number("scene.per_keyframe"),
         "keyframes": record.number("scene.keyframes", math.nan),
@@ -291,17 +309,6 @@ def _moving(bodies: Any) -> float:
     return float(sum(count for count in counts if isinstance(count, (int, float))))
 
 
-def _family(name: str, bodies: Any) -> str:
-    """A scene's name without the numbers of primitives in it, so that its sizes belong together.
-
-    `tablecloth-2048-200` is `tablecloth` if its bodies have 2048 and 200 primitives.
-    """
-    listed = bodies if isinstance(bodies, list) else []
-    counts = {str(body.get("primitives")) for body in listed if isinstance(body, dict)}
-    head, *rest = name.split("-")
-    return "-".join([head, *(part for part in rest if part not in counts)])
-
-
 def _repetitions(record: _Record, index: int, row: dict[str, Any]) -> list[dict[str, float]]:
     """The repetitions of a record that was not refused."""
     if row["refused"]:
@@ -319,6 +326,8 @@ def _repetitions(record: _Record, index: int, row: dict[str, Any]) -> list[dict[
         for name, value in values.items():
             if not (math.isfinite(value) and value >= 0):
                 raise ResultError(f"{one.place}: {name} is {value}, which is not a time.")
+        # Both are the strategy's answers to changes at run time: every sum has them together.
+        values["plan_changes"] += one.number("geometry_changes", 0.0)
         result.append({"run": index, "repetition": number, **values})
     return result
 

@@ -20,6 +20,7 @@ import choices
 import claims as paper_claims
 import exactness
 import figures
+import files
 import paper_figures
 import ratios
 import robustness
@@ -150,7 +151,7 @@ def write(
         symbols={contestant: Markup(symbol(look)) for contestant, look in all_looks.items()},
     )
     path = folder / "report.html"
-    path.write_text(page, encoding="utf-8")
+    files.write_whole(path, page)
     return path
 
 
@@ -189,6 +190,8 @@ def _theory(folder: Path, which: str) -> list[Picture]:
         return theory_figures.pictures(theory_figures.load(file), folder / "figures")
     except theory_figures.TheoryError as problem:
         raise ClaimError(str(problem)) from None
+    except (KeyError, TypeError, ValueError) as problem:
+        raise ClaimError(f"{file}: a field is missing or of the wrong kind: {problem}.") from None
 
 
 def _paper(
@@ -213,6 +216,8 @@ def _sections(
 ) -> list[Section]:
     ordered = pd.concat(study.groups())
     of_group = dict(zip(ordered["group"].unique(), groups))
+    written = scene_pictures.written_out(folder.parent)
+    study.notes += written.notes
     result = []
     for number, (scene, rows) in enumerate(ordered.groupby("scene", sort=False)):
         mine = [of_group[group] for group in rows["group"].unique()]
@@ -220,9 +225,12 @@ def _sections(
         sizes = text.listing([text.size(value) for value in smaller])
         own = bool((rows["origin"] == "files").any())
         card, view = scene_cards.card(rows), None
-        if (shown := scene_pictures.exported(folder.parent, list(rows.sort_values("primitives")["scene_name"]))) is not None:
+        if (shown := written.of(rows.sort_values("primitives"))) is not None:
             card += scene_cards.violence(shown)
-            view = scene_cards.view(shown, folder, str(scene)) if which != "none" else None
+            try:
+                view = scene_cards.view(shown, folder, str(scene)) if which != "none" else None
+            except scene_pictures.MeshError as problem:
+                study.notes.append(f"{scene} has no picture: {problem}.")
         section = Section(str(scene), f"scene-{number + 1}", scene_cards.bodies(rows), card, view, own, sizes, mine)
         timed = rows[rows["refused"] == ""]
         slug = re.sub(r"[^a-z0-9]+", "-", str(scene).lower()).strip("-") or f"scene-{number + 1}"

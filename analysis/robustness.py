@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Optional
 
+import files
 import text
 from load import ResultError, read_json
 
@@ -46,7 +46,7 @@ def stress(folder: Path) -> Optional[Stress]:
     data = read_json(file, STRESS_SCHEMA, ResultError)
     try:
         return _stress(data)
-    except (KeyError, TypeError) as problem:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as problem:
         raise ResultError(f"{file}: a field is missing or of the wrong kind: {problem}.") from None
 
 
@@ -62,6 +62,9 @@ def _stress(data: dict[str, Any]) -> Stress:
         f"{options['seed']}, in {text.listing(list(options['scalars']))}, l = {text.listing([str(l) for l in options['l']])}; the "
         f"longest clip has {text.count(options['many_keyframes'])} keyframes. Commit {data['commit'][:12]}."
     )
+    played = int(data.get("played", options["scenes"]))
+    if played < int(options["scenes"]):
+        facts += f" The run was interrupted after {text.count(played)} of them."
     return Stress(
         facts,
         [_line(name, rows) for name, rows in by_strategy.items()],
@@ -96,7 +99,7 @@ def ccd(folder: Path) -> Optional[Ccd]:
     if not file.exists():
         return None
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
+        data = files.read_json(file)
         peers = sorted({peer for one in data["files"] for peer in one.get("peers", {})})
         rows = [_queries(one, peers) for one in data["files"]]
         head = ("queries of", "queries", "touch", "missed", "extra", "by the filter", "per second")

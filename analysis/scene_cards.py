@@ -57,7 +57,7 @@ def card(rows: pd.DataFrame) -> list[tuple[str, str]]:
 def violence(folder: Path) -> list[tuple[str, str]]:
     """How much the moving bodies of a scene that was written out move, from its card."""
     facts = []
-    for body in scene_pictures.card(folder):
+    for body in scene_pictures.card(folder)["bodies"]:
         if body["keyframes"] > 1:
             facts.append((
                 f"How violent: {body['name']}",
@@ -70,7 +70,8 @@ def violence(folder: Path) -> list[tuple[str, str]]:
 
 def view(folder: Path, figures_folder: Path, scene: str) -> Picture:
     """The scene at a few keyframes."""
-    slug = re.sub(r"[^a-z0-9]+", "-", scene.lower()).strip("-") or "scene"
+    # By the folder, whose name ends with the scene's hash: what was drawn of another scene of this name is not shown.
+    slug = re.sub(r"[^a-z0-9]+", "-", folder.name.lower()).strip("-") or "scene"
     file = figures_folder / f"{slug}-scene.png"
     width, height = scene_pictures.write(folder, file)
     uri = "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode("ascii")

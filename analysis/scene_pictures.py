@@ -8,7 +8,7 @@ NAME --out FOLDER` writes (every body as OBJ, and PC2 if it moves).
 from __future__ import annotations
 
 import argparse
-import json
+import io
 import struct
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +16,8 @@ from typing import Any, Optional
 
 import matplotlib.image
 import numpy as np
+
+import files
 
 PALETTE = ((0.62, 0.30, 0.28), (0.86, 0.72, 0.60), (0.45, 0.55, 0.68))  # bodies, in the order of their files
 WIDEST = 1.7  # of a panel, in heights
@@ -125,28 +127,70 @@ def picture(meshes: list[Mesh], keyframes: list[int], azimuth: float, height: in
     return np.concatenate(panels, axis=1)
 
 
-def exported(results: Path, names: list[str]) -> Optional[Path]:
-    """The folder of the last of these scenes that `kbvh run --out RESULTS` has written out; None if there is none."""
-    for name in reversed(names):
-        folder = results / "scenes" / name.replace("/", "-")
-        if (folder / "card.json").exists():
-            return folder
-    return None
+class MeshError(Exception):
+    """Meshes of a scene that cannot be read; the text is one clause."""
 
 
-def card(folder: Path) -> list[dict[str, Any]]:
-    """The bodies as card.json has them."""
-    return list(json.loads((folder / "card.json").read_text(encoding="utf-8"))["bodies"])
+@dataclass
+class WrittenOut:
+    """The folders of a study's scenes, and sentences about those whose cards cannot be read."""
+
+    by_hash: dict[str, Path]
+    by_name: dict[str, Path]  #: written before scenes had hashes
+    notes: list[str]
+
+    def of(self, rows: Any) -> Optional[Path]:
+        """The folder of the last of these runs whose scene was written out; None if there is none."""
+        for row in reversed(list(rows.itertuples())):
+            found = self.by_hash.get(row.card) if row.card else self.by_name.get(row.scene_name.replace("/", "-"))
+            if found is not None:
+                return found
+        return None
+
+
+def written_out(results: Path) -> WrittenOut:
+    """The scenes that `kbvh run --out RESULTS` has written out."""
+    found = WrittenOut({}, {}, [])
+    for file in sorted((results / "scenes").glob("*/card.json")):
+        try:
+            scene_hash = card(file.parent).get("hash", "")
+        except MeshError as problem:
+            found.notes.append(f"A scene is shown without picture: {problem}.")
+            continue
+        if scene_hash:
+            found.by_hash[scene_hash] = file.parent
+        else:
+            found.by_name[file.parent.name] = file.parent
+    return found
+
+
+CARD_NUMBERS = ("keyframes", "nodes", "sides_changed_per_keyframe", "sides_changed_at_most", "mean_step_in_edges", "largest_step_in_edges")  # fmt: skip
+
+
+def card(folder: Path) -> dict[str, Any]:
+    """What card.json has. Raises MeshError."""
+    file = folder / "card.json"
+    try:
+        found = files.read_json(file)
+        bodies = [(body["name"], [float(body[name]) for name in CARD_NUMBERS]) for body in found["bodies"]]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as problem:
+        raise MeshError(f"{file} cannot be read ({problem})") from None
+    return {**found, "bodies": [{"name": name, **dict(zip(CARD_NUMBERS, numbers))} for name, numbers in bodies]}
 
 
 def write(folder: Path, file: Path, height: int = 420) -> tuple[int, int]:
     """Draws all keyframes that a folder has, unless the file is newer; returns width and height in pixels."""
     if not (file.exists() and file.stat().st_mtime > (folder / "card.json").stat().st_mtime):
-        meshes = [mesh for mesh in read_scene(folder) if len(mesh.triangles)]
-        keyframes = list(range(max((len(mesh.positions) for mesh in meshes), default=0)))
+        try:
+            meshes = [mesh for mesh in read_scene(folder) if len(mesh.triangles)]
+            keyframes = list(range(max((len(mesh.positions) for mesh in meshes), default=0)))
+            image = picture(meshes, keyframes, 50.0, height) if keyframes else np.ones((height, height, 3))
+        except (OSError, ValueError, IndexError, struct.error) as problem:
+            raise MeshError(f"the meshes in {folder} cannot be read ({problem})") from None
         file.parent.mkdir(parents=True, exist_ok=True)
-        image = picture(meshes, keyframes, 50.0, height) if keyframes else np.ones((height, height, 3))
-        matplotlib.image.imsave(file, np.clip(image, 0, 1))
+        drawn = io.BytesIO()
+        matplotlib.image.imsave(drawn, np.clip(image, 0, 1), format="png")
+        files.write_whole(file, drawn.getvalue())
     return int(matplotlib.image.imread(file).shape[1]), int(matplotlib.image.imread(file).shape[0])
 
 

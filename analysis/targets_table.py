@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Optional
 
+import files
 import text
 from load import ResultError
 
@@ -64,7 +65,7 @@ class Target:
 def load_targets(path: Path) -> list[Target]:
     """Reads targets.json. Raises ResultError."""
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
+        rows = files.read_json(path)
     except FileNotFoundError:
         raise ResultError(f"{path} does not exist: `kbvh bench --plan PLAN --out DIR` writes it for a plan with targets.") from None
     except OSError as error:
@@ -228,7 +229,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
         return 0
     try:
         page = rewrite(options.write.read_text(encoding="utf-8"), table)
-        options.write.write_text(page, encoding="utf-8")
+        files.write_whole(options.write, page)
     except OSError as error:
         print(f"targets_table: {error.filename}: {error.strerror}.", file=sys.stderr)
         return 2

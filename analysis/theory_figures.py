@@ -46,10 +46,13 @@ class Theory:
 def load(file: Path) -> Theory:
     """Reads theory.json. Raises TheoryError if it is missing or of another schema."""
     found = read_json(file, SCHEMA, TheoryError)
-    counts = pd.DataFrame(found["counts"])
-    frames = pd.DataFrame(found["frames"])
-    scenes = sorted({*counts.get("scene", []), *frames.get("scene", [])})
-    return Theory(counts, frames, pd.DataFrame(found["fits"]), looks((scene, scene, scene) for scene in scenes))
+    try:
+        counts = pd.DataFrame(found["counts"])
+        frames = pd.DataFrame(found["frames"])
+        scenes = sorted({*counts.get("scene", []), *frames.get("scene", [])})
+        return Theory(counts, frames, pd.DataFrame(found["fits"]), looks((scene, scene, scene) for scene in scenes))
+    except (KeyError, TypeError, ValueError) as problem:
+        raise TheoryError(f"{file}: a field is missing or of the wrong kind: {problem}.") from None
 
 
 def growing(counts: pd.DataFrame) -> pd.DataFrame:
@@ -286,7 +289,11 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     except TheoryError as problem:
         print(f"theory_figures.py: {problem}", file=sys.stderr)
         return 2
-    draw_all(theory, options.folder / "figures")
+    try:
+        draw_all(theory, options.folder / "figures")
+    except OSError as problem:
+        print(f"theory_figures.py: {problem.filename} cannot be written: {problem.strerror}.", file=sys.stderr)
+        return 2
     return 0
 
 

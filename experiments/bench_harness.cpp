@@ -1,12 +1,17 @@
 #include "experiments/bench_harness.hpp"
 
 #include <benchmark/benchmark.h>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <filesystem>
 #include <sstream>
 
 #include "experiments/io/bytes.hpp"
 #include "experiments/json_reader.hpp"
+#include "experiments/results.hpp"
 
 namespace kbvh::experiments {
 
@@ -34,14 +39,19 @@ json run_benchmarks(const std::vector<BenchItem>& items, std::uint32_t repetitio
     benchmark::RegisterBenchmark(item.name.c_str(),
                                  [&item](benchmark::State& state) {
                                    for (auto _ : state) {
-                                     const ClipTimes& clip = item.play();
-                                     state.SetIterationTime(clip.total());
-                                     const PhaseTimes mean = clip.mean();
+                                     const ClipTimes* clip = item.play();
+                                     if (clip == nullptr) {
+                                       state.SkipWithError("it could not be played");
+                                       break;
+                                     }
+                                     state.SetIterationTime(clip->total());
+                                     const PhaseTimes mean = clip->mean();
                                      state.counters["motion_ms"] = 1e3 * mean.motion;
                                      state.counters["update_ms"] = 1e3 * mean.update;
                                      state.counters["traversal_ms"] = 1e3 * mean.traversal;
                                      state.counters["triangle_tests_ms"] = 1e3 * mean.triangle_tests;
                                      state.counters["plan_changes_ms"] = 1e3 * mean.plan_changes;
+                                     state.counters["geometry_changes_ms"] = 1e3 * mean.geometry_changes;
                                    }
                                  })
         ->Iterations(1)
@@ -57,18 +67,53 @@ json run_benchmarks(const std::vector<BenchItem>& items, std::uint32_t repetitio
   return parse_json(without_nan(out.str()), "Google Benchmark's report");
 }
 
-void add_to_benchmark_file(const std::string& file, const json& runs) {
+namespace {
+
+/// Holds the folder's lock, so that of several processes one after the other reads and writes its files.
+class FolderLock {
+ public:
+  explicit FolderLock(const std::filesystem::path& folder)
+      : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    // Where folders cannot be locked (some network file systems), the last process wins, as without a lock.
+    while (descriptor_ >= 0 && ::flock(descriptor_, LOCK_EX) != 0 && errno == EINTR) {
+    }
+  }
+  ~FolderLock() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int descriptor_;
+};
+
+}  // namespace
+
+std::string add_to_benchmark_file(const std::filesystem::path& folder, const json& runs) {
+  const std::filesystem::path file = folder / "benchmark.json";
+  const FolderLock lock(folder);
   json all = runs;
+  std::string said;
   std::error_code error;
-  if (std::filesystem::exists(file, error)) {
-    json before = json::parse(io::read_file(file), nullptr, false);
+  if (std::filesystem::exists(file, error) && std::filesystem::file_size(file, error) > 0) {
+    json before = json_or_nothing(io::read_file(file));
     if (before.is_object() && before.contains("benchmarks") && before["benchmarks"].is_array()) {
       for (const json& run : runs.at("benchmarks")) before["benchmarks"].push_back(run);
       before["context"] = runs.at("context");
       all = std::move(before);
+    } else {
+      std::filesystem::path kept = file.string() + ".damaged";
+      for (int i = 2; std::filesystem::exists(kept, error); ++i)
+        kept = file.string() + ".damaged-" + std::to_string(i);
+      std::filesystem::rename(file, kept, error);
+      if (error) throw io::InputError(file.string() + ": cannot be renamed: " + error.message());
+      said = file.string() + " is not what Google Benchmark writes: it is now " + kept.filename().string() +
+             ", and a new one is begun";
     }
   }
-  io::write_file_atomically(file, all.dump(1) + "\n");
+  io::write_file_atomically(file, all.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+  return said;
 }
 
 }  // namespace kbvh::experiments

@@ -14,6 +14,7 @@
 #include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
+#include "experiments/results.hpp"
 #include "experiments/table.hpp"
 #include "experiments/text.hpp"
 
@@ -127,6 +128,7 @@ int run(const Arguments& arguments) {
   for (const std::string& path : paths)
     for (ImpactQueries& queries : find_impact_queries(path)) files.push_back(std::move(queries));
   if (files.empty()) throw io::InputError("no queries of continuous collision detection in " + joined(paths));
+  if (!arguments.out.empty()) prepare_folder(arguments.out);
   const std::vector<Peer> others = peers();
   std::vector<std::vector<std::string>> table{
       {"queries of", "queries", "touch", "missed", "extra", "filtered", "per second"}};
@@ -183,9 +185,6 @@ int run(const Arguments& arguments) {
   if (unknown > 0) print(counted(unknown, "query") + " without a verdict to compare with.\n");
   if (!arguments.out.empty()) {
     const std::filesystem::path folder = arguments.out;
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) throw io::InputError("cannot make " + folder.string() + ": " + error.message());
     const json all{{"commit", commit()}, {"dirty", dirty()}, {"machine", machine()}, {"files", records}};
     io::write_file_atomically(folder / "ccd.json", all.dump(1) + "\n");
   }

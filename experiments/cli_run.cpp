@@ -117,7 +117,10 @@ int run_study(const StudyOptions& options, Harness harness) {
     say(counted(outcome.measured, "configuration") + " measured, " + std::to_string(outcome.skipped) +
         (outcome.skipped == 1 ? " was in " : " were in ") +
         (std::filesystem::path(options.out) / "results.jsonl").string() + " already");
-  if (outcome.refused == 0) return success;
+  if (outcome.unfinished > 0)
+    say(counted(outcome.unfinished, "configuration") +
+        " for which there was no memory; the next run measures them again");
+  if (outcome.refused == 0) return outcome.unfinished == 0 ? success : internal_error;
   say(counted(outcome.refused, "configuration") + " in which a strategy breaks what it guarantees");
   return guarantee_broken;
 }

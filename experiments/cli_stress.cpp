@@ -1,8 +1,10 @@
 #include <fmt/format.h>
-
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <set>
+#include <vector>
 
 #include "experiments/cli.hpp"
 #include "experiments/cli_options.hpp"
@@ -10,6 +12,7 @@
 #include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
+#include "experiments/results.hpp"
 #include "experiments/stress/runner.hpp"
 #include "experiments/text.hpp"
 
@@ -83,12 +86,77 @@ int run_repro(const StressArguments& arguments, bool others) {
   return failed ? guarantee_broken : success;
 }
 
-std::string file_name(const stress::Repro& repro, std::set<std::string>& taken) {
-  const std::string base = "repro-" + repro.scene.family + "-" + repro.strategy + "-" + repro.scalar;
-  std::string name = base + ".json";
-  for (int i = 2; !taken.insert(name).second; ++i) name = base + "-" + std::to_string(i) + ".json";
-  return name;
-}
+/// What a run leaves in its folder, written while it runs: what was found is there whenever it ends.
+class StressFiles {
+ public:
+  /// Writes nothing if there is no folder. Throws io::InputError if it cannot be written.
+  StressFiles(std::filesystem::path folder, const stress::StressOptions& options)
+      : folder_(std::move(folder)), options_(options) {
+    if (!folder_.empty()) prepare_folder(folder_);
+  }
+
+  /// Failures at once, the table every other second. Problems are kept for `finish`: the run goes on.
+  void keep(stress::StressReport& report) {
+    if (folder_.empty()) return;
+    try {
+      bool found = false;
+      for (std::size_t i = 0; i < report.failures.size(); ++i) found |= keep(report.failures[i], i);
+      const auto now = std::chrono::steady_clock::now();
+      if (!found && now - written_ < std::chrono::seconds(2)) return;
+      write_table(report);
+      written_ = now;
+    } catch (const io::InputError& problem) {
+      if (problem_.empty()) problem_ = problem.what();
+    }
+  }
+
+  /// Throws io::InputError if anything could not be written.
+  void finish(const stress::StressReport& report) {
+    if (folder_.empty()) return;
+    if (!problem_.empty()) throw io::InputError(problem_);
+    write_table(report);
+    say("all numbers are in " + (folder_ / "stress.json").string());
+  }
+
+ private:
+  void write_table(const stress::StressReport& report) {
+    io::write_file_atomically(folder_ / "stress.json", to_json(report, options_).dump(1) + "\n");
+  }
+
+  /// Writes a failure that is new, or was made smaller since; false if there was nothing to do.
+  bool keep(stress::StressFailure& failure, std::size_t i) {
+    std::string text = stress::to_text(failure.repro);
+    if (i < texts_.size() && texts_[i] == text) return false;
+    const std::string before = failure.file;
+    failure.file = name_for(failure.repro, text, before);
+    io::write_file_atomically(folder_ / failure.file, text);
+    std::error_code error;
+    if (!before.empty() && before != failure.file) std::filesystem::remove(folder_ / before, error);
+    texts_.resize(std::max(texts_.size(), i + 1));
+    texts_[i] = std::move(text);
+    return true;
+  }
+
+  /// A name that nothing else has: a failure of another run stays, the same one is not kept twice.
+  std::string name_for(const stress::Repro& repro, const std::string& text, const std::string& own) const {
+    const std::string base = "repro-" + repro.scene.family + "-" + repro.strategy + "-" + repro.scalar;
+    std::error_code error;
+    for (int i = 1;; ++i) {
+      const std::string name = base + (i == 1 ? "" : "-" + std::to_string(i)) + ".json";
+      const std::filesystem::path file = folder_ / name;
+      if (name == own || !std::filesystem::exists(file, error)) return name;
+      const bool readable =
+          std::filesystem::is_regular_file(file, error) && std::filesystem::file_size(file, error) > 0;
+      if (readable && io::read_file(file) == text) return name;
+    }
+  }
+
+  std::filesystem::path folder_;
+  const stress::StressOptions& options_;
+  std::vector<std::string> texts_;  ///< of each failure, as written
+  std::chrono::steady_clock::time_point written_{};
+  std::string problem_;
+};
 
 int run(const StressArguments& arguments, bool strategies_named) {
   if (arguments.list) {
@@ -114,33 +182,22 @@ int run(const StressArguments& arguments, bool strategies_named) {
   options.vary = !arguments.plain;
   options.shrink = !arguments.no_shrink;
   const std::filesystem::path folder = arguments.out;
-  if (!arguments.out.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) throw io::InputError("cannot make " + folder.string() + ": " + error.message());
-  }
+  StressFiles files(folder, options);
   Progress progress;
-  stress::StressReport report =
-      stress::run_stress(options, [&](const std::string& what) { progress.show(what); });
+  const stress::StressReport report = stress::run_stress(
+      options, [&](const std::string& what) { progress.show(what); },
+      [&](stress::StressReport& so_far) { files.keep(so_far); });
   progress.clear();
   print(stress_table(report));
-  std::set<std::string> taken;
-  for (stress::StressFailure& failure : report.failures) {
+  for (const stress::StressFailure& failure : report.failures) {
     const stress::Repro& repro = failure.repro;
     say(repro.strategy + " on " + repro.scene.family + ", " + repro.scalar +
         ", l = " + std::to_string(failure.l) + ": " + repro.failure + " (made smaller from " +
         counted(failure.triangles_before, "triangle") + " to " + std::to_string(repro.scene.triangles()) +
         ")");
-    if (arguments.out.empty()) continue;
-    failure.file = file_name(repro, taken);
-    io::write_file_atomically(folder / failure.file, stress::to_text(repro));
-    say("kbvh stress --repro " + (folder / failure.file).string() + " shows it");
+    if (!failure.file.empty()) say("kbvh stress --repro " + (folder / failure.file).string() + " shows it");
   }
-  if (!arguments.out.empty()) {
-    const std::filesystem::path file = folder / "stress.json";
-    io::write_file_atomically(file, to_json(report, options).dump(1) + "\n");
-    say("all numbers are in " + file.string());
-  }
+  files.finish(report);
   for (const stress::StressRow& row : report.rows)
     if (row.failures() > 0) return guarantee_broken;
   return success;

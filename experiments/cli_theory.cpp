@@ -10,6 +10,7 @@
 #include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
+#include "experiments/results.hpp"
 #include "experiments/text.hpp"
 #include "experiments/theory/theory.hpp"
 
@@ -42,11 +43,7 @@ int run(const TheoryArguments& arguments) {
   if (arguments.exact_limit > 0) options.exact_limit = arguments.exact_limit;
   if (arguments.instants > 0) options.instants = arguments.instants;
   const std::filesystem::path folder = arguments.out;
-  if (!arguments.out.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) throw io::InputError("cannot make " + folder.string() + ": " + error.message());
-  }
+  if (!arguments.out.empty()) prepare_folder(folder);
   theory::MeasurementStore store(arguments.out.empty() ? std::filesystem::path() : folder / "theory.jsonl",
                                  program_identity());
   Progress progress;

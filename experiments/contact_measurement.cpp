@@ -97,27 +97,32 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
   } catch (const ConfigError&) {
     throw;
   } catch (const std::exception& problem) {
-    measured.refused = std::string("it threw: ") + problem.what();
-    measured.verification.first_violation = measured.refused;
     entrant.session.reset();
+    refuse(measured, problem);
   }
   entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
-const ClipTimes& ContactMeasurement<S>::play(std::size_t i) {
-  Session<S>& session = *entrants_[i].session;
-  ClipTimes clip;
-  const auto begin = std::chrono::steady_clock::now();
-  session.reset(knots_[0]);
-  clip.reset_seconds = seconds_since(begin);
-  for (std::size_t k = 1; k < knots_.size(); ++k) {
-    contacts_.clear();
-    clip.frames.emplace_back();
-    session.contacts(knots_[k], contacts_, clip.frames.back());
+const ClipTimes* ContactMeasurement<S>::play(std::size_t i) {
+  Entrant& entrant = entrants_[i];
+  try {
+    ClipTimes clip;
+    const auto begin = std::chrono::steady_clock::now();
+    entrant.session->reset(knots_[0]);
+    clip.reset_seconds = seconds_since(begin);
+    for (std::size_t k = 1; k < knots_.size(); ++k) {
+      contacts_.clear();
+      clip.frames.emplace_back();
+      entrant.session->contacts(knots_[k], contacts_, clip.frames.back());
+    }
+    entrant.measured.repetitions.push_back(std::move(clip));
+  } catch (const std::exception& problem) {
+    entrant.session.reset();
+    refuse(entrant.measured, problem);
+    return nullptr;
   }
-  entrants_[i].measured.repetitions.push_back(std::move(clip));
-  return entrants_[i].measured.repetitions.back();
+  return &entrant.measured.repetitions.back();
 }
 
 template <class S>

@@ -20,7 +20,7 @@ class ContactMeasurement {
   std::size_t size() const { return entrants_.size(); }
   Measured& operator[](std::size_t i) { return entrants_[i].measured; }
   bool timed(std::size_t i) const { return entrants_[i].session != nullptr; }
-  const ClipTimes& play(std::size_t i);
+  const ClipTimes* play(std::size_t i);
   nlohmann::json extras(std::size_t i) const;
 
  private:

@@ -1,6 +1,8 @@
 #include "experiments/contestants.hpp"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <set>
 
 #include "core/scene/self_pairs.hpp"
@@ -117,6 +119,24 @@ std::string label_of(const ContestantSpec& spec) {
                     suggestion(name, known));
 }
 
+/// The values as records have them: of a number its default's text, or the shortest that reads back as it, so
+/// that 2 and 2.0 are one configuration.
+std::map<std::string, std::string> in_one_spelling(const Info& info,
+                                                   std::map<std::string, std::string> given) {
+  for (const Parameter& parameter : info.parameters) {
+    const auto found = given.find(parameter.name);
+    if (found == given.end() || !parameter.allowed.empty()) continue;
+    const auto value = parse_number(found->second), usual = parse_number(parameter.default_value);
+    if (!value) continue;  // Params complains
+    char text[40];
+    const bool whole = *value == std::trunc(*value) && std::abs(*value) < 1e15;
+    const auto end = whole ? std::to_chars(text, text + sizeof text, std::int64_t(*value)).ptr
+                           : std::to_chars(text, text + sizeof text, *value).ptr;
+    found->second = usual && *usual == *value ? parameter.default_value : std::string(text, end);
+  }
+  return given;
+}
+
 void add_configurations(std::vector<ContestantSpec>& list, const Selected& choice, const Sweep& params,
                         const BuilderRequest& builder, std::vector<std::string>& notes) {
   const Info& info = choice.entry->info;
@@ -137,8 +157,8 @@ void add_configurations(std::vector<ContestantSpec>& list, const Selected& choic
         for (const auto& [key, values] : params)
           if (!has_parameter(info, key)) refuse_parameter(info, key);
         for (const auto& given : combinations(params)) {
-          spec.given = given;
-          spec.params = Params(info.id, info.parameters, given).values();
+          spec.given = in_one_spelling(info, given);
+          spec.params = Params(info.id, info.parameters, spec.given).values();
           spec.label = label_of(spec);
           const bool known = std::any_of(list.begin(), list.end(), [&](const ContestantSpec& other) {
             return other.entry == spec.entry && other.label == spec.label;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
+#include <new>
 #include <numeric>
 
 namespace kbvh::experiments {
@@ -81,15 +83,31 @@ PhaseTimes ClipTimes::mean() const {
     sum.traversal += frame.traversal;
     sum.triangle_tests += frame.triangle_tests;
     sum.plan_changes += frame.plan_changes;
+    sum.geometry_changes += frame.geometry_changes;
   }
   const double n = frames.empty() ? 1 : double(frames.size());
-  return {sum.motion / n, sum.update / n, sum.traversal / n, sum.triangle_tests / n, sum.plan_changes / n};
+  return {sum.motion / n,         sum.update / n,       sum.traversal / n,
+          sum.triangle_tests / n, sum.plan_changes / n, sum.geometry_changes / n};
 }
 
 double ClipTimes::total() const {
   double sum = 0;
   for (const PhaseTimes& frame : frames) sum += frame.total();
   return sum;
+}
+
+void refuse(Measured& measured, const std::exception& thrown) {
+  measured.repetitions.clear();
+  measured.choice.clear();
+  if (dynamic_cast<const std::bad_alloc*>(&thrown) != nullptr) {
+    measured.unfinished = true;
+    measured.refused = "out of memory";
+    measured.verification = {};
+    measured.counters = {};
+    return;
+  }
+  measured.refused = std::string("it threw: ") + thrown.what();
+  measured.verification.first_violation = measured.refused;
 }
 
 template <class S>
@@ -116,19 +134,24 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
   } catch (const ConfigError&) {
     throw;
   } catch (const std::exception& problem) {
-    measured.refused = std::string("it threw: ") + problem.what();
-    measured.verification.first_violation = measured.refused;
     entrant.session.reset();
+    refuse(measured, problem);
   }
   entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
-const ClipTimes& Measurement<S>::play(std::size_t i) {
+const ClipTimes* Measurement<S>::play(std::size_t i) {
   Entrant& entrant = entrants_[i];
-  entrant.measured.repetitions.push_back(play_clip<S>(*entrant.session, frames_, script_, pairs_));
-  entrant.measured.choice = entrant.session->strategy().choice();
-  return entrant.measured.repetitions.back();
+  try {
+    entrant.measured.repetitions.push_back(play_clip<S>(*entrant.session, frames_, script_, pairs_));
+    entrant.measured.choice = entrant.session->strategy().choice();
+  } catch (const std::exception& problem) {
+    entrant.session.reset();
+    refuse(entrant.measured, problem);
+    return nullptr;
+  }
+  return &entrant.measured.repetitions.back();
 }
 
 template class Measurement<float>;
@@ -144,6 +167,7 @@ json times_record(const Measured& measured) {
                            {"traversal", ms * mean.traversal},
                            {"triangle_tests", ms * mean.triangle_tests},
                            {"plan_changes", ms * mean.plan_changes},
+                           {"geometry_changes", ms * mean.geometry_changes},
                            {"reset", ms * clip.reset_seconds}});
   }
   std::vector<std::size_t> order(measured.repetitions.size());
@@ -169,12 +193,21 @@ json times_record(const Measured& measured) {
           {"build_ms", ms * measured.build_seconds}};
 }
 
+namespace {
+/// JSON has no infinity: a box that holds nothing is as far off as can be.
+double finite(double value) {
+  return std::isfinite(value) ? value : std::numeric_limits<double>::max();
+}
+}  // namespace
+
 json verified_record(const Measured& measured) {
   const Verification& v = measured.verification;
   json over_time = json::array();
   for (const Quality& q : v.over_time)
-    over_time.push_back(
-        {{"t", q.t}, {"looseness", q.looseness}, {"sah", q.sah}, {"sah_rebuilt", q.sah_rebuilt}});
+    over_time.push_back({{"t", q.t},
+                         {"looseness", finite(q.looseness)},
+                         {"sah", finite(q.sah)},
+                         {"sah_rebuilt", finite(q.sah_rebuilt)}});
   return {{"holds", v.holds()},
           {"first_violation", v.first_violation},
           {"frames", v.frames},
@@ -186,8 +219,8 @@ json verified_record(const Measured& measured) {
           {"repeated", v.repeated},
           {"malformed", v.malformed},
           {"audited", v.audited},
-          {"protrusion", v.audit.protrusion},
-          {"looseness", v.audit.looseness()},
+          {"protrusion", finite(v.audit.protrusion)},
+          {"looseness", finite(v.audit.looseness())},
           {"invalid", v.audit.invalid},
           {"not_tight", v.audit.not_tight},
           {"sampled_every", measured.sampled_every},

@@ -26,11 +26,16 @@ struct Measured {
   Verification verification;
   std::uint64_t sampled_every = 1;
   Counters counters;
-  std::string refused;  ///< why it gets no time, or empty
+  std::string refused;      ///< why it gets no time, or empty
+  bool unfinished = false;  ///< it says nothing of the contestant: there was no memory for it this time
   double build_seconds = 0;
   std::string choice;  ///< of a strategy that chooses, at the end of the clip
   std::vector<ClipTimes> repetitions;
 };
+
+/// Refuses a contestant its time for what it threw: a guarantee that is broken, but for want of memory, which
+/// says nothing and is measured again by the next run.
+void refuse(Measured& measured, const std::exception& thrown);
 
 /// Told what is being done; may be empty.
 using MeasureProgress = std::function<void(const std::string&)>;
@@ -54,8 +59,9 @@ class Measurement {
   Measured& operator[](std::size_t i) { return entrants_[i].measured; }
   /// True if the contestant has an instance to be timed.
   bool timed(std::size_t i) const { return entrants_[i].session != nullptr; }
-  /// Plays the clip once and keeps its times; they are returned, too.
-  const ClipTimes& play(std::size_t i);
+  /// Plays the clip once and keeps its times; they are returned, too. If the contestant throws, it is refused
+  /// its times, is not `timed` any more, and nullptr is returned.
+  const ClipTimes* play(std::size_t i);
   const std::vector<double>& frames() const { return frames_; }
   /// What the record of a contestant has beside what all have.
   nlohmann::json extras(std::size_t /*i*/) const { return nlohmann::json::object(); }

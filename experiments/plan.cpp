@@ -11,6 +11,12 @@ using nlohmann::json;
 
 namespace {
 
+/// Values that are given twice count once, where they come first.
+template <class T>
+void add_once(std::vector<T>& list, T value) {
+  if (std::find(list.begin(), list.end(), value) == list.end()) list.push_back(std::move(value));
+}
+
 /// The text of a parameter's value, as Params takes it.
 std::string value_text(const json& value, const std::string& where) {
   if (value.is_string()) return value.get<std::string>();
@@ -27,7 +33,7 @@ Sweep read_params(const json& object, const std::string& place) {
     const std::string where = place + ": " + key;
     if (value.is_array() && value.empty()) throw io::InputError(where + ": the list is empty");
     for (const json& one : value.is_array() ? value : json::array({value}))
-      sweep[key].push_back(value_text(one, where));
+      add_once(sweep[key], value_text(one, where));
   }
   return sweep;
 }
@@ -37,7 +43,7 @@ BuilderRequest read_builder(const json& object, const std::string& place) {
   BuilderRequest request;
   for (const std::string& word : keys.words("method")) {
     try {
-      request.methods.push_back(build_method(word));
+      add_once(request.methods, build_method(word));
     } catch (const std::invalid_argument& problem) {
       keys.fail("method", problem.what());
     }
@@ -45,10 +51,10 @@ BuilderRequest read_builder(const json& object, const std::string& place) {
   for (const std::uint64_t width : keys.wholes("width", ranges::width)) {
     if (width != 2 && width != 4 && width != 8)
       keys.fail("width", "expected 2, 4 or 8, got " + std::to_string(width));
-    request.widths.push_back(std::uint32_t(width));
+    add_once(request.widths, std::uint32_t(width));
   }
   for (const std::uint64_t size : keys.wholes("leaf_size", ranges::leaf_size))
-    request.leaf_sizes.push_back(std::uint32_t(size));
+    add_once(request.leaf_sizes, std::uint32_t(size));
   keys.finish();
   return request;
 }
@@ -76,7 +82,9 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
     study.scenes.clear();
     for (std::size_t i = 0; i < scenes.size(); ++i)
       for (SceneSpec& spec : read_scenes(scenes[i], place + ": scenes[" + std::to_string(i) + "]", folder))
-        study.scenes.push_back(std::move(spec));
+        if (std::none_of(study.scenes.begin(), study.scenes.end(),
+                         [&](const SceneSpec& known) { return known.said == spec.said; }))
+          study.scenes.push_back(std::move(spec));
   }
   if (const auto strategies = keys.list("strategies"); !strategies.empty()) {
     study.strategies.clear();
@@ -88,13 +96,14 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
   if (const json* builder = keys.find("builder")) study.builder = read_builder(*builder, place + ": builder");
   if (const auto l = keys.wholes("l", ranges::frames_per_keyframe); !l.empty()) {
     study.per_keyframe.clear();
-    for (const std::uint64_t frames : l) study.per_keyframe.push_back(std::uint32_t(frames));
+    for (const std::uint64_t frames : l) add_once(study.per_keyframe, std::uint32_t(frames));
   }
   if (const auto scalars = keys.words("scalars"); !scalars.empty()) {
     for (const std::string& scalar : scalars)
       if (scalar != "float" && scalar != "double")
         keys.fail("scalars", "expected float or double, got '" + scalar + "'");
-    study.scalars = scalars;
+    study.scalars.clear();
+    for (const std::string& scalar : scalars) add_once(study.scalars, scalar);
   }
   if (const auto count = keys.whole("repetitions", ranges::repetitions))
     study.repetitions = std::uint32_t(*count);

@@ -1,5 +1,6 @@
 #include "experiments/record.hpp"
 
+#include "core/base/hasher.hpp"
 #include "experiments/text.hpp"
 
 namespace kbvh::experiments {
@@ -72,9 +73,18 @@ const char* word(Harness harness) {
   return harness == Harness::rounds ? "run" : "bench";
 }
 
+namespace {
+std::uint64_t hash_of_times(std::span<const double> times) {
+  Hasher hasher;
+  hasher.mix(times.size());
+  hasher.bytes(times.data(), times.size_bytes());
+  return hasher.value();
+}
+}  // namespace
+
 template <class S>
 json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_t per_keyframe,
-                  std::size_t frames) {
+                  std::span<const double> frames, const PlanScript<S>& script) {
   json bodies = json::array();
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const Body<S>& body = scene.bodies[i];
@@ -87,20 +97,25 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
                       {"self", i < loaded.self.size() && loaded.self[i]},
                       {"degenerate", loaded.meshes[i].degenerate_primitives}});
   }
-  return {{"name", scene.name},
-          {"order", word(loaded.order)},
-          {"origin", word(loaded.origin)},
-          {"hash", hexadecimal(hash(scene))},
-          {"scalar", sizeof(S) == 4 ? "float" : "double"},
-          {"per_keyframe", per_keyframe},
-          {"keyframes", overlaid_keyframes(scene).size()},
-          {"frames", frames},
-          {"primitives", scene.primitive_count()},
-          {"bodies", bodies}};
+  json record{{"name", scene.name},
+              {"order", word(loaded.order)},
+              {"origin", word(loaded.origin)},
+              {"hash", hexadecimal(hash(scene))},
+              {"scalar", sizeof(S) == 4 ? "float" : "double"},
+              {"per_keyframe", per_keyframe},
+              {"keyframes", overlaid_keyframes(scene).size()},
+              {"frames", frames.size()},
+              {"frame_times", hexadecimal(hash_of_times(frames))},
+              {"primitives", scene.primitive_count()},
+              {"bodies", bodies}};
+  if (!script.empty()) record["script"] = script_record(script, frames.empty() ? 0 : frames.back());
+  return record;
 }
 
-template json scene_record(const Scene<float>&, const LoadedScene&, std::uint32_t, std::size_t);
-template json scene_record(const Scene<double>&, const LoadedScene&, std::uint32_t, std::size_t);
+template json scene_record(const Scene<float>&, const LoadedScene&, std::uint32_t, std::span<const double>,
+                           const PlanScript<float>&);
+template json scene_record(const Scene<double>&, const LoadedScene&, std::uint32_t, std::span<const double>,
+                           const PlanScript<double>&);
 
 template <class S>
 json script_record(const PlanScript<S>& script, double end) {
@@ -144,6 +159,7 @@ std::string configuration_key(Harness harness, const std::string& program, const
            {"scalar", scene.at("scalar")},
            {"per_keyframe", scene.at("per_keyframe")},
            {"frames", scene.at("frames")},
+           {"frame_times", scene.at("frame_times")},
            {"strategy", strategy.at("id")},
            {"params", strategy.at("params")},
            {"builder", strategy.at("builder")},

@@ -10,13 +10,31 @@
 #include <system_error>
 
 #include "experiments/io/animated_mesh.hpp"
+#include "experiments/io/bytes.hpp"
 
 namespace kbvh::experiments {
 
 using nlohmann::json;
 
-ResultStore::ResultStore(const std::filesystem::path& folder)
-    : folder_(folder), file_(folder / "results.jsonl") {
+json json_or_nothing(std::string_view text) {
+  constexpr int deepest = 100;
+  int depth = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (quoted && c == '\\')
+      ++i;
+    else if (c == '"')
+      quoted = !quoted;
+    else if (!quoted && (c == '[' || c == '{') && ++depth > deepest)
+      return json(json::value_t::discarded);
+    else if (!quoted && (c == ']' || c == '}'))
+      --depth;
+  }
+  return json::parse(text, nullptr, false);
+}
+
+void prepare_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (!std::filesystem::is_directory(folder))
@@ -24,16 +42,37 @@ ResultStore::ResultStore(const std::filesystem::path& folder)
                          (error ? ": " + error.message() : ""));
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
     throw io::InputError("the output folder '" + folder.string() + "' cannot be written");
+  // As much as a record or two: where that has no room, nothing of what is measured would be kept.
+  const std::filesystem::path probe = folder / ".kbvh-room";
+  try {
+    io::write_file_atomically(probe, std::string(4096, ' '));
+  } catch (const io::InputError& problem) {
+    const std::string why = problem.what();
+    throw io::InputError("the output folder '" + folder.string() + "' cannot be written" +
+                         why.substr(why.rfind(": ")));
+  }
+  std::filesystem::remove(probe, error);
+}
+
+ResultStore::ResultStore(const std::filesystem::path& folder)
+    : folder_(folder), file_(folder / "results.jsonl") {
+  prepare_folder(folder);
+  std::error_code error;
   if (std::filesystem::exists(file_, error) && !std::filesystem::is_regular_file(file_, error))
     throw io::InputError(file_.string() + ": is not a file that results can be added to");
+  if (const int descriptor = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC); descriptor >= 0)
+    ::close(descriptor);
+  else if (errno != ENOENT)
+    throw io::InputError(file_.string() + ": cannot be written: " + std::strerror(errno));
   std::ifstream in(file_, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   broken_end_ = !text.empty() && text.back() != '\n';
+  std::size_t line = 0;
   for (std::size_t begin = 0; begin < text.size();) {
+    ++line;
     std::size_t end = text.find('\n', begin);
     if (end == std::string::npos) end = text.size();
-    const json record =
-        json::parse(text.begin() + std::ptrdiff_t(begin), text.begin() + std::ptrdiff_t(end), nullptr, false);
+    const json record = json_or_nothing(std::string_view(text).substr(begin, end - begin));
     const bool blank = begin == end;
     begin = end + 1;
     if (blank) continue;
@@ -43,6 +82,7 @@ ResultStore::ResultStore(const std::filesystem::path& folder)
       continue;
     }
     known_.insert_or_assign(key->get<std::string>(), record);
+    line_of_.insert_or_assign(key->get<std::string>(), line);
     ++records_;
   }
 }
@@ -50,6 +90,11 @@ ResultStore::ResultStore(const std::filesystem::path& folder)
 const json* ResultStore::find(const std::string& key) const {
   const auto record = known_.find(key);
   return record == known_.end() ? nullptr : &record->second;
+}
+
+std::string ResultStore::place(const std::string& key) const {
+  const auto line = line_of_.find(key);
+  return file_.string() + (line == line_of_.end() ? "" : " line " + std::to_string(line->second));
 }
 
 void ResultStore::append(const json& record) {
@@ -71,6 +116,7 @@ void ResultStore::append(const json& record) {
   if (!complete) failed();
   broken_end_ = false;
   known_.insert_or_assign(record.at("key").get<std::string>(), record);
+  line_of_.erase(record.at("key").get<std::string>());
   ++records_;
 }
 

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/hasher.hpp"
 #include "core/topology/builders.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/obj.hpp"
 #include "experiments/io/pc2.hpp"
+#include "experiments/names.hpp"
+#include "experiments/text.hpp"
 
 namespace kbvh::experiments {
 
@@ -157,6 +160,24 @@ io::AnimatedMesh thinned(const io::AnimatedMesh& mesh, std::size_t most_keyframe
 
 }  // namespace
 
+std::uint64_t card_hash(const LoadedScene& scene) {
+  Hasher hasher;
+  hasher.mix(std::uint64_t(scene.order));
+  for (const io::AnimatedMesh& mesh : scene.meshes) {
+    hasher.mix(hash_of(mesh.name));
+    hasher.mix(std::uint64_t(mesh.kind));
+    hasher.list(mesh.primitive_offsets);
+    hasher.list(mesh.primitive_vertices);
+    hasher.list(mesh.keyframe_times);
+    hasher.list(mesh.positions);
+  }
+  return hasher.value();
+}
+
+std::string folder_name(const LoadedScene& scene) {
+  return file_name(scene.name) + "-" + hexadecimal(card_hash(scene));
+}
+
 void export_scene(const LoadedScene& scene, const std::filesystem::path& folder, std::size_t most_keyframes) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -166,7 +187,10 @@ void export_scene(const LoadedScene& scene, const std::filesystem::path& folder,
     io::save_obj(mesh, folder / (file + ".obj"));
     if (mesh.moving()) io::save_pc2(mesh, folder / (file + ".pc2"), 1);
   }
-  io::write_file_atomically(folder / "card.json", as_json(scene.name, cards(scene)).dump(2) + "\n");
+  nlohmann::json card = as_json(scene.name, cards(scene));
+  card["hash"] = hexadecimal(card_hash(scene));
+  io::write_file_atomically(folder / "card.json",
+                            card.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace kbvh::experiments

@@ -34,9 +34,16 @@ nlohmann::json as_json(const BodyCard& card);
 /// {"scene": name, "bodies": [cards]}.
 nlohmann::json as_json(const std::string& scene, const std::vector<BodyCard>& list);
 
+/// What tells scenes apart that have the same name: a hash of all that a card and a picture show, the same in
+/// every scalar. O(size of the scene).
+std::uint64_t card_hash(const LoadedScene& scene);
+
+/// The name of a scene's folder among others: its name, shortened, and its card's hash.
+std::string folder_name(const LoadedScene& scene);
+
 /// Writes a scene for people and pictures: every body as OBJ, with PC2 if it moves, its number before its
-/// name, and the cards as card.json. `most_keyframes`: of long clips only so many, the first, the last and
-/// some between; 0: all. Throws io::InputError.
+/// name, and the cards as card.json, with the hash. `most_keyframes`: of long clips only so many, the first,
+/// the last and some between; 0: all. Throws io::InputError.
 void export_scene(const LoadedScene& scene, const std::filesystem::path& folder, std::size_t most_keyframes);
 
 }  // namespace kbvh::experiments

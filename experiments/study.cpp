@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <set>
@@ -9,6 +11,7 @@
 #include "experiments/bench_harness.hpp"
 #include "experiments/contact_measurement.hpp"
 #include "experiments/environment.hpp"
+#include "experiments/io/bytes.hpp"
 #include "experiments/machine.hpp"
 #include "experiments/output.hpp"
 #include "experiments/progress.hpp"
@@ -36,6 +39,10 @@ class Runner {
       : harness_(harness), machine_(machine()), run_(now_utc() + "-" + std::to_string(::getpid())) {
     if (out.empty()) return;
     store_ = std::make_unique<ResultStore>(out);
+    std::error_code error;
+    for (const char* name : {"benchmark.json", "targets.json"})
+      if (const auto file = out / name; std::filesystem::is_directory(file, error))
+        throw io::InputError(file.string() + ": is a folder where a file is to be written");
     if (store_->unreadable_lines() > 0)
       say("note: " + (out / "results.jsonl").string() + " has " + std::to_string(store_->unreadable_lines()) +
           " unreadable lines (of a run that was stopped?); they are left as they are");
@@ -51,7 +58,7 @@ class Runner {
       }
       const LoadedScene loaded = load(spec, making_);
       for (const std::string& text : loaded.notes) note("note: " + text);
-      if (store_) show_scene(loaded);
+      card_ = store_ ? show_scene(loaded) : "";
       for (const std::string& scalar : study.scalars) {
         if (scalar == "float")
           scene<float>(study, contestants, loaded);
@@ -65,8 +72,8 @@ class Runner {
   void targets(const Plan& plan) {
     if (plan.targets.empty()) return;
     const json rows = target_rows(plan, groups_);
-    if (store_) write_targets(store_->folder(), rows);
     print(targets_table(rows) + "\n");
+    if (store_) write_targets(store_->folder(), rows);
   }
 
   StudyOutcome outcome() const { return outcome_; }
@@ -78,14 +85,31 @@ class Runner {
   }
 
   /// What the report shows of a scene: its card, and a few keyframes where it is not too large for a picture.
-  void show_scene(const LoadedScene& loaded) {
+  /// Returns the card's hash; "" without a card.
+  std::string show_scene(const LoadedScene& loaded) {
     std::uint64_t primitives = 0;
     for (const io::AnimatedMesh& mesh : loaded.meshes) primitives += mesh.primitive_count();
-    const std::filesystem::path folder = store_->folder() / "scenes" / file_name(loaded.name);
-    if (primitives > largest_shown || std::filesystem::exists(folder / "card.json")) return;
+    if (primitives > largest_shown) return {};
+    const std::string hash = hexadecimal(card_hash(loaded));
+    const std::filesystem::path folder = store_->folder() / "scenes" / folder_name(loaded);
+    if (is_card(folder / "card.json", hash)) return hash;
     making_("looking at " + loaded.name, 0);
-    export_scene(loaded, folder, keyframes_shown);
+    try {
+      export_scene(loaded, folder, keyframes_shown);
+    } catch (const io::InputError& problem) {
+      // Nothing that is measured depends on it.
+      note("warning: the report will have no picture of " + loaded.name + ": " + problem.what());
+    }
     progress_.clear();
+    return hash;
+  }
+
+  static bool is_card(const std::filesystem::path& file, const std::string& hash) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(file, error) || std::filesystem::file_size(file, error) == 0)
+      return false;
+    const json card = json_or_nothing(io::read_file(file));
+    return card.is_object() && card.contains("bodies") && card.contains("hash") && card.at("hash") == hash;
   }
 
   /// A scene of one body has times, but its query has nothing to find, which is seldom meant.
@@ -130,8 +154,7 @@ class Runner {
   void group(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded,
              const Scene<S>& scene, const PlanScript<S>& script, Oracle<S>& oracle, std::uint32_t l,
              const std::vector<double>& frames) {
-    json about_scene = scene_record(scene, loaded, l, frames.size());
-    if (!script.empty()) about_scene["script"] = script_record(script, frames.back());
+    json about_scene = scene_record(scene, loaded, l, frames, script);
     const std::string title = scene.name + ", l = " + std::to_string(l);
     if (l > 1 && study.oracle_every % l == 0)
       note("warning: with oracle_every " + std::to_string(study.oracle_every) +
@@ -159,7 +182,8 @@ class Runner {
     }
     progress_.show(scene.name + ": finding the true contacts");
     ContactMeasurement<S> measurement(scene, knots);
-    json about_scene = scene_record(scene, loaded, 1, knots.size() - 1);
+    json about_scene = scene_record(scene, loaded, 1, std::span<const double>(knots));
+    about_scene["frames"] = knots.size() - 1;
     about_scene["name"] = scene.name + " (contacts)";
     about_scene["continuous"] = true;
     measure_all(study, contestants, loaded, about_scene, scene.name + ", contacts", measurement,
@@ -172,8 +196,9 @@ class Runner {
   /// Verifies and times the contestants of one table. `M` is a Measurement, or one of contacts.
   template <class M, class Unsuitable>
   void measure_all(const Study& study, const std::vector<ContestantSpec>& contestants,
-                   const LoadedScene& loaded, const json& about_scene, const std::string& title,
-                   M& measurement, const Unsuitable& why_not) {
+                   const LoadedScene& loaded, json about_scene, const std::string& title, M& measurement,
+                   const Unsuitable& why_not) {
+    if (!card_.empty()) about_scene["card"] = card_;
     const std::string scalar = about_scene.at("scalar");
     std::vector<json> records;           // in the order of the contestants
     std::vector<std::size_t> record_of;  // of each one that is measured
@@ -197,10 +222,10 @@ class Runner {
                   {"strategy", strategy_record(spec)}};
       record["key"] =
           configuration_key(harness_, program_identity(), about_scene, record["strategy"], study, machine_);
-      if (const json* known = store_ ? store_->find(record["key"]) : nullptr) {
+      if (const json* known = known_record(record["key"], title + ": " + spec.label)) {
         if (!known->at("verified").at("holds").template get<bool>()) ++outcome_.refused;
         records.push_back(*known);
-        ++skipped;
+        if (store_) ++skipped;
         continue;
       }
       progress_.show(title + ": verifying " + spec.label);
@@ -211,30 +236,73 @@ class Runner {
     if (skipped > 0)
       note(title + ", " + scalar + ": " + std::to_string(skipped) + " of " +
            counted(records.size(), "configuration") + " in the results already, not measured again");
-    play_all(measurement, study.repetitions, title, scalar);
+    const json benchmarks = play_all(measurement, study.repetitions, title, scalar);
+    std::string failed;  // the first of what could not be written
+    const auto keep = [&failed](const auto& work) {
+      try {
+        work();
+      } catch (const io::InputError& problem) {
+        if (failed.empty()) failed = problem.what();
+      }
+    };
     for (std::size_t i = 0; i < measurement.size(); ++i) {
       json& record = records[record_of[i]];
       complete(record, measurement[i]);
       record.update(measurement.extras(i));
       ++outcome_.measured;
-      if (!measurement[i].refused.empty()) ++outcome_.refused;
-      if (store_) store_->append(record);
+      if (measurement[i].unfinished)
+        ++outcome_.unfinished;
+      else if (!measurement[i].refused.empty())
+        ++outcome_.refused;
+      if (store_)
+        keep([&] { store_->append(record); });
+      else
+        of_this_run_.insert_or_assign(record.at("key").get<std::string>(), record);
     }
     outcome_.skipped += skipped;
     groups_.push_back({about_scene, records});
     progress_.clear();
     print(results_table(records) + "\n");
+    if (store_ && !benchmarks.is_null())
+      keep([&] {
+        if (const std::string said = add_to_benchmark_file(store_->folder(), benchmarks); !said.empty())
+          note("warning: " + said);
+      });
+    if (!failed.empty()) throw io::InputError(failed);
   }
 
+  /// The record of a configuration that need not be measured again, or nullptr.
+  const json* known_record(const std::string& key, const std::string& what) {
+    if (!store_) {
+      const auto found = of_this_run_.find(key);
+      return found == of_this_run_.end() || found->second.value("unfinished", false) ? nullptr
+                                                                                     : &found->second;
+    }
+    const json* known = store_->find(key);
+    if (known == nullptr) return nullptr;
+    if (const std::string why = unusable(*known); !why.empty()) {
+      note("warning: " + store_->place(key) + ": " + why + "; " + what + " is measured again");
+      return nullptr;
+    }
+    if (const auto unfinished = known->find("unfinished");
+        unfinished != known->end() && *unfinished == json(true)) {
+      note("note: " + what + " ran out of memory in an earlier run, and is measured again");
+      return nullptr;
+    }
+    return known;
+  }
+
+  /// Plays the repetitions; Google Benchmark's report, or null.
   template <class M>
-  void play_all(M& measurement, std::uint32_t repetitions, const std::string& title,
+  json play_all(M& measurement, std::uint32_t repetitions, const std::string& title,
                 const std::string& scalar) {
     std::vector<std::size_t> timed;
     for (std::size_t i = 0; i < measurement.size(); ++i)
       if (measurement.timed(i)) timed.push_back(i);
-    if (timed.empty()) return;
+    if (timed.empty()) return nullptr;
     std::size_t done = 0;
-    const auto play = [&](std::size_t i) -> const ClipTimes& {
+    const auto play = [&](std::size_t i) -> const ClipTimes* {
+      if (!measurement.timed(i)) return nullptr;  // it has thrown
       progress_.show(title + ": clip " + std::to_string(++done) + " of " +
                      std::to_string(timed.size() * repetitions) + ", " + measurement[i].spec->label);
       return measurement.play(i);
@@ -242,17 +310,17 @@ class Runner {
     if (harness_ == Harness::rounds) {
       for (std::uint32_t r = 0; r < repetitions; ++r)
         for (const std::size_t i : timed) play(i);
-      return;
+      return nullptr;
     }
     std::vector<BenchItem> items;
     for (const std::size_t i : timed)
       items.push_back({title + ", " + scalar + "/" + measurement[i].spec->label,
-                       [&play, i]() -> const ClipTimes& { return play(i); }});
+                       [&play, i]() -> const ClipTimes* { return play(i); }});
     json runs = run_benchmarks(items, repetitions);
     runs["context"]["commit"] = commit();
     runs["context"]["dirty"] = dirty();
     runs["context"]["machine"] = machine_;
-    if (store_) add_to_benchmark_file(store_->folder() / "benchmark.json", runs);
+    return runs;
   }
 
   static void complete(json& record, const Measured& measured) {
@@ -267,12 +335,15 @@ class Runner {
       record["times"] = times_record(measured);
     else
       record["refused"] = measured.refused;
+    if (measured.unfinished) record["unfinished"] = true;
   }
 
   Harness harness_;
   json machine_;
   std::string run_;
   std::unique_ptr<ResultStore> store_;
+  std::map<std::string, json> of_this_run_;  // by key, where there is no store
+  std::string card_;                         // of the scene that is played
   Progress progress_;
   const MakeProgress making_ = [this](const std::string& what, double fraction) {
     progress_.show(what + (fraction > 0 ? ": " + std::to_string(int(100 * fraction)) + " %" : ""));

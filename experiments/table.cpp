@@ -20,9 +20,10 @@ std::size_t width_of(const std::string& text) {
 
 double phase_of(const json& repetition, const std::string& phase) {
   const auto get = [&](const char* name) { return repetition.at(name).get<double>(); };
+  const auto changes = [&] { return get("plan_changes") + repetition.value("geometry_changes", 0.0); };
   if (phase == "query") return get("traversal") + get("triangle_tests");
-  if (phase == "candidates") return get("update") + get("traversal") + get("plan_changes");
-  if (phase == "total") return get("update") + get("traversal") + get("triangle_tests") + get("plan_changes");
+  if (phase == "candidates") return get("update") + get("traversal") + changes();
+  if (phase == "total") return get("update") + get("traversal") + get("triangle_tests") + changes();
   if (phase == "total_with_motion") return get("motion") + phase_of(repetition, "total");
   return get(phase.c_str());
 }

@@ -6,6 +6,7 @@
 #include "core/families/wide/stored_hierarchy.hpp"
 
 #if defined(KBVH_WITH_TBB)
+#include <tbb/global_control.h>
 #include <tbb/parallel_for_each.h>
 #include <tbb/task_arena.h>
 #endif
@@ -38,6 +39,13 @@ int chosen_threads(const Params& params) {
   if (wanted < 1 || wanted > 1024 || wanted != double(int(wanted)))
     throw ConfigError("bottom_up: threads must be a whole number from 1 to 1024, got " +
                       params.word("threads"));
+#if defined(KBVH_WITH_TBB)
+  // More would be cut to this number without a word, and a result would say what was not used.
+  const auto most = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  if (wanted > double(most))
+    throw ConfigError("bottom_up: threads=" + params.word("threads") + ", but this machine runs " +
+                      std::to_string(most) + " at a time");
+#endif
   return int(wanted);
 }
 

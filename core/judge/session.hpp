@@ -25,7 +25,9 @@ struct Contestant {
   BuilderConfig builder;  ///< ignored by strategies that build their own hierarchy
 };
 
-/// Seconds of one frame by phase.
+/// Seconds of one frame by phase. `motion` is the driver's, the same for every contestant that wants
+/// positions: evaluating them, and following changes of plans and geometry; the strategy's answers to those
+/// are phases of their own.
 struct PhaseTimes {
   double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0, geometry_changes = 0;
   double query() const { return traversal + triangle_tests; }
@@ -144,8 +146,10 @@ class Session {
   /// Makes the changes at the current time, all of them or, if one is not valid, none
   /// (Playback::change_plans).
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
-    if (changing_) changing_->check_plans(changes);
-    playback_.change_plans(playback_.time(), changes);
+    timed(times.motion, [&] {
+      if (changing_) changing_->check_plans(changes);
+      playback_.change_plans(playback_.time(), changes);
+    });
     for (const PlanChange<S>& change : changes) watch_.changed(playback_, change.body, change.vertex);
     timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });
   }
@@ -154,7 +158,7 @@ class Session {
   /// ChangingScene) with nothing changed.
   void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
     if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
-    changing_->apply(change, playback_);
+    timed(times.motion, [&] { changing_->apply(change, playback_); });
     geometry_changed_ = true;
     finder_.reset();  // its features are those of before
     watch_.added(playback_, change);

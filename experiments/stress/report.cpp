@@ -113,6 +113,7 @@ json to_json(const StressReport& report, const StressOptions& options) {
             {"vary", options.vary},
             {"many_keyframes", options.many_keyframes},
             {"seconds", options.limits.seconds}}},
+          {"played", report.played},
           {"families", std::move(families)},
           {"rows", std::move(rows)},
           {"failures", std::move(failures)}};

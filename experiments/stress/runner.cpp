@@ -276,7 +276,8 @@ Repro repro_for(const StressScene& scene, const ContestantSpec& spec, const std:
 
 }  // namespace
 
-StressReport run_stress(const StressOptions& options, const std::function<void(const std::string&)>& told) {
+StressReport run_stress(const StressOptions& options, const std::function<void(const std::string&)>& told,
+                        const std::function<void(StressReport&)>& keep) {
   StressReport report;
   report.scenes = options.scenes;
   const std::size_t families = options.families.size(), contestants = options.contestants.size();
@@ -320,9 +321,12 @@ StressReport run_stress(const StressOptions& options, const std::function<void(c
           failure.l = l;
           failure.triangles_before = scene.triangles();
           failure.size_before = scene.size();
-          StressScene small = scene;
-          CaseResult last = results[c];
+          failure.repro = repro_for(scene, specs[c], scalar, results[c]);
+          report.failures.push_back(std::move(failure));
+          // Making it smaller can take long, and the run may be ended before.
+          if (keep) keep(report);
           if (options.shrink) {
+            CaseResult last = results[c];
             told("shrinking what fails " + specs[c].label + " in " + family.name);
             RunLimits limits = options.limits;
             limits.silent = true;
@@ -332,12 +336,14 @@ StressReport run_stress(const StressOptions& options, const std::function<void(c
               last = again;
               return true;
             };
-            small = shrink(scene, fails);
+            const StressScene small = shrink(scene, fails);
+            report.failures.back().repro = repro_for(small, specs[c], scalar, last);
+            if (keep) keep(report);
           }
-          failure.repro = repro_for(small, specs[c], scalar, last);
-          report.failures.push_back(std::move(failure));
         }
       }
+    ++report.played;
+    if (keep) keep(report);
   }
   return report;
 }

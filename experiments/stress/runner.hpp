@@ -97,11 +97,14 @@ struct StressOptions {
 struct StressReport {
   std::vector<StressRow> rows;  ///< by family, then by strategy
   std::vector<StressFailure> failures;
-  std::uint64_t scenes = 0;
+  std::uint64_t scenes = 0, played = 0;  ///< asked for, and played so far
 };
 
-/// Runs the suite. `told` hears what is being done. Same options, same scenes.
-StressReport run_stress(const StressOptions& options, const std::function<void(const std::string&)>& told);
+/// Runs the suite. `told` hears what is being done. `keep`, if there is one, is given the report as far as it
+/// is after every scene, at every failure before it is made smaller, and after that. Same options, same
+/// scenes.
+StressReport run_stress(const StressOptions& options, const std::function<void(const std::string&)>& told,
+                        const std::function<void(StressReport&)>& keep = {});
 
 /// The contestant in another configuration that it declares, drawn at random from the seed: builder, and
 /// every parameter that is a choice of words.

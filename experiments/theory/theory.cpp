@@ -5,6 +5,7 @@
 
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/machine.hpp"
+#include "experiments/results.hpp"
 #include "experiments/text.hpp"
 #include "experiments/theory/judge.hpp"
 #include "experiments/theory/measure_boxtree.hpp"
@@ -41,9 +42,11 @@ MeasurementStore::MeasurementStore(std::filesystem::path file, std::string progr
   std::ifstream in(file_);
   for (std::string line; std::getline(in, line);) {
     // The last line of a run that was stopped may be incomplete.
-    const json record = json::parse(line, nullptr, false);
-    if (record.is_object() && record.value("program", "") == program_)
-      kept_[record.value("key", "")] = record["value"];
+    const json record = experiments::json_or_nothing(line);
+    if (!record.is_object() || !record.contains("value")) continue;
+    const auto made_by = record.find("program"), key = record.find("key");
+    if (made_by != record.end() && key != record.end() && *made_by == json(program_) && key->is_string())
+      kept_[key->get<std::string>()] = record["value"];
   }
   // What follows must not be glued to a half line.
   std::ofstream out(file_, std::ios::app);

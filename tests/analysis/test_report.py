@@ -198,7 +198,7 @@ class TestRefusals(ReportCase):
         self.assertIn("has no results yet", self.refusal(""))
 
     def test_only_a_broken_line(self) -> None:
-        self.assertIn("has no results yet", self.refusal('{"schema": 1, "kind'))
+        self.assertIn("no result that can be used. Line 1 of results.jsonl was skipped", self.refusal('{"schema": 1, "kind'))
 
     def test_unknown_schema(self) -> None:
         line = dict(small()[0], schema=2)
@@ -212,8 +212,12 @@ class TestRefusals(ReportCase):
                 *outer, name = path.split(".")
                 holder = bad[outer[0]] if outer else bad
                 del holder[name]
-                message = self.refusal(json.dumps(good) + "\n" + json.dumps(bad) + "\n")
-                self.assertIn(f"line 2: the field {path} is missing", message)
+                said = f"Line 1 of results.jsonl was skipped: the field {path} is missing"
+                self.assertIn(said, self.refusal(json.dumps(bad) + "\n"))
+                # A line that is no measurement does not take the others with it.
+                page = self.page([good, bad])
+                self.assertIn(said.replace("1", "2", 1), page)
+                (self.folder / "report.html").unlink()
 
     def test_wrong_values(self) -> None:
         def change(line: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
@@ -239,7 +243,7 @@ class TestRefusals(ReportCase):
                 self.assertIn(words, self.refusal(json.dumps(change(small()[0], path, value))))
 
     def test_not_an_object(self) -> None:
-        self.assertIn("a result is an object", self.refusal("[1, 2]\n"))
+        self.assertIn("Line 1 of results.jsonl was skipped: it is no result", self.refusal("[1, 2]\n"))
 
 
 class TestLenience(ReportCase):

@@ -26,10 +26,14 @@ class Binary : public testing::Test {
   };
   Outcome kbvh(const std::string& arguments, const std::string& environment = "",
                const std::string& program = KBVH_PROGRAM) {
+    return shell(environment + " '" + program + "' " + arguments);
+  }
+  /// A command of the shell, in the folder.
+  Outcome shell(const std::string& line) {
     const auto out = folder_ / "stdout", err = folder_ / "stderr";
-    const std::string command = "cd '" + folder_.path().string() + "' && KBVH_CACHE='" +
-                                (folder_ / "cache").string() + "' " + environment + " '" + program + "' " +
-                                arguments + " >'" + out.string() + "' 2>'" + err.string() + "'";
+    const std::string command = "cd '" + folder_.path().string() + "' && export KBVH_CACHE='" +
+                                (folder_ / "cache").string() + "' && { " + line + "\n} >'" + out.string() +
+                                "' 2>'" + err.string() + "'";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of_file(out), text_of_file(err)};
   }

@@ -1,12 +1,15 @@
 // The program with a list of strategies of its own, as a project out of the tree links it: one honest
 // strategy and some that fail, to see that the program refuses them a time and says so.
+#include <cstdlib>
+#include <new>
+
 #include "core/contract/registry.hpp"
 #include "experiments/program.hpp"
 
 namespace kbvh {
 namespace {
 
-enum class Fault { none, loses_a_pair, repeats_a_pair, throws };
+enum class Fault { none, loses_a_pair, repeats_a_pair, throws, needs_memory };
 
 /// Every pair of primitives is a candidate, but for the fault.
 template <class S, Fault fault>
@@ -18,6 +21,7 @@ class EveryPair : public Strategy<S> {
   void reset(double t) override { this->start_at(t); }
   void advance(double) override {
     if (fault == Fault::throws) throw std::runtime_error("out of luck");
+    if (fault == Fault::needs_memory && ++advances_ > memory_for()) throw std::bad_alloc();
   }
   QueryStatus candidates_at(double, PairBuffer& out, const Budget&) override {
     for (const BodyPair& pair : this->scene_.pairs())
@@ -32,6 +36,14 @@ class EveryPair : public Strategy<S> {
     if (fault == Fault::loses_a_pair && !pairs.empty()) pairs.pop_back();
   }
   std::size_t bytes() const override { return 0; }
+
+ private:
+  /// How often it can advance before there is no memory left.
+  static int memory_for() {
+    const char* said = std::getenv("KBVH_TEST_MEMORY");
+    return said == nullptr ? 0 : std::atoi(said);
+  }
+  int advances_ = 0;
 };
 
 template <class S, class Count>
@@ -45,6 +57,10 @@ struct Loses : EveryPair<S, Fault::loses_a_pair> {
 template <class S, class Count>
 struct Repeats : EveryPair<S, Fault::repeats_a_pair> {
   using EveryPair<S, Fault::repeats_a_pair>::EveryPair;
+};
+template <class S, class Count>
+struct NeedsMemory : EveryPair<S, Fault::needs_memory> {
+  using EveryPair<S, Fault::needs_memory>::EveryPair;
 };
 template <class S, class Count>
 struct Throws : EveryPair<S, Fault::throws> {
@@ -73,6 +89,7 @@ std::vector<StrategyEntry> manifest_entries() {
           make_entry<Loses>(info("admits_to_lose", Guarantee::approximate)),
           make_entry<Repeats>(info("repeats", Guarantee::candidate_superset)),
           make_entry<Throws>(info("throws", Guarantee::exact)),
+          make_entry<NeedsMemory>(info("needs_memory", Guarantee::exact)),
           make_entry<Honest>(small),
           make_entry<Honest, Scalars::double_only>(info("only_double", Guarantee::exact))};
 }

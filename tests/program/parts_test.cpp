@@ -145,6 +145,23 @@ TEST(Plan, StudiesInheritAndOverride) {
   EXPECT_EQ(request.builder.methods, std::vector<BuildMethod>{BuildMethod::sah});
 }
 
+TEST(Plan, WhatIsGivenTwiceIsMeasuredOnce) {
+  const Plan plan = read_plan(parse_json(R"({"l": [2, 10, 2], "scalars": ["float", "double", "float"],
+      "scenes": ["tablecloth", "tablecloth", {"builtin": "random_soups", "triangles": [100, 100], "seed": [1, 2, 1],
+                 "order": ["given", "given"]}],
+      "strategies": ["bottom_up", "bottom_up"],
+      "builder": {"width": [8, 8], "leaf_size": [4, 1, 4], "method": ["sah", "sah"]},
+      "params": {"threads": [1, 1.0, "1"]}})",
+                                         "p.json"),
+                              "p.json", {});
+  const Study& study = plan.studies[0];
+  EXPECT_EQ(study.per_keyframe, (std::vector<std::uint32_t>{2, 10}));
+  EXPECT_EQ(study.scalars, (std::vector<std::string>{"float", "double"}));
+  EXPECT_EQ(study.scenes.size(), 3u);
+  std::vector<std::string> notes;
+  EXPECT_EQ(expand(study.strategies, study.params, study.builder, notes).size(), 2u);
+}
+
 TEST(Plan, ErrorsNameFileKeyAndValue) {
   EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
             "p.json: there is no key 'repetition'; known are builder, continuous, description, frames_limit, "
@@ -361,6 +378,18 @@ TEST(Results, NewestOfAKeyCountsAndNothingIsLost) {
   EXPECT_EQ(again.records(), 2u);
 }
 
+TEST(Results, NestingWithoutEndIsNoRecord) {
+  const TemporaryFolder folder;
+  const std::string open(300000, '['), close(300000, ']');
+  write_text(folder / "results.jsonl", open + "\n" + open + close + "\n{\"key\": \"a\", \"x\": " + open +
+                                           close + "}\n{\"key\": \"b\", \"x\": \"[[\\\"[\"}\n");
+  ResultStore store(folder.path());
+  EXPECT_EQ(store.unreadable_lines(), 3u);
+  EXPECT_NE(store.find("b"), nullptr);
+  EXPECT_FALSE(json_or_nothing(std::string(100, '[') + std::string(100, ']')).is_discarded());
+  EXPECT_TRUE(json_or_nothing(std::string(101, '[') + std::string(101, ']')).is_discarded());
+}
+
 TEST(Results, AFolderThatCannotBeMade) {
   const TemporaryFolder folder;
   write_text(folder / "file", "x");
@@ -368,7 +397,7 @@ TEST(Results, AFolderThatCannotBeMade) {
 }
 
 json example_scene() {
-  return {{"hash", "1"}, {"scalar", "float"}, {"per_keyframe", 10}, {"frames", 591}};
+  return {{"hash", "1"}, {"scalar", "float"}, {"per_keyframe", 10}, {"frames", 591}, {"frame_times", "2"}};
 }
 json example_strategy() {
   return {{"id", "x"}, {"params", {{"queue", "avl"}}}, {"builder", {{"width", 2}}}, {"title", "X"}};
@@ -383,7 +412,7 @@ TEST(Results, KeysAreStableAndSeeWhatMatters) {
   };
   const std::string usual = key(example_scene(), example_strategy());
   // Pinned: a change of this value makes every stored result be measured again.
-  EXPECT_EQ(usual, "c2c743abebce6186");
+  EXPECT_EQ(usual, "10db3bc838d887e1");
   json scene = example_scene(), strategy = example_strategy();
   strategy["title"] = "another title";
   scene["name"] = "another name";
@@ -425,6 +454,22 @@ TEST(Times, QuantilesAreOfTheMedianRepetition) {
   EXPECT_DOUBLE_EQ(record.at("total_worst"), 200);
   EXPECT_EQ(record.at("repetitions").size(), 3u);
   EXPECT_DOUBLE_EQ(record.at("repetitions")[0].at("update"), 151.5);
+}
+
+TEST(Times, MeansHaveEveryPhase) {
+  ClipTimes clip;
+  clip.frames = {{1, 2, 3, 4, 5, 6}, {3, 4, 5, 6, 7, 8}};
+  const PhaseTimes mean = clip.mean();
+  EXPECT_EQ(mean.motion, 2);
+  EXPECT_EQ(mean.update, 3);
+  EXPECT_EQ(mean.traversal, 4);
+  EXPECT_EQ(mean.triangle_tests, 5);
+  EXPECT_EQ(mean.plan_changes, 6);
+  EXPECT_EQ(mean.geometry_changes, 7);
+  EXPECT_DOUBLE_EQ(2 * mean.total(), clip.total());
+  Measured measured;
+  measured.repetitions = {clip};
+  EXPECT_DOUBLE_EQ(times_record(measured).at("repetitions")[0].at("geometry_changes"), 7e3);
 }
 
 json example_record(const std::string& id, const std::string& family, double update) {

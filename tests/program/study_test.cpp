@@ -301,7 +301,7 @@ TEST_F(Binary, BrokenGuaranteesAreRefusedATime) {
     EXPECT_NE(run.out.find("throws is refused a time: it threw: out of luck"), std::string::npos) << run.out;
     std::map<std::string, json> by_id;
     for (const json& record : records(out + "/results.jsonl")) by_id[record.at("strategy").at("id")] = record;
-    ASSERT_EQ(by_id.size(), 5u);
+    ASSERT_EQ(by_id.size(), 6u);
     for (const char* id : {"loses", "repeats", "throws"}) {
       EXPECT_TRUE(by_id.at(id).at("times").is_null()) << id;
       EXPECT_FALSE(by_id.at(id).at("verified").at("holds")) << id;

@@ -1,0 +1,52 @@
+"""Which results are of one scene: names tell scenes apart only as far as their hashes agree."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+
+def family(name: str, bodies: Any) -> str:
+    """A scene's name without the numbers of primitives in it, so that its sizes belong together.
+
+    `tablecloth-2048-200` is `tablecloth` if its bodies have 2048 and 200 primitives.
+    """
+    listed = bodies if isinstance(bodies, list) else []
+    counts = {str(body.get("primitives")) for body in listed if isinstance(body, dict)}
+    head, *rest = name.split("-")
+    return "-".join([head, *(part for part in rest if part not in counts)])
+
+
+def told_apart(runs: pd.DataFrame) -> tuple[pd.Series, list[str]]:
+    """The scene of each run, and a sentence for every name that several scenes share.
+
+    Of several scenes with one name and size, as of a mesh that was corrected, the one measured last keeps the name; the
+    others have their hash behind it. Scenes from files and shapes have sizes only where their names say so.
+    """
+    card_of = {row.hash: row.card for row in runs.itertuples() if row.hash and row.card}
+    cards = [row.card or card_of.get(row.hash, "") for row in runs.itertuples()]
+    # Without a card a hash is of one scalar: another scalar's is no other scene.
+    scalars = ["" if card else row.scalar for row, card in zip(runs.itertuples(), cards)]
+    one_size = runs["origin"].isin(("files", "shapes")) & (runs["scene"] == runs["scene_name"])
+    table = pd.DataFrame(
+        {
+            "identity": [card or row.hash for row, card in zip(runs.itertuples(), cards)],
+            "place": list(zip(runs["scene"], runs["primitives"].where(~one_size, 0), scalars)),
+            "scene": runs["scene"].to_list(),
+            "hash": runs["hash"].to_list(),
+        }
+    )
+    scenes = list(table["scene"])
+    notes = []
+    for _, rows in table[table["identity"] != ""].groupby("place", sort=False):
+        newest = rows["identity"].iloc[-1]
+        for _, older in rows[rows["identity"] != newest].groupby("identity", sort=False):
+            for at in older.index:
+                scenes[at] = f"{older['scene'].iloc[0]} (hash {older['hash'].iloc[0][:8]})"
+        if rows["identity"].nunique() > 1:
+            notes.append(
+                f"{rows['identity'].nunique()} scenes are called {rows['scene'].iloc[0]}: "
+                "the one measured last has the name, the others have their hash behind it."
+            )
+    return pd.Series(scenes, index=runs.index), list(dict.fromkeys(notes))

@@ -1,0 +1,338 @@
+// Nothing that was measured or found is lost: out of memory, full disks, damaged and shared files, runs that
+// are ended.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <functional>
+#include <set>
+
+#include "binary.hpp"
+#include "experiments/bench_harness.hpp"
+#include "experiments/io/animated_mesh.hpp"
+#include "experiments/record.hpp"
+#include "experiments/results.hpp"
+#include "experiments/table.hpp"
+
+namespace kbvh::experiments {
+namespace {
+
+const std::string one = tiny + "--strategies bottom_up ";
+
+TEST_F(Binary, OutOfMemoryIsNoBrokenGuaranteeAndIsMeasuredAgain) {
+  // At the first frame, while it is verified; and when it is played, after it has held.
+  for (const std::string memory : {"0", "4"})
+    for (const std::string command : {"run ", "bench "}) {
+      SCOPED_TRACE(command + memory);
+      const std::string out = command.substr(0, 1) + memory;
+      const std::string arguments = command + tiny + "--strategies honest,needs_memory --out " + out;
+      const Outcome first = kbvh(arguments, "KBVH_TEST_MEMORY=" + memory, KBVH_FAULTY_PROGRAM);
+      EXPECT_EQ(first.code, 3) << first.err;
+      EXPECT_EQ(first.err.find("breaks what it guarantees"), std::string::npos) << first.err;
+      EXPECT_NE(first.err.find("1 configuration for which there was no memory"), std::string::npos)
+          << first.err;
+      EXPECT_NE(first.out.find("needs_memory is refused a time: out of memory"), std::string::npos)
+          << first.out;
+      const auto list = records(out + "/results.jsonl");
+      ASSERT_EQ(list.size(), 2u);
+      EXPECT_TRUE(list[0].at("times").is_object());
+      EXPECT_EQ(list[1].at("refused"), "out of memory");
+      EXPECT_EQ(list[1].at("unfinished"), true);
+      EXPECT_TRUE(list[1].at("times").is_null());
+      const Outcome second = kbvh(arguments, "KBVH_TEST_MEMORY=1000", KBVH_FAULTY_PROGRAM);
+      EXPECT_EQ(second.code, 0) << second.err;
+      EXPECT_NE(second.err.find("1 configuration measured, 1 were in"), std::string::npos) << second.err;
+      const auto all = records(out + "/results.jsonl");
+      ASSERT_EQ(all.size(), 3u);
+      EXPECT_EQ(all[2].at("key"), list[1].at("key"));
+      EXPECT_TRUE(all[2].at("times").is_object());
+      EXPECT_EQ(kbvh(arguments, "", KBVH_FAULTY_PROGRAM).code, 0) << "a good result is not measured again";
+    }
+}
+
+TEST_F(Binary, RecordsThatCannotBeUsedAreNamedAndMeasuredAgain) {
+  ASSERT_EQ(kbvh("run " + one + "--out whole").code, 0);
+  const json whole = records("whole/results.jsonl").at(0);
+  EXPECT_EQ(unusable(whole), "");
+  const auto damaged = [&](const std::function<void(json&)>& work) {
+    json record = whole;
+    work(record);
+    return record;
+  };
+  const std::vector<std::pair<json, std::string>> cases{
+      {damaged([](json& r) { r["times"]["repetitions"] = json::array(); }), "times.repetitions has no entry"},
+      {damaged([](json& r) { r["times"]["repetitions"][1].erase("update"); }),
+       "the field times.repetitions.update is missing"},
+      {damaged([](json& r) { r["times"]["repetitions"][0]["motion"] = nullptr; }),
+       "times.repetitions.motion is not a finite number that is not negative"},
+      {damaged([](json& r) { r["times"] = 3; }), "times is neither an object nor null"},
+      {damaged([](json& r) { r.erase("times"); }), "the field times is missing"},
+      {damaged([](json& r) { r.erase("verified"); }), "the field verified is missing"},
+      {damaged([](json& r) { r["verified"].erase("holds"); }), "the field verified.holds is missing"},
+      {damaged([](json& r) { r["verified"]["protrusion"] = nullptr; }),
+       "verified.protrusion is not a finite number that is not negative"},
+      {damaged([](json& r) { r["scene"]["frames"] = -1; }), "scene.frames is not a whole number"},
+      {damaged([](json& r) { r["strategy"]["label"] = 7; }), "strategy.label is not a text"},
+      {damaged([](json& r) { r["choice"] = 7; }), "choice is not a text"}};
+  for (const auto& [record, why] : cases) {
+    SCOPED_TRACE(why);
+    EXPECT_EQ(unusable(record), why);
+    std::filesystem::remove_all(folder_ / "out");
+    std::filesystem::create_directories(folder_ / "out");
+    write_text(folder_ / "out/results.jsonl", "\n" + record.dump() + "\n");
+    const Outcome run = kbvh("run " + one + "--out out");
+    EXPECT_EQ(run.code, 0) << run.err;
+    EXPECT_NE(run.err.find("out/results.jsonl line 2: " + why + "; "), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("1 configuration measured"), std::string::npos) << run.err;
+    EXPECT_EQ(kbvh("run " + one + "--out out").err.find("warning"), std::string::npos);
+  }
+}
+
+TEST_F(Binary, EveryFieldThatIsTakenOutIsNoticedOrNotNeeded) {
+  ASSERT_EQ(kbvh("run " + one + "--out out").code, 0);
+  const json whole = records().at(0);
+  std::size_t taken_out = 0;
+  const std::function<void(json&, json&)> visit = [&](json& root, json& at) {
+    if (!at.is_structured()) return;
+    std::vector<std::string> keys;
+    if (at.is_object())
+      for (const auto& [key, value] : at.items()) keys.push_back(key);
+    for (std::size_t i = 0; i < (at.is_object() ? keys.size() : at.size()); ++i) {
+      json& member = at.is_object() ? at[keys[i]] : at[i];
+      visit(root, member);
+      for (const json& other : {json(), json("text"), json(-1.5), json::array(), json::object()}) {
+        const json kept = member;
+        member = other;
+        ++taken_out;
+        // Whatever passes can be shown.
+        if (unusable(root).empty()) {
+          EXPECT_NO_THROW(results_table({root})) << root.dump();
+        }
+        (at.is_object() ? at[keys[i]] : at[i]) = kept;
+      }
+    }
+  };
+  json root = whole;
+  visit(root, root);
+  EXPECT_EQ(root, whole);
+  EXPECT_GT(taken_out, 300u);
+}
+
+TEST_F(Binary, TablesArePrintedWhereResultsCannotBeWritten) {
+  // A disk with room for the first record, and not for the fourth.
+  ASSERT_EQ(kbvh("run " + one + "--out whole").code, 0);
+  const auto size = std::filesystem::file_size(folder_ / "whole/results.jsonl");
+  const std::string room =
+      "bash -c 'trap \"\" XFSZ; ulimit -f " + std::to_string(1 + 2 * size / 1024) + "; exec \"$0\" \"$@\"' ";
+  const std::string contestants = "--strategies bottom_up,bottom_up_period,rebuild,top_down ";
+  for (const std::string command : {"run ", "bench "}) {
+    const std::string out(1, command[0]);
+    const Outcome run =
+        shell(room + "'" + KBVH_PROGRAM + "' " + command + tiny + contestants + "--out " + out);
+    EXPECT_EQ(run.code, 2) << run.err;
+    EXPECT_NE(run.err.find("results.jsonl: cannot be written"), std::string::npos) << run.err;
+    for (const char* id : {"bottom_up ", "bottom_up_period ", "rebuild ", "top_down "})
+      EXPECT_NE(run.out.find(std::string("\n") + id), std::string::npos) << run.out;
+  }
+}
+
+TEST_F(Binary, FullDisksAndFoldersInTheWayAreNoticedBeforeAnythingIsMeasured) {
+  const std::string no_room = "bash -c 'trap \"\" XFSZ; ulimit -f 1; exec \"$0\" \"$@\"' ";
+  for (const std::string& arguments :
+       {"run " + one + "--out out", "bench " + one + "--out out", std::string("stress --scenes 1 --out out"),
+        std::string("theory --sizes 100 --out out")}) {
+    const Outcome run = shell(no_room + "'" + KBVH_PROGRAM + "' " + arguments);
+    EXPECT_EQ(run.code, 2) << arguments << run.err;
+    EXPECT_EQ(run.out, "") << arguments;
+    EXPECT_NE(run.err.find("cannot be written"), std::string::npos) << run.err;
+  }
+  for (const std::string file : {"benchmark.json", "targets.json", "results.jsonl"}) {
+    std::filesystem::create_directories(folder_ / "taken" / file);
+    const Outcome run = kbvh("bench " + one + "--out taken");
+    EXPECT_EQ(run.code, 2) << file;
+    EXPECT_EQ(run.out, "") << file;
+    EXPECT_NE(run.err.find(file), std::string::npos) << run.err;
+    std::filesystem::remove_all(folder_ / "taken");
+  }
+  // What was looked for leaves nothing behind.
+  EXPECT_EQ(kbvh("run " + one + "--out out").code, 0);
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "out"))
+    names.insert(entry.path().filename());
+  EXPECT_EQ(names, (std::set<std::string>{"results.jsonl", "scenes"}));
+}
+
+TEST_F(Binary, ADamagedBenchmarkFileIsKeptAndNamed) {
+  std::filesystem::create_directories(folder_ / "out");
+  for (const std::string damaged : {"precious", "{\"benchmarks\": 3}"}) {
+    std::filesystem::remove(folder_ / "out/results.jsonl");
+    write_text(folder_ / "out/benchmark.json", damaged);
+    const Outcome run = kbvh("bench " + one + "--out out");
+    EXPECT_EQ(run.code, 0) << run.err;
+    EXPECT_NE(
+        run.err.find("benchmark.json is not what Google Benchmark writes: it is now benchmark.json.damaged"),
+        std::string::npos)
+        << run.err;
+    EXPECT_TRUE(json::parse(text_of_file(folder_ / "out/benchmark.json")).at("benchmarks").is_array());
+  }
+  EXPECT_EQ(text_of_file(folder_ / "out/benchmark.json.damaged"), "precious");
+  EXPECT_EQ(text_of_file(folder_ / "out/benchmark.json.damaged-2"), "{\"benchmarks\": 3}");
+  // An empty file holds nothing that could be lost.
+  write_text(folder_ / "out/benchmark.json", "");
+  std::filesystem::remove(folder_ / "out/results.jsonl");
+  const Outcome run = kbvh("bench " + one + "--out out");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_EQ(run.err.find("warning"), std::string::npos) << run.err;
+  EXPECT_EQ(records().size(), 1u);
+}
+
+TEST(BenchmarkFile, ManyProcessesLoseNothing) {
+  const TemporaryFolder folder;
+  constexpr int processes = 6, each = 15;
+  for (int p = 0; p < processes; ++p) {
+    if (::fork() != 0) continue;
+    for (int i = 0; i < each; ++i)
+      add_to_benchmark_file(folder.path(),
+                            {{"context", {{"process", p}}}, {"benchmarks", {{{"name", p * each + i}}}}});
+    ::_exit(0);
+  }
+  for (int p = 0; p < processes; ++p) {
+    int status = -1;
+    ::wait(&status);
+    EXPECT_EQ(status, 0);
+  }
+  const json all = json::parse(text_of_file(folder / "benchmark.json"));
+  std::set<int> names;
+  for (const json& run : all.at("benchmarks")) names.insert(run.at("name").get<int>());
+  EXPECT_EQ(names.size(), std::size_t(processes * each));
+}
+
+TEST_F(Binary, AStressRunThatIsEndedLeavesWhatItFound) {
+  // Ended as soon as there is a failure and a table; the suite itself would go on for minutes.
+  const Outcome ended = shell("'" KBVH_FAULTY_PROGRAM
+                              "' stress --strategies loses,honest --families unit,near_tangent,spikes "
+                              "--scenes 100000 --out out >/dev/null 2>&1 & pid=$!; "
+                              "for i in $(seq 6000); do if [ -e out/stress.json ] && ls out/repro-*.json "
+                              ">/dev/null 2>&1; then break; "
+                              "fi; sleep 0.1; done; kill -9 $pid; wait $pid 2>/dev/null; true");
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  const json table = json::parse(text_of_file(folder_ / "out/stress.json"));
+  EXPECT_LT(table.at("played"), table.at("options").at("scenes"));
+  ASSERT_GE(table.at("failures").size(), 1u);
+  const std::string file = table.at("failures")[0].at("file");
+  const Outcome again = kbvh("stress --repro out/" + file, "", KBVH_FAULTY_PROGRAM);
+  EXPECT_EQ(again.code, 1) << again.err;
+  EXPECT_NE(again.out.find("loses, "), std::string::npos) << again.out;
+}
+
+TEST_F(Binary, FailuresOfAnotherStressRunStay) {
+  const auto files = [&] {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / "out"))
+      if (entry.path().filename().string().starts_with("repro-")) names.insert(entry.path().filename());
+    return names;
+  };
+  const auto stress = [&](const std::string& seed) {
+    const Outcome run = kbvh(
+        "stress --strategies loses --families unit --scenes 1 --l 1 --scalars float --out out --seed " + seed,
+        "", KBVH_FAULTY_PROGRAM);
+    EXPECT_EQ(run.code, 1) << run.err;
+    EXPECT_EQ(json::parse(text_of_file(folder_ / "out/stress.json")).at("played"), 1);
+  };
+  stress("1");
+  const std::string first = text_of_file(folder_ / "out/repro-unit-loses-float.json");
+  EXPECT_EQ(files().size(), 1u);
+  stress("1");
+  EXPECT_EQ(files().size(), 1u) << "the same failure twice";
+  for (const char* seed : {"2", "3", "4"}) stress(seed);
+  EXPECT_EQ(text_of_file(folder_ / "out/repro-unit-loses-float.json"), first);
+}
+
+TEST_F(Binary, ScenesOfOneNameHaveCardsOfTheirOwn) {
+  write_text(folder_ / "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const auto run = [&](const std::string& file, const std::string& scalar) {
+    const Outcome outcome =
+        kbvh("run --name mine --body " + file +
+             " --body sphere:triangles=80,keyframes=2,step=0.1:0:0 --l 1 --repetitions 1 --strategies "
+             "bottom_up --out out --scalar " +
+             scalar);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return records().back().at("scene").at("card").get<std::string>();
+  };
+  const auto card = [&](const std::string& hash) {
+    const json read = json::parse(text_of_file(folder_ / ("out/scenes/mine-" + hash) / "card.json"));
+    EXPECT_EQ(read.at("hash"), hash);
+    return read;
+  };
+  const std::string first = run("a.obj", "float");
+  EXPECT_EQ(run("a.obj", "double"), first) << "a scalar makes no other scene";
+  // Corrected, under the old name.
+  write_text(folder_ / "a.obj", "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n");
+  const std::string second = run("a.obj", "float");
+  EXPECT_NE(second, first);
+  EXPECT_EQ(card(first).at("bodies")[0].at("primitives"), 1);
+  EXPECT_EQ(card(second).at("bodies")[0].at("primitives"), 2);
+  // A card that was damaged is made again.
+  write_text(folder_ / ("out/scenes/mine-" + first) / "card.json", "{");
+  write_text(folder_ / ("out/scenes/mine-" + second) / "card.json", "");
+  EXPECT_EQ(run("a.obj", "double"), second);
+  EXPECT_EQ(card(second).at("bodies")[0].at("primitives"), 2);
+}
+
+TEST_F(Binary, LongNamesOfScenesAreShortenedInFolders) {
+  std::string name;
+  for (int i = 0; i < 100; ++i) name += "\xc3\xa4\xe6\xbc\xa2";
+  const Outcome run = kbvh("run " + one + "--name " + name + " --out out");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_EQ(run.err.find("warning"), std::string::npos) << run.err;
+  EXPECT_EQ(records().at(0).at("scene").at("name"), name);
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "out/scenes"))
+    EXPECT_TRUE(json(entry.path().filename().string()).dump().size() > 20) << "valid UTF-8";
+  EXPECT_EQ(kbvh("run " + one + "--name .. --out out").code, 0);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/card.json"));
+}
+
+TEST_F(Binary, ScriptsThatDifferInTheirRateAreMeasuredBoth) {
+  for (const std::string rate : {"20", "40"}) {
+    write_text(folder_ / "script.json",
+               R"({"frames": 10, "rate": )" + rate +
+                   R"(, "steps": [{"time": 0, "changes": [{"vertex": 3, "velocity": [0, 0, 1]}]}]})");
+    const Outcome run = kbvh(
+        "run --body waving_sheet:triangles=50,keyframes=4 --body sphere:triangles=80 --script script.json "
+        "--strategies bottom_up --repetitions 1 --out out");
+    EXPECT_EQ(run.code, 0) << run.err;
+    EXPECT_NE(run.err.find("1 configuration measured, 0 were in"), std::string::npos) << run.err;
+  }
+}
+
+TEST_F(Binary, NothingIsMeasuredTwiceInOneRun) {
+  // 50 and 51 triangles are the same sheet, which reading the numbers does not show.
+  const std::string twice =
+      "--scene waving_sheet --triangles 50,51,50 --obstacle 80 --keyframes 2 --l 2,2 --scalar float,float "
+      "--repetitions 1 --strategies bottom_up,bottom_up ";
+  const Outcome bench = kbvh("bench " + twice + "--out out");
+  EXPECT_EQ(bench.code, 0) << bench.err;
+  EXPECT_EQ(records().size(), 1u);
+  EXPECT_EQ(json::parse(text_of_file(folder_ / "out/benchmark.json")).at("benchmarks").size(), 1u);
+  const Outcome run = kbvh("run " + twice);
+  EXPECT_EQ(run.code, 0) << run.err;
+  const auto first = run.out.find("\nbottom_up"), second = run.out.find("\nbottom_up", first + 1);
+  ASSERT_NE(second, std::string::npos) << run.out;
+  EXPECT_EQ(run.out.find("\nbottom_up", second + 1), std::string::npos) << run.out;
+  EXPECT_EQ(run.out.substr(first, run.out.find('\n', first + 1) - first),
+            run.out.substr(second, run.out.find('\n', second + 1) - second))
+      << "the second table shows what was measured";
+}
+
+TEST_F(Binary, ThreadsThatTheMachineHasNotAreRefused) {
+  const Outcome run = kbvh("run " + one + "--param threads=1000 --out out");
+  EXPECT_EQ(run.code, 2) << run.err;
+  EXPECT_EQ(run.out, "");
+  EXPECT_TRUE(run.err.find("threads=1000, but this machine runs") != std::string::npos ||
+              run.err.find("parameter 'threads' of 'bottom_up' cannot be '1000'") != std::string::npos)
+      << run.err;
+  EXPECT_TRUE(records().empty());
+}
+
+}  // namespace
+}  // namespace kbvh::experiments
