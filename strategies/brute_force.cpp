@@ -126,7 +126,7 @@ KBVH_STRATEGY(brute_force) {
               .self_pairs = true,
               .time_budget = true,
               .contacts = true},
-      .topology = {.node_bounds = true},
+      .topology = {.own = true},
       .max_primitive_pairs = 100'000'000,
   })};
 }
