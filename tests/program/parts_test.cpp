@@ -53,18 +53,18 @@ TEST(Text, Assignments) {
 }
 
 TEST(Text, NearestNames) {
-  const std::vector<std::string> known{"bottom_up", "bottom_up_budget", "top_down", "sphere", "uv_sphere",
-                                       "interval_join", "l"};
-  for (const auto& [word, meant] : std::vector<std::pair<std::string, std::string>>{
-           {"botom_up", "bottom_up"},
-           {"bottom-up", "bottom_up"},
-           {"Bottom_Up", "bottom_up"},
-           {"topdown", "top_down"},
-           {"shpere", "sphere"},
-           {"spere", "sphere"},
-           {"bottom_up", "bottom_up"},
-           {"interval", "interval_join"},
-           {"L", "l"}})
+  const std::vector<std::string> known{"bottom_up", "bottom_up_budget", "top_down", "sphere",
+                                       "uv_sphere", "interval_join",    "l"};
+  for (const auto& [word, meant] :
+       std::vector<std::pair<std::string, std::string>>{{"botom_up", "bottom_up"},
+                                                        {"bottom-up", "bottom_up"},
+                                                        {"Bottom_Up", "bottom_up"},
+                                                        {"topdown", "top_down"},
+                                                        {"shpere", "sphere"},
+                                                        {"spere", "sphere"},
+                                                        {"bottom_up", "bottom_up"},
+                                                        {"interval", "interval_join"},
+                                                        {"L", "l"}})
     EXPECT_EQ(nearest_of(word, known).value_or("nothing"), meant) << word;
   for (const char* word : {"", "x", "cloth", "bo", "rebuild", "/tmp/mesh.obj"})
     EXPECT_FALSE(nearest_of(word, known)) << word << ": " << *nearest_of(word, known);
@@ -121,7 +121,8 @@ TEST(Plan, ErrorsNameFileKeyAndValue) {
   EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
             "p.json: there is no key 'repetition'; known are builder, continuous, description, frames_limit, "
             "l, name, "
-            "oracle_every, params, repetitions, scalars, scenes, strategies, studies, targets");
+            "oracle_every, params, repetitions, scalars, scenes, strategies, studies, targets; did you mean "
+            "'repetitions'?");
   EXPECT_TRUE(contains(plan_complaint("{\n  \"scenes\": ]\n}"), "p.json: line 2, column 13"));
   EXPECT_TRUE(contains(plan_complaint("[]"), "p.json: expected an object"));
   EXPECT_TRUE(contains(plan_complaint("{}"), "p.json: scenes: is missing"));
