@@ -9,6 +9,7 @@
 #include "core/contract/registry.hpp"
 #include "core/judge/range_watch.hpp"
 #include "core/judge/verify.hpp"
+#include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh {
 namespace {
@@ -142,6 +143,21 @@ TEST(Admissible, CornersAreLimited) {
   scene.bodies[0].primitives.add(corners);
   EXPECT_EQ(complaint([&] { validate(scene); }),
             "body 'large': primitive 1 has 4096 corners; at most 4095 are possible");
+}
+
+// What everybody is held against may be played.
+TEST(Admissible, TheScenesOfTheConformanceTestsAre) {
+  for (const std::string& name : test::synthetic_scene_names())
+    for (const std::uint32_t l : {1u, 3u, 7u}) {
+      const auto check = [&](const auto& test) {
+        const auto frames = test.frames.empty() ? frame_times(test.scene, l) : test.frames;
+        EXPECT_EQ(complaint([&] { check_played(test.scene, test.script, std::span<const double>(frames)); }),
+                  "nothing was thrown")
+            << name;
+      };
+      check(test::synthetic_scene<float>(name, l));
+      check(test::synthetic_scene<double>(name, l));
+    }
 }
 
 // --- everybody ----------------------------------------------------------------------------------------
