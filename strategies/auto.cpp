@@ -22,6 +22,7 @@ struct Seen {
   double reads = 0;               // vertices that a refit reads
   double step = 0;                // mean way of a vertex in a frame past another body, in mean leaf sides
   double slide = 0;               // the same of primitives past those they are candidates with
+  bool many_bodies = false;       // more pairs of bodies than a choice looks at
   double spread = 1;              // how different these are among a body's vertices, from 0: all the same
 };
 
@@ -52,7 +53,9 @@ double join_cost(const Seen& seen) {
   // Bodies apart: a box at each end, unless they come to meet; on a long way they may fly through each other.
   if (seen.candidates == 0) return 1.5 / l * (1 + moves * moves) * refit_cost(seen);
   const double alike = 1 - seen.spread;
-  return refit_cost(seen) * (0.08 + 5.5 / (l + 4.6) * (1 + moves) + 0.2 * alike * alike * moves);
+  // Small bodies that move past each other meet others on their way, besides those that they touch now.
+  const double others = seen.many_bodies ? 1 + moves : 1;
+  return refit_cost(seen) * (0.08 + 5.5 / (l + 4.6) * (1 + moves) * others + 0.2 * alike * alike * moves);
 }
 
 /// A strategy to choose, the parameters that differ from its defaults, and what it would cost. To offer
@@ -276,6 +279,7 @@ class Auto final : public Strategy<S> {
     seen_.step = seen_.spread = 0;
     // Of many pairs of bodies, some: what moves fastest past another body is seen in others of its kind.
     const auto pairs = this->scene_.pairs();
+    seen_.many_bodies = pairs.size() > most_pairs;
     const std::size_t apart = (pairs.size() + most_pairs - 1) / most_pairs;
     for (std::size_t i = 0; i < pairs.size(); i += apart) {
       pass(pairs[i].first, pairs[i].second);

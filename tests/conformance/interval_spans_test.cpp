@@ -211,9 +211,10 @@ void check_frame(Play<S>& play) {
     for (auto& join : joiner->joins) {
       PairBuffer read, held;
       join.read(fraction, read);
+      const BodyPair bodies = join.pairs().empty() ? BodyPair{} : join.bodies_of(0);
       for (const JoinedPair& pair : join.pairs())
         if (pair.begin <= fraction && fraction <= pair.end)
-          held.push_back({join.body_a(), pair.primitive_a, join.body_b(), pair.primitive_b});
+          held.push_back({bodies.first, pair.primitive_a, bodies.second, pair.primitive_b});
       std::sort(read.begin(), read.end());
       std::sort(held.begin(), held.end());
       ASSERT_EQ(read, held) << name(joiner->kernels) << " at t = " << play.playback.time();
