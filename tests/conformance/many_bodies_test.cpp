@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/families/wide/near_bodies.hpp"
+#include "core/geometry/lane_box.hpp"
 #include "tests/conformance/check.hpp"
 #include "tests/support/many_bodies.hpp"
 
