@@ -6,6 +6,7 @@ TABLE has one room a line: name|folder|rooms it uses, by commas|include folders,
 """
 
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -42,6 +43,26 @@ def sees(compiler, include, header):
     return subprocess.run(command, input=source, text=True, capture_output=True, cwd="/").returncode == 0
 
 
+def stray_includes(rooms, source):
+    """Include lines that name a header by another path than core/..., or one of a room that is not declared.
+
+    Rooms without sources are compiled within those that use them, which may see more.
+    """
+    homes = sorted(((room["folder"], name) for name, room in rooms.items()), key=lambda home: -len(home[0]))
+    found, read = [], 0
+    for name, room in rooms.items():
+        allowed = reach(rooms, name)
+        for file in sorted((source / room["folder"]).rglob("*.[hc]pp")):
+            for path in re.findall(r'^ *# *include *"([^"]*)"', file.read_text(), re.M):
+                read += 1
+                home = next((other for folder, other in homes if path.startswith(folder + "/")), None)
+                if home is None and (path.startswith("core/") or "/" in path):
+                    found.append(f"{file.relative_to(source)} includes {path}, which is in no room")
+                elif home is not None and home not in allowed:
+                    found.append(f"{file.relative_to(source)} includes {path}: {name} does not declare {home}")
+    return found, read
+
+
 def main(table, source_dir, compiler):
     rooms = read_table(table)
     source = pathlib.Path(source_dir)
@@ -69,8 +90,11 @@ def main(table, source_dir, compiler):
                 forbidden += 1
                 if sees(compiler, room["include"], header):
                     faults.append(f"{name} sees {header}")
-    print("\n".join(faults) if faults else f"{declared} declared edges work, {forbidden} others do not compile")
-    return 1 if faults or forbidden == 0 or declared == 0 else 0
+    stray, read = stray_includes(rooms, source)
+    faults += stray
+    print("\n".join(faults) if faults else
+          f"{declared} declared edges work, {forbidden} others do not compile; {read} include lines are as declared")
+    return 1 if faults or 0 in (forbidden, declared, read) else 0
 
 
 if __name__ == "__main__":
