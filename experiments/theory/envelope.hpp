@@ -10,7 +10,7 @@
 namespace kbvh::theory {
 
 /// Exact envelopes of flight plans, computed apart from the kinetic tree that is to be proved by them: from
-/// the stored numbers, in rationals, with no code of core/kinetic or core/motion.
+/// the stored numbers, in rationals, with no code of core/families/events or core/motion.
 using Rational = boost::multiprecision::cpp_rational;
 
 /// The rational that a finite double is.
