@@ -28,7 +28,8 @@ std::string readable(std::string_view bytes) {
   std::string text;
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t length = utf8_length(bytes, at);
-    if (length > 0)
+    const auto byte = static_cast<unsigned char>(bytes[at]);
+    if (length > 1 || (length == 1 && byte >= 32 && byte != 127))
       text += bytes.substr(at, length);
     else
       text += "\\x" + io::byte_text(bytes, at).substr(2);

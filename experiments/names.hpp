@@ -8,8 +8,8 @@ namespace kbvh::experiments {
 /// The length of the UTF-8 character that begins at `at`, or 0 if the bytes there are none.
 std::size_t utf8_length(std::string_view text, std::size_t at);
 
-/// The text with every byte that is not UTF-8 spelt out ("caf\xE9"): file names may be any bytes, results are
-/// JSON. Valid text stays as it is.
+/// The text with every byte that is not UTF-8, or a control character, spelt out ("caf\xE9"): file names may
+/// be any bytes, results are JSON, and names are of one line. Other text stays as it is.
 std::string readable(std::string_view bytes);
 
 /// Checks a name that a user gives to a scene or a body; throws io::InputError that begins with `place` if it

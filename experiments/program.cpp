@@ -136,6 +136,9 @@ int run_program(int argc, const char* const* argv) {
     return wrong(problem.what());
   } catch (const ConfigError& problem) {
     return wrong(problem.what());
+  } catch (const std::bad_alloc&) {
+    say("out of memory: what was asked for does not fit into this machine, or into a limit (ulimit -v)");
+    return internal_error;
   } catch (const std::exception& problem) {
     say(std::string("internal error: ") + one_line(problem.what()));
     return internal_error;

@@ -302,7 +302,10 @@ Matrix matrix_of(const Placement::Rotation& rotation) {
     sine = std::round(sine);
     cosine = std::round(cosine);
   }
-  const double* a = rotation.axis;
+  // Scaled first: squares of the user's numbers could overflow, or vanish.
+  const double largest =
+      std::max({std::abs(rotation.axis[0]), std::abs(rotation.axis[1]), std::abs(rotation.axis[2])});
+  const double a[3] = {rotation.axis[0] / largest, rotation.axis[1] / largest, rotation.axis[2] / largest};
   const double length = std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
   const double x = a[0] / length, y = a[1] / length, z = a[2] / length, rest = 1 - cosine;
   return {{{cosine + x * x * rest, x * y * rest - z * sine, x * z * rest + y * sine},
@@ -393,7 +396,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
                              "splines within a thousandth of the body's size");
     if (mesh.jumps > 0)
       loaded.notes.push_back(source + ": " + counted(mesh.jumps, "jump") +
-                             " of STEP samplers take one rounding of time: no frame lies within, but "
+                             " of STEP samplers, each within one rounding of time: no frame lies within, but "
                              "contacts between keyframes are found on the way");
     if (mesh.kind != io::MeshKind::polygons)
       loaded.notes.push_back(

@@ -245,6 +245,13 @@ class Runner {
         if (failed.empty()) failed = problem.what();
       }
     };
+    // Before the records: a configuration whose record is there is not measured again, so that its table in
+    // benchmark.json would never come.
+    if (store_ && !benchmarks.is_null())
+      keep([&] {
+        if (const std::string said = add_to_benchmark_file(store_->folder(), benchmarks); !said.empty())
+          note("warning: " + said);
+      });
     for (std::size_t i = 0; i < measurement.size(); ++i) {
       json& record = records[record_of[i]];
       complete(record, measurement[i]);
@@ -263,11 +270,6 @@ class Runner {
     groups_.push_back({about_scene, records});
     progress_.clear();
     print(results_table(records) + "\n");
-    if (store_ && !benchmarks.is_null())
-      keep([&] {
-        if (const std::string said = add_to_benchmark_file(store_->folder(), benchmarks); !said.empty())
-          note("warning: " + said);
-      });
     if (!failed.empty()) throw io::InputError(failed);
   }
 

@@ -2,6 +2,9 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#if defined(__linux__)
+#include <sys/prctl.h>
+#endif
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -34,8 +37,13 @@ void write_all(int file, const void* data, std::size_t size) {
   }
 }
 
-[[noreturn]] void be_child(int file, std::size_t first, std::size_t jobs,
+[[noreturn]] void be_child([[maybe_unused]] pid_t parent, int file, std::size_t first, std::size_t jobs,
                            const std::function<std::string(std::size_t)>& work, Stderr standard_error) {
+#if defined(__linux__)
+  // A child outlives no parent, however that ends.
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(5);
+#endif
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
   if (standard_error == Stderr::silent) {
@@ -78,6 +86,7 @@ std::vector<JobOutcome> run_in_children(std::size_t jobs, double seconds,
   while (outcomes.size() < jobs) {
     int ends[2];
     if (::pipe(ends) != 0) throw std::runtime_error(std::string("no pipe: ") + std::strerror(errno));
+    const pid_t parent = ::getpid();
     const pid_t child = ::fork();
     if (child < 0) {
       ::close(ends[0]);
@@ -86,7 +95,7 @@ std::vector<JobOutcome> run_in_children(std::size_t jobs, double seconds,
     }
     if (child == 0) {
       ::close(ends[0]);
-      be_child(ends[1], outcomes.size(), jobs, work, standard_error);
+      be_child(parent, ends[1], outcomes.size(), jobs, work, standard_error);
     }
     ::close(ends[1]);
     std::string received;

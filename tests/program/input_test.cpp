@@ -36,6 +36,7 @@ TEST(Names, AreSpeltOutWhereTheyAreNoText) {
   EXPECT_EQ(readable("cloth"), "cloth");
   EXPECT_EQ(readable("caf\xC3\xA9"), "caf\xC3\xA9");
   EXPECT_EQ(readable("caf\xE9 \xFF"), "caf\\xE9 \\xFF");
+  EXPECT_EQ(readable("two\nlines\x7F"), "two\\x0Alines\\x7F");
 }
 
 /// A name of a file that is an entry of its folder on every system.
@@ -113,6 +114,19 @@ TEST_F(Binary, ScenesOfAnyNameAreStoredWhereTheyBelong) {
       kbvh("run --body sphere:triangles=20,keyframes=2,step=0.1:0:0 --body caf\xE9.obj " + two);
   EXPECT_EQ(latin.code, 0) << latin.err;
   EXPECT_EQ(records("o/out/results.jsonl").back().at("scene").at("bodies")[1].at("name"), "caf\\xE9");
+}
+
+TEST_F(Binary, AnAxisOfAnyLengthTurnsTheSame) {
+  std::string first;
+  for (const char* axis : {"1:0:0", "1e200:0:0", "1e-170:0:0", "1e308:1e-308:0"}) {
+    const Outcome run =
+        kbvh(std::string("run --body box:triangles=20,keyframes=2,step=0.1:0:0,rotate=") + axis +
+             ":30 --body sphere:triangles=20 --repetitions 1 --strategies bottom_up --out o" + axis);
+    EXPECT_EQ(run.code, 0) << axis << run.err;
+    const std::string hash = records(std::string("o") + axis + "/results.jsonl").at(0).at("scene").at("hash");
+    if (first.empty()) first = hash;
+    EXPECT_EQ(hash, first) << axis;
+  }
 }
 
 TEST_F(Binary, AMisspeltShapeIsNoFile) {
