@@ -1,7 +1,8 @@
 #pragma once
-// Internal to kernels (core/*/kernels/*.cpp): vectors as wide as the instruction set that the file is compiled for.
-// Everything is in an anonymous namespace and forced inline, so that no two translation units share code.
-// "portable" has vectors of one lane, which are plain numbers: the same source, without any extension.
+// Internal to kernels (core/*/kernels/*.cpp): vectors as wide as the instruction set that the file is
+// compiled for. Everything is in an anonymous namespace and forced inline, so that no two translation units
+// share code. "portable" has vectors of one lane, which are plain numbers: the same source, without any
+// extension.
 #include <cstddef>
 #include <cstdint>
 // A header that is compiled by itself, for no instruction set, is portable.
