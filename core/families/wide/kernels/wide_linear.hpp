@@ -7,9 +7,9 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// Boxes of a wide hierarchy that are linear in time over a segment: rows and own boxes as in `WideArrays`,
-/// at its begin and at its end. At every fraction between, a box is what lies between, larger by the margin
-/// on every side.
+/// Boxes of a wide hierarchy that are linear in time over a segment: child and node bounds as in
+/// `WideArrays`, at its begin and at its end. At every fraction between, a box is what lies between, larger
+/// by the margin on every side.
 template <class S>
 struct WideEnds {
   const S* child_bounds[2];
@@ -20,7 +20,7 @@ struct WideEnds {
 /// Boxes at one fraction of the segment, made from the ends when the traversal first comes to a node.
 template <class S>
 struct WideMoment {
-  WideArrays<S> hierarchy;  ///< lanes and own boxes are written
+  WideArrays<S> hierarchy;  ///< child_bounds and node_bounds are written
   WideEnds<S> ends;
   std::uint8_t* stale;  ///< [node]: not 0 until its boxes are made
   S fraction;
