@@ -46,8 +46,10 @@ def stress(folder: Path) -> Optional[Stress]:
     data = read_json(file, STRESS_SCHEMA, ResultError)
     try:
         return _stress(data)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as problem:
-        raise ResultError(f"{file}: a field is missing or of the wrong kind: {problem}.") from None
+    except KeyError as problem:
+        raise ResultError(f"{file} is not what `kbvh stress` writes: the field {problem.args[0]} is missing.") from None
+    except (TypeError, ValueError, AttributeError, IndexError):
+        raise ResultError(f"{file} is not what `kbvh stress` writes: a field is of the wrong kind.") from None
 
 
 def _stress(data: dict[str, Any]) -> Stress:
@@ -106,8 +108,12 @@ def ccd(folder: Path) -> Optional[Ccd]:
         for peer in peers:
             head += (f"{peer}: missed", "extra", "per second")
         return Ccd(f"Commit {data['commit'][:12]}.", head, rows)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as problem:
-        raise ResultError(f"{file}: it cannot be read as what `kbvh ccd` writes: {problem}.") from None
+    except (OSError, ValueError) as problem:
+        raise ResultError(f"{file} cannot be read: {problem}.") from None
+    except KeyError as problem:
+        raise ResultError(f"{file} is not what `kbvh ccd` writes: the field {problem.args[0]} is missing.") from None
+    except (TypeError, AttributeError):
+        raise ResultError(f"{file} is not what `kbvh ccd` writes: a field is of the wrong kind.") from None
 
 
 def _queries(one: dict[str, Any], peers: list[str]) -> Cells:

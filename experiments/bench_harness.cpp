@@ -1,9 +1,6 @@
 #include "experiments/bench_harness.hpp"
 
 #include <benchmark/benchmark.h>
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <filesystem>
@@ -11,6 +8,7 @@
 
 #include "experiments/io/bytes.hpp"
 #include "experiments/json_reader.hpp"
+#include "experiments/result_file.hpp"
 #include "experiments/results.hpp"
 
 namespace kbvh::experiments {
@@ -67,48 +65,18 @@ json run_benchmarks(const std::vector<BenchItem>& items, std::uint32_t repetitio
   return parse_json(without_nan(out.str()), "Google Benchmark's report");
 }
 
-namespace {
-
-/// Holds the folder's lock, so that of several processes one after the other reads and writes its files.
-class FolderLock {
- public:
-  explicit FolderLock(const std::filesystem::path& folder)
-      : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-    // Where folders cannot be locked (some network file systems), the last process wins, as without a lock.
-    while (descriptor_ >= 0 && ::flock(descriptor_, LOCK_EX) != 0 && errno == EINTR) {
-    }
-  }
-  ~FolderLock() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
-
- private:
-  int descriptor_;
-};
-
-}  // namespace
-
 std::string add_to_benchmark_file(const std::filesystem::path& folder, const json& runs) {
   const std::filesystem::path file = folder / "benchmark.json";
   const FolderLock lock(folder);
   json all = runs;
   std::string said;
-  std::error_code error;
-  if (std::filesystem::exists(file, error) && std::filesystem::file_size(file, error) > 0) {
-    json before = json_or_nothing(io::read_file(file));
-    if (before.is_object() && before.contains("benchmarks") && before["benchmarks"].is_array()) {
-      for (const json& run : runs.at("benchmarks")) before["benchmarks"].push_back(run);
-      before["context"] = runs.at("context");
-      all = std::move(before);
+  if (std::optional<json> before = content_of(file)) {
+    if (before->is_object() && before->contains("benchmarks") && (*before)["benchmarks"].is_array()) {
+      for (const json& run : runs.at("benchmarks")) (*before)["benchmarks"].push_back(run);
+      (*before)["context"] = runs.at("context");
+      all = std::move(*before);
     } else {
-      std::filesystem::path kept = file.string() + ".damaged";
-      for (int i = 2; std::filesystem::exists(kept, error); ++i)
-        kept = file.string() + ".damaged-" + std::to_string(i);
-      std::filesystem::rename(file, kept, error);
-      if (error) throw io::InputError(file.string() + ": cannot be renamed: " + error.message());
-      said = file.string() + " is not what Google Benchmark writes: it is now " + kept.filename().string() +
+      said = file.string() + " is not what Google Benchmark writes: it is now " + set_aside(file) +
              ", and a new one is begun";
     }
   }

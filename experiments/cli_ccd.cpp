@@ -3,6 +3,7 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "core/contract/registry.hpp"
 #include "experiments/cli.hpp"
@@ -14,7 +15,7 @@
 #include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
-#include "experiments/results.hpp"
+#include "experiments/result_file.hpp"
 #include "experiments/table.hpp"
 #include "experiments/text.hpp"
 
@@ -128,7 +129,9 @@ int run(const Arguments& arguments) {
   for (const std::string& path : paths)
     for (ImpactQueries& queries : find_impact_queries(path)) files.push_back(std::move(queries));
   if (files.empty()) throw io::InputError("no queries of continuous collision detection in " + joined(paths));
-  if (!arguments.out.empty()) prepare_folder(arguments.out);
+  const json options{{"paths", paths}, {"seconds", arguments.seconds}};
+  std::optional<ResultFile> result;
+  if (!arguments.out.empty()) result.emplace(arguments.out, "ccd.json", options);
   const std::vector<Peer> others = peers();
   std::vector<std::vector<std::string>> table{
       {"queries of", "queries", "touch", "missed", "extra", "filtered", "per second"}};
@@ -183,11 +186,12 @@ int run(const Arguments& arguments) {
   print(columns(table));
   if (others.empty()) print("No peer with a continuous test of its own is built in (FCL 0.7 has one).\n");
   if (unknown > 0) print(counted(unknown, "query") + " without a verdict to compare with.\n");
-  if (!arguments.out.empty()) {
-    const std::filesystem::path folder = arguments.out;
-    const json all{{"commit", commit()}, {"dirty", dirty()}, {"machine", machine()}, {"files", records}};
-    io::write_file_atomically(folder / "ccd.json", all.dump(1) + "\n");
-  }
+  if (result)
+    result->write({{"commit", commit()},
+                   {"dirty", dirty()},
+                   {"machine", machine()},
+                   {"options", options},
+                   {"files", records}});
   if (wrong == 0) return success;
   say(counted(wrong, "verdict") + " that should have been the other");
   return guarantee_broken;

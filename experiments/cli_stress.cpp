@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "experiments/cli.hpp"
@@ -12,7 +13,7 @@
 #include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
-#include "experiments/results.hpp"
+#include "experiments/result_file.hpp"
 #include "experiments/stress/runner.hpp"
 #include "experiments/text.hpp"
 
@@ -92,7 +93,9 @@ class StressFiles {
   /// Writes nothing if there is no folder. Throws io::InputError if it cannot be written.
   StressFiles(std::filesystem::path folder, const stress::StressOptions& options)
       : folder_(std::move(folder)), options_(options) {
-    if (!folder_.empty()) prepare_folder(folder_);
+    if (folder_.empty()) return;
+    file_.emplace(folder_, "stress.json", options_record(options));
+    if (file_->earlier().is_null()) write_table({});
   }
 
   /// Failures at once, the table every other second. Problems are kept for `finish`: the run goes on.
@@ -115,12 +118,16 @@ class StressFiles {
     if (folder_.empty()) return;
     if (!problem_.empty()) throw io::InputError(problem_);
     write_table(report);
-    say("all numbers are in " + (folder_ / "stress.json").string());
+    say("all numbers are in " + file_->path().string());
   }
 
  private:
+  /// Leaves the table of an earlier run with the same options until this one has come as far.
   void write_table(const stress::StressReport& report) {
-    io::write_file_atomically(folder_ / "stress.json", to_json(report, options_).dump(1) + "\n");
+    if (const nlohmann::json& earlier = file_->earlier();
+        !earlier.is_null() && earlier.value("played", nlohmann::json(0)) > nlohmann::json(report.played))
+      return;
+    file_->write(to_json(report, options_));
   }
 
   /// Writes a failure that is new, or was made smaller since; false if there was nothing to do.
@@ -153,6 +160,7 @@ class StressFiles {
 
   std::filesystem::path folder_;
   const stress::StressOptions& options_;
+  std::optional<ResultFile> file_;
   std::vector<std::string> texts_;  ///< of each failure, as written
   std::chrono::steady_clock::time_point written_{};
   std::string problem_;

@@ -1,5 +1,6 @@
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "experiments/builtin_scenes.hpp"
 #include "experiments/cli.hpp"
@@ -10,7 +11,7 @@
 #include "experiments/output.hpp"
 #include "experiments/program.hpp"
 #include "experiments/progress.hpp"
-#include "experiments/results.hpp"
+#include "experiments/result_file.hpp"
 #include "experiments/text.hpp"
 #include "experiments/theory/theory.hpp"
 
@@ -43,7 +44,8 @@ int run(const TheoryArguments& arguments) {
   if (arguments.exact_limit > 0) options.exact_limit = arguments.exact_limit;
   if (arguments.instants > 0) options.instants = arguments.instants;
   const std::filesystem::path folder = arguments.out;
-  if (!arguments.out.empty()) prepare_folder(folder);
+  std::optional<ResultFile> file;
+  if (!arguments.out.empty()) file.emplace(folder, "theory.json", theory::options_record(options));
   theory::MeasurementStore store(arguments.out.empty() ? std::filesystem::path() : folder / "theory.jsonl",
                                  program_identity());
   Progress progress;
@@ -52,12 +54,10 @@ int run(const TheoryArguments& arguments) {
   progress.clear();
   print(theory::claims_table(report.claims));
   for (const std::string& note : report.notes) say(note);
-  if (!arguments.out.empty()) {
-    const std::filesystem::path file = folder / "theory.json";
-    io::write_file_atomically(file, theory::to_json(report, options).dump(1) + "\n");
-    say("all numbers are in " + file.string());
-  }
-  if (arguments.out.empty() || arguments.no_figures) return success;
+  if (!file) return success;
+  file->write(theory::to_json(report, options));
+  say("all numbers are in " + file->path().string());
+  if (arguments.no_figures) return success;
   const std::string script = (analysis_folder() / "theory_figures.py").string();
   const int code = run_and_wait({python(), script, arguments.out});
   if (code == 0) return success;

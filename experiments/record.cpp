@@ -156,6 +156,7 @@ std::string configuration_key(Harness harness, const std::string& program, const
            {"kind", word(harness)},
            {"program", program},
            {"scene", scene.at("hash")},
+           {"name", scene.value("name", "")},
            {"scalar", scene.at("scalar")},
            {"per_keyframe", scene.at("per_keyframe")},
            {"frames", scene.at("frames")},

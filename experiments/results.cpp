@@ -1,9 +1,11 @@
 #include "experiments/results.hpp"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -11,6 +13,7 @@
 
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/bytes.hpp"
+#include "experiments/text.hpp"
 
 namespace kbvh::experiments {
 
@@ -18,6 +21,8 @@ using nlohmann::json;
 
 json json_or_nothing(std::string_view text) {
   constexpr int deepest = 100;
+  // The parser takes a NUL byte for the end of the text.
+  if (text.find('\0') != std::string_view::npos) return json(json::value_t::discarded);
   int depth = 0;
   bool quoted = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -33,6 +38,28 @@ json json_or_nothing(std::string_view text) {
   }
   return json::parse(text, nullptr, false);
 }
+
+namespace {
+
+/// Removes what killed processes left of files that they were about to replace (FILE.tmp-PROCESS-ATTEMPT), if
+/// no such process runs and nothing was written for an hour: the folder may be shared with another machine.
+void remove_left_overs(const std::filesystem::path& folder) {
+  std::error_code error;
+  const auto old = std::filesystem::file_time_type::clock::now() - std::chrono::hours(1);
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    const std::size_t at = name.rfind(".tmp-");
+    if (at == std::string::npos) continue;
+    const auto numbers = split(name.substr(at + 5), '-');
+    const auto process = parse_whole(numbers[0]);
+    if (numbers.size() != 2 || !process || !parse_whole(numbers[1]) || *process > 0x7fffffff) continue;
+    if (::kill(pid_t(*process), 0) == 0 || errno != ESRCH) continue;
+    if (entry.is_regular_file(error) && entry.last_write_time(error) < old && !error)
+      std::filesystem::remove(entry.path(), error);
+  }
+}
+
+}  // namespace
 
 void prepare_folder(const std::filesystem::path& folder) {
   std::error_code error;
@@ -52,6 +79,7 @@ void prepare_folder(const std::filesystem::path& folder) {
                          why.substr(why.rfind(": ")));
   }
   std::filesystem::remove(probe, error);
+  remove_left_overs(folder);
 }
 
 ResultStore::ResultStore(const std::filesystem::path& folder)

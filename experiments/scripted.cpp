@@ -179,19 +179,24 @@ bool has_own_frames(const LoadedScene& loaded) {
 
 template <class S>
 std::vector<double> frames_of(const Scene<S>& scene, const LoadedScene& loaded, const PlanScript<S>& script,
-                              std::uint32_t per_keyframe) {
-  if (loaded.reversal) return frames_of(*loaded.reversal);
+                              std::uint32_t per_keyframe, std::size_t most) {
   std::vector<double> frames;
+  if (loaded.reversal) {
+    frames = frames_of(*loaded.reversal);
+    frames.resize(std::min(frames.size(), most));
+    return frames;
+  }
   if (has_own_frames(loaded)) {
     const double first = overlaid_keyframes(scene).front();
-    for (std::uint32_t f = 0; f < loaded.script->frames; ++f)
+    for (std::uint32_t f = 0; f < loaded.script->frames && f < most; ++f)
       frames.push_back(first + double(f) / loaded.script->rate);
   } else {
-    frames = frame_times(scene, per_keyframe);
+    frames = frame_times(scene, per_keyframe, most);
   }
   for (const auto& step : script.steps) frames.push_back(step.time);
   std::sort(frames.begin(), frames.end());
   frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+  frames.resize(std::min(frames.size(), most));
   try {
     check_played(scene, script, frames);
   } catch (const std::invalid_argument& problem) {
@@ -203,7 +208,7 @@ std::vector<double> frames_of(const Scene<S>& scene, const LoadedScene& loaded, 
 #define KBVH_INSTANTIATE(S)                                                                         \
   template PlanScript<S> script_of(const Scene<S>&, const LoadedScene&, const MakeProgress&);       \
   template std::vector<double> frames_of(const Scene<S>&, const LoadedScene&, const PlanScript<S>&, \
-                                         std::uint32_t);
+                                         std::uint32_t, std::size_t);
 KBVH_INSTANTIATE(float)
 KBVH_INSTANTIATE(double)
 #undef KBVH_INSTANTIATE

@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -46,10 +47,12 @@ PlanScript<S> script_of(const Scene<S>& scene, const LoadedScene& loaded, const 
 bool has_own_frames(const LoadedScene& loaded);
 
 /// The frames of a scene: its own, or l for each keyframe interval; every time of the script is one of them.
-/// Throws io::InputError with vertex, time and value if the scene leaves the admissible range until the last
-/// one (core/motion/admissible.hpp): before any contestant sees it.
+/// Only the first `most` of them are made. Throws io::InputError with vertex, time and value if the scene
+/// leaves the admissible range until the last one (core/motion/admissible.hpp): before any contestant sees
+/// it.
 template <class S>
 std::vector<double> frames_of(const Scene<S>& scene, const LoadedScene& loaded, const PlanScript<S>& script,
-                              std::uint32_t per_keyframe);
+                              std::uint32_t per_keyframe,
+                              std::size_t most = std::numeric_limits<std::size_t>::max());
 
 }  // namespace kbvh::experiments

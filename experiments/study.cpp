@@ -140,8 +140,8 @@ class Runner {
       per_keyframe = {1};
     }
     for (const std::uint32_t l : per_keyframe) {
-      std::vector<double> frames = frames_of(scene, loaded, script, l);
-      if (study.frames_limit > 0 && frames.size() > study.frames_limit) frames.resize(study.frames_limit);
+      const std::size_t most = study.frames_limit > 0 ? study.frames_limit : SIZE_MAX;
+      const std::vector<double> frames = frames_of(scene, loaded, script, l, most);
       group(study, contestants, loaded, scene, script, oracle, l, frames);
     }
     const std::string before = oracle.problem();

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "experiments/io/bytes.hpp"
 #include "experiments/machine.hpp"
 #include "experiments/plan.hpp"
+#include "experiments/progress.hpp"
+#include "experiments/result_file.hpp"
 #include "experiments/table.hpp"
 #include "experiments/targets.hpp"
 
@@ -302,8 +305,20 @@ std::string targets_table(const json& rows) {
 }
 
 void write_targets(const std::filesystem::path& folder, const json& rows) {
-  io::write_file_atomically(folder / "targets.json",
-                            rows.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+  const FolderLock lock(folder);
+  const std::filesystem::path file = folder / "targets.json";
+  std::set<std::string> plans;
+  for (const json& row : rows) plans.insert(row.at("plan").get<std::string>());
+  json all = json::array();
+  if (const std::optional<json> before = content_of(file); before && before->is_array()) {
+    for (const json& row : *before)
+      if (!row.is_object() || !plans.contains(row.value("plan", ""))) all.push_back(row);
+  } else if (before) {
+    say("warning: " + file.string() + " is no list of targets: it is now " + set_aside(file) +
+        ", and a new one is begun");
+  }
+  for (const json& row : rows) all.push_back(row);
+  io::write_file_atomically(file, all.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace kbvh::experiments

@@ -66,7 +66,8 @@ nlohmann::json target_rows(const Plan& plan, const std::vector<TargetGroup>& gro
 /// The tables that `run` and `bench` print for the rows: what counts, then every scene.
 std::string targets_table(const nlohmann::json& rows);
 
-/// Writes the rows as `folder`/targets.json, in place of what was there. Throws io::InputError.
+/// Writes the rows to `folder`/targets.json, in place of those of the same plans; rows of other plans stay. A
+/// file that cannot be read is renamed. Throws io::InputError.
 void write_targets(const std::filesystem::path& folder, const nlohmann::json& rows);
 
 }  // namespace kbvh::experiments

@@ -189,13 +189,14 @@ class Auto final : public Strategy<S> {
       if (runner.frames > 0)
         text += (text.empty() ? "" : ", ") + std::string(runner.candidate->id) + " for " +
                 std::to_string(runner.frames) + (runner.frames == 1 ? " frame" : " frames");
-    char last[160];
-    std::snprintf(
-        last, sizeof last,
-        " (last seen: %.3g frames per segment, steps of %.2g leaves, %.0f candidates, plans changed "
-        "at %.2g of frames)",
-        seen_.frames_per_segment, seen_.step, seen_.candidates, seen_.changes_per_frame);
-    return text.empty() ? text : text + last;
+    if (text.empty()) return text;
+    char segments[48] = "one segment", last[160];
+    if (std::isfinite(seen_.frames_per_segment))
+      std::snprintf(segments, sizeof segments, "%.3g frames per segment", seen_.frames_per_segment);
+    std::snprintf(last, sizeof last,
+                  " (last seen: %s, steps of %.2g leaves, %.0f candidates, plans changed at %.2g of frames)",
+                  segments, seen_.step, seen_.candidates, seen_.changes_per_frame);
+    return text + last;
   }
 
   std::size_t bytes() const override {

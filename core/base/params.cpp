@@ -30,9 +30,12 @@ Params::Params(const std::string& owner, const std::vector<Parameter>& declared,
       double number = 0;
       const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
       if (error != std::errc() || end != value.data() + value.size() || !std::isfinite(number) ||
-          number < parameter->minimum)
+          number < parameter->minimum) {
+        char least[32];
+        const std::string shortest(least, std::to_chars(least, least + sizeof least, parameter->minimum).ptr);
         throw ConfigError("parameter '" + key + "' of '" + owner + "' cannot be '" + value +
-                          "'; it is a finite number of at least " + std::to_string(parameter->minimum));
+                          "'; it is a finite number of at least " + shortest);
+      }
     }
     values_[key] = value;
   }

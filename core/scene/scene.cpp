@@ -68,18 +68,19 @@ std::vector<double> overlaid_keyframes(const Scene<S>& scene) {
 }
 
 template <class S>
-std::vector<double> frame_times(const Scene<S>& scene, std::uint32_t per_keyframe) {
+std::vector<double> frame_times(const Scene<S>& scene, std::uint32_t per_keyframe, std::size_t most) {
   if (per_keyframe == 0) throw std::invalid_argument("frames per keyframe must be at least 1, got 0");
   const std::vector<double> keyframes = overlaid_keyframes(scene);
   std::vector<double> frames;
-  frames.reserve((keyframes.size() - 1) * per_keyframe + 1);
+  frames.reserve(std::min((keyframes.size() - 1) * per_keyframe + 1, most));
   for (std::size_t k = 0; k + 1 < keyframes.size(); ++k)
     for (std::uint32_t j = 0; j < per_keyframe; ++j) {
+      if (frames.size() == most) return frames;
       const double t = keyframes[k] + (keyframes[k + 1] - keyframes[k]) * double(j) / double(per_keyframe);
       // Between keyframes that nearly touch, rounding may reach the next one; it comes as its own frame.
       if (t < keyframes[k + 1] && (frames.empty() || frames.back() < t)) frames.push_back(t);
     }
-  frames.push_back(keyframes.back());
+  if (frames.size() < most) frames.push_back(keyframes.back());
   return frames;
 }
 
@@ -87,7 +88,7 @@ std::vector<double> frame_times(const Scene<S>& scene, std::uint32_t per_keyfram
   template void validate(const Scene<S>&);                          \
   template std::uint64_t hash(const Scene<S>&);                     \
   template std::vector<double> overlaid_keyframes(const Scene<S>&); \
-  template std::vector<double> frame_times(const Scene<S>&, std::uint32_t);
+  template std::vector<double> frame_times(const Scene<S>&, std::uint32_t, std::size_t);
 KBVH_INSTANTIATE(float)
 KBVH_INSTANTIATE(double)
 #undef KBVH_INSTANTIATE

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -102,9 +103,10 @@ std::uint64_t hash(const Scene<S>& scene);
 
 /// The times of a clip with `per_keyframe` (l >= 1) frames for each segment of the overlaid keyframe times of
 /// all bodies: t = T_i + (T_{i+1} - T_i) * j / l for j = 0..l-1, and the last keyframe. One time if nothing
-/// moves.
+/// moves. Only the first `most` of them are made.
 template <class S>
-std::vector<double> frame_times(const Scene<S>& scene, std::uint32_t per_keyframe);
+std::vector<double> frame_times(const Scene<S>& scene, std::uint32_t per_keyframe,
+                                std::size_t most = std::numeric_limits<std::size_t>::max());
 
 /// The overlaid keyframe times of all bodies, strictly increasing.
 template <class S>

@@ -236,18 +236,14 @@ class Baker {
     const std::vector<Rigid> rigid = rigid_groups();
     CurvedMotion motion{pose_.times(), pose_.jumps(),
                         [&](double time, std::vector<double>& out) { place_probes(rigid, time, out); }};
-    std::vector<double> first(3 * vertices_);
-    pose_.evaluate(motion.keys[0]);
-    bake_keyframe(first.data());
-    double tolerance = gltf_tolerance * diagonal(first);
-    if (!(tolerance > 0)) {  // of a body that grows from a point
-      std::vector<double> points;
-      for (const double key : motion.keys) {
-        motion.points(key, points);
-        tolerance = std::max(tolerance, gltf_tolerance * diagonal(points));
-      }
+    double tolerance = 0;
+    std::vector<double> baked(3 * vertices_);
+    for (const double key : motion.keys) {
+      pose_.evaluate(key);
+      bake_keyframe(baked.data());
+      tolerance = std::max(tolerance, gltf_tolerance * diagonal(baked));
+      for (const double x : baked) tolerance = std::max(tolerance, 1e-9 * std::abs(x));
     }
-    for (const double x : first) tolerance = std::max(tolerance, 1e-9 * std::abs(x));
     const std::size_t most = std::min<std::uint64_t>(most_keyframes, most_baked_numbers / (3 * vertices_));
     std::optional<KeyframeTimes> found = follow(motion, tolerance, std::max(most, motion.keys.size()));
     if (!found) {

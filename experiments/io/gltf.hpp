@@ -7,8 +7,8 @@
 
 namespace kbvh::io {
 
-/// How far a baked vertex may be from where the animation has it, between keyframes: as part of the diagonal
-/// of the body's box at its first key.
+/// How far a baked vertex may be from where the animation has it, between keyframes: as part of the body's
+/// size, the largest diagonal of its box at any key.
 inline constexpr double gltf_tolerance = 1e-3;
 
 /// Reads a glTF 2.0 file (.gltf or .glb) and bakes one animation into keyframes in scene space.

@@ -30,8 +30,9 @@ std::string key_of(std::string_view token) {
   return key.is_string() ? key.get<std::string>() : std::string(token);
 }
 
-/// Refuses what is nested too deep before anything is built of it.
-void check_depth(std::string_view text, const std::string& name) {
+/// Refuses what is nested too deep before anything is built of it, and a NUL byte between values: the parser
+/// takes it for the end of the text, and would lose what follows.
+void check_depth_and_end(std::string_view text, const std::string& name) {
   std::size_t depth = 0;
   for (std::size_t at = 0; at < text.size(); ++at) {
     switch (text[at]) {
@@ -48,6 +49,8 @@ void check_depth(std::string_view text, const std::string& name) {
       case ']':
         if (depth > 0) --depth;
         break;
+      case '\0':
+        refuse(text, name, at, "this is not JSON: a NUL byte");
       default:
         break;
     }
@@ -98,7 +101,7 @@ void check_keys(std::string_view text, const std::string& name) {
 
 json parse_json_text(std::string_view text, const std::string& name) {
   refuse_utf16(text, name);
-  check_depth(text, name);
+  check_depth_and_end(text, name);
   json value;
   try {
     value = json::parse(text);

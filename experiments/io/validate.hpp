@@ -5,8 +5,9 @@
 
 namespace kbvh::io {
 
-/// Coordinates beyond this magnitude are refused: products of three of them still fit a double.
-inline constexpr double largest_coordinate = 1e30;
+/// Coordinates beyond this magnitude are refused: 1e30 as a float, so that files of floats and files of text
+/// have one limit. Products of three of them still fit a double.
+inline constexpr double largest_coordinate = 1e30f;
 
 /// The last step of every reader: checks what they all promise, and mends what may be mended. In place:
 ///  - structure: sizes fit together, at least one vertex, primitive and keyframe, every polygon has at

@@ -62,6 +62,23 @@ std::string stress_table(const StressReport& report) {
   return columns(table);
 }
 
+json options_record(const StressOptions& options) {
+  json families = json::array(), strategies = json::array();
+  for (const Family* family : options.families) families.push_back(family->name);
+  for (const ContestantSpec& spec : options.contestants)
+    strategies.push_back({{"label", spec.label}, {"params", spec.params}});
+  return {{"scenes", options.scenes},
+          {"seed", options.seed},
+          {"scalars", options.scalars},
+          {"l", options.l},
+          {"vary", options.vary},
+          {"shrink", options.shrink},
+          {"many_keyframes", options.many_keyframes},
+          {"seconds", options.limits.seconds},
+          {"families", std::move(families)},
+          {"strategies", std::move(strategies)}};
+}
+
 json to_json(const StressReport& report, const StressOptions& options) {
   json rows = json::array(), failures = json::array(), families = json::array();
   for (const Family* family : options.families)
@@ -100,23 +117,11 @@ json to_json(const StressReport& report, const StressOptions& options) {
                         {"triangles", failure.repro.scene.triangles()},
                         {"size_before", failure.size_before},
                         {"size", failure.repro.scene.size()}});
-  return {{"schema", "kbvh-stress-1"},
-          {"commit", commit()},
-          {"dirty", dirty()},
-          {"when", now_utc()},
-          {"machine", machine()},
-          {"options",
-           {{"scenes", options.scenes},
-            {"seed", options.seed},
-            {"scalars", options.scalars},
-            {"l", options.l},
-            {"vary", options.vary},
-            {"many_keyframes", options.many_keyframes},
-            {"seconds", options.limits.seconds}}},
-          {"played", report.played},
-          {"families", std::move(families)},
-          {"rows", std::move(rows)},
-          {"failures", std::move(failures)}};
+  return {{"schema", "kbvh-stress-1"}, {"commit", commit()},
+          {"dirty", dirty()},          {"when", now_utc()},
+          {"machine", machine()},      {"options", options_record(options)},
+          {"played", report.played},   {"families", std::move(families)},
+          {"rows", std::move(rows)},   {"failures", std::move(failures)}};
 }
 
 }  // namespace kbvh::experiments::stress

@@ -117,5 +117,7 @@ BuilderConfig builder_of(const std::string& text);
 /// The table that the program prints, and what is written as stress.json (RESULTS.md).
 std::string stress_table(const StressReport& report);
 nlohmann::json to_json(const StressReport& report, const StressOptions& options);
+/// The member "options" of stress.json: all that decides what is played.
+nlohmann::json options_record(const StressOptions& options);
 
 }  // namespace kbvh::experiments::stress

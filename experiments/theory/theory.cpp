@@ -278,6 +278,17 @@ TheoryReport run_theory(const TheoryOptions& options, MeasurementStore& store,
   return Runner(options, store, progress).run();
 }
 
+json options_record(const TheoryOptions& options) {
+  return {{"scenes", options.scenes},
+          {"sizes", options.sizes},
+          {"keyframes", options.keyframes},
+          {"exact_limit", options.exact_limit},
+          {"simulation_limit", options.simulation_limit},
+          {"instants", options.instants},
+          {"sequences", options.sequences},
+          {"sequence_keyframes", options.sequence_keyframes}};
+}
+
 json to_json(const TheoryReport& report, const TheoryOptions& options) {
   json claims = json::array();
   for (const Claim& claim : report.claims) claims.push_back(to_json(claim));
@@ -288,15 +299,7 @@ json to_json(const TheoryReport& report, const TheoryOptions& options) {
           {"commit", experiments::commit()},
           {"dirty", experiments::dirty()},
           {"scalar", "float"},
-          {"options",
-           {{"scenes", options.scenes},
-            {"sizes", options.sizes},
-            {"keyframes", options.keyframes},
-            {"exact_limit", options.exact_limit},
-            {"simulation_limit", options.simulation_limit},
-            {"instants", options.instants},
-            {"sequences", options.sequences},
-            {"sequence_keyframes", options.sequence_keyframes}}},
+          {"options", options_record(options)},
           {"claims", claims},
           {"counts", counts},
           {"fits", report.fits},

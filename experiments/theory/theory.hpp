@@ -75,5 +75,7 @@ TheoryReport run_theory(const TheoryOptions& options, MeasurementStore& store,
 
 /// theory.json, see RESULTS.md.
 nlohmann::json to_json(const TheoryReport& report, const TheoryOptions& options);
+/// Its member "options": all that decides what is counted.
+nlohmann::json options_record(const TheoryOptions& options);
 
 }  // namespace kbvh::theory

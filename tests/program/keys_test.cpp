@@ -34,9 +34,10 @@ void add_keys(const Study& study, const LoadedScene& loaded, const json& machine
   std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
   if (has_own_frames(loaded) || study.continuous) per_keyframe = {1};
   for (const std::uint32_t l : per_keyframe) {
+    const std::size_t most = study.frames_limit > 0 ? study.frames_limit : SIZE_MAX;
     std::vector<double> frames =
-        study.continuous ? overlaid_keyframes(scene) : frames_of(scene, loaded, script, l);
-    if (study.frames_limit > 0 && frames.size() > study.frames_limit) frames.resize(study.frames_limit);
+        study.continuous ? overlaid_keyframes(scene) : frames_of(scene, loaded, script, l, most);
+    frames.resize(std::min(frames.size(), most));
     const json about = scene_record(scene, loaded, l, std::span<const double>(frames), script);
     for (const ContestantSpec& spec : contestants)
       keys.insert(configuration_key(Harness::rounds, "p", about, strategy_record(spec), study, machine));
@@ -151,8 +152,8 @@ TEST(Keys, SeeHowAFileIsPlayed) {
 }
 
 TEST(Keys, SeeEveryParameterOfEveryStrategy) {
-  const json scene{
-      {"hash", "1"}, {"scalar", "float"}, {"per_keyframe", 1}, {"frames", 2}, {"frame_times", "3"}};
+  const json scene{{"name", "s"},       {"hash", "1"}, {"scalar", "float"},
+                   {"per_keyframe", 1}, {"frames", 2}, {"frame_times", "3"}};
   std::set<std::string> keys;
   std::size_t configurations = 0;
   const auto add = [&](const StrategyRequest& request) {
@@ -228,8 +229,8 @@ TEST(Keys, SeeEveryNumberOfAScene) {
 }
 
 TEST(Keys, SeeTheMachineTheProgramAndTheHarness) {
-  const json scene{
-      {"hash", "1"}, {"scalar", "float"}, {"per_keyframe", 1}, {"frames", 2}, {"frame_times", "3"}};
+  const json scene{{"name", "s"},       {"hash", "1"}, {"scalar", "float"},
+                   {"per_keyframe", 1}, {"frames", 2}, {"frame_times", "3"}};
   std::vector<std::string> notes;
   const json strategy = strategy_record(expand({{"bottom_up", {}, {}}}, {}, {}, notes).at(0));
   std::set<std::string> keys;

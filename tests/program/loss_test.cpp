@@ -3,6 +3,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
+
 #include <fstream>
 #include <functional>
 #include <set>
@@ -11,6 +13,7 @@
 #include "experiments/bench_harness.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/record.hpp"
+#include "experiments/result_file.hpp"
 #include "experiments/results.hpp"
 #include "experiments/table.hpp"
 
@@ -211,12 +214,12 @@ TEST(BenchmarkFile, ManyProcessesLoseNothing) {
 
 TEST_F(Binary, AStressRunThatIsEndedLeavesWhatItFound) {
   // Ended as soon as there is a failure and a table; the suite itself would go on for minutes.
-  const Outcome ended = shell("'" KBVH_FAULTY_PROGRAM
-                              "' stress --strategies loses,honest --families unit,near_tangent,spikes "
-                              "--scenes 100000 --out out >/dev/null 2>&1 & pid=$!; "
-                              "for i in $(seq 6000); do if [ -e out/stress.json ] && ls out/repro-*.json "
-                              ">/dev/null 2>&1; then break; "
-                              "fi; sleep 0.1; done; kill -9 $pid; wait $pid 2>/dev/null; true");
+  const Outcome ended =
+      shell("'" KBVH_FAULTY_PROGRAM
+            "' stress --strategies loses,honest --families unit,near_tangent,spikes "
+            "--scenes 100000 --out out >/dev/null 2>&1 & pid=$!; "
+            "for i in $(seq 6000); do if grep -q repro- out/stress.json 2>/dev/null; then break; "
+            "fi; sleep 0.1; done; kill -9 $pid; wait $pid 2>/dev/null; true");
   EXPECT_EQ(ended.code, 0) << ended.err;
   const json table = json::parse(text_of_file(folder_ / "out/stress.json"));
   EXPECT_LT(table.at("played"), table.at("options").at("scenes"));
@@ -225,6 +228,90 @@ TEST_F(Binary, AStressRunThatIsEndedLeavesWhatItFound) {
   const Outcome again = kbvh("stress --repro out/" + file, "", KBVH_FAULTY_PROGRAM);
   EXPECT_EQ(again.code, 1) << again.err;
   EXPECT_NE(again.out.find("loses, "), std::string::npos) << again.out;
+}
+
+TEST_F(Binary, OneProcessAtATimeWritesATable) {
+  const auto folder = folder_ / "out";
+  const ResultFile mine(folder, "stress.json", {{"seed", 1}});
+  for (const std::string command :
+       {"stress --scenes 1 --strategies bottom_up --families spikes --out out", "stress --list"}) {
+    const Outcome run = kbvh(command);
+    const bool writes = command.find("--out") != std::string::npos;
+    EXPECT_EQ(run.code, writes ? 2 : 0) << run.err;
+    EXPECT_EQ(run.err.find("stress.json: another process is writing it") != std::string::npos, writes)
+        << run.err;
+  }
+  EXPECT_THROW(ResultFile(folder, "stress.json", {}), io::InputError);
+  { const ResultFile other(folder, "theory.json", {}); }
+  const ResultFile again(folder, "theory.json", {});
+}
+
+TEST_F(Binary, ATableOfOtherOptionsIsRenamed) {
+  const auto stress = [&](const std::string& options) {
+    const Outcome run =
+        kbvh("stress --strategies bottom_up --families spikes --l 1 --scalars float --out out " + options);
+    EXPECT_EQ(run.code, 0) << run.err;
+    return run.err;
+  };
+  const auto scenes = [&](const std::string& name) {
+    return json::parse(text_of_file(folder_ / "out" / name)).at("options").at("scenes").get<int>();
+  };
+  stress("--scenes 3");
+  EXPECT_NE(stress("--scenes 2").find("it is now stress-2.json"), std::string::npos);
+  EXPECT_EQ(stress("--scenes 2").find("it is now"), std::string::npos) << "the same again";
+  EXPECT_EQ(scenes("stress.json"), 2);
+  EXPECT_EQ(scenes("stress-2.json"), 3);
+  stress("--scenes 1");
+  EXPECT_EQ(scenes("stress-3.json"), 2);
+  EXPECT_EQ(scenes("stress.json"), 1);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/.stress.json.lock"));
+}
+
+TEST_F(Binary, ATableSaysHowFarItHasCome) {
+  // Long before the first scene is done there is a table, of none.
+  const Outcome ended =
+      shell("'" KBVH_PROGRAM
+            "' stress --strategies bottom_up --families many_keyframes --scenes 1 --out out "
+            ">/dev/null 2>&1 & pid=$!; for i in $(seq 600); do if [ -e out/stress.json ]; then "
+            "break; fi; sleep 0.05; done; kill -9 $pid; wait $pid 2>/dev/null; true");
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  const json table = json::parse(text_of_file(folder_ / "out/stress.json"));
+  EXPECT_LE(table.at("played"), 1);
+  EXPECT_EQ(kbvh("stress --strategies bottom_up --families spikes --scenes 1 --l 1 --out out").code, 0)
+      << "the lock of a process that was killed binds nobody";
+}
+
+TEST_F(Binary, WhatKilledProcessesLeftIsRemoved) {
+  std::filesystem::create_directory(folder_ / "out");
+  const auto old = std::filesystem::file_time_type::clock::now() - std::chrono::hours(2);
+  const auto left = [&](const std::string& name, bool is_old) {
+    write_text(folder_ / "out" / name, "half");
+    if (is_old) std::filesystem::last_write_time(folder_ / "out" / name, old);
+  };
+  const std::string nobody = ".tmp-2147483647-0";  // above the largest process id
+  left("benchmark.json" + nobody, true);
+  left("targets.json" + nobody, false);
+  left("stress.json.tmp-" + std::to_string(getpid()) + "-0", true);
+  left("notes.tmp-mine", true);
+  EXPECT_EQ(kbvh("run " + one + "--out out").code, 0);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / ("out/benchmark.json" + nobody)));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / ("out/targets.json" + nobody)))
+      << "it may be of another machine";
+  EXPECT_TRUE(std::filesystem::exists(folder_ / ("out/stress.json.tmp-" + std::to_string(getpid()) + "-0")));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/notes.tmp-mine"));
+}
+
+TEST_F(Binary, ASceneUnderAnotherNameHasATableOfItsOwn) {
+  for (const std::string name : {"first", "second", "first"}) {
+    const Outcome run = kbvh("run " + one + "--name " + name + " --out out");
+    EXPECT_EQ(run.code, 0) << run.err;
+    EXPECT_NE(run.out.find(name + ","), std::string::npos) << run.out;
+  }
+  const auto list = records();
+  ASSERT_EQ(list.size(), 2u);
+  EXPECT_EQ(list[0].at("scene").at("name"), "first");
+  EXPECT_EQ(list[1].at("scene").at("name"), "second");
+  EXPECT_EQ(list[0].at("scene").at("hash"), list[1].at("scene").at("hash"));
 }
 
 TEST_F(Binary, FailuresOfAnotherStressRunStay) {

@@ -415,8 +415,11 @@ TEST(Results, KeysAreStableAndSeeWhatMatters) {
   EXPECT_EQ(usual, "10db3bc838d887e1");
   json scene = example_scene(), strategy = example_strategy();
   strategy["title"] = "another title";
-  scene["name"] = "another name";
   EXPECT_EQ(key(scene, strategy), usual);
+  // A table and a report are of scenes by name: what was measured under another one is not in them.
+  scene["name"] = "another name";
+  EXPECT_NE(key(scene, example_strategy()), usual);
+  scene = example_scene();
   scene["hash"] = "2";
   EXPECT_NE(key(scene, example_strategy()), usual);
   strategy["params"]["queue"] = "binary_heap";

@@ -62,6 +62,10 @@ TEST(Scripts, AreReadAndTriedOut) {
   EXPECT_EQ(frames.size(), 5u);
   EXPECT_TRUE(std::find(frames.begin(), frames.end(), 0.05) != frames.end());
   EXPECT_FALSE(has_own_frames(loaded));
+  const auto all = frames_of(scene, loaded, script, 3);
+  for (std::size_t most = 0; most <= all.size() + 1; ++most)
+    EXPECT_EQ(frames_of(scene, loaded, script, 3, most),
+              std::vector<double>(all.begin(), all.begin() + std::ptrdiff_t(std::min(most, all.size()))));
 
   const LoadedScene own = scene_with({{"frames", 10}, {"rate", 20}, {"steps", sound}});
   EXPECT_TRUE(has_own_frames(own));

@@ -349,11 +349,19 @@ TEST(Targets, TableShowsRowsAndScenes) {
       "  other             0.5       0.5 to 0.5   1  bottom_up_period [leaf=1]   2  bottom_up [leaf=1]\n");
 }
 
-TEST(Targets, TheFileIsReplaced) {
+TEST(Targets, RowsOfTheSamePlanAreReplacedAndOthersStay) {
   const TemporaryFolder folder;
-  write_targets(folder.path(), json::array({1, 2}));
-  write_targets(folder.path(), json::array({3}));
-  EXPECT_EQ(json::parse(text_of_file(folder / "targets.json")), json::array({3}));
+  const auto row = [](const char* plan, int number) { return json{{"plan", plan}, {"number", number}}; };
+  const auto written = [&] { return json::parse(text_of_file(folder / "targets.json")); };
+  write_targets(folder.path(), {row("a", 1), row("a", 2)});
+  write_targets(folder.path(), {row("b", 3)});
+  EXPECT_EQ(written(), json({row("a", 1), row("a", 2), row("b", 3)}));
+  write_targets(folder.path(), {row("a", 4)});
+  EXPECT_EQ(written(), json({row("b", 3), row("a", 4)}));
+  write_text(folder / "targets.json", "{");
+  write_targets(folder.path(), {row("a", 5)});
+  EXPECT_EQ(written(), json({row("a", 5)}));
+  EXPECT_EQ(text_of_file(folder / "targets.json.damaged"), "{");
 }
 
 }  // namespace

@@ -292,6 +292,11 @@ TEST(Scene, FrameTimesOverlayTheBodies) {
   EXPECT_EQ(frames.size(), (keyframes.size() - 1) * 10 + 1);
   EXPECT_TRUE(std::is_sorted(frames.begin(), frames.end()));
   EXPECT_THROW(frame_times(scene, 0), std::invalid_argument);
+  for (const std::size_t most :
+       {std::size_t(0), std::size_t(1), std::size_t(17), frames.size() - 1, frames.size()})
+    EXPECT_EQ(frame_times(scene, 10, most),
+              std::vector<double>(frames.begin(), frames.begin() + std::ptrdiff_t(most)));
+  EXPECT_EQ(frame_times(scene, 4000000000u, 2).size(), 2u) << "only so many are made";
 }
 
 TEST(Scene, HashSeesEveryNumber) {

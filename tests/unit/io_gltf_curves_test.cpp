@@ -107,6 +107,20 @@ TEST_F(IoGltfCurves, AStepIsAJump) {
   for (const double t : {1.0, 1.5, 2.0, before_3}) EXPECT_EQ(on_lines(mesh, 0, t)[2], 10) << t;
 }
 
+// A body that unfolds is not held against the point that it was at first.
+TEST_F(IoGltfCurves, TheToleranceIsOfTheLargestKey) {
+  const auto keyframes = [&](float first) {
+    const AnimatedMesh mesh = load_animated_mesh(
+        {moved("scale", "VEC3", "CUBICSPLINE", {0, 1, 2},
+               {0, 0, 0, first, first, first, 1, 1, 1, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 0, 2, 2, 2, 0, 0, 0}),
+         "", "", 0});
+    return mesh.keyframe_times.size();
+  };
+  EXPECT_GT(keyframes(1), 5u);
+  EXPECT_LT(keyframes(1), 40u);
+  for (const float first : {0.0f, 1e-9f, 1e-4f, 0.1f}) EXPECT_LT(keyframes(first), 50u) << first;
+}
+
 TEST_F(IoGltfCurves, StraightMotionNeedsNoMore) {
   const AnimatedMesh line = load_animated_mesh(
       {moved("translation", "VEC3", "LINEAR", {0, 1, 4}, {0, 0, 0, 5, 0, 0, 0, 7, 0}), "", "", 0});

@@ -118,6 +118,10 @@ TEST(IoJson, ErrorsNameThePlace) {
             "a.json: line 1, column 11: this is not JSON: the byte 0xE9 is not UTF-8");
   EXPECT_EQ(json_error("\xEF\xBB\xBF{}"), "");
   expect_words(json_error("[1e999]"), {"a.json", "too large for a double"});
+  EXPECT_EQ(json_error(std::string("1\0", 2)), "a.json: line 1, column 2: this is not JSON: a NUL byte");
+  EXPECT_EQ(json_error(std::string("{}\n\0, ]", 7)),
+            "a.json: line 2, column 1: this is not JSON: a NUL byte");
+  expect_words(json_error(std::string("[\"a\0\"]", 6)), {"a.json: line 1", "not JSON"});
   expect_words(json_error(utf16("{}", false)), {"a.json", "UTF-16"});
 }
 
@@ -128,14 +132,16 @@ TEST(IoJson, RandomTextsAreReadOrRefused) {
   for (int round = 0; round < 2000; ++round) {
     std::string text;
     for (unsigned i = 0, n = 1 + below(60); i < n; ++i) {
-      constexpr const char* parts[] = {"{",     "}",         "[", "]",  ",",  ":",
-                                       "\"a\"", "\"b\\\"\"", "1", "\"", "\\", "\n"};
-      text += parts[below(12)];
+      constexpr const char* parts[] = {"{",         "}", "[",  "]",  ",",  ":", "\"a\"",
+                                       "\"b\\\"\"", "1", "\"", "\\", "\n", "\0"};
+      const unsigned part = below(13);
+      text.append(parts[part], part == 12 ? 1 : std::string_view(parts[part]).size());
     }
     const std::string said = json_error(text);
     EXPECT_EQ(said.find('\n'), std::string::npos) << text;
     const bool says_twice = said.find("given twice") != std::string::npos;
-    EXPECT_EQ(said.empty() || says_twice, nlohmann::json::accept(text)) << text;
+    const bool is_json = nlohmann::json::accept(text) && text.find('\0') == std::string::npos;
+    EXPECT_EQ(said.empty() || says_twice, is_json) << text;
   }
 }
 
