@@ -1,4 +1,5 @@
-# Rooms: folders of core, each a library of its own that sees the headers of the rooms it declares and no others.
+# Rooms: folders of core and experiments, each a library of its own that sees the headers of the rooms it declares and
+# no others.
 
 # Instruction sets for which the kernels of a room are compiled, and chosen from at run time
 # (core/kernels/kernel_set.hpp). A kernel file defines its tables in the namespace kbvh::kernels::KBVH_KERNELS and
@@ -18,11 +19,12 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   set(kbvh_kernel_definitions KBVH_X86_KERNELS)
 endif()
 
-# kbvh_room(NAME SOURCES file... [KERNELS file...] [USES room...]): the folder that calls it is a room, the library
+# kbvh_room(NAME SOURCES file... [KERNELS file...] [USES room...] [NO_UNITY]): the folder that calls it is a room, the library
 # kbvh_NAME. Its headers are staged alone, under the path that #include spells, so that a file sees the rooms that its
 # own room uses, those that these use in turn, and nothing else of the tree. USES are all edges: there are no others.
+# NO_UNITY: its sources are always compiled one by one, for they use the same names for different things.
 function(kbvh_room name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;KERNELS;USES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "NO_UNITY" "" "SOURCES;KERNELS;USES")
   cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY ${PROJECT_SOURCE_DIR} OUTPUT_VARIABLE path)
   set(stage ${CMAKE_BINARY_DIR}/rooms/${name})
   cmake_path(GET path PARENT_PATH folder)
@@ -33,6 +35,13 @@ function(kbvh_room name)
   list(TRANSFORM uses PREPEND kbvh_)
   if(arg_SOURCES)
     add_library(kbvh_${name} STATIC ${arg_SOURCES})
+    if(KBVH_UNITY AND NOT arg_NO_UNITY)
+      set_target_properties(kbvh_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+    endif()
+    if(KBVH_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+      # Anonymous namespaces of sources are taken for those of headers.
+      target_compile_options(kbvh_${name} PRIVATE -Wno-subobject-linkage)
+    endif()
     set(visibility PUBLIC)
     target_link_libraries(kbvh_${name} PRIVATE $<BUILD_INTERFACE:kbvh_warnings>)
     target_compile_definitions(kbvh_${name} PRIVATE ${kbvh_kernel_definitions})

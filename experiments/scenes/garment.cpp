@@ -15,7 +15,7 @@ using cloth::Vec;
 /// Part of every cache key: to be raised by every change that can alter a bit of the result.
 constexpr int solver_version = 1;
 
-constexpr double margin = 0.004;        // between cloth and figure at the start
+constexpr double cloth_margin = 0.004;  // between cloth and figure at the start
 constexpr std::uint32_t fine_lead = 8;  // keyframes before the first that the second level is given to fold
 
 const char* name(GarmentKind kind) {
@@ -132,7 +132,8 @@ std::vector<io::AnimatedMesh> simulate_garment(const GarmentConfig& config, cons
   check(config);
   const GarmentShape shape = garment_shape(config.kind);
   WalkingFigure figure(config);
-  const GarmentPattern pattern = sew(shape, garment_counts(shape, config.triangles), figure.walker(), margin);
+  const GarmentPattern pattern =
+      sew(shape, garment_counts(shape, config.triangles), figure.walker(), cloth_margin);
   const Recorder recorder(config, figure.metres_per_second());
 
   std::vector<io::AnimatedMesh> bodies(2);
@@ -172,7 +173,7 @@ std::vector<io::AnimatedMesh> simulate_garment(const GarmentConfig& config, cons
     return bodies;
   }
   const GarmentPattern coarse =
-      sew(shape, garment_counts(shape, config.full_triangles), WalkingFigure(config).walker(), margin);
+      sew(shape, garment_counts(shape, config.full_triangles), WalkingFigure(config).walker(), cloth_margin);
   // Time of either level by its steps and vertices, for the progress only.
   const double coarse_work = double(coarse.rest.size()) * full_steps(config, coarse);
   const double fine_work = double(pattern.rest.size()) * 2 * config.fine_steps;

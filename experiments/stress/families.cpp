@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "core/geometry/predicates.hpp"
+#include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/stress/family_parts.hpp"
-#include "experiments/text.hpp"
 
 namespace kbvh::experiments::stress {
 

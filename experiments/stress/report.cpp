@@ -1,8 +1,8 @@
 #include <cstdio>
 
-#include "experiments/machine.hpp"
+#include "experiments/common/machine.hpp"
+#include "experiments/results/table.hpp"
 #include "experiments/stress/runner.hpp"
-#include "experiments/table.hpp"
 
 namespace kbvh::experiments::stress {
 

@@ -6,11 +6,11 @@
 #include <optional>
 
 #include "core/judge/verify.hpp"
+#include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/stress/isolate.hpp"
 #include "experiments/stress/shrink.hpp"
-#include "experiments/text.hpp"
 
 namespace kbvh::experiments::stress {
 

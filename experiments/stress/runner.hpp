@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "experiments/contestants.hpp"
 #include "experiments/stress/families.hpp"
+#include "experiments/study/contestants.hpp"
 
 namespace kbvh::experiments::stress {
 

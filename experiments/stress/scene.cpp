@@ -5,7 +5,7 @@
 
 #include "core/judge/range_watch.hpp"
 #include "core/judge/session.hpp"
-#include "experiments/json_reader.hpp"
+#include "experiments/common/json_reader.hpp"
 
 namespace kbvh::experiments::stress {
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "experiments/text.hpp"
+#include "experiments/common/text.hpp"
 
 namespace kbvh::theory {
 

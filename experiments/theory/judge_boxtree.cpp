@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "experiments/text.hpp"
+#include "experiments/common/text.hpp"
 #include "experiments/theory/judge.hpp"
 
 namespace kbvh::theory {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "experiments/text.hpp"
+#include "experiments/common/text.hpp"
 #include "experiments/theory/fit.hpp"
 #include "experiments/theory/judge.hpp"
 

@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "experiments/text.hpp"
+#include "experiments/common/text.hpp"
 #include "experiments/theory/fit.hpp"
 #include "experiments/theory/judge.hpp"
 

@@ -3,10 +3,10 @@
 #include <fstream>
 #include <optional>
 
+#include "experiments/common/machine.hpp"
+#include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh.hpp"
-#include "experiments/machine.hpp"
-#include "experiments/results.hpp"
-#include "experiments/text.hpp"
+#include "experiments/results/results.hpp"
 #include "experiments/theory/judge.hpp"
 #include "experiments/theory/measure_boxtree.hpp"
 #include "experiments/theory/measure_counts.hpp"

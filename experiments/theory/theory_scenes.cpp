@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "experiments/environment.hpp"
+#include "experiments/common/environment.hpp"
 #include "experiments/io/load.hpp"
-#include "experiments/scene_spec.hpp"
+#include "experiments/scenes/scene_spec.hpp"
 #include "experiments/scenes/shapes.hpp"
 
 namespace kbvh::theory {

@@ -5,7 +5,7 @@
 
 #include "core/judge/session.hpp"
 #include "core/scene/scene.hpp"
-#include "experiments/builtin_scenes.hpp"
+#include "experiments/scenes/builtin_scenes.hpp"
 
 namespace kbvh::theory {
 

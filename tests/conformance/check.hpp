@@ -1,16 +1,16 @@
 #pragma once
+#include <list>
+
 #include "core/judge/verify.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
 
-/// Runs one contestant over one scene and returns the first violation, or an empty text. "skipped: ..." says
-/// that the contestant does not take part (scalar, capability, size) and why.
+/// Why the contestant does not take part in a scene (scalar, capability, size): "skipped: ..."; or an empty
+/// text.
 template <class S>
-std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uint32_t frames_per_keyframe,
-                  const std::map<std::string, std::string>& params, const BuilderConfig& builder,
-                  const VerifyOptions& options = {}) {
+std::string skipped(const StrategyEntry& entry, const TestScene<S>& test) {
   if (entry.factory<S>() == nullptr) return "skipped: no such scalar";
   if (test.script.changes_plans() && !entry.info.can.plan_changes) return "skipped: plans cannot change";
   if (test.script.changes_geometry() && !entry.info.can.geometry_changes)
@@ -25,11 +25,40 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
   if (entry.info.topology.own && !entry.info.own_scalar.empty())
     for (const auto& body : test.scene.bodies)
       if (body.primitives.kind != PrimitiveKind::polygons) return "skipped: a peer that knows polygons only";
+  return {};
+}
+
+/// The truth of a scene, found once for all contestants that play it one after the other.
+template <class S>
+Oracle<S>& shared_oracle(const TestScene<S>& test) {
+  struct Known {
+    explicit Known(const TestScene<S>& of)
+        : scene(of.scene), oracle(scene, {}, of.script.steps.empty() ? 0 : hash(of.script)) {}
+    Scene<S> scene;
+    Oracle<S> oracle;
+  };
+  constexpr std::size_t most = 8;  // pairs of thousands of frames take memory
+  static std::list<std::pair<std::uint64_t, Known>> known;
+  const std::uint64_t key = hash(test.scene);
+  for (auto& [scene, truth] : known)
+    if (scene == key && truth.oracle.script() == (test.script.steps.empty() ? 0 : hash(test.script)))
+      return truth.oracle;
+  if (known.size() == most) known.pop_front();
+  return known.emplace_back(std::piecewise_construct, std::forward_as_tuple(key), std::forward_as_tuple(test))
+      .second.oracle;
+}
+
+/// Runs one contestant over one scene and returns the first violation, or an empty text, or why it does not
+/// take part (`skipped`).
+template <class S>
+std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uint32_t frames_per_keyframe,
+                  const std::map<std::string, std::string>& params, const BuilderConfig& builder,
+                  const VerifyOptions& options = {}) {
+  if (const std::string why = skipped(entry, test); !why.empty()) return why;
   const std::vector<double> frames =
       test.frames.empty() ? frame_times(test.scene, frames_per_keyframe) : test.frames;
   Session<S> session(test.scene, {&entry, params, builder}, CountingPolicy::counting);
-  Oracle<S> oracle(test.scene);
-  const Verification result = verify(session, std::span<const double>(frames), oracle,
+  const Verification result = verify(session, std::span<const double>(frames), shared_oracle(test),
                                      test.script.steps.empty() ? nullptr : &test.script, options);
   if (!result.holds()) return result.first_violation;
   if (result.audited && entry.info.guarantee != Guarantee::approximate && result.audit.protrusion != 0)

@@ -8,9 +8,9 @@
 
 #include "core/continuous/contacts.hpp"
 #include "core/judge/session.hpp"
-#include "experiments/environment.hpp"
-#include "experiments/impact_queries.hpp"
+#include "experiments/common/environment.hpp"
 #include "experiments/io/animated_mesh.hpp"
+#include "experiments/study/impact_queries.hpp"
 
 namespace kbvh::experiments {
 namespace {

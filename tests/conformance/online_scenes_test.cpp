@@ -12,8 +12,8 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "experiments/reversal.hpp"
-#include "experiments/scene_spec.hpp"
+#include "experiments/scenes/reversal.hpp"
+#include "experiments/scenes/scene_spec.hpp"
 #include "tests/conformance/check.hpp"
 
 namespace kbvh::test {

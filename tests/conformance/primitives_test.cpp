@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "experiments/scene_spec.hpp"
 #include "experiments/scenes/nurbs.hpp"
+#include "experiments/scenes/scene_spec.hpp"
 #include "tests/conformance/check.hpp"
 
 namespace kbvh::test {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "experiments/scene_spec.hpp"
+#include "experiments/scenes/scene_spec.hpp"
 
 namespace kbvh::test {
 

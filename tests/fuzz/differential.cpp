@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "core/judge/verify.hpp"
-#include "experiments/contestants.hpp"
+#include "experiments/study/contestants.hpp"
 #include "tests/fuzz/input_file.hpp"
 
 namespace kbvh::fuzz {

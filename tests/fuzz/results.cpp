@@ -1,4 +1,4 @@
-#include "experiments/results.hpp"
+#include "experiments/results/results.hpp"
 
 #include "tests/fuzz/input_file.hpp"
 

@@ -1,6 +1,6 @@
+#include "experiments/common/json_reader.hpp"
 #include "experiments/io/bytes.hpp"
-#include "experiments/json_reader.hpp"
-#include "experiments/scene_spec.hpp"
+#include "experiments/scenes/scene_spec.hpp"
 #include "tests/fuzz/input_file.hpp"
 
 // A script of plan changes: read, tried out on a small scene, and held against the admissible range until its

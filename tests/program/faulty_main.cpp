@@ -4,7 +4,7 @@
 #include <new>
 
 #include "core/contract/registry.hpp"
-#include "experiments/program.hpp"
+#include "experiments/cli/program.hpp"
 
 namespace kbvh {
 namespace {

@@ -1,9 +1,9 @@
 // What a user gives a name, and what was meant by a word that names nothing.
 #include "binary.hpp"
+#include "experiments/common/json_reader.hpp"
+#include "experiments/common/names.hpp"
 #include "experiments/io/animated_mesh.hpp"
-#include "experiments/json_reader.hpp"
-#include "experiments/names.hpp"
-#include "experiments/plan.hpp"
+#include "experiments/study/plan.hpp"
 
 namespace kbvh::experiments {
 namespace {

@@ -6,13 +6,13 @@
 #include <functional>
 #include <set>
 
-#include "experiments/contact_measurement.hpp"
+#include "experiments/common/json_reader.hpp"
 #include "experiments/io/obj.hpp"
 #include "experiments/io/pc2.hpp"
-#include "experiments/json_reader.hpp"
-#include "experiments/plan.hpp"
-#include "experiments/record.hpp"
+#include "experiments/results/record.hpp"
 #include "experiments/scenes/shapes.hpp"
+#include "experiments/study/contact_measurement.hpp"
+#include "experiments/study/plan.hpp"
 #include "temporary_folder.hpp"
 
 namespace kbvh::experiments {

@@ -10,12 +10,12 @@
 #include <set>
 
 #include "binary.hpp"
-#include "experiments/bench_harness.hpp"
 #include "experiments/io/animated_mesh.hpp"
-#include "experiments/record.hpp"
-#include "experiments/result_file.hpp"
-#include "experiments/results.hpp"
-#include "experiments/table.hpp"
+#include "experiments/results/record.hpp"
+#include "experiments/results/result_file.hpp"
+#include "experiments/results/results.hpp"
+#include "experiments/results/table.hpp"
+#include "experiments/run/bench_harness.hpp"
 
 namespace kbvh::experiments {
 namespace {

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "binary.hpp"
-#include "experiments/program.hpp"
+#include "experiments/cli/program.hpp"
 
 namespace kbvh::experiments {
 namespace {

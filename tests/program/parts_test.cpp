@@ -6,15 +6,15 @@
 #include <limits>
 #include <tuple>
 
-#include "experiments/contestants.hpp"
-#include "experiments/json_reader.hpp"
-#include "experiments/measure.hpp"
-#include "experiments/plan.hpp"
-#include "experiments/record.hpp"
-#include "experiments/results.hpp"
-#include "experiments/scene_spec.hpp"
-#include "experiments/table.hpp"
-#include "experiments/text.hpp"
+#include "experiments/common/json_reader.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/results/record.hpp"
+#include "experiments/results/results.hpp"
+#include "experiments/results/table.hpp"
+#include "experiments/scenes/scene_spec.hpp"
+#include "experiments/study/contestants.hpp"
+#include "experiments/study/measure.hpp"
+#include "experiments/study/plan.hpp"
 #include "temporary_folder.hpp"
 
 namespace kbvh::experiments {

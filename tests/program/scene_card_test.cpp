@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/topology/builders.hpp"
-#include "experiments/scene_card.hpp"
+#include "experiments/scenes/scene_card.hpp"
 #include "experiments/scenes/shapes.hpp"
 
 namespace kbvh::experiments {

@@ -3,13 +3,13 @@
 
 #include <functional>
 
-#include "experiments/json_reader.hpp"
-#include "experiments/measure.hpp"
-#include "experiments/plan.hpp"
-#include "experiments/record.hpp"
-#include "experiments/scene_spec.hpp"
-#include "experiments/scripted.hpp"
-#include "experiments/table.hpp"
+#include "experiments/common/json_reader.hpp"
+#include "experiments/results/record.hpp"
+#include "experiments/results/table.hpp"
+#include "experiments/scenes/scene_spec.hpp"
+#include "experiments/scenes/scripted.hpp"
+#include "experiments/study/measure.hpp"
+#include "experiments/study/plan.hpp"
 #include "temporary_folder.hpp"
 
 namespace kbvh::experiments {

@@ -5,10 +5,11 @@
 
 #include <functional>
 
-#include "experiments/contestants.hpp"
-#include "experiments/json_reader.hpp"
-#include "experiments/plan.hpp"
-#include "experiments/targets.hpp"
+#include "experiments/common/json_reader.hpp"
+#include "experiments/results/target_rows.hpp"
+#include "experiments/study/contestants.hpp"
+#include "experiments/study/plan.hpp"
+#include "experiments/study/targets.hpp"
 #include "temporary_folder.hpp"
 
 namespace kbvh::experiments {

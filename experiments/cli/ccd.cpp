@@ -1,0 +1,213 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "core/contract/registry.hpp"
+#include "experiments/cli/commands.hpp"
+#include "experiments/cli/options.hpp"
+#include "experiments/cli/program.hpp"
+#include "experiments/common/environment.hpp"
+#include "experiments/common/machine.hpp"
+#include "experiments/common/output.hpp"
+#include "experiments/common/progress.hpp"
+#include "experiments/common/stopwatch.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/io/bytes.hpp"
+#include "experiments/results/result_file.hpp"
+#include "experiments/results/table.hpp"
+#include "experiments/study/impact_queries.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr const char* ccd_examples = R"(Examples:
+  kbvh ccd
+  kbvh ccd queries/unit-tests frames/cloth-ball --out results/ccd
+Decides queries of continuous collision detection (a vertex and a face, or two edges, in linear motion) exactly, and
+compares with the verdicts that come with them: files of 8 rows a query in exact rationals, folders of such files, and
+pairs of frames with lists of pairs, as in the NYU CCD benchmark (Wang et al. 2021). Beside it, where they are built
+in, the peers' own continuous tests of the same two features, which answer in floating point. DIR/ccd.json has the table;
+with the folder of a study for DIR, that study's report has it, too.
+Exit codes: 0 all verdicts are right, 1 one is wrong, 2 wrong use or input, 3 anything else.)";
+
+/// What one test said of the queries of one file, and how fast.
+struct Row {
+  std::uint64_t positives = 0, missed = 0, extra = 0, filtered = 0;
+  double seconds = 0;
+  std::uint64_t passes = 0;
+  double per_second(std::size_t queries) const {
+    return seconds > 0 ? double(queries) * double(passes) / seconds : 0;
+  }
+};
+
+struct Peer {
+  std::string id;
+  bool (*touches)(Contact::Kind, const MovingPoints&);
+};
+
+std::vector<Peer> peers() {
+  std::vector<Peer> found;
+  for (const StrategyEntry& entry : registry())
+    if (entry.info.own_impact != nullptr) found.push_back({entry.info.id, entry.info.own_impact});
+  return found;
+}
+
+/// Decides all queries once and compares with the truth; `test` says whether one touches.
+template <class Test>
+void judge(const ImpactQueries& queries, Row& row, const Test& test) {
+  for (const ImpactQuery& query : queries.queries) {
+    const bool touches = test(query.kind, query.moving());
+    row.positives += touches ? 1 : 0;
+    if (!query.truth) continue;
+    if (*query.truth && !touches) ++row.missed;
+    if (!*query.truth && touches) ++row.extra;
+  }
+}
+
+/// Decides all queries again and again, until that has taken `seconds`. Doubles the passes between two looks
+/// at the clock, because a look costs more than a query.
+template <class Test>
+void time_passes(const ImpactQueries& queries, Row& row, double seconds, const Test& test) {
+  std::vector<std::uint8_t> said(queries.queries.size());
+  if (said.empty()) return;
+  double here = 0;
+  for (std::uint64_t passes = 1; passes == 1 || here < seconds; passes *= 2) {
+    const auto begin = std::chrono::steady_clock::now();
+    for (std::uint64_t k = 0; k < passes; ++k)
+      for (std::size_t i = 0; i < said.size(); ++i)
+        said[i] = test(queries.queries[i].kind, queries.queries[i].moving()) ? 1 : 0;
+    here += seconds_since(begin);
+    row.passes += passes;
+  }
+  row.seconds += here;
+}
+
+/// The exact test and the peers, by turns, each for `seconds` in all.
+std::vector<Row> measure(const ImpactQueries& queries, const std::vector<Peer>& others, double seconds) {
+  std::vector<Row> rows(1 + others.size());
+  ImpactStats stats, ignored;
+  const auto exact = [](ImpactStats& counts) {
+    return [&counts](Contact::Kind kind, const MovingPoints& points) {
+      return find_impact(kind, points, &counts).touches;
+    };
+  };
+  judge(queries, rows[0], exact(stats));
+  rows[0].filtered = stats.filtered;
+  for (std::size_t i = 0; i < others.size(); ++i) judge(queries, rows[1 + i], others[i].touches);
+  const int turns = seconds > 0 ? 4 : 1;
+  for (int turn = 0; turn < turns; ++turn) {
+    time_passes(queries, rows[0], seconds / turns, exact(ignored));
+    for (std::size_t i = 0; i < others.size(); ++i)
+      time_passes(queries, rows[1 + i], seconds / turns, others[i].touches);
+  }
+  return rows;
+}
+
+json record_of(const Row& row, std::size_t queries) {
+  return {{"positives", row.positives},
+          {"missed", row.missed},
+          {"extra", row.extra},
+          {"passes", row.passes},
+          {"queries_per_second", row.per_second(queries)}};
+}
+
+struct Arguments {
+  std::vector<std::string> paths;
+  std::string out;
+  double seconds = 0.05;
+};
+
+int run(const Arguments& arguments) {
+  std::vector<ImpactQueries> files;
+  std::vector<std::string> paths = arguments.paths;
+  if (paths.empty()) paths.push_back((data_folder() / "ccd").string());
+  for (const std::string& path : paths)
+    for (ImpactQueries& queries : find_impact_queries(path)) files.push_back(std::move(queries));
+  if (files.empty()) throw io::InputError("no queries of continuous collision detection in " + joined(paths));
+  const json options{{"paths", paths}, {"seconds", arguments.seconds}};
+  std::optional<ResultFile> result;
+  if (!arguments.out.empty()) result.emplace(arguments.out, "ccd.json", options);
+  const std::vector<Peer> others = peers();
+  std::vector<std::vector<std::string>> table{
+      {"queries of", "queries", "touch", "missed", "extra", "filtered", "per second"}};
+  for (const Peer& peer : others)
+    for (const char* column : {" missed", " extra", " per second"}) table[0].push_back(peer.id + column);
+  json records = json::array();
+  std::uint64_t queries = 0, wrong = 0, unknown = 0;
+  Progress progress;
+  std::vector<Row> totals(1 + others.size());
+  const auto add_line = [&](const std::string& name, std::size_t count, const std::vector<Row>& rows) {
+    std::vector<std::string> line{
+        name,
+        std::to_string(count),
+        std::to_string(rows[0].positives),
+        std::to_string(rows[0].missed),
+        std::to_string(rows[0].extra),
+        fmt::format("{:.1f} %", count == 0 ? 0 : 100.0 * double(rows[0].filtered) / double(count)),
+        fmt::format("{:.3g}", rows[0].per_second(count))};
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+      line.push_back(std::to_string(rows[i].missed));
+      line.push_back(std::to_string(rows[i].extra));
+      line.push_back(fmt::format("{:.3g}", rows[i].per_second(count)));
+    }
+    table.push_back(std::move(line));
+  };
+  for (const ImpactQueries& file : files) {
+    progress.show(file.name);
+    const std::vector<Row> rows = measure(file, others, arguments.seconds);
+    add_line(file.name, file.queries.size(), rows);
+    json record = record_of(rows[0], file.queries.size());
+    record["name"] = file.name;
+    record["queries"] = file.queries.size();
+    record["filtered"] = rows[0].filtered;
+    for (std::size_t i = 0; i < others.size(); ++i)
+      record["peers"][others[i].id] = record_of(rows[1 + i], file.queries.size());
+    records.push_back(std::move(record));
+    queries += file.queries.size();
+    wrong += rows[0].missed + rows[0].extra;
+    for (const ImpactQuery& query : file.queries) unknown += query.truth ? 0 : 1;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      totals[i].positives += rows[i].positives;
+      totals[i].missed += rows[i].missed;
+      totals[i].extra += rows[i].extra;
+      totals[i].filtered += rows[i].filtered;
+      // Seconds for one pass over everything.
+      if (rows[i].passes > 0) totals[i].seconds += rows[i].seconds / double(rows[i].passes);
+      totals[i].passes = 1;
+    }
+  }
+  progress.clear();
+  add_line("all", queries, totals);
+  print(columns(table));
+  if (others.empty()) print("No peer with a continuous test of its own is built in (FCL 0.7 has one).\n");
+  if (unknown > 0) print(counted(unknown, "query") + " without a verdict to compare with.\n");
+  if (result)
+    result->write({{"commit", commit()},
+                   {"dirty", dirty()},
+                   {"machine", machine()},
+                   {"options", options},
+                   {"files", records}});
+  if (wrong == 0) return success;
+  say(counted(wrong, "verdict") + " that should have been the other");
+  return guarantee_broken;
+}
+
+}  // namespace
+
+void add_ccd(CLI::App& program, Action& action) {
+  CLI::App* command = program.add_subcommand("ccd", "decide queries of continuous collision detection");
+  command->footer(ccd_examples);
+  auto a = std::make_shared<Arguments>();
+  add_texts(*command, "paths", a->paths, "files, folders, frame pairs (the data folder's ccd)");
+  add_number(*command, "--seconds", a->seconds, 0, 3600, "of each test on each file, at least (0.05)");
+  add_text(*command, "--out", a->out, "folder for ccd.json (none: the table only)");
+  command->callback([&action, a] { action = [a] { return run(*a); }; });
+}
+
+}  // namespace kbvh::experiments

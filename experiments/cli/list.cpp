@@ -1,0 +1,146 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "experiments/cli/commands.hpp"
+#include "experiments/cli/program.hpp"
+#include "experiments/common/output.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/results/record.hpp"
+#include "experiments/results/table.hpp"
+#include "experiments/scenes/shape_bodies.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr const char* list_examples = R"(Examples:
+  kbvh list
+  kbvh list --json | python3 -c 'import json,sys; print([s["id"] for s in json.load(sys.stdin)["strategies"]])')";
+
+std::vector<std::string> scalars_of(const Info& info) {
+  std::vector<std::string> scalars;
+  if (info.has_float) scalars.push_back("float");
+  if (info.has_double) scalars.push_back("double");
+  return scalars;
+}
+
+std::vector<std::string> capabilities_of(const Info& info) {
+  const std::pair<bool, const char*> all[] = {{info.can.event_driven, "event_driven"},
+                                              {info.can.continuous, "continuous"},
+                                              {info.can.restructures, "restructures"},
+                                              {info.can.plan_changes, "plan_changes"},
+                                              {info.can.geometry_changes, "geometry_changes"},
+                                              {info.can.spans, "spans"},
+                                              {info.can.self_pairs, "self_pairs"},
+                                              {info.can.time_budget, "time_budget"},
+                                              {info.can.contacts, "contacts"}};
+  std::vector<std::string> words;
+  for (const auto& [can, word] : all)
+    if (can) words.push_back(word);
+  return words;
+}
+
+json strategy_json(const Info& info) {
+  json parameters = json::array();
+  for (const Parameter& parameter : info.parameters) {
+    json one{{"name", parameter.name}, {"default", parameter.default_value}, {"meaning", parameter.meaning}};
+    if (parameter.allowed.empty())
+      one["minimum"] = parameter.minimum;
+    else
+      one["allowed"] = parameter.allowed;
+    parameters.push_back(std::move(one));
+  }
+  json topology;
+  if (!info.topology.own)
+    topology = {{"widths", info.topology.widths},
+                {"min_leaf_size", info.topology.min_leaf_size},
+                {"max_leaf_size", info.topology.max_leaf_size},
+                {"preferred",
+                 {{"method", name(info.topology.preferred.method)},
+                  {"width", info.topology.preferred.width},
+                  {"leaf_size", info.topology.preferred.leaf_size}}}};
+  return {{"id", info.id},
+          {"title", info.title},
+          {"family", info.family},
+          {"citation", info.citation},
+          {"foresight", word(info.foresight)},
+          {"tightness", word(info.tightness)},
+          {"guarantee", word(info.guarantee)},
+          {"positions", info.positions == PositionUse::all       ? "all"
+                        : info.positions == PositionUse::fetched ? "fetched"
+                                                                 : "varying"},
+          {"scalars", scalars_of(info)},
+          {"own_scalar", info.own_scalar},
+          {"capabilities", capabilities_of(info)},
+          {"parameters", parameters},
+          {"topology", topology},
+          {"max_primitive_pairs", info.max_primitive_pairs}};
+}
+
+void print_json() {
+  json strategies = json::array(), scenes = json::array(), shapes = json::array();
+  for (const StrategyEntry& entry : registry()) strategies.push_back(strategy_json(entry.info));
+  for (const BuiltinScene& scene : builtin_scenes())
+    scenes.push_back({{"name", scene.name}, {"meaning", scene.meaning}});
+  for (const ShapeKind& shape : shape_kinds())
+    shapes.push_back({{"name", shape.name}, {"meaning", shape.meaning}});
+  const json all{{"strategies", strategies}, {"scenes", scenes}, {"shapes", shapes}};
+  print(all.dump(2) + "\n");
+}
+
+void print_strategy(const Info& info) {
+  std::string text = fmt::format("{}: {} ({})\n", info.id, info.title, info.citation);
+  text +=
+      fmt::format("    family {}, foresight {}, {}, guarantee {}, {}{}\n", info.family, word(info.foresight),
+                  info.tightness == Tightness::none ? "bounds of no declared tightness"
+                                                    : std::string(word(info.tightness)) + " bounds",
+                  word(info.guarantee), joined(scalars_of(info), " and "),
+                  info.own_scalar.empty() ? "" : ", keeps bounds in " + info.own_scalar);
+  if (info.topology.own)
+    text += "    builds its own hierarchy\n";
+  else
+    text += fmt::format("    at its best: {}, width {}, {} primitives per leaf\n",
+                        name(info.topology.preferred.method), info.topology.preferred.width,
+                        info.topology.preferred.leaf_size);
+  if (const auto words = capabilities_of(info); !words.empty()) text += "    can: " + joined(words) + "\n";
+  if (info.max_primitive_pairs > 0)
+    text += fmt::format("    only up to {} primitive pairs of two bodies\n", info.max_primitive_pairs);
+  for (const Parameter& parameter : info.parameters) {
+    const std::string allowed = parameter.allowed.empty() ? fmt::format("number >= {:g}", parameter.minimum)
+                                                          : joined(parameter.allowed, " | ");
+    text += fmt::format("    {}={} ({}): {}\n", parameter.name, parameter.default_value, allowed,
+                        parameter.meaning);
+  }
+  print(text);
+}
+
+void print_text() {
+  print("Strategies\n");
+  for (const StrategyEntry& entry : registry()) print_strategy(entry.info);
+  print("\nBuilt-in scenes (--scene)\n");
+  for (const BuiltinScene& scene : builtin_scenes())
+    print(fmt::format("{:<17} {}\n", scene.name, scene.meaning));
+  print(
+      "\nShapes (--body shape:key=value,...); those at rest also take keyframes, rate, and step or turns\n");
+  for (const ShapeKind& shape : shape_kinds()) print(fmt::format("{:<17} {}\n", shape.name, shape.meaning));
+}
+
+}  // namespace
+
+void add_list(CLI::App& program, Action& action) {
+  CLI::App* command = program.add_subcommand("list", "strategies, built-in scenes and shapes");
+  command->footer(list_examples);
+  auto as_json = std::make_shared<bool>(false);
+  command->add_flag("--json", *as_json, "everything, for programs");
+  command->callback([&action, as_json] {
+    action = [as_json] {
+      *as_json ? print_json() : print_text();
+      return int(success);
+    };
+  });
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,148 @@
+#include "experiments/cli/program.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/params.hpp"
+#include "experiments/cli/commands.hpp"
+#include "experiments/common/machine.hpp"
+#include "experiments/common/output.hpp"
+#include "experiments/common/progress.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/io/animated_mesh.hpp"
+#include "experiments/io/bytes.hpp"
+
+namespace kbvh::experiments {
+
+namespace {
+
+/// Makes one line of a message, without characters that a terminal obeys. Where a value or a path makes it
+/// long, its middle is left out: both ends say what is wrong.
+std::string one_line(std::string text) {
+  constexpr std::size_t longest = 290, tail = 90;
+  for (char& c : text)
+    if (const auto byte = static_cast<unsigned char>(c); byte < 32 || byte == 127) c = c == '\n' ? ' ' : '?';
+  text.erase(text.find_last_not_of(' ') + 1);
+  if (text.size() <= longest) return text;
+  // Not within a character of several bytes.
+  const auto continues = [&](std::size_t at) { return (text[at] & 0xc0) == 0x80; };
+  std::size_t head = longest - tail - 5, rest = text.size() - tail;
+  while (head > 0 && continues(head)) --head;
+  while (rest < text.size() && continues(rest)) ++rest;
+  return text.substr(0, head) + " ... " + text.substr(rest);
+}
+
+std::string version() {
+  return "kbvh, commit " + commit() + (dirty() ? " with changes" : "");
+}
+
+/// The options of a command, as they are written.
+std::vector<std::string> options_of(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  return names;
+}
+
+/// What to say of words that no option takes.
+std::string unexpected(const CLI::App& program) {
+  const auto called = program.get_subcommands();
+  const CLI::App& command = called.empty() ? program : *called.front();
+  const std::string name = called.empty() ? "kbvh" : "kbvh " + command.get_name();
+  const std::vector<std::string> extras = program.remaining(true);
+  for (const std::string& word : extras) {
+    if (!word.starts_with("-")) continue;
+    const std::string option = word.substr(0, word.find('='));
+    const std::vector<std::string> known = options_of(command);
+    if (std::find(known.begin(), known.end(), option) != known.end())
+      return option + " belongs behind the command, as in " + name + " " + option;
+    return name + " has no option " + io::printable(option) + suggestion(option, known) + " (try " + name +
+           " --help)";
+  }
+  return name + " cannot use the word " + io::printable(extras.empty() ? "" : extras.front()) + " (try " +
+         name + " --help)";
+}
+
+/// CLI11 takes the word after "--out=" for the missing value.
+std::optional<std::string> option_without_value(int argc, const char* const* argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word.starts_with("--") && word.ends_with('=') && word.find('=') + 1 == word.size())
+      return std::string(word.substr(0, word.size() - 1));
+  }
+  return {};
+}
+
+/// The exit code, after a complaint if not everything that was printed has arrived.
+int finished(int code) {
+  const std::string why = output_failure();
+  if (why.empty()) return code;
+  say("standard output cannot be written: " + why);
+  return code == success ? internal_error : code;
+}
+
+int wrong(const std::string& what) {
+  say(one_line(what));
+  return finished(wrong_use);
+}
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv) {
+  prepare_output();
+  Action action;
+  CLI::App program("kbvh compares ways to keep bounding volume hierarchies valid while meshes deform.",
+                   "kbvh");
+  program.set_version_flag("--version", version());
+  program.footer(
+      "Example:\n  kbvh run --scene tablecloth --triangles 2000 --out results && kbvh report --out results\n"
+      "Each command has its own --help.");
+  program.require_subcommand(1);
+  add_list(program, action);
+  add_run(program, action);
+  add_bench(program, action);
+  add_report(program, action);
+  add_scene(program, action);
+  add_theory(program, action);
+  add_stress(program, action);
+  add_ccd(program, action);
+  // CLI11 would only say that a command is missing.
+  std::vector<std::string> commands;
+  for (const CLI::App* command : program.get_subcommands({})) commands.push_back(command->get_name());
+  if (argc > 1 && argv[1][0] != '-' && std::find(commands.begin(), commands.end(), argv[1]) == commands.end())
+    return wrong("there is no command " + io::printable(argv[1]) + "; known are " + joined(commands) +
+                 suggestion(argv[1], commands) + " (try --help)");
+  if (const auto option = option_without_value(argc, argv))
+    return wrong(*option + ": is empty, but needs a value (try --help)");
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ExtrasError&) {
+    return wrong(unexpected(program));
+  } catch (const CLI::ParseError& problem) {
+    if (problem.get_exit_code() != 0) return wrong(std::string(problem.what()) + " (try --help)");
+    // Help and version arrive here as well, and print themselves.
+    std::ostringstream text;
+    program.exit(problem, text, text);
+    print(text.str());
+    return finished(success);
+  }
+  try {
+    return finished(action());
+  } catch (const io::InputError& problem) {
+    return wrong(problem.what());
+  } catch (const ConfigError& problem) {
+    return wrong(problem.what());
+  } catch (const std::bad_alloc&) {
+    say("out of memory: what was asked for does not fit into this machine, or into a limit (ulimit -v)");
+    return internal_error;
+  } catch (const std::exception& problem) {
+    say(std::string("internal error: ") + one_line(problem.what()));
+    return internal_error;
+  }
+}
+
+}  // namespace kbvh::experiments

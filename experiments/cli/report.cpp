@@ -1,0 +1,88 @@
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <system_error>
+
+#include "experiments/cli/commands.hpp"
+#include "experiments/cli/options.hpp"
+#include "experiments/cli/program.hpp"
+#include "experiments/common/environment.hpp"
+#include "experiments/common/output.hpp"
+#include "experiments/common/progress.hpp"
+#include "experiments/io/animated_mesh.hpp"
+
+extern char** environ;
+
+namespace kbvh::experiments {
+
+namespace {
+
+constexpr const char* report_examples = R"(Example:
+  kbvh report --out results
+writes results/report.html, self-contained, its figures and results/claims.json, from results/results.jsonl and what lies
+beside it: targets.json (bench), theory.json, stress.json, ccd.json. Commands that make those take the same --out.)";
+
+int report(const std::string& out, const std::string& title) {
+  const std::filesystem::path results = std::filesystem::path(out) / "results.jsonl";
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(results, error))
+    throw io::InputError("there is no " + results.string() + " (`kbvh run --out " + out + "` makes it)");
+  std::vector<std::string> words{python(), (analysis_folder() / "report.py").string(), out};
+  if (!title.empty()) words.insert(words.end(), {"--title", title});
+  const int code = run_and_wait(words);
+  if (code == 0) return success;
+  say("the report was not made: " + words[1] + " ended with " + std::to_string(code));
+  return code == wrong_use ? wrong_use : internal_error;
+}
+
+/// Prints what is read, until its end.
+void pass_on(int descriptor) {
+  char bytes[4096];
+  for (;;) {
+    const ssize_t n = ::read(descriptor, bytes, sizeof bytes);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return;
+    print({bytes, std::size_t(n)});
+  }
+}
+
+}  // namespace
+
+int run_and_wait(std::vector<std::string> words) {
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  // What the program prints comes through here, so that a full disk is told of in one way.
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), "pipe");
+  posix_spawn_file_actions_t actions;
+  ::posix_spawn_file_actions_init(&actions);
+  ::posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+  pid_t child = 0;
+  const int error = ::posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+  ::posix_spawn_file_actions_destroy(&actions);
+  ::close(ends[1]);
+  if (error == 0) pass_on(ends[0]);
+  ::close(ends[0]);
+  if (error != 0) throw io::InputError("cannot start " + words[0] + ": " + std::strerror(error));
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0)
+    if (errno != EINTR) throw std::system_error(errno, std::generic_category(), "waitpid");
+  return WIFEXITED(status) ? WEXITSTATUS(status) : internal_error;
+}
+
+void add_report(CLI::App& program, Action& action) {
+  CLI::App* command = program.add_subcommand("report", "tables and figures of a result folder");
+  command->footer(report_examples);
+  auto out = std::make_shared<std::string>(), title = std::make_shared<std::string>();
+  add_text(*command, "--out", *out, "folder with results.jsonl")->required();
+  add_text(*command, "--title", *title, "of the report");
+  command->callback([&action, out, title] { action = [out, title] { return report(*out, *title); }; });
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,232 @@
+#include <algorithm>
+#include <filesystem>
+
+#include "experiments/cli/commands.hpp"
+#include "experiments/cli/options.hpp"
+#include "experiments/cli/program.hpp"
+#include "experiments/common/json_reader.hpp"
+#include "experiments/common/output.hpp"
+#include "experiments/common/progress.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/io/bytes.hpp"
+#include "experiments/study/plan.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr const char* run_examples = R"(Examples:
+  kbvh run --scene tablecloth --triangles 2000 --l 10
+  kbvh run --body cloth.obj,motion=cloth.pc2 --body sphere:triangles=2000,centre=0:0:1,radius=0.4 --out results
+  kbvh run --scene waving_sheet --strategies bottom_up,rebuild --leaf-size 1,4 --scalar float,double
+A body is a file (.obj .ply .gltf .glb, or a folder of numbered frames) or a shape, then key=value separated by
+commas: motion clip fps (files), name scale rotate=axis:degrees translate=x:y:z as=triangles|points (all); `kbvh
+list` shows shapes.
+Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input, 3 anything else.)";
+
+constexpr const char* bench_examples = R"(Examples:
+  kbvh bench --scene tablecloth --triangles 2000,16000 --l 1,10 --repetitions 5 --out results
+  kbvh bench --plan experiments/plans/default.json --out results
+One iteration is a whole clip, timed by phases; repetitions are randomly interleaved and all kept, in
+DIR/benchmark.json and DIR/results.jsonl. Whoever breaks its guarantee is refused a time.)";
+
+/// Parameters as the plan holds them: "key=a,b" becomes {"key": ["a", "b"]}.
+json params_of(const std::vector<std::string>& assignments) {
+  json params = json::object();
+  for (const std::string& text : assignments) {
+    const auto assignment = parse_assignment(text);
+    if (!assignment)
+      throw io::InputError("--param: expected key=value or strategy.key=value, got '" + text + "'");
+    if (params.contains(assignment->first))
+      throw io::InputError("--param: '" + assignment->first + "' is given twice; separate values by commas");
+    params[assignment->first] = split(assignment->second, ',');
+  }
+  return params;
+}
+
+/// --clip is for every glTF body that does not name a clip of its own.
+void choose_clip(json& scene, const std::string& clip) {
+  bool used = false;
+  for (json& body : scene["bodies"]) {
+    const std::string extension = std::filesystem::path(body.value("file", "")).extension().string();
+    if ((extension != ".gltf" && extension != ".glb") || body.contains("clip")) continue;
+    body["clip"] = clip;
+    used = true;
+  }
+  if (!used)
+    throw io::InputError("--clip: " + io::printable(clip) +
+                         " is for glTF files without a clip of their own, and no --body is one");
+}
+
+json scene_of(const StudyOptions& options) {
+  json scene = json::object();
+  if (options.bodies.empty()) {
+    scene["builtin"] = options.scene.empty() ? "tablecloth" : options.scene;
+  } else {
+    if (!options.scene.empty()) throw io::InputError("--scene and --body exclude each other");
+    for (const std::string& body : options.bodies) scene["bodies"].push_back(body_from_text(body));
+  }
+  if (!options.clip.empty()) choose_clip(scene, options.clip);
+  if (!options.triangles.empty()) scene["triangles"] = options.triangles;
+  if (!options.seeds.empty()) scene["seed"] = options.seeds;
+  if (options.keyframes > 0) scene["keyframes"] = options.keyframes;
+  if (options.obstacle > 0) scene["obstacle"] = options.obstacle;
+  if (!options.name.empty()) scene["name"] = options.name;
+  if (!options.script.empty()) scene["script"] = options.script;
+  if (options.self) scene["self"] = true;
+  if (!options.orders.empty()) scene["order"] = options.orders;
+  return scene;
+}
+
+void set_common(json& plan, const StudyOptions& options) {
+  if (options.repetitions > 0) plan["repetitions"] = options.repetitions;
+  if (options.frames_limit > 0) plan["frames_limit"] = options.frames_limit;
+  if (options.oracle_every > 0) plan["oracle_every"] = options.oracle_every;
+}
+
+int run_study(const StudyOptions& options, Harness harness) {
+  Plan plan;
+  if (options.plan_file.empty()) {
+    const json said = plan_of(options);
+    if (options.print_plan) {
+      read_plan(said, "command line", {});
+      print(said.dump(2) + "\n");
+      return success;
+    }
+    plan = read_plan(said, "command line", {});
+  } else {
+    const std::string text = io::read_file(options.plan_file);
+    json said = parse_json(text, options.plan_file);
+    if (said.is_object()) {
+      set_common(said, options);
+      if (said.contains("studies") && said["studies"].is_array())
+        for (json& study : said["studies"])
+          if (study.is_object()) set_common(study, options);
+      if (!options.studies.empty()) keep_studies(said, options.studies, options.plan_file);
+    }
+    if (options.print_plan) {
+      print(said.dump(2) + "\n");
+      return success;
+    }
+    plan = read_plan(said, options.plan_file, std::filesystem::path(options.plan_file).parent_path());
+  }
+  const StudyOutcome outcome = run_plan(plan, harness, options.out);
+  if (!options.out.empty())
+    say(counted(outcome.measured, "configuration") + " measured, " + std::to_string(outcome.skipped) +
+        (outcome.skipped == 1 ? " was in " : " were in ") +
+        (std::filesystem::path(options.out) / "results.jsonl").string() + " already");
+  if (outcome.unfinished > 0)
+    say(counted(outcome.unfinished, "configuration") +
+        " for which there was no memory; the next run measures them again");
+  if (outcome.refused == 0) return outcome.unfinished == 0 ? success : internal_error;
+  say(counted(outcome.refused, "configuration") + " in which a strategy breaks what it guarantees");
+  return guarantee_broken;
+}
+
+void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
+  std::vector<CLI::Option*> said_by_plan{
+      add_text(command, "--scene", o->scene, "built-in scene (default: tablecloth); `kbvh list` shows them"),
+      add_texts(command, "--body", o->bodies, "a body from a file or by formula; repeatable, see below"),
+      add_text(command, "--clip", o->clip,
+               "animation of glTF bodies: its name or index; also as clip= in --body"),
+      add_text(command, "--name", o->name, "name of the scene in results"),
+      add_wholes(command, "--triangles", o->triangles, ranges::triangles,
+                 "of the built-in scene's moving body (2000); a list sweeps"),
+      add_whole(command, "--obstacle", o->obstacle, ranges::triangles,
+                "triangles of the body beside it (a table: 2048; else as many, up to 20000)"),
+      add_whole(command, "--keyframes", o->keyframes, ranges::keyframes, "of a built-in scene (60)"),
+      add_wholes(command, "--seed", o->seeds, ranges::any, "of what chance decides (1); a list sweeps"),
+      add_text(command, "--script", o->script,
+               "changes of plans while the scene runs: a file, see RESULTS.md"),
+      command.add_flag(
+          "--continuous", o->continuous,
+          "contacts of vertices and faces, and of edges, between keyframes: exact, l does not apply"),
+      command.add_flag("--self", o->self,
+                       "pairs within every body, too, of primitives that share no vertex; of one: self=true"),
+      add_words(command, "--order", o->orders, "vertex order: given, shuffled, renumbered; a list sweeps"),
+      add_words(command, "--strategies", o->strategies,
+                "ids, family:NAME, default (all that promise something) or all; !x: but not x"),
+      add_texts(command, "--param", o->params, "key=value or strategy.key=value; a list of values sweeps"),
+      add_words(command, "--builder", o->builders, "median, sah, morton (each strategy's own best)"),
+      add_wholes(command, "--width", o->widths, ranges::width, "children per node: 2, 4, 8"),
+      add_wholes(command, "--leaf-size", o->leaf_sizes, ranges::leaf_size,
+                 "most primitives per leaf: 1 to 16"),
+      add_wholes(command, "--l", o->l, ranges::frames_per_keyframe,
+                 "frames for each keyframe interval (10); a list sweeps"),
+      add_words(command, "--scalar", o->scalars, "float, double (float)")};
+  add_whole(command, "--repetitions", o->repetitions, ranges::repetitions,
+            "timed clips of each contestant (3)");
+  add_whole(command, "--frames-limit", o->frames_limit, ranges::positive,
+            "only so many first frames (intervals with --continuous)");
+  add_whole(command, "--oracle-every", o->oracle_every, ranges::positive,
+            "compare only every n-th frame or interval (and the last) with the truth (1)");
+  add_text(command, "--out", o->out, "folder to which results are appended (none: the table only)");
+  CLI::Option* plan = add_text(command, "--plan", o->plan_file, "a study as a file, see RESULTS.md");
+  add_texts(command, "--study", o->studies,
+            "only the studies of this name, without the plan's targets; repeatable")
+      ->needs(plan);
+  command.add_flag("--print-plan", o->print_plan, "print the plan file that says the same, and stop");
+  for (CLI::Option* option : said_by_plan) plan->excludes(option);
+}
+
+void add_command(CLI::App& program, Action& action, const char* name, const char* meaning,
+                 const char* footer, Harness harness) {
+  CLI::App* command = program.add_subcommand(name, meaning);
+  command->footer(footer);
+  auto options = std::make_shared<StudyOptions>();
+  add_study(*command, options);
+  command->callback(
+      [&action, options, harness] { action = [options, harness] { return run_study(*options, harness); }; });
+}
+
+}  // namespace
+
+void keep_studies(json& plan, const std::vector<std::string>& names, const std::string& place) {
+  const auto name_of = [](const json& object, const std::string& otherwise) {
+    const auto found = object.is_object() ? object.find("name") : object.end();
+    return found != object.end() && found->is_string() ? found->get<std::string>() : otherwise;
+  };
+  const std::string plan_name = name_of(plan, "");
+  const bool several = plan.contains("studies") && plan["studies"].is_array();
+  std::vector<std::string> known;
+  json kept = json::array();
+  for (const json& study : several ? plan["studies"] : json::array({plan})) {
+    const std::string name = name_of(study, plan_name);
+    if (std::find(known.begin(), known.end(), name) == known.end()) known.push_back(name);
+    if (std::find(names.begin(), names.end(), name) != names.end()) kept.push_back(study);
+  }
+  for (const std::string& name : names)
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      throw io::InputError(place + ": " + no_such("study", name, known));
+  if (several) plan["studies"] = kept;
+  plan.erase("targets");
+}
+
+json plan_of(const StudyOptions& options) {
+  json plan = json::object();
+  plan["scenes"] = json::array({scene_of(options)});
+  if (!options.strategies.empty()) plan["strategies"] = options.strategies;
+  if (!options.params.empty()) plan["params"] = params_of(options.params);
+  if (!options.builders.empty()) plan["builder"]["method"] = options.builders;
+  if (!options.widths.empty()) plan["builder"]["width"] = options.widths;
+  if (!options.leaf_sizes.empty()) plan["builder"]["leaf_size"] = options.leaf_sizes;
+  if (!options.l.empty()) plan["l"] = options.l;
+  if (!options.scalars.empty()) plan["scalars"] = options.scalars;
+  if (options.continuous) plan["continuous"] = true;
+  set_common(plan, options);
+  return plan;
+}
+
+void add_run(CLI::App& program, Action& action) {
+  add_command(program, action, "run", "verify and time contestants on a scene, and print a table",
+              run_examples, Harness::rounds);
+}
+
+void add_bench(CLI::App& program, Action& action) {
+  add_command(program, action, "bench", "the same under Google Benchmark", bench_examples,
+              Harness::google_benchmark);
+}
+
+}  // namespace kbvh::experiments

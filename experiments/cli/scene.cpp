@@ -1,0 +1,132 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "experiments/cli/commands.hpp"
+#include "experiments/cli/options.hpp"
+#include "experiments/cli/program.hpp"
+#include "experiments/common/output.hpp"
+#include "experiments/common/progress.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/io/obj.hpp"
+#include "experiments/scenes/scene_card.hpp"
+
+namespace kbvh::experiments {
+
+namespace {
+
+constexpr const char* scene_examples = R"(Examples:
+  kbvh scene shirt --triangles 32000
+  kbvh scene dress --triangles 8000 --frame 30 --out dress.obj
+  kbvh scene dress --triangles 8000 --out folder
+Prints counts and how violently the bodies move: the share of the sides of a binary tree (a triangle per leaf)
+whose realising vertex changes from one keyframe to the next. A folder gets every body as OBJ, with PC2 if it
+moves, and these numbers as card.json; a file ending in .obj holds all bodies at one keyframe, one after the other.)";
+
+struct SceneOptions {
+  std::string name, out;
+  BuiltinOptions scene;
+  std::size_t frame = 0;
+  bool as_json = false;
+};
+
+/// All bodies as one mesh at one keyframe: bodies at rest, and past their end, as they are last.
+io::AnimatedMesh snapshot(const std::vector<io::AnimatedMesh>& bodies, std::size_t frame) {
+  io::AnimatedMesh all;
+  all.keyframe_times = {0.0};
+  for (const io::AnimatedMesh& body : bodies) {
+    const std::size_t k = std::min(frame, body.keyframe_times.size() - 1);
+    const std::size_t size = std::size_t(3) * body.vertex_count;
+    for (const std::uint32_t v : body.primitive_vertices)
+      all.primitive_vertices.push_back(all.vertex_count + v);
+    const std::uint32_t base = all.primitive_offsets.back();
+    for (std::size_t p = 1; p < body.primitive_offsets.size(); ++p)
+      all.primitive_offsets.push_back(base + body.primitive_offsets[p]);
+    all.positions.insert(all.positions.end(), body.positions.begin() + std::ptrdiff_t(k * size),
+                         body.positions.begin() + std::ptrdiff_t((k + 1) * size));
+    all.vertex_count += body.vertex_count;
+  }
+  return all;
+}
+
+bool is_obj(const SceneOptions& options) {
+  return std::filesystem::path(options.out).extension() == ".obj";
+}
+
+/// Complains about a --frame that no file would show.
+void check_frame(const LoadedScene& scene, const SceneOptions& options) {
+  if (options.frame == 0) return;
+  if (!is_obj(options)) throw io::InputError("--frame: goes with --out FILE.obj, which shows one keyframe");
+  std::size_t keyframes = 0;
+  for (const io::AnimatedMesh& body : scene.meshes)
+    keyframes = std::max(keyframes, body.keyframe_times.size());
+  if (options.frame >= keyframes)
+    throw io::InputError("--frame: " + std::to_string(options.frame) +
+                         " is not before the end, the scene has " + counted(keyframes, "keyframe") +
+                         ", from 0");
+}
+
+void write(const LoadedScene& scene, const SceneOptions& options) {
+  const std::filesystem::path out = options.out;
+  if (is_obj(options))
+    io::save_obj(snapshot(scene.meshes, options.frame), out);
+  else
+    export_scene(scene, out, 0);
+}
+
+void print_cards(const std::vector<BodyCard>& list) {
+  for (const BodyCard& c : list) {
+    std::string text = fmt::format("{}: {}, {}, {}", c.name, counted(c.primitives, "primitive"),
+                                   counted(c.vertices, "vertex"), counted(c.keyframes, "keyframe"));
+    if (c.keyframes > 1)
+      text += fmt::format(
+          " in {:.3g} s\n    {:.2f}% of the sides of {} nodes change their realiser per keyframe (at most "
+          "{:.2f}%)\n"
+          "    a vertex moves by {:.2f} edges per keyframe (at most {:.2f})",
+          c.seconds, 100 * c.sides_changed, c.nodes, 100 * c.most_sides_changed, c.mean_step, c.largest_step);
+    print(text + "\n");
+  }
+}
+
+int show(const SceneOptions& options) {
+  SceneSpec spec;
+  spec.builtin = find_builtin_scene(options.name).name;
+  spec.options = options.scene;
+  Progress line;
+  const LoadedScene scene = load(spec, [&](const std::string& what, double fraction) {
+    line.show(what + ": " + std::to_string(int(100 * fraction)) + " %");
+  });
+  line.clear();
+  check_frame(scene, options);
+  if (!options.out.empty()) write(scene, options);
+  const std::vector<BodyCard> list = cards(scene);
+  if (!options.as_json) {
+    print_cards(list);
+    return success;
+  }
+  print(as_json(options.name, list).dump(2) + "\n");
+  return success;
+}
+
+}  // namespace
+
+void add_scene(CLI::App& program, Action& action) {
+  CLI::App* command = program.add_subcommand("scene", "what a built-in scene is, and its meshes as files");
+  command->footer(scene_examples);
+  auto o = std::make_shared<SceneOptions>();
+  add_text(*command, "name", o->name, "`kbvh list` shows them")->required();
+  add_whole(*command, "--triangles", o->scene.triangles, ranges::triangles, "of the moving body (2000)");
+  add_whole(*command, "--obstacle", o->scene.obstacle_triangles, ranges::triangles,
+            "triangles of the body beside it");
+  add_whole(*command, "--keyframes", o->scene.keyframes, {1, ranges::keyframes.most}, "(60)");
+  add_whole(*command, "--seed", o->scene.seed, ranges::any, "of what chance decides (1)");
+  add_whole(*command, "--full-triangles", o->scene.full_triangles, ranges::triangles,
+            "garments: most triangles that are simulated in full; above, a second level refines");
+  add_whole(*command, "--frame", o->frame, ranges::any, "keyframe of the OBJ file, from 0");
+  add_text(*command, "--out", o->out, "OBJ file or folder to write");
+  command->add_flag("--json", o->as_json, "for programs");
+  command->callback([&action, o] { action = [o] { return show(*o); }; });
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,126 @@
+#include "experiments/common/machine.hpp"
+
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "core/kernels/kernel_set.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/io/animated_mesh.hpp"
+
+namespace kbvh::experiments {
+
+extern const char* const built_commit;  // written by the build
+extern const bool built_dirty;
+
+namespace {
+
+/// The value of the first "key : value" line of /proc/cpuinfo.
+std::string cpuinfo(const std::string& key) {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t colon = line.find(':');
+    if (colon == std::string::npos || !line.starts_with(key)) continue;
+    const std::size_t end = line.find_last_not_of(" \t", colon - 1);
+    if (line.substr(0, end + 1) != key) continue;
+    const std::size_t begin = line.find_first_not_of(" \t", colon + 1);
+    return begin == std::string::npos ? "" : line.substr(begin);
+  }
+  return "unknown";
+}
+
+std::string operating_system() {
+  std::ifstream file("/etc/os-release");
+  std::string pretty = "unknown";
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("PRETTY_NAME=")) {
+      pretty = line.substr(12);
+      std::erase(pretty, '"');
+    }
+  utsname names{};
+  if (::uname(&names) == 0)
+    pretty += std::string(", ") + names.sysname + " " + names.release + " " + names.machine;
+  return pretty;
+}
+
+std::string simd() {
+  std::istringstream flags(cpuinfo("flags"));
+  std::vector<std::string> found;
+  for (std::string flag; flags >> flag;)
+    if (flag == "sse2" || flag == "sse4_1" || flag == "sse4_2" || flag == "avx" || flag == "avx2" ||
+        flag == "fma" || flag.starts_with("avx512"))
+      found.push_back(flag);
+  return joined(found, " ");
+}
+
+std::string compiler() {
+#if defined(__clang__)
+  return std::string("Clang ") + __clang_version__;
+#elif defined(__GNUC__)
+  return std::string("GCC ") + __VERSION__;
+#else
+  return "unknown";
+#endif
+}
+
+/// The kernels in use; a wrong word in the environment is wrong use of the program.
+std::string kernels() {
+  try {
+    return name(active_kernel_set());
+  } catch (const std::invalid_argument& problem) {
+    throw io::InputError(std::string("KBVH_KERNELS: ") + problem.what());
+  }
+}
+
+}  // namespace
+
+nlohmann::json machine() {
+  const double bytes = double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGE_SIZE));
+  return {{"cpu", cpuinfo("model name")},
+          {"cores", std::thread::hardware_concurrency()},
+          {"memory_gb", std::round(bytes / double(1 << 30) * 10) / 10},
+          {"os", operating_system()},
+          {"compiler", compiler()},
+          {"flags", KBVH_BUILD_FLAGS},
+          {"build_type", KBVH_BUILD_TYPE},
+          {"simd", simd()},
+          {"kernels", kernels()}};
+}
+
+std::string commit() {
+  return built_commit;
+}
+bool dirty() {
+  return built_dirty;
+}
+
+std::string program_identity() {
+  static const std::string identity = [] {
+    std::string text = built_commit;
+    if (!built_dirty && text != "unknown") return text;
+    std::ifstream file("/proc/self/exe", std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    return text + "+" + hexadecimal(hash_of(bytes));
+  }();
+  return identity;
+}
+
+std::string now_utc() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm parts{};
+  ::gmtime_r(&now, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text;
+}
+
+}  // namespace kbvh::experiments

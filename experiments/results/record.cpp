@@ -1,0 +1,117 @@
+#include "experiments/results/record.hpp"
+
+#include "core/base/hasher.hpp"
+#include "experiments/common/text.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+const char* word(PrimitiveKind kind) {
+  switch (kind) {
+    case PrimitiveKind::points:
+      return "points";
+    case PrimitiveKind::control_nets:
+      return "control_nets";
+    case PrimitiveKind::polygons:
+      break;
+  }
+  return "polygons";
+}
+
+const char* word(SceneOrigin origin) {
+  switch (origin) {
+    case SceneOrigin::built_in:
+      return "built_in";
+    case SceneOrigin::files:
+      return "files";
+    case SceneOrigin::shapes:
+      break;
+  }
+  return "shapes";
+}
+
+const char* word(Harness harness) {
+  return harness == Harness::rounds ? "run" : "bench";
+}
+
+namespace {
+std::uint64_t hash_of_times(std::span<const double> times) {
+  Hasher hasher;
+  hasher.mix(times.size());
+  hasher.bytes(times.data(), times.size_bytes());
+  return hasher.value();
+}
+}  // namespace
+
+template <class S>
+json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_t per_keyframe,
+                  std::span<const double> frames, const PlanScript<S>& script) {
+  json bodies = json::array();
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const Body<S>& body = scene.bodies[i];
+    bodies.push_back({{"name", body.name},
+                      {"primitives", body.primitives.count()},
+                      {"vertices", body.plans.vertex_count()},
+                      {"keyframes", body.plans.keyframe_count()},
+                      {"moving", body.plans.moving()},
+                      {"kind", word(body.primitives.kind)},
+                      {"self", i < loaded.self.size() && loaded.self[i]},
+                      {"degenerate", loaded.meshes[i].degenerate_primitives}});
+  }
+  json record{{"name", scene.name},
+              {"order", word(loaded.order)},
+              {"origin", word(loaded.origin)},
+              {"hash", hexadecimal(hash(scene))},
+              {"scalar", sizeof(S) == 4 ? "float" : "double"},
+              {"per_keyframe", per_keyframe},
+              {"keyframes", overlaid_keyframes(scene).size()},
+              {"frames", frames.size()},
+              {"frame_times", hexadecimal(hash_of_times(frames))},
+              {"primitives", scene.primitive_count()},
+              {"bodies", bodies}};
+  if (!script.empty()) record["script"] = script_record(script, frames.empty() ? 0 : frames.back());
+  return record;
+}
+
+template json scene_record(const Scene<float>&, const LoadedScene&, std::uint32_t, std::span<const double>,
+                           const PlanScript<float>&);
+template json scene_record(const Scene<double>&, const LoadedScene&, std::uint32_t, std::span<const double>,
+                           const PlanScript<double>&);
+
+template <class S>
+json script_record(const PlanScript<S>& script, double end) {
+  std::size_t steps = 0;
+  for (const auto& step : script.steps) steps += step.time <= end ? 1 : 0;
+  return {{"hash", hexadecimal(hash(script))}, {"steps", steps}, {"changes", script.changes_until(end)}};
+}
+
+template json script_record(const PlanScript<float>&, double);
+template json script_record(const PlanScript<double>&, double);
+
+std::string configuration_key(Harness harness, const std::string& program, const json& scene,
+                              const json& strategy, const Study& study, const json& machine) {
+  // nlohmann's objects are sorted by key, so the text does not depend on the order of insertion.
+  json all{{"schema", results_schema},
+           {"kind", word(harness)},
+           {"program", program},
+           {"scene", scene.at("hash")},
+           {"name", scene.value("name", "")},
+           {"scalar", scene.at("scalar")},
+           {"per_keyframe", scene.at("per_keyframe")},
+           {"frames", scene.at("frames")},
+           {"frame_times", scene.at("frame_times")},
+           {"strategy", strategy.at("id")},
+           {"params", strategy.at("params")},
+           {"builder", strategy.at("builder")},
+           {"repetitions", study.repetitions},
+           {"oracle_every", study.oracle_every},
+           {"machine",
+            {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
+             machine.at("kernels")}}};
+  if (study.continuous) all["continuous"] = true;
+  if (scene.contains("script")) all["script"] = scene.at("script").at("hash");
+  return hexadecimal(hash_of(all.dump()));
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,135 @@
+#include <cmath>
+#include <optional>
+
+#include "experiments/results/record.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+enum class Kind : std::uint8_t { text, whole, number, truth, object, list };
+
+const char* name(Kind kind) {
+  switch (kind) {
+    case Kind::text:
+      return "a text";
+    case Kind::whole:
+      return "a whole number";
+    case Kind::number:
+      return "a finite number that is not negative";
+    case Kind::truth:
+      return "true or false";
+    case Kind::object:
+      return "an object";
+    case Kind::list:
+      break;
+  }
+  return "a list";
+}
+
+bool is(const json& value, Kind kind) {
+  switch (kind) {
+    case Kind::text:
+      return value.is_string();
+    case Kind::whole:
+      return value.is_number_unsigned();
+    case Kind::number:
+      return value.is_number() && std::isfinite(value.get<double>()) && value.get<double>() >= 0;
+    case Kind::truth:
+      return value.is_boolean();
+    case Kind::object:
+      return value.is_object();
+    case Kind::list:
+      break;
+  }
+  return value.is_array();
+}
+
+struct Field {
+  const char* name;
+  Kind kind;
+};
+
+/// The first field that is missing or of another kind.
+std::string wrong(const json& object, const std::string& place, std::initializer_list<Field> fields) {
+  for (const Field& field : fields) {
+    const auto found = object.find(field.name);
+    if (found == object.end()) return "the field " + place + field.name + " is missing";
+    if (!is(*found, field.kind)) return place + field.name + " is not " + name(field.kind);
+  }
+  return {};
+}
+
+std::string wrong_scene(const json& scene) {
+  std::string what = wrong(scene, "scene.",
+                           {{"name", Kind::text},
+                            {"scalar", Kind::text},
+                            {"per_keyframe", Kind::whole},
+                            {"frames", Kind::whole},
+                            {"primitives", Kind::whole},
+                            {"bodies", Kind::list}});
+  if (!what.empty()) return what;
+  for (const json& body : scene.at("bodies")) {
+    if (!body.is_object()) return "scene.bodies is not a list of objects";
+    what = wrong(body, "scene.bodies.",
+                 {{"moving", Kind::truth}, {"primitives", Kind::whole}, {"kind", Kind::text}});
+    if (!what.empty()) return what;
+  }
+  if (scene.contains("continuous") && !scene.at("continuous").is_boolean())
+    return "scene.continuous is not true or false";
+  if (!scene.contains("script")) return {};
+  if (!scene.at("script").is_object()) return "scene.script is not an object";
+  return wrong(scene.at("script"), "scene.script.", {{"steps", Kind::whole}, {"changes", Kind::whole}});
+}
+
+std::string wrong_times(const json& times) {
+  if (times.is_null()) return {};
+  if (!times.is_object()) return "times is neither an object nor null";
+  if (std::string what = wrong(times, "times.", {{"repetitions", Kind::list}}); !what.empty()) return what;
+  if (times.at("repetitions").empty()) return "times.repetitions has no entry";
+  for (const json& repetition : times.at("repetitions")) {
+    if (!repetition.is_object()) return "times.repetitions is not a list of objects";
+    std::string what = wrong(repetition, "times.repetitions.",
+                             {{"motion", Kind::number},
+                              {"update", Kind::number},
+                              {"traversal", Kind::number},
+                              {"triangle_tests", Kind::number},
+                              {"plan_changes", Kind::number}});
+    if (what.empty() && repetition.contains("geometry_changes"))
+      what = wrong(repetition, "times.repetitions.", {{"geometry_changes", Kind::number}});
+    if (!what.empty()) return what;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string unusable(const json& record) {
+  std::string what =
+      wrong(record, "", {{"scene", Kind::object}, {"strategy", Kind::object}, {"verified", Kind::object}});
+  if (what.empty()) what = wrong_scene(record.at("scene"));
+  if (what.empty())
+    what =
+        wrong(record.at("strategy"), "strategy.",
+              {{"id", Kind::text}, {"label", Kind::text}, {"family", Kind::text}, {"params", Kind::object}});
+  if (what.empty())
+    what = wrong(record.at("verified"), "verified.",
+                 {{"holds", Kind::truth},
+                  {"missed", Kind::whole},
+                  {"extra", Kind::whole},
+                  {"audited", Kind::truth},
+                  {"protrusion", Kind::number}});
+  // Looseness may be negative: boxes that hold nothing have no area.
+  if (what.empty() &&
+      (!record.at("verified").contains("looseness") || !record.at("verified").at("looseness").is_number()))
+    what = "the field verified.looseness is missing or not a number";
+  if (what.empty() && !record.contains("times")) what = "the field times is missing";
+  if (what.empty()) what = wrong_times(record.at("times"));
+  for (const char* text : {"choice", "refused", "run"})
+    if (what.empty() && record.contains(text)) what = wrong(record, "", {{text, Kind::text}});
+  return what;
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,154 @@
+#include "experiments/results/table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "experiments/common/text.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+/// Width in characters, not bytes, of UTF-8 text.
+std::size_t width_of(const std::string& text) {
+  return std::size_t(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; }));
+}
+
+double phase_of(const json& repetition, const std::string& phase) {
+  const auto get = [&](const char* name) { return repetition.at(name).get<double>(); };
+  const auto changes = [&] { return get("plan_changes") + repetition.value("geometry_changes", 0.0); };
+  if (phase == "query") return get("traversal") + get("triangle_tests");
+  if (phase == "candidates") return get("update") + get("traversal") + changes();
+  if (phase == "total") return get("update") + get("traversal") + get("triangle_tests") + changes();
+  if (phase == "total_with_motion") return get("motion") + phase_of(repetition, "total");
+  return get(phase.c_str());
+}
+
+std::string milliseconds(double value) {
+  return fmt::format("{:.4g}", value);
+}
+
+std::string fraction(double value) {
+  return value == 0 ? "0" : fmt::format("{:.3g}", value);
+}
+
+}  // namespace
+
+std::string columns(const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> widths;
+  for (const auto& row : rows)
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      if (c >= widths.size()) widths.push_back(0);
+      widths[c] = std::max(widths[c], width_of(row[c]));
+    }
+  std::string text;
+  for (const auto& row : rows) {
+    std::string line;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const std::string padding(widths[c] - width_of(row[c]), ' ');
+      line += (c == 0 ? "" : "  ") + (c == 0 ? row[c] + padding : padding + row[c]);
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
+bool has_times(const json& record) {
+  return record.at("times").is_object();
+}
+
+std::vector<double> phase_values(const json& record, const std::string& phase) {
+  std::vector<double> values;
+  for (const json& repetition : record.at("times").at("repetitions"))
+    values.push_back(phase_of(repetition, phase));
+  return values;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
+
+double median_phase(const json& record, const std::string& phase) {
+  return median(phase_values(record, phase));
+}
+
+const json* best_refit(const std::vector<json>& records) {
+  const json* best = nullptr;
+  for (const json& record : records) {
+    if (record.at("strategy").at("family") != "refit" || !has_times(record)) continue;
+    if (best == nullptr || median_phase(record, "total") < median_phase(*best, "total")) best = &record;
+  }
+  return best;
+}
+
+std::string results_table(const std::vector<json>& records) {
+  if (records.empty()) return {};
+  const json& scene = records[0].at("scene");
+  const char* const step = scene.value("continuous", false) ? "interval" : "frame";
+  std::string text =
+      fmt::format("{}, l = {}, {}: {}, {}\n", scene.at("name").get<std::string>(),
+                  scene.at("per_keyframe").get<std::uint64_t>(), scene.at("scalar").get<std::string>(),
+                  counted(scene.at("frames").get<std::uint64_t>(), step),
+                  counted(scene.at("primitives").get<std::uint64_t>(), "primitive"));
+  const json* refit = best_refit(records);
+  std::vector<const char*> phases{"motion", "update", "query"};
+  std::vector<std::string> head{"strategy", "motion", "update", "query"};
+  if (scene.contains("script")) {
+    const json& script = scene.at("script");
+    text += fmt::format("  plans change while it runs: {} at {}, column plans\n",
+                        counted(script.at("changes").get<std::uint64_t>(), "change"),
+                        counted(script.at("steps").get<std::uint64_t>(), "frame"));
+    phases.push_back("plan_changes");
+    head.push_back("plans");
+  }
+  const json bodies = scene.value("bodies", json::array());
+  for (const std::string kind : {"points", "control_nets"})
+    if (std::any_of(bodies.begin(), bodies.end(),
+                    [&](const json& body) { return body.value("kind", std::string()) == kind; }))
+      text +=
+          fmt::format("  pairs with {} are candidates: boxes that overlap, which says nothing of contact\n",
+                      kind == "points" ? "points" : "control nets");
+  for (const char* column : {"x refit", "with motion", "missed", "extra", "protrusion", "looseness"})
+    head.push_back(column);
+  std::vector<std::vector<std::string>> rows{head};
+  std::string refusals, choices;
+  for (const json& record : records) {
+    const json& verified = record.at("verified");
+    const std::string label = record.at("strategy").at("label").get<std::string>();
+    std::vector<std::string> row{label};
+    if (has_times(record)) {
+      for (const char* phase : phases) row.push_back(milliseconds(median_phase(record, phase)));
+      for (const char* phase : {"total", "total_with_motion"})
+        row.push_back(refit == nullptr
+                          ? "-"
+                          : fmt::format("{:.3g}", median_phase(*refit, phase) / median_phase(record, phase)));
+    } else {
+      row.push_back("refused");
+      row.resize(1 + phases.size() + 2);
+      refusals += "  " + label + " is refused a time: " + record.value("refused", std::string()) + "\n";
+    }
+    row.push_back(std::to_string(verified.at("missed").get<std::uint64_t>()));
+    row.push_back(std::to_string(verified.at("extra").get<std::uint64_t>()));
+    const bool audited = verified.at("audited").get<bool>();
+    row.push_back(audited ? fraction(verified.at("protrusion").get<double>()) : "-");
+    row.push_back(audited ? fraction(verified.at("looseness").get<double>()) : "-");
+    rows.push_back(std::move(row));
+    if (record.contains("choice"))
+      choices += "  " + label + " chose " + record.at("choice").get<std::string>() + "\n";
+  }
+  text += columns(rows) + refusals + choices;
+  std::set<std::string> runs;
+  for (const json& record : records) runs.insert(record.value("run", std::string()));
+  if (runs.size() > 1)
+    text += "  (not all of one run: the machine may not have been the same all the time)\n";
+  return text;
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,324 @@
+#include "experiments/results/target_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "experiments/common/machine.hpp"
+#include "experiments/common/progress.hpp"
+#include "experiments/io/bytes.hpp"
+#include "experiments/results/result_file.hpp"
+#include "experiments/results/table.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+/// What stands for a selector in one table.
+struct Side {
+  const json* record = nullptr;  ///< of the fastest configuration
+  std::vector<double> times;     ///< of its repetitions, ms per frame
+  double middle = 0;
+  std::string missing;  ///< why there is none
+};
+
+Side side_of(const TargetSelector& selector, const std::vector<json>& records) {
+  Side side;
+  std::string refused;
+  for (const json& record : records) {
+    if (!matches(selector, record.at("strategy"))) continue;
+    const std::string label = record.at("strategy").at("label").get<std::string>();
+    if (!has_times(record)) {
+      refused = label + " is refused a time: " + record.value("refused", std::string());
+      continue;
+    }
+    std::vector<double> times = phase_values(record, selector.phase);
+    const double middle = median(times);
+    if (side.record != nullptr && middle >= side.middle) continue;
+    side.record = &record;
+    side.times = std::move(times);
+    side.middle = middle;
+    side.missing = middle > 0 ? "" : label + " spends no time in '" + selector.phase + "'";
+  }
+  if (side.record == nullptr) {
+    side.missing = !refused.empty() ? refused
+                   : known_strategy(selector.strategy) == nullptr
+                       ? "this program was built without " + selector.strategy
+                       : described(selector) + " takes no part";
+  }
+  return side;
+}
+
+/// The bootstrap's chance (Steele, Lea and Flood 2014, "Fast splittable pseudorandom number generators"), the
+/// same on every machine.
+class Chance {
+ public:
+  std::size_t below(std::size_t count) {
+    std::uint64_t x = state_ += 0x9e3779b97f4a7c15u;
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return std::size_t(((x ^ (x >> 31)) >> 32) * count >> 32);
+  }
+
+ private:
+  std::uint64_t state_ = 1;
+};
+
+double resampled_median(const std::vector<double>& values, Chance& chance, std::vector<double>& buffer) {
+  buffer.clear();
+  for (std::size_t i = 0; i < values.size(); ++i) buffer.push_back(values[chance.below(values.size())]);
+  return median(buffer);
+}
+
+/// The middle 95 % of the ratio of medians over repetitions drawn anew; null where a side has but one.
+json confidence_interval(const Side& numerator, const Side& denominator) {
+  if (numerator.times.size() < 2 || denominator.times.size() < 2) return nullptr;
+  constexpr std::size_t draws = 4000, left_out = draws / 40;
+  Chance chance;
+  std::vector<double> ratios, buffer;
+  for (std::size_t i = 0; i < draws; ++i) {
+    const double above = resampled_median(numerator.times, chance, buffer);
+    ratios.push_back(above / resampled_median(denominator.times, chance, buffer));
+  }
+  std::sort(ratios.begin(), ratios.end());
+  const double low = ratios[left_out], high = ratios[draws - 1 - left_out];
+  if (!std::isfinite(low) || !std::isfinite(high)) return nullptr;
+  return {low, high};
+}
+
+json side_json(const Side& side) {
+  if (side.record == nullptr) return nullptr;
+  const json& record = *side.record;
+  return {{"label", record.at("strategy").at("label")},
+          {"ms", side.middle},
+          {"repetitions", side.times.size()},
+          {"run", record.value("run", std::string())}};
+}
+
+bool is_counted(const Target& target, const std::string& scene) {
+  return std::find(target.scenes.begin(), target.scenes.end(), scene) != target.scenes.end();
+}
+
+/// The ratio in one table, or why there is none.
+json scene_row(const Target& target, const TargetGroup& group) {
+  const Side numerator = side_of(target.numerator, group.records);
+  const Side denominator = side_of(target.denominator, group.records);
+  std::uint64_t triangles = 0;
+  for (const json& body : group.scene.at("bodies"))
+    if (body.at("moving").get<bool>()) triangles += body.at("primitives").get<std::uint64_t>();
+  json row{{"scene", group.scene.at("name")},
+           {"order", group.scene.value("order", std::string())},
+           {"triangles", triangles},
+           {"counts", is_counted(target, group.scene.at("name").get<std::string>())},
+           {"ratio", nullptr},
+           {"confidence_interval", nullptr},
+           {"numerator", side_json(numerator)},
+           {"denominator", side_json(denominator)}};
+  std::string missing = numerator.missing;
+  if (denominator.missing != missing && !denominator.missing.empty())
+    missing += (missing.empty() ? "" : "; ") + denominator.missing;
+  if (!missing.empty()) {
+    row["reason"] = missing;
+    return row;
+  }
+  row["ratio"] = numerator.middle / denominator.middle;
+  row["confidence_interval"] = confidence_interval(numerator, denominator);
+  return row;
+}
+
+/// Every scene that the target's scalar and l were measured on, once: from the first table with both sides.
+json scene_rows(const Target& target, const std::vector<TargetGroup>& groups) {
+  std::vector<std::pair<std::string, json>> rows;  // by hash of the scene
+  for (const TargetGroup& group : groups) {
+    if (group.scene.at("scalar") != target.scalar || group.scene.at("per_keyframe") != target.per_keyframe)
+      continue;
+    const std::string hash = group.scene.at("hash").get<std::string>();
+    const auto known =
+        std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == hash; });
+    if (known == rows.end())
+      rows.emplace_back(hash, scene_row(target, group));
+    else if (known->second.at("ratio").is_null())
+      if (json row = scene_row(target, group); !row.at("ratio").is_null()) known->second = std::move(row);
+  }
+  json list = json::array();
+  for (auto& [hash, row] : rows)
+    if (!row.at("ratio").is_null() || row.at("counts").get<bool>()) list.push_back(std::move(row));
+  for (const std::string& scene : target.scenes)
+    if (std::none_of(list.begin(), list.end(), [&](const json& row) { return row.at("scene") == scene; }))
+      list.push_back({{"scene", scene},
+                      {"order", nullptr},
+                      {"triangles", nullptr},
+                      {"counts", true},
+                      {"ratio", nullptr},
+                      {"confidence_interval", nullptr},
+                      {"numerator", nullptr},
+                      {"denominator", nullptr},
+                      {"reason", "the scene was left out"}});
+  return list;
+}
+
+json selector_json(const TargetSelector& selector) {
+  return {{"strategy", selector.strategy}, {"phase", selector.phase}, {"which", described(selector)}};
+}
+
+/// Geometric means over scenes. Of intervals those of their ends: as if all scenes were as bad, or as good,
+/// as they may be at once, so it is wider than one of 95 %.
+class Mean {
+ public:
+  void add(const json& scene) {
+    ++count_;
+    ratio_ += std::log(scene.at("ratio").get<double>());
+    const json& interval = scene.at("confidence_interval");
+    known_ = known_ && interval.is_array();
+    if (!known_) return;
+    low_ += std::log(interval[0].get<double>());
+    high_ += std::log(interval[1].get<double>());
+  }
+  double ratio() const { return std::exp(ratio_ / count_); }
+  json interval() const {
+    if (!known_) return nullptr;
+    return {std::exp(low_ / count_), std::exp(high_ / count_)};
+  }
+
+ private:
+  double count_ = 0, ratio_ = 0, low_ = 0, high_ = 0;
+  bool known_ = true;
+};
+
+json target_row(const Target& target, const std::vector<TargetGroup>& groups) {
+  json row{{"what", target.what},
+           {"measured", nullptr},
+           {"at_least", target.at_least},
+           {"aim", target.aim},
+           {"confidence_interval", nullptr},
+           {"confidence", 0.95},
+           {"verdict", "unmeasured"},
+           {"scene", nullptr},
+           {"scenes", target.scenes},
+           {"over", target.mean ? "geometric_mean" : "worst"},
+           {"scalar", target.scalar},
+           {"l", target.per_keyframe},
+           {"numerator", selector_json(target.numerator)},
+           {"denominator", selector_json(target.denominator)},
+           {"note", target.note},
+           {"per_scene", scene_rows(target, groups)}};
+  const json* worst = nullptr;
+  Mean mean;
+  std::set<std::string> runs;
+  for (const json& one : row["per_scene"]) {
+    if (!one.at("counts").get<bool>()) continue;
+    if (one.at("ratio").is_null()) {
+      // What was not measured on a scene that counts could be worse than all the others.
+      row["reason"] = one.at("scene").get<std::string>() + ": " + one.at("reason").get<std::string>();
+      return row;
+    }
+    for (const char* side : {"numerator", "denominator"})
+      runs.insert(one.at(side).at("run").get<std::string>());
+    if (worst == nullptr || one.at("ratio").get<double>() < worst->at("ratio").get<double>()) worst = &one;
+    mean.add(one);
+  }
+  const double measured = target.mean ? mean.ratio() : worst->at("ratio").get<double>();
+  row["measured"] = measured;
+  row["confidence_interval"] = target.mean ? mean.interval() : worst->at("confidence_interval");
+  row["scene"] = worst->at("scene");
+  row["verdict"] = measured >= target.aim        ? "reached_aim"
+                   : measured >= target.at_least ? "reached"
+                                                 : "missed";
+  row["runs"] = runs;
+  return row;
+}
+
+}  // namespace
+
+json target_rows(const Plan& plan, const std::vector<TargetGroup>& groups) {
+  const json facts{{"schema", targets_schema}, {"plan", plan.name},    {"commit", commit()},
+                   {"dirty", dirty()},         {"machine", machine()}, {"when", now_utc()}};
+  json rows = json::array();
+  for (const Target& target : plan.targets) {
+    rows.push_back(target_row(target, groups));
+    rows.back().update(facts);
+  }
+  return rows;
+}
+
+// --- shown ----------------------------------------------------------------------------------------------
+
+namespace {
+
+std::string number_text(const json& value) {
+  return value.is_number() ? fmt::format("{:.4g}", value.get<double>()) : "-";
+}
+
+std::string interval_text(const json& interval) {
+  return interval.is_array() ? number_text(interval[0]) + " to " + number_text(interval[1]) : "-";
+}
+
+std::string verdict_text(const json& row) {
+  const std::string verdict = row.at("verdict").get<std::string>();
+  return verdict == "reached_aim" ? "aim reached" : verdict;
+}
+
+std::string scene_text(const json& row) {
+  if (!row.at("scene").is_string()) return "-";
+  return row.at("over") == "geometric_mean" ? "mean of " + std::to_string(row.at("scenes").size())
+                                            : row.at("scene").get<std::string>();
+}
+
+}  // namespace
+
+std::string targets_table(const json& rows) {
+  std::vector<std::vector<std::string>> summary{
+      {"target", "measured", "95 % interval", "at least", "aim", "verdict", "on"}};
+  std::string reasons, details;
+  bool several_runs = false;
+  for (const json& row : rows) {
+    const std::string what = row.at("what").get<std::string>();
+    summary.push_back({what, number_text(row.at("measured")), interval_text(row.at("confidence_interval")),
+                       number_text(row.at("at_least")), number_text(row.at("aim")), verdict_text(row),
+                       scene_text(row)});
+    if (row.contains("reason"))
+      reasons += "  " + what + ": not measured: " + row.at("reason").get<std::string>() + "\n";
+    several_runs = several_runs || (row.contains("runs") && row.at("runs").size() > 1);
+    std::vector<std::vector<std::string>> scenes{{what, "ratio", "95 % interval", "ms", "of", "ms", "of"}};
+    for (const json& one : row.at("per_scene")) {
+      std::vector<std::string> cells{
+          "  " + one.at("scene").get<std::string>() + (one.at("counts").get<bool>() ? " *" : ""),
+          number_text(one.at("ratio")), interval_text(one.at("confidence_interval"))};
+      for (const char* side : {"numerator", "denominator"}) {
+        const json& times = one.at(side);
+        cells.push_back(times.is_object() ? number_text(times.at("ms")) : "-");
+        cells.push_back(times.is_object() ? times.at("label").get<std::string>() : "-");
+      }
+      scenes.push_back(std::move(cells));
+    }
+    details += "\n" + columns(scenes);
+  }
+  std::string text = "Targets: how many times slower the other is, on the scenes that count\n";
+  text += columns(summary) + reasons;
+  if (several_runs) text += "  (not all of one run: the machine may not have been the same all the time)\n";
+  return text + "\nAll scenes (* counts)\n" + details;
+}
+
+void write_targets(const std::filesystem::path& folder, const json& rows) {
+  const FolderLock lock(folder);
+  const std::filesystem::path file = folder / "targets.json";
+  std::set<std::string> plans;
+  for (const json& row : rows) plans.insert(row.at("plan").get<std::string>());
+  json all = json::array();
+  if (const std::optional<json> before = content_of(file); before && before->is_array()) {
+    for (const json& row : *before)
+      if (!row.is_object() || !plans.contains(row.value("plan", ""))) all.push_back(row);
+  } else if (before) {
+    say("warning: " + file.string() + " is no list of targets: it is now " + set_aside(file) +
+        ", and a new one is begun");
+  }
+  for (const json& row : rows) all.push_back(row);
+  io::write_file_atomically(file, all.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,31 @@
+#pragma once
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "experiments/study/plan.hpp"
+
+namespace kbvh::experiments {
+
+/// Version of the rows in targets.json; RESULTS.md documents them.
+inline constexpr int targets_schema = 1;
+
+/// Records of one table: one scene, one scalar, one l, in one study.
+struct TargetGroup {
+  nlohmann::json scene;  ///< as in the records
+  std::vector<nlohmann::json> records;
+};
+
+/// One row per target of the plan, from the records of `groups` (in the order in which they were measured).
+/// Intervals are of 95 %, by a bootstrap over the repetitions whose chance is always the same.
+nlohmann::json target_rows(const Plan& plan, const std::vector<TargetGroup>& groups);
+
+/// The tables that `run` and `bench` print for the rows: what counts, then every scene.
+std::string targets_table(const nlohmann::json& rows);
+
+/// Writes the rows to `folder`/targets.json, in place of those of the same plans; rows of other plans stay. A
+/// file that cannot be read is renamed. Throws io::InputError.
+void write_targets(const std::filesystem::path& folder, const nlohmann::json& rows);
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,376 @@
+#include "experiments/run/run_plan.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <set>
+
+#include "experiments/common/environment.hpp"
+#include "experiments/common/machine.hpp"
+#include "experiments/common/output.hpp"
+#include "experiments/common/progress.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/io/bytes.hpp"
+#include "experiments/results/record.hpp"
+#include "experiments/results/results.hpp"
+#include "experiments/results/table.hpp"
+#include "experiments/results/target_rows.hpp"
+#include "experiments/run/bench_harness.hpp"
+#include "experiments/scenes/scene_card.hpp"
+#include "experiments/study/contact_measurement.hpp"
+#include "experiments/study/targets.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+namespace {
+
+/// Primitives up to which a scene's keyframes are written for its picture, and how many keyframes.
+constexpr std::uint64_t largest_shown = 150'000;
+constexpr std::size_t keyframes_shown = 4;
+
+/// One run of a plan: what all its groups share.
+class Runner {
+ public:
+  Runner(Harness harness, const std::filesystem::path& out)
+      : harness_(harness), machine_(machine()), run_(now_utc() + "-" + std::to_string(::getpid())) {
+    if (out.empty()) return;
+    store_ = std::make_unique<ResultStore>(out);
+    std::error_code error;
+    for (const char* name : {"benchmark.json", "targets.json"})
+      if (const auto file = out / name; std::filesystem::is_directory(file, error))
+        throw io::InputError(file.string() + ": is a folder where a file is to be written");
+    if (store_->unreadable_lines() > 0)
+      say("note: " + (out / "results.jsonl").string() + " has " + std::to_string(store_->unreadable_lines()) +
+          " unreadable lines (of a run that was stopped?); they are left as they are");
+  }
+
+  void study(const Study& study, const std::vector<ContestantSpec>& contestants) {
+    for (const SceneSpec& spec : study.scenes) {
+      if (spec.optional) {
+        if (const std::string missing = missing_file(spec); !missing.empty()) {
+          note("note: the scene '" + spec.name + "' is left out, there is no " + missing);
+          continue;
+        }
+      }
+      const LoadedScene loaded = load(spec, making_);
+      for (const std::string& text : loaded.notes) note("note: " + text);
+      card_ = store_ ? show_scene(loaded) : "";
+      for (const std::string& scalar : study.scalars) {
+        if (scalar == "float")
+          scene<float>(study, contestants, loaded);
+        else
+          scene<double>(study, contestants, loaded);
+      }
+    }
+  }
+
+  /// Holds what was measured against the plan's targets.
+  void targets(const Plan& plan) {
+    if (plan.targets.empty()) return;
+    const json rows = target_rows(plan, groups_);
+    print(targets_table(rows) + "\n");
+    if (store_) write_targets(store_->folder(), rows);
+  }
+
+  StudyOutcome outcome() const { return outcome_; }
+
+ private:
+  void note(const std::string& text) {
+    progress_.clear();
+    if (said_.insert(text).second) say(text);
+  }
+
+  /// What the report shows of a scene: its card, and a few keyframes where it is not too large for a picture.
+  /// Returns the card's hash; "" without a card.
+  std::string show_scene(const LoadedScene& loaded) {
+    std::uint64_t primitives = 0;
+    for (const io::AnimatedMesh& mesh : loaded.meshes) primitives += mesh.primitive_count();
+    if (primitives > largest_shown) return {};
+    const std::string hash = hexadecimal(card_hash(loaded));
+    const std::filesystem::path folder = store_->folder() / "scenes" / folder_name(loaded);
+    if (is_card(folder / "card.json", hash)) return hash;
+    making_("looking at " + loaded.name, 0);
+    try {
+      export_scene(loaded, folder, keyframes_shown);
+    } catch (const io::InputError& problem) {
+      // Nothing that is measured depends on it.
+      note("warning: the report will have no picture of " + loaded.name + ": " + problem.what());
+    }
+    progress_.clear();
+    return hash;
+  }
+
+  static bool is_card(const std::filesystem::path& file, const std::string& hash) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(file, error) || std::filesystem::file_size(file, error) == 0)
+      return false;
+    const json card = json_or_nothing(io::read_file(file));
+    return card.is_object() && card.contains("bodies") && card.contains("hash") && card.at("hash") == hash;
+  }
+
+  /// A scene of one body has times, but its query has nothing to find, which is seldom meant.
+  template <class S>
+  void warn_of_no_pairs(const Scene<S>& scene) {
+    if (!scene.pairs.empty()) return;
+    note("warning: " + scene.name +
+         " has one body, so there are no pairs of bodies, and nothing is found or compared; pairs within it "
+         "are "
+         "asked for by --self (in a plan: \"self\": true)");
+  }
+
+  template <class S>
+  void scene(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded) {
+    const Scene<S> scene = assemble<S>(loaded);
+    warn_of_no_pairs(scene);
+    const PlanScript<S> script = script_of(scene, loaded, making_);
+    if (study.continuous) {
+      contact_group(study, contestants, loaded, scene, script);
+      return;
+    }
+    Oracle<S> oracle(scene, cache_folder(), hash(script));
+    if (!oracle.problem().empty()) note("warning: " + oracle.problem());
+    std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
+    if (has_own_frames(loaded)) {
+      if (per_keyframe != std::vector<std::uint32_t>{1})
+        note("note: " + scene.name + " says itself when its frames are: l does not apply and counts as 1");
+      per_keyframe = {1};
+    }
+    for (const std::uint32_t l : per_keyframe) {
+      const std::size_t most = study.frames_limit > 0 ? study.frames_limit : SIZE_MAX;
+      const std::vector<double> frames = frames_of(scene, loaded, script, l, most);
+      group(study, contestants, loaded, scene, script, oracle, l, frames);
+    }
+    const std::string before = oracle.problem();
+    oracle.keep();
+    if (oracle.problem() != before) note("warning: " + oracle.problem());
+  }
+
+  /// All contestants on one scene, in one scalar, at one l: what one table shows.
+  template <class S>
+  void group(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded,
+             const Scene<S>& scene, const PlanScript<S>& script, Oracle<S>& oracle, std::uint32_t l,
+             const std::vector<double>& frames) {
+    json about_scene = scene_record(scene, loaded, l, frames, script);
+    const std::string title = scene.name + ", l = " + std::to_string(l);
+    if (l > 1 && study.oracle_every % l == 0)
+      note("warning: with oracle_every " + std::to_string(study.oracle_every) +
+           " and l = " + std::to_string(l) +
+           " only keyframes are compared with the truth; take a number without common factors");
+    Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script);
+    measure_all(study, contestants, loaded, about_scene, title, measurement,
+                [&](const Info& info) { return unsuitable(info, scene, script); });
+  }
+
+  /// The same for contacts from each keyframe to the next.
+  template <class S>
+  void contact_group(const Study& study, const std::vector<ContestantSpec>& contestants,
+                     const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script) {
+    if (!script.empty()) {
+      note("note: " + scene.name +
+           " is left out: contacts between keyframes know nothing of changes of plans");
+      return;
+    }
+    std::vector<double> knots = overlaid_keyframes(scene);
+    if (study.frames_limit > 0 && knots.size() > study.frames_limit + 1) knots.resize(study.frames_limit + 1);
+    if (knots.size() < 2) {
+      note("note: " + scene.name + " is left out: nothing moves, so there are no contacts between keyframes");
+      return;
+    }
+    progress_.show(scene.name + ": finding the true contacts");
+    ContactMeasurement<S> measurement(scene, knots);
+    json about_scene = scene_record(scene, loaded, 1, std::span<const double>(knots));
+    about_scene["frames"] = knots.size() - 1;
+    about_scene["name"] = scene.name + " (contacts)";
+    about_scene["continuous"] = true;
+    measure_all(study, contestants, loaded, about_scene, scene.name + ", contacts", measurement,
+                [&](const Info& info) -> std::string {
+                  if (!info.can.contacts) return "finds no contacts between keyframes";
+                  return unsuitable(info, scene, script);
+                });
+  }
+
+  /// Verifies and times the contestants of one table. `M` is a Measurement, or one of contacts.
+  template <class M, class Unsuitable>
+  void measure_all(const Study& study, const std::vector<ContestantSpec>& contestants,
+                   const LoadedScene& loaded, json about_scene, const std::string& title, M& measurement,
+                   const Unsuitable& why_not) {
+    if (!card_.empty()) about_scene["card"] = card_;
+    const std::string scalar = about_scene.at("scalar");
+    std::vector<json> records;           // in the order of the contestants
+    std::vector<std::size_t> record_of;  // of each one that is measured
+    std::size_t skipped = 0;
+    for (std::size_t c = 0; c < contestants.size(); ++c) {
+      const ContestantSpec& spec = contestants[c];
+      if (const std::string why = why_not(spec.entry->info); !why.empty()) {
+        note("note: " + spec.entry->info.id + " is left out of " + about_scene.at("name").get<std::string>() +
+             ": it " + why);
+        continue;
+      }
+      json record{{"schema", results_schema},
+                  {"kind", word(harness_)},
+                  {"run", run_},
+                  {"study", study.name},
+                  {"commit", commit()},
+                  {"dirty", dirty()},
+                  {"machine", machine_},
+                  {"seed", loaded.seed},
+                  {"scene", about_scene},
+                  {"strategy", strategy_record(spec)}};
+      record["key"] =
+          configuration_key(harness_, program_identity(), about_scene, record["strategy"], study, machine_);
+      if (const json* known = known_record(record["key"], title + ": " + spec.label)) {
+        if (!known->at("verified").at("holds").template get<bool>()) ++outcome_.refused;
+        records.push_back(*known);
+        if (store_) ++skipped;
+        continue;
+      }
+      progress_.show(title + ": verifying " + spec.label);
+      measurement.add(spec, study.oracle_every);
+      record_of.push_back(records.size());
+      records.push_back(std::move(record));
+    }
+    if (skipped > 0)
+      note(title + ", " + scalar + ": " + std::to_string(skipped) + " of " +
+           counted(records.size(), "configuration") + " in the results already, not measured again");
+    const json benchmarks = play_all(measurement, study.repetitions, title, scalar);
+    std::string failed;  // the first of what could not be written
+    const auto keep = [&failed](const auto& work) {
+      try {
+        work();
+      } catch (const io::InputError& problem) {
+        if (failed.empty()) failed = problem.what();
+      }
+    };
+    // Before the records: a configuration whose record is there is not measured again, so that its table in
+    // benchmark.json would never come.
+    if (store_ && !benchmarks.is_null())
+      keep([&] {
+        if (const std::string said = add_to_benchmark_file(store_->folder(), benchmarks); !said.empty())
+          note("warning: " + said);
+      });
+    for (std::size_t i = 0; i < measurement.size(); ++i) {
+      json& record = records[record_of[i]];
+      complete(record, measurement[i]);
+      record.update(measurement.extras(i));
+      ++outcome_.measured;
+      if (measurement[i].unfinished)
+        ++outcome_.unfinished;
+      else if (!measurement[i].refused.empty())
+        ++outcome_.refused;
+      if (store_)
+        keep([&] { store_->append(record); });
+      else
+        of_this_run_.insert_or_assign(record.at("key").get<std::string>(), record);
+    }
+    outcome_.skipped += skipped;
+    groups_.push_back({about_scene, records});
+    progress_.clear();
+    print(results_table(records) + "\n");
+    if (!failed.empty()) throw io::InputError(failed);
+  }
+
+  /// The record of a configuration that need not be measured again, or nullptr.
+  const json* known_record(const std::string& key, const std::string& what) {
+    if (!store_) {
+      const auto found = of_this_run_.find(key);
+      return found == of_this_run_.end() || found->second.value("unfinished", false) ? nullptr
+                                                                                     : &found->second;
+    }
+    const json* known = store_->find(key);
+    if (known == nullptr) return nullptr;
+    if (const std::string why = unusable(*known); !why.empty()) {
+      note("warning: " + store_->place(key) + ": " + why + "; " + what + " is measured again");
+      return nullptr;
+    }
+    if (const auto unfinished = known->find("unfinished");
+        unfinished != known->end() && *unfinished == json(true)) {
+      note("note: " + what + " ran out of memory in an earlier run, and is measured again");
+      return nullptr;
+    }
+    return known;
+  }
+
+  /// Plays the repetitions; Google Benchmark's report, or null.
+  template <class M>
+  json play_all(M& measurement, std::uint32_t repetitions, const std::string& title,
+                const std::string& scalar) {
+    std::vector<std::size_t> timed;
+    for (std::size_t i = 0; i < measurement.size(); ++i)
+      if (measurement.timed(i)) timed.push_back(i);
+    if (timed.empty()) return nullptr;
+    std::size_t done = 0;
+    const auto play = [&](std::size_t i) -> const ClipTimes* {
+      if (!measurement.timed(i)) return nullptr;  // it has thrown
+      progress_.show(title + ": clip " + std::to_string(++done) + " of " +
+                     std::to_string(timed.size() * repetitions) + ", " + measurement[i].spec->label);
+      return measurement.play(i);
+    };
+    if (harness_ == Harness::rounds) {
+      for (std::uint32_t r = 0; r < repetitions; ++r)
+        for (const std::size_t i : timed) play(i);
+      return nullptr;
+    }
+    std::vector<BenchItem> items;
+    for (const std::size_t i : timed)
+      items.push_back({title + ", " + scalar + "/" + measurement[i].spec->label,
+                       [&play, i]() -> const ClipTimes* { return play(i); }});
+    json runs = run_benchmarks(items, repetitions);
+    runs["context"]["commit"] = commit();
+    runs["context"]["dirty"] = dirty();
+    runs["context"]["machine"] = machine_;
+    return runs;
+  }
+
+  static void complete(json& record, const Measured& measured) {
+    record["when"] = now_utc();
+    record["verified"] = verified_record(measured);
+    record["counters"] = counters_record(measured.counters);
+    record["events_at_depth"] = depths_record(measured.counters);
+    record["bytes"] = measured.counters[Counter::bytes];
+    if (!measured.choice.empty()) record["choice"] = measured.choice;
+    record["times"] = nullptr;
+    if (measured.refused.empty())
+      record["times"] = times_record(measured);
+    else
+      record["refused"] = measured.refused;
+    if (measured.unfinished) record["unfinished"] = true;
+  }
+
+  Harness harness_;
+  json machine_;
+  std::string run_;
+  std::unique_ptr<ResultStore> store_;
+  std::map<std::string, json> of_this_run_;  // by key, where there is no store
+  std::string card_;                         // of the scene that is played
+  Progress progress_;
+  const MakeProgress making_ = [this](const std::string& what, double fraction) {
+    progress_.show(what + (fraction > 0 ? ": " + std::to_string(int(100 * fraction)) + " %" : ""));
+  };
+  std::set<std::string> said_;
+  StudyOutcome outcome_;
+  std::vector<TargetGroup> groups_;  // everything that the plan has asked for, for its targets
+};
+
+}  // namespace
+
+StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::path& out) {
+  // Everything that can be wrong with the contestants is found before the first is measured.
+  std::vector<std::vector<ContestantSpec>> contestants;
+  std::vector<std::string> notes;
+  for (const Study& study : plan.studies)
+    contestants.push_back(expand(study.strategies, study.params, study.builder, notes));
+  for (const auto& list : contestants) try_parameters(list);
+  check_target_contestants(plan, contestants);
+  for (const std::string& text : std::set<std::string>(notes.begin(), notes.end())) say("note: " + text);
+  Runner runner(harness, out);
+  for (std::size_t i = 0; i < plan.studies.size(); ++i) runner.study(plan.studies[i], contestants[i]);
+  runner.targets(plan);
+  return runner.outcome();
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,169 @@
+#include "experiments/scenes/builtin_scenes.hpp"
+
+#include <algorithm>
+#include <system_error>
+
+#include "experiments/common/environment.hpp"
+#include "experiments/common/progress.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/io/animated_mesh_cache.hpp"
+#include "experiments/scenes/garment.hpp"
+#include "experiments/scenes/shapes.hpp"
+#include "experiments/scenes/tablecloth.hpp"
+
+namespace kbvh::experiments {
+
+namespace {
+
+using Meshes = std::vector<io::AnimatedMesh>;
+
+/// What was simulated before is read from the cache, else simulate(progress) is called and its result kept.
+/// `what` names it in reports of progress.
+template <class Config, class Simulate>
+Meshes simulated(const Config& config, Simulate simulate, const std::string& what,
+                 const MakeProgress& progress) {
+  const std::filesystem::path folder = cache_folder();
+  const std::filesystem::path file = folder / (scenes::cache_key(config) + ".kbvhmesh");
+  std::error_code error;
+  if (!folder.empty() && std::filesystem::exists(file, error)) {
+    try {
+      return io::load_cache(file);
+    } catch (const io::InputError& problem) {
+      say(std::string("warning: ") + problem.what() + "; the scene is simulated anew");
+    }
+  }
+  const auto report = [&](double fraction) {
+    if (progress)
+      progress("simulating a " + what + " of " + std::to_string(config.triangles) + " triangles", fraction);
+  };
+  Meshes meshes = simulate(config, report);
+  if (!folder.empty()) {
+    try {
+      io::save_cache(meshes, file);
+    } catch (const io::InputError& problem) {
+      say(std::string("warning: the simulated scene is not kept: ") + problem.what());
+    }
+  }
+  return meshes;
+}
+
+Meshes tablecloth(const BuiltinOptions& options, const MakeProgress& progress) {
+  scenes::TableclothConfig config;
+  config.triangles = options.triangles;
+  if (options.obstacle_triangles > 0) config.table_triangles = options.obstacle_triangles;
+  config.seed = options.seed;
+  config.keyframes = options.keyframes;
+  return simulated(config, scenes::simulate_tablecloth, "tablecloth", progress);
+}
+
+/// The obstacle has about as many triangles up to 20 000, which is what the measurements are defined for.
+std::uint32_t obstacle_triangles(const BuiltinOptions& options) {
+  if (options.obstacle_triangles > 0) return options.obstacle_triangles;
+  return options.triangles < 20000 ? options.triangles : 20000;
+}
+
+Meshes garment(scenes::GarmentKind kind, const char* what, const BuiltinOptions& options,
+               const MakeProgress& progress) {
+  scenes::GarmentConfig config;
+  config.kind = kind;
+  config.triangles = options.triangles;
+  config.avatar_triangles = obstacle_triangles(options);
+  if (options.full_triangles > 0) config.full_triangles = options.full_triangles;
+  config.seed = options.seed;
+  config.keyframes = options.keyframes;
+  return simulated(config, scenes::simulate_garment, what, progress);
+}
+
+Meshes shirt(const BuiltinOptions& options, const MakeProgress& progress) {
+  return garment(scenes::GarmentKind::shirt, "shirt", options, progress);
+}
+
+Meshes dress(const BuiltinOptions& options, const MakeProgress& progress) {
+  return garment(scenes::GarmentKind::dress, "dress", options, progress);
+}
+
+Meshes waving_sheet(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::waving_sheet(options.triangles, options.keyframes),
+          scenes::icosphere(obstacle_triangles(options), {0.1, -0.05, 0.0}, 0.5)};
+}
+
+Meshes expanding_sphere(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::expanding_sphere(options.triangles, {0, 0, 0}, 0.2, 0.6, options.keyframes),
+          scenes::icosphere(obstacle_triangles(options), {0.5, 0.1, -0.05}, 0.4)};
+}
+
+// Two spheres grow towards each other, all vertices at 0.1 m/s until they are told otherwise. Their centres
+// are not mirror images in anything that their triangles are aligned with, so contacts are in general
+// position.
+constexpr std::array<double, 3> left_centre{-0.52, 0.0, 0.0}, right_centre{0.52, 0.013, -0.007};
+constexpr double first_radius = 0.5, outward_speed = 0.1;
+
+ReversalRule reversing_rule(const BuiltinOptions& options) {
+  return {.centres = {left_centre, right_centre}, .lowest_radius = first_radius, .frames = options.keyframes};
+}
+
+Meshes reversing_spheres(const BuiltinOptions& options, const MakeProgress&) {
+  // The velocity field holds until it is changed: one segment, whose end no clip of up to 1000 frames
+  // reaches.
+  const ReversalRule rule = reversing_rule(options);
+  const double seconds = double(std::max(1000u, rule.frames)) / rule.frames_per_second;
+  const double last_radius = first_radius + outward_speed * seconds;
+  const auto sphere = [&](std::uint32_t triangles, const std::array<double, 3>& centre) {
+    return scenes::expanding_sphere(triangles, {centre[0], centre[1], centre[2]}, first_radius, last_radius,
+                                    2, 1 / seconds);
+  };
+  return {
+      sphere(options.triangles, left_centre),
+      sphere(options.obstacle_triangles > 0 ? options.obstacle_triangles : options.triangles, right_centre)};
+}
+
+Meshes passing_spheres(const BuiltinOptions& options, const MakeProgress&) {
+  const double last = options.keyframes > 1 ? double(options.keyframes - 1) : 1.0;
+  const double path = 1.5;
+  return {scenes::translated(scenes::icosphere(options.triangles, {-0.5 * path, 0.05, 0.1}, 0.4),
+                             {path / last, 0, 0}, options.keyframes),
+          scenes::translated(scenes::icosphere(obstacle_triangles(options), {0.5 * path, -0.05, -0.1}, 0.4),
+                             {-path / last, 0, 0}, options.keyframes)};
+}
+
+Meshes turning_box(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::rotated(scenes::box(options.triangles, {-0.5, -0.4, -0.3}, {0.5, 0.4, 0.3}), {0, 0, 0},
+                          1.0 / 120.0, options.keyframes),
+          scenes::icosphere(obstacle_triangles(options), {0.35, 0.2, 0.05}, 0.4)};
+}
+
+Meshes random_soups(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::random_soup(options.triangles, options.seed, options.keyframes),
+          scenes::random_soup(obstacle_triangles(options), options.seed + 1, options.keyframes)};
+}
+
+}  // namespace
+
+const std::vector<BuiltinScene>& builtin_scenes() {
+  static const std::vector<BuiltinScene> list{
+      {"tablecloth", "a cloth, simulated, falls onto a round table and hangs over its rim", &tablecloth},
+      {"shirt", "a walking man and his shirt, simulated", &shirt},
+      {"dress", "a walking woman and her dress, simulated", &dress},
+      {"waving_sheet", "a sheet in crossing waves cuts a sphere at rest", &waving_sheet},
+      {"expanding_sphere", "a growing sphere reaches a sphere at rest", &expanding_sphere},
+      {"reversing_spheres",
+       "two spheres expand and vertices turn round where triangles meet, at 60 frames per second; keyframes: "
+       "frames",
+       &reversing_spheres, &reversing_rule},
+      {"passing_spheres", "two spheres fly through each other, without deforming", &passing_spheres},
+      {"turning_box", "a box turns inside a sphere at rest", &turning_box},
+      {"random_soups", "two clouds of separate drifting triangles in the same cube", &random_soups},
+  };
+  return list;
+}
+
+const BuiltinScene& find_builtin_scene(const std::string& name) {
+  std::vector<std::string> known;
+  for (const BuiltinScene& scene : builtin_scenes()) {
+    if (scene.name == name) return scene;
+    known.push_back(scene.name);
+  }
+  throw io::InputError(no_such("built-in scene", name, known));
+}
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,484 @@
+#include "experiments/scenes/scene_spec.hpp"
+
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <set>
+
+#include "core/motion/admissible.hpp"
+#include "core/topology/renumber.hpp"
+#include "experiments/common/environment.hpp"
+#include "experiments/common/json_reader.hpp"
+#include "experiments/common/names.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/io/load.hpp"
+#include "experiments/scenes/shape_bodies.hpp"
+#include "experiments/scenes/shapes.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+// --- from text and JSON ---------------------------------------------------------------------------------
+
+namespace {
+
+double number_of(const std::string& text, const std::string& where) {
+  const auto value = parse_number(text);
+  if (!value) throw io::InputError(where + ": expected a finite number, got '" + text + "'");
+  return *value;
+}
+
+/// "z:90" or "1:1:0:45".
+Placement::Rotation rotation_of(const std::string& text, const std::string& where) {
+  const auto parts = split(text, ':');
+  Placement::Rotation rotation{{0, 0, 0}, 0};
+  if (parts.size() == 2 && (parts[0] == "x" || parts[0] == "y" || parts[0] == "z")) {
+    rotation.axis[parts[0][0] - 'x'] = 1;
+  } else if (parts.size() == 4) {
+    for (std::size_t d = 0; d < 3; ++d) rotation.axis[d] = number_of(parts[d], where);
+    if (rotation.axis[0] == 0 && rotation.axis[1] == 0 && rotation.axis[2] == 0)
+      throw io::InputError(where + ": the axis of '" + text + "' has no direction");
+  } else {
+    throw io::InputError(where + ": expected axis:degrees (as z:90, or 1:1:0:45), got '" + text + "'");
+  }
+  rotation.degrees = number_of(parts.back(), where);
+  return rotation;
+}
+
+/// JSON as text. What is not UTF-8 in it, such as the name of a file, is spelt out.
+std::string text_of(json value) {
+  const std::function<void(json&)> mend = [&](json& part) {
+    if (part.is_string()) part = readable(part.get_ref<const std::string&>());
+    if (part.is_structured())
+      for (json& inner : part) mend(inner);
+  };
+  mend(value);
+  return value.dump();
+}
+
+fs::path resolved(const std::string& text, const fs::path& folder) {
+  constexpr std::string_view data = "data:";
+  if (text.starts_with(data)) return data_folder() / text.substr(data.size());
+  const fs::path path = text;
+  return path.is_absolute() || folder.empty() ? path : folder / path;
+}
+
+io::TakeAs take_as_of(JsonReader& keys) {
+  const std::string word = keys.word("as").value_or("given");
+  if (word == "given") return io::TakeAs::given;
+  if (word == "triangles") return io::TakeAs::triangles;
+  if (word == "points") return io::TakeAs::points;
+  keys.fail("as", "expected given, triangles or points, got '" + word + "'");
+}
+
+BodySpec read_body(const json& value, const std::string& place, const fs::path& folder) {
+  const json object = value.is_string() ? body_from_text(value.get<std::string>()) : value;
+  JsonReader keys(object, place);
+  BodySpec body;
+  body.place = place;
+  body.name = keys.word("name").value_or("");
+  check_name(body.name, place + ": name");
+  body.placement.scale = keys.number("scale").value_or(1);
+  if (body.placement.scale == 0) keys.fail("scale", "must not be 0");
+  for (const std::string& rotation : keys.words("rotate"))
+    body.placement.rotations.push_back(rotation_of(rotation, place + ": rotate"));
+  if (const auto move = keys.numbers("translate", 3))
+    std::copy(move->begin(), move->end(), body.placement.translate);
+  body.as = take_as_of(keys);
+  body.self = keys.truth("self").value_or(false);
+  if (keys.has("file") == keys.has("shape"))
+    throw io::InputError(place + ": a body has either a file or a shape");
+  if (keys.has("shape")) {
+    if (const json* triangles = keys.find("triangles"); triangles != nullptr && triangles->is_array())
+      keys.fail("triangles", "a sweep belongs to the scene, a body has one number");
+    body.shape = object;
+    for (const char* common : {"name", "scale", "rotate", "translate", "as", "self"})
+      body.shape.erase(common);
+    // Made once for its complaints where the sizes are small, so that a wrong key shows before hours of work.
+    json probe = body.shape;
+    const auto& name = probe["shape"];
+    const std::string size = name.is_string() ? shape_kind(name, place).size_key : "triangles";
+    if (!probe.contains(size) || (probe[size].is_number_unsigned() && probe[size].get<std::uint64_t>() > 100))
+      probe[size] = 100;
+    JsonReader shape_keys(probe, place);
+    make_shape(shape_keys);
+    shape_keys.finish();
+    return body;
+  }
+  body.file = resolved(keys.word("file").value_or(""), folder);
+  if (body.file.empty()) keys.fail("file", "is empty");
+  if (const auto motion = keys.word("motion")) {
+    if (motion->empty()) keys.fail("motion", "is empty");
+    body.motion = resolved(*motion, folder);
+  }
+  body.clip = keys.word("clip").value_or("");
+  body.frames_per_second = keys.number("fps").value_or(0);
+  if (body.frames_per_second < 0) keys.fail("fps", "must not be negative");
+  keys.finish();
+  return body;
+}
+
+/// A word that is neither a file nor the beginning of one's name was meant for a shape.
+void check_is_a_file(const BodySpec& body) {
+  std::error_code error;
+  const std::string word = body.file.filename().string();
+  if (body.file.empty() || body.file.has_extension() || fs::exists(body.file, error)) return;
+  throw io::InputError(body.place + ": there is no file or folder " + body.file.string() + " and no shape '" +
+                       word + "'; shapes are " + joined(shape_names()) + suggestion(word, shape_names()));
+}
+
+VertexOrder order_of(const std::string& word, const JsonReader& keys) {
+  if (word == "given") return VertexOrder::given;
+  if (word == "shuffled") return VertexOrder::shuffled;
+  if (word == "renumbered") return VertexOrder::renumbered;
+  keys.fail("order", "expected given, shuffled or renumbered, got '" + word + "'");
+}
+
+/// What an order adds to the name of a scene.
+std::string suffix(VertexOrder order) {
+  return order == VertexOrder::given ? "" : std::string("-") + word(order);
+}
+
+}  // namespace
+
+const char* word(VertexOrder order) {
+  switch (order) {
+    case VertexOrder::shuffled:
+      return "shuffled";
+    case VertexOrder::renumbered:
+      return "renumbered";
+    case VertexOrder::given:
+      break;
+  }
+  return "given";
+}
+
+std::string given_name(const SceneSpec& spec) {
+  return spec.name.empty() ? "" : spec.name + suffix(spec.order);
+}
+
+json body_from_text(const std::string& text) {
+  const std::string where = "body '" + text + "'";
+  static const std::set<std::string> words{"name", "motion", "clip", "as", "knots"},
+      wholes{"triangles", "keyframes", "seed", "spans", "degree"},
+      vectors{"translate", "centre", "step", "lower", "upper"};
+  json body = json::object();
+  auto parts = split(text, ',');
+  const std::size_t colon = parts[0].find(':');
+  const std::string head = parts[0].substr(0, colon);
+  // "name:key=value" is a shape, also if there is no shape of that name.
+  const bool means_a_shape = colon != std::string::npos && head.find_first_of("./\\") == std::string::npos &&
+                             head != "data" && parse_assignment(parts[0].substr(colon + 1));
+  if (is_shape(head) || means_a_shape) {
+    shape_kind(head, where);
+    body["shape"] = head;
+    if (colon == std::string::npos)
+      parts.erase(parts.begin());
+    else
+      parts[0] = parts[0].substr(colon + 1);
+  } else {
+    if (parts[0].empty()) throw io::InputError(where + ": it must begin with a file or a shape");
+    body["file"] = parts[0];
+    parts.erase(parts.begin());
+  }
+  for (const std::string& part : parts) {
+    const auto assignment = parse_assignment(part);
+    if (!assignment) throw io::InputError(where + ": expected key=value, got '" + part + "'");
+    const auto& [key, value] = *assignment;
+    const std::string at = where + ": " + key;
+    if (value.empty()) throw io::InputError(at + ": is empty, but needs a value");
+    if (key == "rotate") {
+      body[key].push_back(value);
+      continue;
+    }
+    if (body.contains(key)) throw io::InputError(at + ": is given twice");
+    if (key == "self") {
+      if (value != "true" && value != "false")
+        throw io::InputError(at + ": expected true or false, got '" + value + "'");
+      body[key] = value == "true";
+    } else if (words.contains(key)) {
+      body[key] = value;
+    } else if (wholes.contains(key)) {
+      const auto number = parse_whole(value);
+      if (!number) throw io::InputError(at + ": expected a whole number, got '" + value + "'");
+      body[key] = *number;
+    } else if (vectors.contains(key)) {
+      json numbers = json::array();
+      for (const std::string& number : split(value, ':')) numbers.push_back(number_of(number, at));
+      if (numbers.size() != 3) throw io::InputError(at + ": expected x:y:z, got '" + value + "'");
+      body[key] = numbers;
+    } else {
+      // Unknown keys are refused by whoever reads the object; a number or a word, that is for it to say.
+      const auto number = parse_number(value);
+      body[key] = number ? json(*number) : json(value);
+    }
+  }
+  return body;
+}
+
+std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, const fs::path& folder) {
+  const json object = scene.is_string() ? json{{"builtin", scene}} : scene;
+  JsonReader keys(object, place);
+  SceneSpec base;
+  base.name = keys.word("name").value_or("");
+  check_name(base.name, place + ": name");
+  base.optional = keys.truth("optional").value_or(false);
+  base.self = keys.truth("self").value_or(false);
+  base.builtin = keys.word("builtin").value_or("");
+  if (keys.has("bodies") != base.builtin.empty())
+    throw io::InputError(place + ": a scene is either builtin or has bodies");
+  if (base.builtin.empty()) {
+    const auto bodies = keys.list("bodies");
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      base.bodies.push_back(read_body(bodies[i], place + ": bodies[" + std::to_string(i) + "]", folder));
+    if (!base.optional)
+      for (const BodySpec& body : base.bodies) check_is_a_file(body);
+    for (const char* key : {"triangles", "keyframes", "obstacle"})
+      if (keys.has(key)) keys.fail(key, "is for built-in scenes; bodies have their own numbers");
+  } else {
+    try {
+      find_builtin_scene(base.builtin);
+    } catch (const io::InputError& problem) {
+      throw io::InputError(place + ": " + problem.what());
+    }
+  }
+  if (const json* script = keys.find("script")) {
+    if (!base.builtin.empty() && find_builtin_scene(base.builtin).reversal != nullptr)
+      keys.fail("script", "the scene '" + base.builtin + "' records its own");
+    base.script = read_script_spec(*script, place + ": script", folder);
+  }
+  auto triangles = keys.wholes("triangles", ranges::triangles);
+  auto seeds = keys.wholes("seed", ranges::any);
+  auto orders = keys.words("order");
+  base.options.keyframes =
+      std::uint32_t(keys.whole("keyframes", ranges::keyframes).value_or(base.options.keyframes));
+  base.options.obstacle_triangles = std::uint32_t(keys.whole("obstacle", ranges::triangles).value_or(0));
+  keys.finish();
+  if (triangles.empty()) triangles = {base.options.triangles};
+  if (seeds.empty()) seeds = {base.options.seed};
+  if (orders.empty()) orders = {"given"};
+  std::vector<SceneSpec> scenes;
+  for (const std::uint64_t count : triangles)
+    for (const std::uint64_t seed : seeds)
+      for (const std::string& order : orders) {
+        SceneSpec spec = base;
+        spec.options.triangles = std::uint32_t(count);
+        spec.options.seed = seed;
+        spec.order = order_of(order, keys);
+        if (spec.script && spec.order != VertexOrder::given)
+          keys.fail("order", "a script names vertices in the given order");
+        spec.said = text_of(json{object, count, seed, order}) + " in " + folder.string();
+        scenes.push_back(std::move(spec));
+      }
+  return scenes;
+}
+
+// --- loading and placing --------------------------------------------------------------------------------
+
+bool Placement::identity() const {
+  return scale == 1 && rotations.empty() && translate[0] == 0 && translate[1] == 0 && translate[2] == 0;
+}
+
+namespace {
+struct Matrix {
+  double m[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+};
+
+Matrix product(const Matrix& a, const Matrix& b) {
+  Matrix c;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      c.m[i][j] = a.m[i][0] * b.m[0][j] + a.m[i][1] * b.m[1][j] + a.m[i][2] * b.m[2][j];
+  return c;
+}
+
+/// Rodrigues' formula; sines of our own, so that every machine puts a body in the same place.
+Matrix matrix_of(const Placement::Rotation& rotation) {
+  const double turns = rotation.degrees / 360.0;
+  double sine = scenes::sine_of_turns(turns), cosine = scenes::cosine_of_turns(turns);
+  if (std::fmod(rotation.degrees, 90.0) == 0) {
+    sine = std::round(sine);
+    cosine = std::round(cosine);
+  }
+  // Scaled first: squares of the user's numbers could overflow, or vanish.
+  const double largest =
+      std::max({std::abs(rotation.axis[0]), std::abs(rotation.axis[1]), std::abs(rotation.axis[2])});
+  const double a[3] = {rotation.axis[0] / largest, rotation.axis[1] / largest, rotation.axis[2] / largest};
+  const double length = std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+  const double x = a[0] / length, y = a[1] / length, z = a[2] / length, rest = 1 - cosine;
+  return {{{cosine + x * x * rest, x * y * rest - z * sine, x * z * rest + y * sine},
+           {y * x * rest + z * sine, cosine + y * y * rest, y * z * rest - x * sine},
+           {z * x * rest - y * sine, z * y * rest + x * sine, cosine + z * z * rest}}};
+}
+}  // namespace
+
+void place(io::AnimatedMesh& mesh, const Placement& placement) {
+  if (placement.identity()) return;
+  Matrix matrix;
+  for (const Placement::Rotation& rotation : placement.rotations)
+    matrix = product(matrix_of(rotation), matrix);
+  for (std::size_t i = 0; i + 2 < mesh.positions.size(); i += 3) {
+    double* p = mesh.positions.data() + i;
+    const double scaled[3] = {placement.scale * p[0], placement.scale * p[1], placement.scale * p[2]};
+    for (int d = 0; d < 3; ++d)
+      p[d] = matrix.m[d][0] * scaled[0] + matrix.m[d][1] * scaled[1] + matrix.m[d][2] * scaled[2] +
+             placement.translate[d];
+  }
+}
+
+void shuffle_vertices(io::AnimatedMesh& mesh, std::uint64_t seed) {
+  std::vector<std::uint32_t> place_of(mesh.vertex_count);
+  std::iota(place_of.begin(), place_of.end(), 0u);
+  const scenes::SeededNoise noise(seed);
+  for (std::uint32_t i = mesh.vertex_count; i > 1; --i)
+    std::swap(place_of[i - 1], place_of[noise.bits(i) % i]);
+  for (std::uint32_t& v : mesh.primitive_vertices) v = place_of[v];
+  std::vector<double> moved(mesh.positions.size());
+  for (std::size_t k = 0; k < mesh.keyframe_times.size(); ++k) {
+    const std::size_t begin = 3 * k * mesh.vertex_count;
+    for (std::uint32_t v = 0; v < mesh.vertex_count; ++v)
+      for (std::size_t d = 0; d < 3; ++d)
+        moved[begin + 3 * std::size_t(place_of[v]) + d] = mesh.positions[begin + 3 * std::size_t(v) + d];
+  }
+  mesh.positions = std::move(moved);
+}
+
+std::string missing_file(const SceneSpec& spec) {
+  std::error_code error;
+  for (const BodySpec& body : spec.bodies)
+    for (const fs::path& file : {body.file, body.motion})
+      if (!file.empty() && !fs::exists(file, error)) return file.string();
+  return {};
+}
+
+LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
+  LoadedScene loaded;
+  loaded.seed = spec.options.seed;
+  if (!spec.builtin.empty()) {
+    const BuiltinScene& builtin = find_builtin_scene(spec.builtin);
+    loaded.origin = SceneOrigin::built_in;
+    loaded.meshes = builtin.make(spec.options, progress);
+    if (builtin.reversal != nullptr) loaded.reversal = builtin.reversal(spec.options);
+    loaded.name = spec.builtin;
+    // Shapes end their names with the number of triangles that their pattern allowed.
+    if (!loaded.meshes.empty()) loaded.name += "-" + std::to_string(loaded.meshes[0].primitive_count());
+    if (spec.options.obstacle_triangles > 0 && loaded.meshes.size() > 1)
+      loaded.name += "-" + std::to_string(loaded.meshes[1].primitive_count());
+    if (spec.options.seed != BuiltinOptions{}.seed)
+      loaded.name += "-seed" + std::to_string(spec.options.seed);
+  }
+  std::vector<std::string> names;
+  loaded.sources.assign(loaded.meshes.size(), "built-in scene " + spec.builtin);
+  for (const BodySpec& body : spec.bodies) {
+    io::AnimatedMesh mesh;
+    if (!body.shape.is_null()) {
+      JsonReader keys(body.shape, body.place);
+      mesh = make_shape(keys);
+    } else {
+      if (progress) progress("reading " + body.file.string(), 0);
+      loaded.origin = SceneOrigin::files;
+      mesh = io::load_animated_mesh({body.file, body.motion, body.clip, body.frames_per_second});
+    }
+    mesh.name = body.name.empty() ? readable(mesh.name) : body.name;
+    io::take_as(mesh, body.as);
+    const std::string source = body.shape.is_null() ? body.file.string() : mesh.name;
+    if (mesh.degenerate_primitives > 0)
+      loaded.notes.push_back(source + ": " + counted(mesh.degenerate_primitives, "degenerate primitive") +
+                             " at the first keyframe, kept");
+    if (mesh.merged_keyframes > 0)
+      loaded.notes.push_back(source + ": merged " + counted(mesh.merged_keyframes, "keyframe") +
+                             " with time and positions of the one before");
+    if (mesh.added_keyframes > 0)
+      loaded.notes.push_back(source + ": " + counted(mesh.added_keyframes, "keyframe") +
+                             " added between those of the file, so that straight lines follow its turns and "
+                             "splines within a thousandth of the body's size");
+    if (mesh.jumps > 0)
+      loaded.notes.push_back(source + ": " + counted(mesh.jumps, "jump") +
+                             " of STEP samplers, each within one rounding of time: no frame lies within, but "
+                             "contacts between keyframes are found on the way");
+    if (mesh.kind != io::MeshKind::polygons)
+      loaded.notes.push_back(
+          source + ": " +
+          counted(mesh.primitive_count(), mesh.kind == io::MeshKind::points ? "point" : "control net") +
+          "; pairs with them are overlaps of boxes, not intersections");
+    place(mesh, body.placement);
+    loaded.sources.push_back(source);
+    names.push_back(mesh.name);
+    loaded.self.push_back(body.self);
+    loaded.meshes.push_back(std::move(mesh));
+  }
+  if (spec.self) loaded.self.assign(loaded.meshes.size(), true);
+  if (loaded.name.empty()) loaded.name = name_of_bodies(names);
+  if (!spec.name.empty()) loaded.name = spec.name;
+  loaded.order = spec.order;
+  loaded.script = spec.script;
+  loaded.name += suffix(spec.order);
+  if (spec.order == VertexOrder::shuffled)
+    for (std::size_t i = 0; i < loaded.meshes.size(); ++i)
+      shuffle_vertices(loaded.meshes[i], hash_of(std::to_string(i), spec.options.seed));
+  if (loaded.meshes.empty()) throw io::InputError("the scene has no body");
+  return loaded;
+}
+
+namespace {
+PrimitiveKind kind_of(io::MeshKind kind) {
+  switch (kind) {
+    case io::MeshKind::points:
+      return PrimitiveKind::points;
+    case io::MeshKind::control_nets:
+      return PrimitiveKind::control_nets;
+    case io::MeshKind::polygons:
+      break;
+  }
+  return PrimitiveKind::polygons;
+}
+}  // namespace
+
+namespace {
+void check_corners(const io::AnimatedMesh& mesh, const std::string& source) {
+  for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
+    const std::uint32_t corners = mesh.primitive_offsets[p + 1] - mesh.primitive_offsets[p];
+    if (corners <= most_corners) continue;
+    throw io::InputError(source + ": polygon " + std::to_string(p) + " has " + std::to_string(corners) +
+                         " corners; at most " + std::to_string(most_corners) +
+                         " are possible, as=triangles cuts it into triangles");
+  }
+}
+}  // namespace
+
+template <class S>
+Scene<S> assemble(const LoadedScene& loaded) {
+  Scene<S> scene;
+  scene.name = loaded.name;
+  for (std::size_t i = 0; i < loaded.meshes.size(); ++i) {
+    const io::AnimatedMesh& mesh = loaded.meshes[i];
+    check_corners(mesh, loaded.sources[i]);
+    Body<S> body;
+    body.name = mesh.name;
+    body.primitives.kind = kind_of(mesh.kind);
+    body.primitives.offsets = mesh.primitive_offsets;
+    body.primitives.vertices = mesh.primitive_vertices;
+    try {
+      body.plans = FlightPlans<S>(mesh.vertex_count, mesh.keyframe_times,
+                                  std::vector<S>(mesh.positions.begin(), mesh.positions.end()));
+    } catch (const std::invalid_argument& problem) {
+      throw io::InputError(loaded.sources[i] + ": body '" + mesh.name + "' as " +
+                           (sizeof(S) == 4 ? "float" : "double") + ": " + problem.what());
+    }
+    scene.bodies.push_back(std::move(body));
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  for (std::uint32_t i = 0; i < loaded.self.size(); ++i)
+    if (loaded.self[i]) scene.pairs.push_back({i, i});
+  validate(scene);
+  if (loaded.order == VertexOrder::renumbered)
+    scene = std::move(renumber_in_leaf_order(scene, BuilderConfig{}).scene);
+  return scene;
+}
+
+template Scene<float> assemble(const LoadedScene&);
+template Scene<double> assemble(const LoadedScene&);
+
+}  // namespace kbvh::experiments

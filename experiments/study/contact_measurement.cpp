@@ -1,0 +1,134 @@
+#include "experiments/study/contact_measurement.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "experiments/common/stopwatch.hpp"
+#include "experiments/io/animated_mesh.hpp"
+
+namespace kbvh::experiments {
+
+namespace {
+
+std::string text(const Contact& contact) {
+  return std::string(contact.kind == Contact::Kind::vertex_face ? "vertex-face" : "edge-edge") + " (" +
+         std::to_string(contact.body_a) + ":" + std::to_string(contact.feature_a) + ", " +
+         std::to_string(contact.body_b) + ":" + std::to_string(contact.feature_b) + ")";
+}
+
+/// Compares sorted contacts with the truth.
+void compare(const ContactBuffer& found, const ContactBuffer& truth, std::size_t interval,
+             Verification& result) {
+  ContactBuffer missed, extra;
+  std::set_difference(truth.begin(), truth.end(), found.begin(), found.end(), std::back_inserter(missed));
+  std::set_difference(found.begin(), found.end(), truth.begin(), truth.end(), std::back_inserter(extra));
+  ++result.frames;
+  result.pairs += truth.size();
+  result.missed += missed.size();
+  result.extra += extra.size();
+  for (std::size_t i = 1; i < found.size(); ++i) result.repeated += found[i] == found[i - 1] ? 1 : 0;
+  if (!result.first_violation.empty()) return;
+  const std::string place = "interval " + std::to_string(interval) + ": ";
+  if (!missed.empty())
+    result.first_violation = place + "contact " + text(missed[0]) + " is missed";
+  else if (!extra.empty())
+    result.first_violation = place + "contact " + text(extra[0]) + " is reported too often, or is none";
+}
+
+}  // namespace
+
+template <class S>
+ContactMeasurement<S>::ContactMeasurement(const Scene<S>& scene, std::vector<double> knots)
+    : scene_(&scene), knots_(std::move(knots)) {
+  try {
+    ContactFinder<S> finder(scene);
+    Playback<S> playback(scene);
+    for (std::size_t k = 0; k + 1 < knots_.size(); ++k) {
+      playback.seek(knots_[k]);
+      playback.evaluate_all();
+      finder.start(playback);
+      playback.seek(knots_[k + 1]);
+      playback.evaluate_all();
+      truth_.emplace_back();
+      finder.find_by_sweep(playback, truth_.back());
+      std::sort(truth_.back().begin(), truth_.back().end());
+    }
+  } catch (const std::invalid_argument& problem) {
+    throw io::InputError(scene.name + ": " + problem.what());
+  }
+}
+
+template <class S>
+void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every) {
+  Entrant entrant;
+  Measured& measured = entrant.measured;
+  measured.spec = &spec;
+  measured.sampled_every = oracle_every;
+  try {
+    {
+      Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
+      PhaseTimes ignored;
+      session.reset(knots_[0]);
+      for (std::size_t k = 0; k < truth_.size(); ++k) {
+        contacts_.clear();
+        measured.verification.candidates += session.contacts(knots_[k + 1], contacts_, ignored);
+        if (k % oracle_every != 0 && k + 1 != truth_.size()) continue;
+        std::sort(contacts_.begin(), contacts_.end());
+        compare(contacts_, truth_[k], k, measured.verification);
+      }
+      measured.counters = session.strategy().counters();
+      entrant.impacts = session.impact_stats();
+    }
+    if (!measured.verification.holds()) {
+      measured.refused = measured.verification.first_violation;
+    } else {
+      const auto begin = std::chrono::steady_clock::now();
+      entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
+      measured.build_seconds = seconds_since(begin);
+      // Warm: buffers grow, and hierarchies for sweeps are made when they are first asked for.
+      PhaseTimes ignored;
+      entrant.session->reset(knots_[0]);
+      contacts_.clear();
+      entrant.session->contacts(knots_[1], contacts_, ignored);
+    }
+  } catch (const ConfigError&) {
+    throw;
+  } catch (const std::exception& problem) {
+    entrant.session.reset();
+    refuse(measured, problem);
+  }
+  entrants_.push_back(std::move(entrant));
+}
+
+template <class S>
+const ClipTimes* ContactMeasurement<S>::play(std::size_t i) {
+  Entrant& entrant = entrants_[i];
+  try {
+    ClipTimes clip;
+    const auto begin = std::chrono::steady_clock::now();
+    entrant.session->reset(knots_[0]);
+    clip.reset_seconds = seconds_since(begin);
+    for (std::size_t k = 1; k < knots_.size(); ++k) {
+      contacts_.clear();
+      clip.frames.emplace_back();
+      entrant.session->contacts(knots_[k], contacts_, clip.frames.back());
+    }
+    entrant.measured.repetitions.push_back(std::move(clip));
+  } catch (const std::exception& problem) {
+    entrant.session.reset();
+    refuse(entrant.measured, problem);
+    return nullptr;
+  }
+  return &entrant.measured.repetitions.back();
+}
+
+template <class S>
+nlohmann::json ContactMeasurement<S>::extras(std::size_t i) const {
+  const ImpactStats& impacts = entrants_[i].impacts;
+  return {{"impacts", {{"tests", impacts.tests}, {"filtered", impacts.filtered}, {"exact", impacts.exact}}}};
+}
+
+template class ContactMeasurement<float>;
+template class ContactMeasurement<double>;
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,42 @@
+#pragma once
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "core/continuous/contacts.hpp"
+#include "experiments/study/measure.hpp"
+
+namespace kbvh::experiments {
+
+/// As Measurement, for the contacts of features while vertices move from one time of `knots` to the next.
+template <class S>
+class ContactMeasurement {
+ public:
+  /// Finds the true contacts, by sorting and sweeping. Throws io::InputError unless all bodies that are in
+  /// pairs consist of triangles.
+  ContactMeasurement(const Scene<S>& scene, std::vector<double> knots);
+
+  /// Verifies a contestant, comparing every n-th interval and the last.
+  void add(const ContestantSpec& spec, std::uint64_t oracle_every);
+  std::size_t size() const { return entrants_.size(); }
+  Measured& operator[](std::size_t i) { return entrants_[i].measured; }
+  bool timed(std::size_t i) const { return entrants_[i].session != nullptr; }
+  const ClipTimes* play(std::size_t i);
+  nlohmann::json extras(std::size_t i) const;
+
+ private:
+  struct Entrant {
+    Measured measured;
+    ImpactStats impacts;
+    std::unique_ptr<Session<S>> session;
+  };
+  const Scene<S>* scene_;
+  std::vector<double> knots_;
+  std::vector<ContactBuffer> truth_;  ///< [interval], sorted
+  std::vector<Entrant> entrants_;
+  ContactBuffer contacts_;
+};
+
+extern template class ContactMeasurement<float>;
+extern template class ContactMeasurement<double>;
+
+}  // namespace kbvh::experiments

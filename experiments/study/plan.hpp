@@ -1,0 +1,55 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "experiments/scenes/scene_spec.hpp"
+#include "experiments/study/contestants.hpp"
+#include "experiments/study/targets.hpp"
+
+namespace kbvh::experiments {
+
+/// How the repetitions are made.
+enum class Harness : std::uint8_t {
+  rounds,            ///< `kbvh run`: the first repetition of all contestants, then the second of all, ...
+  google_benchmark,  ///< `kbvh bench`: under Google Benchmark, randomly interleaved
+};
+
+/// Every scene with every contestant, l and scalar.
+struct Study {
+  std::string name;
+  std::vector<SceneSpec> scenes;
+  std::vector<StrategyRequest> strategies{{"default", {}, {}}};
+  Sweep params;                                 ///< for all strategies that have them, or "strategy.key"
+  BuilderRequest builder;                       ///< for all strategies without one of their own
+  std::vector<std::uint32_t> per_keyframe{10};  ///< l: frames for each keyframe interval
+  std::vector<std::string> scalars{"float"};
+  std::uint32_t repetitions = 3;
+  std::uint64_t frames_limit = 0;  ///< only so many first frames; 0: all
+  std::uint64_t oracle_every = 1;  ///< verify every n-th frame (and the last)
+  bool continuous = false;         ///< contacts between keyframes instead of pairs at frames
+};
+
+/// A plan is one or more studies, done one after the other into the same results.
+struct Plan {
+  std::string name, description;
+  std::vector<Study> studies;
+  std::vector<Target> targets;  ///< what its times are held against
+};
+
+/// Reads a plan. Its keys are those of a study, which are then the defaults of those listed in "studies";
+/// with no such list the plan is one study. RESULTS.md shows them all. `place` begins every message (the
+/// file's name), `folder` is where relative file names start. Throws io::InputError on unknown keys and wrong
+/// values; ConfigError is left to `expand`.
+Plan read_plan(const nlohmann::json& plan, const std::string& place, const std::filesystem::path& folder);
+
+/// Reads "params" and "builder" wherever they stand. Throw io::InputError that begins with `place`.
+Sweep read_params(const nlohmann::json& object, const std::string& place);
+BuilderRequest read_builder(const nlohmann::json& object, const std::string& place);
+
+/// Reads a plan file.
+Plan load_plan(const std::filesystem::path& file);
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,67 @@
+#include "experiments/study/strategy_record.hpp"
+
+namespace kbvh::experiments {
+
+using nlohmann::json;
+
+const char* word(Tightness tightness) {
+  switch (tightness) {
+    case Tightness::tight:
+      return "tight";
+    case Tightness::conservative:
+      return "conservative";
+    case Tightness::none:
+      break;
+  }
+  return "none";
+}
+
+const char* word(Guarantee guarantee) {
+  switch (guarantee) {
+    case Guarantee::exact:
+      return "exact";
+    case Guarantee::candidate_superset:
+      return "candidate_superset";
+    case Guarantee::approximate:
+      break;
+  }
+  return "approximate";
+}
+
+const char* word(Foresight foresight) {
+  switch (foresight) {
+    case Foresight::step_bound:
+      return "step_bound";
+    case Foresight::next_keyframe:
+      return "next_keyframe";
+    case Foresight::whole_clip:
+      return "whole_clip";
+    case Foresight::none:
+      break;
+  }
+  return "none";
+}
+
+json strategy_record(const ContestantSpec& spec) {
+  const Info& info = spec.entry->info;
+  json builder;
+  if (!info.topology.own)
+    builder = {{"method", name(spec.builder.method)},
+               {"width", spec.builder.width},
+               {"leaf_size", spec.builder.leaf_size}};
+  json params = json::object();
+  for (const auto& [key, value] : spec.params) params[key] = value;
+  return {{"id", info.id},
+          {"label", spec.label},
+          {"title", info.title},
+          {"family", info.family},
+          {"guarantee", word(info.guarantee)},
+          {"tightness", word(info.tightness)},
+          {"foresight", word(info.foresight)},
+          {"citation", info.citation},
+          {"own_scalar", info.own_scalar},
+          {"params", params},
+          {"builder", builder}};
+}
+
+}  // namespace kbvh::experiments

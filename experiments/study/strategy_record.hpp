@@ -1,0 +1,16 @@
+#pragma once
+#include <nlohmann/json.hpp>
+
+#include "experiments/study/contestants.hpp"
+
+namespace kbvh::experiments {
+
+/// Words of result files.
+const char* word(Tightness tightness);
+const char* word(Guarantee guarantee);
+const char* word(Foresight foresight);
+
+/// The "strategy" of a record.
+nlohmann::json strategy_record(const ContestantSpec& spec);
+
+}  // namespace kbvh::experiments
