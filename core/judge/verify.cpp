@@ -102,10 +102,15 @@ class FrameChecker {
   void judge(std::uint32_t body, const AuditView& view, Quality& quality) const {
     const Primitives& primitives = session_.scene().bodies[body].primitives;
     const S* positions = session_.playback().positions(body);
-    std::vector<Box<double>> boxes = tight_boxes(view.topology, primitives, positions);
-    for (std::size_t node = 0; node < boxes.size(); ++node)
-      if (view.stale.empty() || !view.stale[node]) boxes[node] = view.boxes[node];
-    quality.sah += sah_cost(view.topology, boxes);
+    const std::vector<Box<double>> tight = tight_boxes(view.topology, primitives, positions);
+    std::vector<double> areas(tight.size());
+    for (std::uint32_t node = 0; node < tight.size(); ++node) {
+      const bool read = view.stale.empty() || !view.stale[node];
+      areas[node] = !read          ? surface_area(tight[node])
+                    : view.volumes ? view.volumes->surface(node)
+                                   : surface_area(view.boxes[node]);
+    }
+    quality.sah += sah_cost(view.topology, areas);
     const Topology rebuilt = build_topology(
         primitives, positions,
         {.method = BuildMethod::sah, .width = view.topology.width, .leaf_size = view.topology.leaf_size});
