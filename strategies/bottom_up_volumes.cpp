@@ -44,7 +44,7 @@ KBVH_STRATEGY(bottom_up_volumes) {
       .family = "volumes",
       .citation = "Klosowski et al. 1998 (k-DOPs); Ritter 1990 (spheres); Gottschalk et al. 1996, Larsson & "
                   "Källberg 2011 (oriented boxes)",
-      // Boxes and k-DOPs are tight; spheres and oriented boxes are only large enough.
+      // Boxes are tight, k-DOPs over polygons, too; spheres and oriented boxes are only large enough.
       .tightness = Tightness::conservative,
       .can = {.plan_changes = true, .geometry_changes = true, .self_pairs = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},

@@ -89,7 +89,7 @@ class FrameChecker {
       if (!found.topology_error.empty()) violate(where + found.topology_error);
       if (info.guarantee != Guarantee::approximate && found.invalid) violate(where + found.first_fault);
       if (info.tightness == Tightness::tight && found.not_tight)
-        violate(where + std::to_string(found.not_tight) + " boxes are not tight");
+        violate(where + std::to_string(found.not_tight) + " bounds are not tight");
     }
     quality.looseness = frame.looseness();
     if (quality.sah_rebuilt > 0) result_.over_time.push_back(quality);
