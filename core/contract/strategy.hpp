@@ -8,6 +8,7 @@
 
 #include "core/base/counters.hpp"
 #include "core/base/params.hpp"
+#include "core/contract/audit_volumes.hpp"
 #include "core/scene/geometry_change.hpp"
 #include "core/scene/motion_view.hpp"
 #include "core/scene/pairs.hpp"
@@ -86,9 +87,10 @@ struct Info {
 /// What an audit sees of one body's hierarchy after a query: bounds in double (exact for float), per node.
 struct AuditView {
   Topology topology;               ///< a copy, at the strategy's present version
-  std::vector<Box<double>> boxes;  ///< one per node
+  std::vector<Box<double>> boxes;  ///< one per node; empty if `volumes` is set
   std::vector<std::uint8_t>
-      stale;  ///< nodes whose box was not brought up to date because no query read it; may be empty
+      stale;  ///< nodes whose bound was not brought up to date because no query read it; may be empty
+  std::shared_ptr<const AuditVolumes> volumes{};  ///< one per node, where bounds are not boxes; else null
 };
 
 /// A contestant: keeps bounds valid while a whole scene moves, and answers which primitives meet.

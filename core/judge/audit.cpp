@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 namespace kbvh {
 
@@ -11,6 +12,91 @@ std::string short_number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", value);
   return text;
+}
+
+/// Notes one invalid bound: by how much, and where if it is the first.
+void add_fault(Audit& result, const Topology& topology, std::uint32_t node, const std::string& where,
+               double amount) {
+  if (result.first_fault.empty())
+    result.first_fault = "node " + std::to_string(node) + (topology.nodes[node].is_leaf() ? " (leaf)" : "") +
+                         ", " + where + ": a vertex protrudes by " + short_number(amount);
+  result.protrusion = std::max(result.protrusion, amount);
+}
+
+/// The vertices below every node of a topology, in one list: a node's are contiguous.
+template <class S>
+class PointsBelow {
+ public:
+  PointsBelow(const Topology& topology, const Primitives& primitives, const S* positions)
+      : begin_(topology.size(), 0), count_(topology.size(), 0) {
+    if (topology.empty()) return;
+    const LeafVertices leaves = unique_leaf_vertices(topology, primitives);
+    for (std::uint32_t node = topology.size(); node-- > 0;) {
+      const TopologyNode content = topology.nodes[node];
+      if (content.is_leaf()) count_[node] = std::uint32_t(leaves[node].size());
+      for (std::uint32_t k = content.first(); !content.is_leaf() && k < content.first() + content.count();
+           ++k)
+        count_[node] += count_[k];
+    }
+    points_.resize(std::size_t(3) * count_[0]);
+    vertices_.resize(count_[0]);
+    for (std::uint32_t node = 0; node < topology.size(); ++node) {
+      const TopologyNode content = topology.nodes[node];
+      std::uint32_t at = begin_[node];
+      if (!content.is_leaf()) {
+        for (std::uint32_t k = content.first(); k < content.first() + content.count(); ++k) {
+          begin_[k] = at;
+          at += count_[k];
+        }
+        continue;
+      }
+      for (const std::uint32_t v : leaves[node]) {
+        for (std::size_t d = 0; d < 3; ++d)
+          points_[std::size_t(3) * at + d] = double(positions[std::size_t(3) * v + d]);
+        vertices_[at++] = v;
+      }
+    }
+  }
+  /// [point][3]; vertices of several leaves are there several times.
+  std::span<const double> points(std::uint32_t node) const {
+    return {points_.data() + std::size_t(3) * begin_[node], std::size_t(3) * count_[node]};
+  }
+  std::span<const std::uint32_t> vertices(std::uint32_t node) const {
+    return {vertices_.data() + begin_[node], count_[node]};
+  }
+
+ private:
+  std::vector<std::uint32_t> begin_, count_, vertices_;
+  std::vector<double> points_;
+};
+
+/// Asks every volume that is not stale about all vertices below its node.
+template <class S>
+void audit_volumes(const AuditView& view, const Primitives& primitives, const S* positions, Audit& result) {
+  const PointsBelow<S> below(view.topology, primitives, positions);
+  for (std::uint32_t node = 0; node < view.topology.size(); ++node) {
+    if (!view.stale.empty() && view.stale[node]) {
+      ++result.stale;
+      continue;
+    }
+    const auto points = below.points(node);
+    const double surface = view.volumes->surface(node), tight = view.volumes->tight_surface(points);
+    result.area += surface;
+    result.tight_area += tight;
+    if (surface != tight) ++result.not_tight;
+    double furthest = 0;
+    std::uint32_t vertex = 0;
+    for (std::size_t i = 0; i < points.size() / 3; ++i) {
+      double amount = view.volumes->protrusion(node, points.data() + 3 * i);
+      if (std::isnan(amount)) amount = std::numeric_limits<double>::infinity();
+      if (!(amount > furthest)) continue;
+      furthest = amount;
+      vertex = below.vertices(node)[i];
+    }
+    if (furthest == 0) continue;
+    ++result.invalid;
+    add_fault(result, view.topology, node, "vertex " + std::to_string(vertex), furthest);
+  }
 }
 }  // namespace
 
@@ -54,9 +140,14 @@ Audit audit(const AuditView& view, const Primitives& primitives, const S* positi
   if (sound == nullptr || !(view.topology == *sound))
     result.topology_error = check_topology(view.topology, primitives);
   if (!result.topology_error.empty()) return result;
-  if (view.boxes.size() != view.topology.size()) {
-    result.topology_error =
-        std::to_string(view.boxes.size()) + " boxes for " + std::to_string(view.topology.size()) + " nodes";
+  const std::size_t bounds = view.volumes ? view.volumes->size() : view.boxes.size();
+  if (bounds != view.topology.size()) {
+    result.topology_error = std::to_string(bounds) + (view.volumes ? " volumes for " : " boxes for ") +
+                            std::to_string(view.topology.size()) + " nodes";
+    return result;
+  }
+  if (view.volumes) {
+    audit_volumes(view, primitives, positions, result);
     return result;
   }
   const auto tight = tight_boxes(view.topology, primitives, positions);
@@ -76,25 +167,26 @@ Audit audit(const AuditView& view, const Primitives& primitives, const S* positi
                    above = tight[i].upper[axis] - box.upper[axis];
       double amount = std::max(below, above);
       if (std::isnan(amount)) amount = std::numeric_limits<double>::infinity();
-      if (amount > 0 && result.first_fault.empty())
-        result.first_fault = "node " + std::to_string(i) +
-                             (view.topology.nodes[i].is_leaf() ? " (leaf)" : "") + ", axis " + "xyz"[axis] +
-                             ": a vertex protrudes by " + short_number(amount);
-      result.protrusion = std::max(result.protrusion, amount);
+      if (amount > 0) add_fault(result, view.topology, i, std::string("axis ") + "xyz"[axis], amount);
     }
   }
   return result;
 }
 
-double sah_cost(const Topology& topology, const std::vector<Box<double>>& boxes, double traversal_cost) {
+double sah_cost(const Topology& topology, std::span<const double> areas, double traversal_cost) {
   if (topology.empty()) return 0;
   double cost = 0;
   for (std::uint32_t i = 0; i < topology.size(); ++i) {
     const TopologyNode node = topology.nodes[i];
-    cost += surface_area(boxes[i]) * (node.is_leaf() ? double(node.count()) : traversal_cost);
+    cost += areas[i] * (node.is_leaf() ? double(node.count()) : traversal_cost);
   }
-  const double root = surface_area(boxes[0]);
-  return root > 0 ? cost / root : 0;
+  return areas[0] > 0 ? cost / areas[0] : 0;
+}
+
+double sah_cost(const Topology& topology, const std::vector<Box<double>>& boxes, double traversal_cost) {
+  std::vector<double> areas(boxes.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i) areas[i] = surface_area(boxes[i]);
+  return sah_cost(topology, areas, traversal_cost);
 }
 
 template std::vector<Box<double>> tight_boxes(const Topology&, const Primitives&, const float*);

@@ -1,4 +1,5 @@
 #pragma once
+#include <span>
 #include <string>
 
 #include "core/contract/strategy.hpp"
@@ -9,20 +10,26 @@ namespace kbvh {
 /// counted.
 struct Audit {
   std::uint64_t nodes = 0, stale = 0;
-  std::uint64_t invalid = 0;    ///< nodes whose box does not contain a vertex below it
-  std::uint64_t not_tight = 0;  ///< nodes whose box is not exactly the box of the vertices below it
-  double protrusion = 0;        ///< furthest that a vertex leaves a box above it, along one axis; valid = 0
+  std::uint64_t invalid = 0;    ///< nodes whose bound does not contain a vertex below it
+  std::uint64_t not_tight = 0;  ///< nodes whose bound is not exactly that of the vertices below it
+  /// Furthest that a vertex leaves a bound above it: along one axis for boxes, as a volume measures it
+  /// otherwise (AuditVolumes::protrusion); valid = 0.
+  double protrusion = 0;
   double area = 0, tight_area = 0;  ///< summed surface areas, in double
   std::string topology_error;       ///< first broken combinatorial invariant, or empty
-  std::string first_fault;          ///< node, axis and amount of the first invalid box, or empty
+  std::string first_fault;          ///< node, place and amount of the first invalid bound, or empty
 
-  /// Summed surface area over tight, minus one (0/0 = 0).
+  /// Summed surface area over tight, minus one (0/0 = 0). The tight bounds of volumes are of their own kind,
+  /// fitted to the vertices at once, so the looseness of kinds whose best fit is not known may be negative.
   double looseness() const { return tight_area > 0 ? area / tight_area - 1 : 0; }
   void add(const Audit& other);
 };
 
-/// Audits topology, validity and tightness of one body against its current positions [vertex][3]. O(nodes +
-/// vertices).
+/// Audits topology, validity and tightness of one body against its current positions [vertex][3]. Boxes:
+/// O(nodes
+/// + vertices). Volumes (`view.volumes`) are asked about every vertex below every node, inner nodes included:
+/// O(nodes + vertices x depth); one counts as tight if its surface equals that of a volume fitted at once.
+/// `sound` is a topology that was found sound before, so that an equal one is not checked again, or null.
 template <class S>
 Audit audit(const AuditView& view, const Primitives& primitives, const S* positions,
             const Topology* sound = nullptr);
@@ -34,7 +41,9 @@ std::vector<Box<double>> tight_boxes(const Topology& topology, const Primitives&
 
 /// Expected cost of a random query by the surface-area heuristic: sum over inner nodes of area x
 /// traversal_cost plus over leaves of area x primitives, relative to the root's area. 0 for an empty
-/// hierarchy.
+/// hierarchy. `areas` has the surface area of each node's bound.
+double sah_cost(const Topology& topology, std::span<const double> areas, double traversal_cost = 1.0);
+/// The same for boxes.
 double sah_cost(const Topology& topology, const std::vector<Box<double>>& boxes, double traversal_cost = 1.0);
 
 }  // namespace kbvh

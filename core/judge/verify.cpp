@@ -89,7 +89,7 @@ class FrameChecker {
       if (!found.topology_error.empty()) violate(where + found.topology_error);
       if (info.guarantee != Guarantee::approximate && found.invalid) violate(where + found.first_fault);
       if (info.tightness == Tightness::tight && found.not_tight)
-        violate(where + std::to_string(found.not_tight) + " boxes are not tight");
+        violate(where + std::to_string(found.not_tight) + " bounds are not tight");
     }
     quality.looseness = frame.looseness();
     if (quality.sah_rebuilt > 0) result_.over_time.push_back(quality);
@@ -102,10 +102,15 @@ class FrameChecker {
   void judge(std::uint32_t body, const AuditView& view, Quality& quality) const {
     const Primitives& primitives = session_.scene().bodies[body].primitives;
     const S* positions = session_.playback().positions(body);
-    std::vector<Box<double>> boxes = tight_boxes(view.topology, primitives, positions);
-    for (std::size_t node = 0; node < boxes.size(); ++node)
-      if (view.stale.empty() || !view.stale[node]) boxes[node] = view.boxes[node];
-    quality.sah += sah_cost(view.topology, boxes);
+    const std::vector<Box<double>> tight = tight_boxes(view.topology, primitives, positions);
+    std::vector<double> areas(tight.size());
+    for (std::uint32_t node = 0; node < tight.size(); ++node) {
+      const bool read = view.stale.empty() || !view.stale[node];
+      areas[node] = !read          ? surface_area(tight[node])
+                    : view.volumes ? view.volumes->surface(node)
+                                   : surface_area(view.boxes[node]);
+    }
+    quality.sah += sah_cost(view.topology, areas);
     const Topology rebuilt = build_topology(
         primitives, positions,
         {.method = BuildMethod::sah, .width = view.topology.width, .leaf_size = view.topology.leaf_size});

@@ -4,12 +4,14 @@
 
 namespace kbvh {
 
-/// A contestant's boxes at one time, summed over the bodies whose hierarchy can be seen.
+/// A contestant's bounds at one time, summed over the bodies whose hierarchy can be seen.
 struct Quality {
   double t = 0;
-  double looseness = 0;    ///< of the boxes that are up to date
-  double sah = 0;          ///< `sah_cost`; boxes that no query has brought up to date count as tight
-  double sah_rebuilt = 0;  ///< the same of SAH trees built at t, of the same width and leaf size
+  double looseness = 0;  ///< of the bounds that are up to date
+  /// `sah_cost` with the areas of its own kind of bound; a bound that no query has brought up to date counts
+  /// as a tight box.
+  double sah = 0;
+  double sah_rebuilt = 0;  ///< the same of SAH trees of boxes built at t, of the same width and leaf size
 };
 
 /// What a verified run of one contestant over a clip showed. Recorded with every measurement.

@@ -25,14 +25,17 @@ struct NodePair {
   std::uint32_t first, second;
 };
 
-/// The simultaneous traversal of two hierarchies (Z&W Algorithm 2): visits every pair of leaves whose boxes,
-/// and whose ancestors' boxes on both sides, overlap, and calls on_leaves(leaf of a, leaf of b) once for
+/// The simultaneous traversal of two hierarchies (Z&W Algorithm 2): visits every pair of leaves whose bounds,
+/// and whose ancestors' bounds on both sides, overlap, and calls on_leaves(leaf of a, leaf of b) once for
 /// each. A bounds view tells how a hierarchy's bounds are read:
-///   void ensure(std::uint32_t node)         makes the node's bounds valid at the query's time
-///   Box<S> operator()(std::uint32_t node)   its box, read only after `ensure`
-/// Views of the two bodies may differ. (Stored boxes have a query of their own: wide_hierarchy.hpp.) Both
-/// inner: descend both; one leaf: descend the other. The stack grows as needed and is the caller's, so that
-/// no work is dropped and a frame allocates nothing. `Count` is a counting policy.
+///   void ensure(std::uint32_t node)         makes the node's bound valid at the query's time
+///   B operator()(std::uint32_t node)        its bound, read only after `ensure`
+/// B is a Box<S> or any other type for which argument-dependent lookup finds `bool overlap(bound of a, bound
+/// of b)`: every BoundingVolume (core/geometry/volumes) has one. An overlap may be false only where no point
+/// is in both. Views of the two bodies may differ. (Stored boxes have a query of their own:
+/// wide_hierarchy.hpp.) Both inner: descend both; one leaf: descend the other. The stack grows as needed and
+/// is the caller's, so that no work is dropped and a frame allocates nothing. Of a body with itself, each two
+/// leaves are visited in both orders. `Count` is a counting policy.
 template <class ViewA, class ViewB, class Count, class OnLeaves>
 QueryStatus traverse(const Topology& a, ViewA&& bounds_a, const Topology& b, ViewB&& bounds_b,
                      std::vector<NodePair>& stack, Count& count, const Budget& budget, OnLeaves&& on_leaves) {
@@ -59,9 +62,9 @@ QueryStatus traverse(const Topology& a, ViewA&& bounds_a, const Topology& b, Vie
     for (std::uint32_t j = begin_b; j < end_b; ++j) bounds_b.ensure(j);
     for (std::uint32_t i = begin_a; i < end_a; ++i) {
       bounds_a.ensure(i);
-      const auto box = bounds_a(i);
+      const auto bound = bounds_a(i);
       for (std::uint32_t j = begin_b; j < end_b; ++j)
-        if (overlap(box, bounds_b(j))) stack.push_back({i, j});
+        if (overlap(bound, bounds_b(j))) stack.push_back({i, j});
     }
     tests += std::uint64_t(end_a - begin_a) * (end_b - begin_b);
   }

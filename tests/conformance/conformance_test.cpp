@@ -92,9 +92,13 @@ TEST_P(Configurations, AllConform) {
       expect_conforms(check(entry, in_double, 7, {}, builder), GetParam() + " on " + where + ", double");
     });
     for (const Parameter& parameter : entry.info.parameters)
-      for (const std::string& word : parameter.allowed)
-        expect_conforms(check(entry, in_float, 7, {{parameter.name, word}}, entry.info.topology.preferred),
-                        GetParam() + " on " + scene_name + " with " + parameter.name + "=" + word);
+      for (const std::string& word : parameter.allowed) {
+        const std::map<std::string, std::string> params{{parameter.name, word}};
+        const std::string where = GetParam() + " on " + scene_name + " with " + parameter.name + "=" + word;
+        expect_conforms(check(entry, in_float, 7, params, entry.info.topology.preferred), where + ", float");
+        expect_conforms(check(entry, in_double, 7, params, entry.info.topology.preferred),
+                        where + ", double");
+      }
   }
 }
 

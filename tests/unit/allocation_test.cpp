@@ -10,7 +10,10 @@
 #include <new>
 
 #include "core/contract/registry.hpp"
+#include "core/families/volumes/volume_hierarchy.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
+#include "core/geometry/volumes/sphere.hpp"
+#include "core/topology/builders.hpp"
 #include "tests/support/moving_grids.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
@@ -60,8 +63,9 @@ namespace {
 /// In the third round of a clip, plans changed as the test's script says; that a plan changes in the playback
 /// is not the strategy's doing.
 template <class S>
-std::string allocations_when_warm(const StrategyEntry& entry, const TestScene<S>& test) {
-  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+std::string allocations_when_warm(const StrategyEntry& entry, const TestScene<S>& test,
+                                  const std::map<std::string, std::string>& params = {}) {
+  Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred}, CountingPolicy::silent);
   PhaseTimes times;
   PairBuffer pairs;
   for (int round = 0; round < 3; ++round) {
@@ -130,6 +134,49 @@ TEST(Allocation, NoneOnceWarmWherePlansChange) {
       EXPECT_EQ(allocations_when_warm(entry, in_double), "") << entry.info.id << " on " << name << ", double";
     }
   }
+}
+
+TEST(Allocation, NoneOnceWarmWithAnyVolume) {
+  const StrategyEntry& entry = find_strategy("bottom_up_volumes");
+  const auto in_float = synthetic_scene<float>("soups", 7);
+  const auto in_double = synthetic_scene<double>("sheets", 7);
+  for (const Parameter& parameter : entry.info.parameters)
+    for (const std::string& word : parameter.allowed) {
+      EXPECT_EQ(allocations_when_warm(entry, in_float, {{parameter.name, word}}), "") << word;
+      EXPECT_EQ(allocations_when_warm(entry, in_double, {{parameter.name, word}}), "") << word;
+    }
+}
+
+TEST(Allocation, NoneByRotationsOnceWarm) {
+  const auto test = synthetic_scene<float>("sheets", 7);
+  const Primitives& primitives = test.scene.bodies[0].primitives;
+  const float* const positions = test.scene.bodies[0].plans.keyframe(0);
+  std::vector<float> padded(positions,
+                            positions + std::size_t(3) * test.scene.bodies[0].plans.vertex_count());
+  padded.push_back(0);
+  VolumeHierarchy<Sphere<float>> hierarchy(
+      build_topology(primitives, padded.data(), {.method = BuildMethod::sah, .width = 2, .leaf_size = 1}),
+      primitives, Cover::vertices);
+  std::size_t rotations = 0;
+  std::uint64_t spent = 0, before = 0;
+  for (int round = 0; round < 2; ++round) {
+    before = allocations;
+    hierarchy.restore();
+    hierarchy.refit(padded.data());
+    Random random(3);
+    for (int i = 0; i < 2000; ++i) {
+      const Topology& topology = hierarchy.topology();
+      const std::uint32_t node = 1 + random.below(topology.size() - 1);
+      const TopologyNode siblings = topology.nodes[topology.parents[node]];
+      const std::uint32_t sibling = siblings.first() + (node == siblings.first() ? 1 : 0);
+      if (topology.nodes[sibling].is_leaf()) continue;
+      hierarchy.rotate(node, topology.nodes[sibling].first() + random.below(2));
+      ++rotations;
+    }
+    spent = allocations - before;
+  }
+  EXPECT_GT(rotations, 500u);
+  EXPECT_EQ(spent, 0u);
 }
 
 TEST(Allocation, IsCounted) {

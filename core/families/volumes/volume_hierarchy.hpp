@@ -1,0 +1,182 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/contract/audit_volumes.hpp"
+#include "core/geometry/lane_box.hpp"
+#include "core/geometry/volumes/bounding_volume.hpp"
+#include "core/topology/subtree_swap.hpp"
+#include "core/topology/topology.hpp"
+
+namespace kbvh {
+
+/// What the volume of a leaf has to contain of each primitive.
+enum class Cover : std::uint8_t {
+  vertices,  ///< its vertices, and so their convex hull
+  boxes,     ///< its axis-aligned box: where pairs are answered at candidate level, by boxes
+};
+
+/// The hierarchy of one body with a bounding volume of any kind stored for each node, on a topology of any
+/// width that may be rotated while it is used.
+template <BoundingVolume V>
+class VolumeHierarchy {
+ public:
+  using S = VolumeScalar<V>;
+
+  VolumeHierarchy(Topology topology, const Primitives& primitives, Cover cover) : cover_(cover) {
+    assign(std::move(topology), primitives);
+  }
+
+  /// Takes a topology over primitives that must outlive this object; volumes are empty until the next refit.
+  void assign(Topology topology, const Primitives& primitives) {
+    topology_ = std::move(topology);
+    primitives_ = &primitives;
+    start_.reset();
+    volumes_.assign(topology_.size(), V{});
+    leaf_vertices_.assign(topology_.primitives.size(), {});
+    LeafVertices lists = unique_leaf_vertices(topology_, primitives);
+    for (std::uint32_t node = 0; node < topology_.size(); ++node)
+      if (topology_.nodes[node].is_leaf())
+        leaf_vertices_[topology_.nodes[node].first()] = {lists.offsets[node], lists.offsets[node + 1]};
+    vertices_ = std::move(lists.vertices);
+    corners_.resize(cover_ == Cover::boxes ? std::size_t(topology_.leaf_size) * corners_each * 3 : 0);
+  }
+
+  /// Makes all volumes from positions [vertex][3], readable up to one scalar past the end: leaves from what
+  /// they have to contain, parents from their children. O(nodes + leaf vertices).
+  void refit(const S* positions) {
+    for (std::uint32_t node = topology_.size(); node-- > 0;)
+      if (topology_.nodes[node].is_leaf())
+        fit_leaf(node, positions);
+      else
+        enclose_children(node);
+  }
+
+  /// Exchanges two subtrees (SubtreeSwap::swap) and makes the volumes of the two parents and of all nodes
+  /// above them anew; all volumes must be current. O(what the exchange changes + depth). The first call since
+  /// the topology was assigned copies it.
+  void swap(std::uint32_t first, std::uint32_t second) {
+    keep_start();
+    swap_.swap(topology_, first, second, edit_);
+    follow_edit();
+  }
+  /// The same for a tree rotation (SubtreeSwap::rotate).
+  void rotate(std::uint32_t child, std::uint32_t grandchild) {
+    keep_start();
+    swap_.rotate(topology_, child, grandchild, edit_);
+    follow_edit();
+  }
+  /// Takes back all exchanges: the topology is the one last assigned. Volumes are to be refitted.
+  void restore() {
+    if (start_) topology_ = *start_;
+  }
+
+  const Topology& topology() const { return topology_; }
+  bool empty() const { return topology_.empty(); }
+  const V& volume(std::uint32_t node) const { return volumes_[node]; }
+  void set_volume(std::uint32_t node, const V& volume) { volumes_[node] = volume; }
+  /// The vertices of a leaf, each once, ascending.
+  std::span<const std::uint32_t> vertices(std::uint32_t leaf) const {
+    const Range range = leaf_vertices_[topology_.nodes[leaf].first()];
+    return {vertices_.data() + range.begin, vertices_.data() + range.end};
+  }
+  std::size_t leaf_vertex_count() const { return vertices_.size(); }
+  /// A copy of all volumes, for audits.
+  std::vector<V> volumes() const { return volumes_; }
+
+  std::size_t bytes() const {
+    return topology_.bytes() + (start_ ? start_->bytes() : 0) + volumes_.size() * sizeof(V) +
+           leaf_vertices_.size() * sizeof(Range) + vertices_.size() * sizeof(std::uint32_t) +
+           corners_.size() * sizeof(S) + swap_.bytes() + edit_.moved.capacity() * sizeof(TopologyEdit::Move) +
+           edit_.changed.capacity() * sizeof(std::uint32_t) + carried_.capacity() * sizeof(V);
+  }
+
+ private:
+  static constexpr std::size_t corners_each = 8;
+  struct Range {
+    std::uint32_t begin = 0, end = 0;
+  };
+
+  void fit_leaf(std::uint32_t leaf, const S* positions) {
+    if (cover_ == Cover::vertices) {
+      fit(volumes_[leaf], PointSet<S>(vertices(leaf), positions));
+      return;
+    }
+    const TopologyNode content = topology_.nodes[leaf];
+    S* out = corners_.data();
+    for (std::uint32_t k = content.first(); k < content.first() + content.count(); ++k) {
+      const Box<S> box = primitive_box((*primitives_)[topology_.primitives[k]], positions);
+      for (std::size_t corner = 0; corner < corners_each; ++corner)
+        for (std::size_t d = 0; d < 3; ++d) *out++ = (corner >> d) & 1 ? box.upper[d] : box.lower[d];
+    }
+    fit(volumes_[leaf], PointSet<S>(corners_.data(), content.count() * corners_each));
+  }
+  void enclose_children(std::uint32_t node) {
+    const TopologyNode content = topology_.nodes[node];
+    enclose(volumes_[node], std::span<const V>(volumes_.data() + content.first(), content.count()));
+  }
+  void keep_start() {
+    if (!start_) start_ = topology_;
+  }
+  void follow_edit() {
+    carried_.clear();
+    for (const auto& move : edit_.moved) carried_.push_back(volumes_[move.from]);
+    for (std::size_t i = 0; i < carried_.size(); ++i) volumes_[edit_.moved[i].to] = carried_[i];
+    // From the larger id up, then from the smaller: the larger may lie below the smaller.
+    std::sort(edit_.changed.begin(), edit_.changed.end(), std::greater<>());
+    for (std::uint32_t node : edit_.changed)
+      for (;; node = topology_.parents[node]) {
+        enclose_children(node);
+        if (node == 0) break;
+      }
+  }
+
+  Topology topology_;
+  std::optional<Topology> start_;  ///< as assigned; kept from the first exchange on
+  const Primitives* primitives_ = nullptr;
+  Cover cover_;
+  std::vector<V> volumes_;  ///< one per node
+  std::vector<Range>
+      leaf_vertices_;  ///< of the leaf whose first entry this is: leaves change their nodes' ids
+  std::vector<std::uint32_t> vertices_;
+  std::vector<S> corners_;
+  SubtreeSwap swap_;
+  TopologyEdit edit_;
+  std::vector<V> carried_;
+};
+
+namespace detail {
+/// For a class with a member of that name.
+template <BoundingVolume V>
+double protrusion_of(const V& volume, const double* point) {
+  return protrusion(volume, point);
+}
+}  // namespace detail
+
+/// The volumes of a hierarchy as an audit asks for them.
+template <BoundingVolume V>
+class AuditedVolumes final : public AuditVolumes {
+ public:
+  explicit AuditedVolumes(std::vector<V> volumes) : volumes_(std::move(volumes)) {}
+  std::size_t size() const override { return volumes_.size(); }
+  double protrusion(std::uint32_t node, const double* point) const override {
+    return detail::protrusion_of(volumes_[node], point);
+  }
+  double surface(std::uint32_t node) const override { return surface_area(volumes_[node]); }
+  double tight_surface(std::span<const double> points) const override {
+    std::vector<VolumeScalar<V>> own(points.size());
+    for (std::size_t i = 0; i < own.size(); ++i) own[i] = VolumeScalar<V>(points[i]);
+    V volume;
+    fit(volume, PointSet<VolumeScalar<V>>(own.data(), own.size() / 3));
+    return surface_area(volume);
+  }
+
+ private:
+  std::vector<V> volumes_;
+};
+
+}  // namespace kbvh

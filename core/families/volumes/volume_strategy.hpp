@@ -1,0 +1,192 @@
+#pragma once
+#include <optional>
+#include <variant>
+
+#include "core/contract/strategy.hpp"
+#include "core/families/volumes/volume_hierarchy.hpp"
+#include "core/families/wide/near_bodies.hpp"
+#include "core/geometry/volumes/aligned_box.hpp"
+#include "core/topology/leaf_pairs.hpp"
+
+namespace kbvh {
+
+/// A plain strategy over bounding volumes of any kind: every volume of a moving body is made anew at each
+/// frame, leaves first, and the one traversal (core/topology/traversal.hpp) compares them. `Volumes` are the
+/// kinds that an instance can be made with. Nothing is specialised for speed: the wide hierarchies of boxes
+/// are for that.
+///
+/// Within one body the traversal meets each two leaves in both orders; one is dropped.
+template <class S, class Count, BoundingVolume... Volumes>
+class VolumeStrategy : public Strategy<S> {
+  template <class V>
+  using Bodies = std::vector<VolumeHierarchy<V>>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+
+  /// `kind` is the index among Volumes of the kind to use.
+  VolumeStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
+                 std::size_t kind)
+      : Strategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+    std::size_t index = 0;
+    (void)((index++ == kind && (bodies_.template emplace<Bodies<Volumes>>(), true)) || ...);
+    const std::vector<Cover> cover = covers(scene);
+    on_bodies([&](auto& bodies) {
+      for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+        bodies.emplace_back(std::move(topologies[body]), scene.primitives(body), cover[body]);
+    });
+  }
+
+  /// Starts over with the topologies of the start, or of the last change of geometry: what exchanged subtrees
+  /// since then is taken back.
+  void reset(double t) override {
+    this->start_at(t);
+    plans_changed_ = false;
+    near_bodies_.start_over();
+    on_bodies([&](auto& bodies) {
+      for (std::uint32_t body = 0; body < bodies.size(); ++body) {
+        bodies[body].restore();
+        update(bodies[body], body);
+      }
+    });
+    count_.table = {};
+  }
+
+  void advance(double t) override {
+    this->move_to(t);
+    on_bodies([&](auto& bodies) {
+      for (std::uint32_t body = 0; body < bodies.size(); ++body)
+        if (this->scene_.moving(body) || plans_changed_) update(bodies[body], body);
+    });
+  }
+
+  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+    QueryStatus status;
+    BoxTests tests;
+    on_bodies([&](auto& bodies) {
+      const auto box_of = [&](std::uint32_t body) {
+        return bodies[body].empty() ? Box<double>{} : enclosing_box(bodies[body].volume(0));
+      };
+      for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
+        const BodyPair& pair = this->scene_.pairs()[i];
+        if (tests.made >= budget.box_tests) {
+          ++status.pending;
+          continue;
+        }
+        const auto &a = bodies[pair.first], &b = bodies[pair.second];
+        LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
+                                      b.topology(), tests, out);
+        const bool within = pair.first == pair.second;
+        const auto on_leaves = [&](std::uint32_t leaf_a, std::uint32_t leaf_b) {
+          if (!within || leaf_a <= leaf_b) leaves(leaf_a, leaf_b);
+        };
+        status.pending += traverse(a.topology(), stored(a), b.topology(), stored(b), stack_, tests,
+                                   rest_of(budget, tests.made), on_leaves)
+                              .pending;
+      }
+    });
+    count_.add(Counter::box_tests, tests.made);
+    return status;
+  }
+
+  /// Positions are all it reads: no body is at rest for certain any more.
+  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+    plans_changed_ = true;
+  }
+
+  /// Edits the topologies locally, guided by boxes, and lays them out anew: O(nodes) for each body that
+  /// changes.
+  void geometry_changed(double /*t*/, const GeometryChange<S>& change) override {
+    plans_changed_ = true;  // new vertices have plans of their own
+    on_bodies([&](auto& bodies) {
+      for (const BodyChange& own : body_changes(this->scene_, change)) {
+        auto& body = bodies[own.body];
+        const Primitives& primitives = this->scene_.primitives(own.body);
+        const S* positions = this->sampled_.positions(own.body);
+        VolumeHierarchy<Box<S>> boxes(body.topology(), primitives, Cover::vertices);
+        boxes.refit(positions);
+        body.assign(edited_topology(body.topology(), boxes.volumes(), own, primitives, positions),
+                    primitives);
+        update(body, own.body);
+      }
+    });
+  }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    return on_bodies([&](const auto& bodies) { return view_of(bodies[body]); });
+  }
+
+  std::size_t bytes() const override {
+    return on_bodies([&](const auto& bodies) {
+      std::size_t total = near_bodies_.bytes();
+      for (const auto& body : bodies) total += body.bytes();
+      return total;
+    });
+  }
+
+ protected:
+  Counters counted() const override { return count_.table; }
+
+  /// Calls work(bodies) with the hierarchies of all bodies, of the kind in use.
+  template <class Work>
+  decltype(auto) on_bodies(Work&& work) {
+    return std::visit(std::forward<Work>(work), bodies_);
+  }
+  template <class Work>
+  decltype(auto) on_bodies(Work&& work) const {
+    return std::visit(std::forward<Work>(work), bodies_);
+  }
+
+ private:
+  /// A bounds view of volumes that are there.
+  template <class V>
+  struct Stored {
+    void ensure(std::uint32_t /*node*/) const {}
+    const V& operator()(std::uint32_t node) const { return hierarchy.volume(node); }
+    const VolumeHierarchy<V>& hierarchy;
+  };
+  template <class V>
+  static Stored<V> stored(const VolumeHierarchy<V>& hierarchy) {
+    return {hierarchy};
+  }
+
+  /// Boxes for the bodies of a pair that is answered by boxes; but a point is its box.
+  static std::vector<Cover> covers(const SceneView<S>& scene) {
+    const auto kind = [&](std::uint32_t body) { return scene.primitives(body).kind; };
+    std::vector<Cover> covers(scene.body_count(), Cover::vertices);
+    for (const BodyPair& pair : scene.pairs()) {
+      if (kind(pair.first) == PrimitiveKind::polygons && kind(pair.second) == PrimitiveKind::polygons)
+        continue;
+      for (const std::uint32_t body : {pair.first, pair.second})
+        if (kind(body) != PrimitiveKind::points) covers[body] = Cover::boxes;
+    }
+    return covers;
+  }
+
+  template <class V>
+  void update(VolumeHierarchy<V>& hierarchy, std::uint32_t body) {
+    hierarchy.refit(this->sampled_.positions(body));
+    const std::uint64_t nodes = hierarchy.topology().size();
+    count_.add(Counter::nodes_visited, nodes);
+    count_.add(Counter::values_written, nodes * (sizeof(V) / sizeof(S)));
+    count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
+  }
+
+  template <class V>
+  static AuditView view_of(const VolumeHierarchy<V>& hierarchy) {
+    AuditView view{hierarchy.topology(), {}, {}};
+    if constexpr (std::is_same_v<V, Box<S>>)
+      for (const Box<S>& box : hierarchy.volumes()) view.boxes.push_back(to_double(box));
+    else
+      view.volumes = std::make_shared<AuditedVolumes<V>>(hierarchy.volumes());
+    return view;
+  }
+
+  NearBodies near_bodies_;
+  std::variant<Bodies<Volumes>...> bodies_;
+  std::vector<NodePair> stack_;
+  Count count_;
+  bool plans_changed_ = false;
+};
+
+}  // namespace kbvh

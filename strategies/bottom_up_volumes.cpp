@@ -1,0 +1,56 @@
+// Bottom-up refit of any bounding volume, written once over the concept BoundingVolume
+// (core/geometry/volumes/bounding_volume.hpp): what a kind of volume is worth, with nothing else changed.
+// With boxes it is a plain refit on a stored tree; `bottom_up` is the fast one.
+
+#include "core/contract/registry.hpp"
+#include "core/families/volumes/volume_strategy.hpp"
+#include "core/geometry/volumes/dop.hpp"
+#include "core/geometry/volumes/obb.hpp"
+#include "core/geometry/volumes/sphere.hpp"
+
+namespace kbvh {
+namespace {
+
+/// In the order of the volumes of BottomUpVolumes.
+const std::vector<std::string>& volume_words() {
+  static const std::vector<std::string> words{"aabb", "dop14", "dop18", "dop26", "sphere", "obb"};
+  return words;
+}
+
+std::size_t chosen_volume(const Params& params) {
+  const auto& words = volume_words();
+  return std::size_t(std::find(words.begin(), words.end(), params.word("volume")) - words.begin());
+}
+
+template <class S, class Count>
+class BottomUpVolumes final
+    : public VolumeStrategy<S, Count, Box<S>, Dop<S, 14>, Dop<S, 18>, Dop<S, 26>, Sphere<S>, Obb<S>> {
+  using Base = VolumeStrategy<S, Count, Box<S>, Dop<S, 14>, Dop<S, 18>, Dop<S, 26>, Sphere<S>, Obb<S>>;
+
+ public:
+  BottomUpVolumes(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
+                  const Params& params)
+      : Base(scene, motion, std::move(topologies), chosen_volume(params)) {}
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(bottom_up_volumes) {
+  using namespace kbvh;
+  return {make_entry<BottomUpVolumes>({
+      .id = "bottom_up_volumes",
+      .title = "refit of any volume",
+      .family = "volumes",
+      .citation = "Klosowski et al. 1998 (k-DOPs); Ritter 1990 (spheres); Gottschalk et al. 1996, Larsson & "
+                  "Källberg 2011 (oriented boxes)",
+      // Boxes are tight, k-DOPs over polygons, too; spheres and oriented boxes are only large enough.
+      .tightness = Tightness::conservative,
+      .can = {.plan_changes = true, .geometry_changes = true, .self_pairs = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+      .parameters =
+          {{"volume", "aabb", volume_words(),
+            "bounding volume of every node: axis-aligned box, k-DOP with 14, 18 or 26 sides, sphere, "
+            "oriented box"}},
+  })};
+}

@@ -1,0 +1,215 @@
+// Exchanging subtrees in place: the topology stays sound as by its validator, contents go where the edit
+// says, and the work is in proportion to what changed.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/topology/builders.hpp"
+#include "core/topology/subtree_swap.hpp"
+#include "tests/support/synthetic_scenes.hpp"
+
+namespace kbvh::test {
+namespace {
+
+Topology random_tree(std::uint32_t primitives, BuildMethod method, Random& random, std::uint32_t width = 2) {
+  std::vector<Box<double>> boxes(primitives);
+  for (Box<double>& box : boxes)
+    for (int corner = 0; corner < 2; ++corner) {
+      const double point[3] = {random.unit(), std::pow(random.unit(), 3), std::pow(random.unit(), 5)};
+      box.extend(point);
+    }
+  return build_topology<double>(boxes, {.method = method, .width = width, .leaf_size = 2});
+}
+
+/// The primitives below each node, ascending.
+std::vector<std::vector<std::uint32_t>> primitives_below(const Topology& topology) {
+  std::vector<std::vector<std::uint32_t>> below(topology.size());
+  for (std::uint32_t node = topology.size(); node-- > 0;) {
+    const TopologyNode content = topology.nodes[node];
+    for (std::uint32_t k = content.first(); k < content.first() + content.count(); ++k)
+      if (content.is_leaf())
+        below[node].push_back(topology.primitives[k]);
+      else
+        below[node].insert(below[node].end(), below[k].begin(), below[k].end());
+    std::sort(below[node].begin(), below[node].end());
+  }
+  return below;
+}
+
+std::uint32_t nodes_below(const Topology& topology, std::uint32_t node) {
+  const TopologyNode content = topology.nodes[node];
+  if (content.is_leaf()) return 1;
+  return 1 + nodes_below(topology, content.first()) + nodes_below(topology, content.first() + 1);
+}
+
+bool above(const Topology& topology, std::uint32_t upper, std::uint32_t node) {
+  for (; node != upper; node = topology.parents[node])
+    if (node == 0) return false;
+  return true;
+}
+
+/// Any two nodes of which neither is above the other.
+std::pair<std::uint32_t, std::uint32_t> two_places(const Topology& topology, Random& random) {
+  for (;;) {
+    const std::uint32_t a = random.below(topology.size()), b = random.below(topology.size());
+    if (!above(topology, a, b) && !above(topology, b, a)) return {a, b};
+  }
+}
+
+/// Exchanges two subtrees and holds the outcome against what was there before.
+void swap_and_check(Topology& topology, std::uint32_t primitives, std::uint32_t a, std::uint32_t b,
+                    SubtreeSwap& swapping, TopologyEdit& edit) {
+  const auto before = primitives_below(topology);
+  const std::uint32_t most = 2 * (nodes_below(topology, a) + nodes_below(topology, b)) +
+                             2u * topology.depths[a] + 2u * topology.depths[b];
+  swapping.swap(topology, a, b, edit);
+  ASSERT_EQ(check_topology(topology, primitives), "") << a << " and " << b;
+  ASSERT_FALSE(topology.perfect);
+  ASSERT_LE(edit.moved.size(), most);
+  // Where everything lies now: the moves are a permutation.
+  std::vector<std::uint32_t> now(topology.size()), from, to;
+  for (std::uint32_t node = 0; node < topology.size(); ++node) now[node] = node;
+  for (const auto& move : edit.moved) {
+    ASSERT_NE(move.from, move.to);
+    now[move.from] = move.to;
+    from.push_back(move.from);
+    to.push_back(move.to);
+  }
+  std::sort(from.begin(), from.end());
+  std::sort(to.begin(), to.end());
+  ASSERT_EQ(from, to);
+  ASSERT_EQ(std::adjacent_find(from.begin(), from.end()), from.end());
+  // Every node has below it what it had, but those above one of the places and not above both.
+  const auto after = primitives_below(topology);
+  const std::uint32_t at_a = now[a], at_b = now[b];
+  ASSERT_EQ(after[at_a], before[a]);
+  ASSERT_EQ(after[at_b], before[b]);
+  for (std::uint32_t node = 0; node < topology.size(); ++node) {
+    const std::uint32_t there = now[node];
+    const bool holds_a = there != at_a && above(topology, there, at_a),
+               holds_b = there != at_b && above(topology, there, at_b);
+    if (holds_a == holds_b) {
+      ASSERT_EQ(after[there], before[node]) << node;
+    } else {
+      ASSERT_TRUE(std::includes(after[there].begin(), after[there].end(), before[holds_a ? a : b].begin(),
+                                before[holds_a ? a : b].end()));
+    }
+  }
+  for (const std::uint32_t node : {at_a, at_b})
+    ASSERT_NE(std::find(edit.changed.begin(), edit.changed.end(), topology.parents[node]),
+              edit.changed.end());
+}
+
+TEST(SubtreeSwap, StaysSoundOverThousandsOfRandomExchanges) {
+  Random random(3);
+  std::size_t reordered = 0;
+  for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
+    for (const std::uint32_t primitives : {5u, 16u, 100u}) {
+      Topology topology = random_tree(primitives, method, random);
+      SubtreeSwap swapping;
+      TopologyEdit edit;
+      for (int i = 0; i < 400; ++i) {
+        const auto [a, b] = two_places(topology, random);
+        swap_and_check(topology, primitives, a, b, swapping, edit);
+        if (HasFatalFailure()) return;
+        reordered += edit.moved.size() > 2 ? 1 : 0;
+      }
+    }
+  EXPECT_GT(reordered, 500u) << "ids were hardly ever in the wrong order: little is shown";
+}
+
+TEST(SubtreeSwap, TakesItselfBack) {
+  Random random(5);
+  const Topology start = random_tree(64, BuildMethod::sah, random);
+  for (int i = 0; i < 200; ++i) {
+    Topology topology = start;
+    SubtreeSwap swapping;
+    TopologyEdit edit;
+    auto [a, b] = two_places(topology, random);
+    for (int twice = 0; twice < 2; ++twice) {
+      swapping.swap(topology, a, b, edit);
+      for (std::uint32_t* const node : {&a, &b})
+        for (const auto& move : edit.moved)
+          if (move.from == *node) {
+            *node = move.to;
+            break;
+          }
+    }
+    // The same tree, perhaps under other ids.
+    std::vector<std::uint32_t> order;
+    Topology back = compacted(topology, order), expected = compacted(start, order);
+    EXPECT_EQ(back.nodes, expected.nodes);
+    EXPECT_EQ(back.primitives, expected.primitives);
+  }
+}
+
+TEST(SubtreeSwap, RotatesAChildWithAGrandchild) {
+  Random random(7);
+  Topology topology = random_tree(200, BuildMethod::median, random);
+  SubtreeSwap swapping;
+  TopologyEdit edit;
+  std::size_t rotations = 0, moved = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const std::uint32_t node = 1 + random.below(topology.size() - 1);
+    const TopologyNode siblings = topology.nodes[topology.parents[node]];
+    const std::uint32_t sibling = siblings.first() + (node == siblings.first() ? 1 : 0);
+    if (topology.nodes[sibling].is_leaf()) continue;
+    swapping.rotate(topology, node, topology.nodes[sibling].first() + random.below(2), edit);
+    ++rotations;
+    moved += edit.moved.size();
+    if (rotations % 50 == 0) {
+      ASSERT_EQ(check_topology(topology, 200u), "") << i;
+    }
+  }
+  EXPECT_EQ(check_topology(topology, 200u), "");
+  EXPECT_GT(rotations, 5000u);
+  EXPECT_LT(moved, 40 * rotations);
+}
+
+// A rotation far down in a large tree touches a few nodes, not the tree.
+TEST(SubtreeSwap, CostsWhatItChanges) {
+  Random random(9);
+  Topology topology = random_tree(1 << 15, BuildMethod::median, random);
+  SubtreeSwap swapping;
+  TopologyEdit edit;
+  std::size_t most = 0, rotations = 0;
+  for (int i = 0; i < 30'000; ++i) {
+    const std::uint32_t node = 1 + random.below(topology.size() - 1);
+    if (nodes_below(topology, topology.parents[node]) > 15) continue;
+    const TopologyNode siblings = topology.nodes[topology.parents[node]];
+    const std::uint32_t sibling = siblings.first() + (node == siblings.first() ? 1 : 0);
+    if (topology.nodes[sibling].is_leaf()) continue;
+    swapping.rotate(topology, node, topology.nodes[sibling].first() + random.below(2), edit);
+    most = std::max(most, edit.moved.size());
+    ++rotations;
+  }
+  EXPECT_EQ(check_topology(topology, 1u << 15), "");
+  EXPECT_GT(rotations, 1000u);
+  EXPECT_LE(most, 40u);
+  EXPECT_LE(swapping.bytes(), 8192u);
+}
+
+TEST(SubtreeSwap, RefusesWhatIsNoExchange) {
+  Random random(11);
+  Topology topology = random_tree(40, BuildMethod::median, random);
+  const Topology before = topology;
+  SubtreeSwap swapping;
+  TopologyEdit edit;
+  const std::uint32_t left = topology.nodes[0].first(), below = topology.nodes[left].first();
+  EXPECT_THROW(swapping.swap(topology, left, left, edit), std::invalid_argument);
+  EXPECT_THROW(swapping.swap(topology, left, below, edit), std::invalid_argument);
+  EXPECT_THROW(swapping.swap(topology, below, left, edit), std::invalid_argument);
+  EXPECT_THROW(swapping.swap(topology, 0, left, edit), std::invalid_argument);
+  EXPECT_THROW(swapping.swap(topology, left, topology.size(), edit), std::invalid_argument);
+  EXPECT_THROW(swapping.rotate(topology, left, below, edit), std::invalid_argument) << "its own child";
+  EXPECT_THROW(swapping.rotate(topology, left, left + 1, edit), std::invalid_argument) << "its sibling";
+  EXPECT_THROW(swapping.rotate(topology, 0, left, edit), std::invalid_argument);
+  EXPECT_TRUE(topology == before);
+  Topology wide = random_tree(40, BuildMethod::median, random, 4);
+  EXPECT_THROW(swapping.swap(wide, 1, 2, edit), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace kbvh::test
