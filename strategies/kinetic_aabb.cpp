@@ -8,12 +8,17 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count>
-class KineticAabb final : public KineticAabbStrategy<S, Count, AvlQueue<S>, BinaryHeapQueue<S>> {
+using OnAnyQueue = KineticAabbStrategy<S, Count, SegmentHeapQueue<S>, AvlQueue<S>, BinaryHeapQueue<S>>;
+
+template <class S, class Count>
+class KineticAabb final : public OnAnyQueue<S, Count> {
  public:
   KineticAabb(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
               const Params& params)
-      : KineticAabbStrategy<S, Count, AvlQueue<S>, BinaryHeapQueue<S>>(
-            scene, motion, std::move(topologies), params.word("queue") == AvlQueue<S>::name ? 0 : 1) {}
+      : OnAnyQueue<S, Count>(scene, motion, std::move(topologies),
+                             params.word("queue") == SegmentHeapQueue<S>::name ? 0
+                             : params.word("queue") == AvlQueue<S>::name       ? 1
+                                                                               : 2) {}
 };
 
 }  // namespace
@@ -34,8 +39,9 @@ KBVH_STRATEGY(kinetic_aabb) {
               .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"queue",
-                      "avl",
-                      {"avl", "binary_heap"},
-                      "event queue: the paper's AVL tree, or an indexed binary heap"}},
+                      "segment_heap",
+                      {"segment_heap", "avl", "binary_heap"},
+                      "event queue: lists by segment and a heap of what comes next, the paper's AVL tree, or "
+                      "an indexed binary heap"}},
   })};
 }

@@ -30,11 +30,12 @@ std::string summary(const EnvelopeReport& r) {
          std::to_string(r.several_steps) + ", choices " + std::to_string(r.choices);
 }
 
-/// Both queues over one play: their logs must be one, which is then proved.
+/// All queues over one play: their logs must be one, which is then proved.
 template <class S>
 EnvelopeReport prove(const TestScene<S>& test, const Play& play) {
   const auto recording = test::record<S, AvlQueue>(test, play);
   EXPECT_EQ(recording.log(), (record<S, BinaryHeapQueue>(test, play).log())) << "queues differ";
+  EXPECT_EQ(recording.log(), (record<S, SegmentHeapQueue>(test, play).log())) << "queues differ";
   const EnvelopeReport report = check(test.scene, recording);
   EXPECT_EQ(report.violation, "");
   EXPECT_EQ(report.net, report.envelope);

@@ -237,10 +237,11 @@ void expect_growth_keeps_order() {
       Event event;
       event.slot = random.below(slots);
       // Unlike times, in no order.
-      event.begin = event.hint = std::fmod(next_time += 617, 100'003);
-      event.end = event.begin + 0.5;
+      event.hint = std::fmod(next_time += 617, 100'003) / 100'003;
+      event.begin = 0;
+      event.end = 1;
       queue.schedule(event);
-      expected[event.slot] = event.begin;
+      expected[event.slot] = event.hint;
       const std::uint32_t other = random.below(slots);
       EXPECT_EQ(queue.cancel(other), expected.erase(other) == 1);
     }
@@ -252,7 +253,7 @@ void expect_growth_keeps_order() {
   for (const auto& [slot, time] : expected) order.emplace_back(time, slot);
   std::sort(order.begin(), order.end());
   while (!queue.empty()) {
-    popped.emplace_back(queue.top().begin, queue.top().slot);
+    popped.emplace_back(queue.top().hint, queue.top().slot);
     queue.pop();
   }
   EXPECT_EQ(popped, order);
@@ -261,6 +262,7 @@ void expect_growth_keeps_order() {
 TEST(GeometryChange, QueuesGrow) {
   expect_growth_keeps_order<AvlQueue<double>>();
   expect_growth_keeps_order<BinaryHeapQueue<double>>();
+  expect_growth_keeps_order<SegmentHeapQueue<double>>();
 }
 
 }  // namespace

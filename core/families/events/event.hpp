@@ -3,10 +3,13 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "core/families/events/keyframe_rows.hpp"
 #include "core/motion/exact_piece.hpp"
 #include "core/motion/flight_plans.hpp"
 
@@ -36,6 +39,18 @@ struct Event {
 };
 static_assert(sizeof(Event) == 48);
 
+/// What a queue of many events keeps of one: half as much. The rest follows from the keyframes, or from the
+/// crossing that the clock remembers.
+struct PackedEvent {
+  double hint = 0;
+  std::uint32_t winner = 0, loser = 0;
+  std::uint32_t segment = 0;    ///< of the keyframes, or none: a plan of its own takes part
+  std::uint32_t body : 21 = 0;  ///< as in Event
+  std::uint32_t side : 3 = 0;
+  std::uint32_t depth : 8 = 0;
+};
+static_assert(sizeof(PackedEvent) == 24);
+
 /// An instant at which certificates are computed: a frame's or change's double, or the exact time of an
 /// event.
 template <class S>
@@ -53,7 +68,19 @@ template <class S>
 class EventClock {
  public:
   using Event = kbvh::Event;
-  explicit EventClock(std::vector<const FlightPlans<S>*> plans) : plans_(std::move(plans)) {}
+  using Packed = PackedEvent;
+  /// Copies the keyframes of moving bodies; bodies that share theirs share the copy.
+  explicit EventClock(std::vector<const FlightPlans<S>*> plans) : plans_(std::move(plans)) {
+    std::unordered_map<const S*, const KeyframeRows<S>*> of_keyframes;
+    for (const FlightPlans<S>* body : plans_) {
+      const KeyframeRows<S>*& rows = of_keyframes[body->keyframe(0)];
+      if (rows == nullptr) {
+        distinct_rows_.push_back(std::make_unique<const KeyframeRows<S>>(*body));
+        rows = distinct_rows_.back().get();
+      }
+      rows_.push_back(rows);
+    }
+  }
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return *plans_[body]; }
 
@@ -61,6 +88,57 @@ class EventClock {
   Crossing<S> crossing(const Event& event) const {
     if (event.slot < place_.size() && place_[event.slot] != none) return own_[place_[event.slot]];
     return keyframed_crossing(event);
+  }
+
+  /// The short form of an event that is about to be scheduled, its crossing remembered.
+  Packed pack(const Event& event) const {
+    const bool own = event.slot < place_.size() && place_[event.slot] != none;
+    return {event.hint,  event.winner,
+            event.loser, own ? none : std::uint32_t(rows_[event.body]->segment_at(event.begin)),
+            event.body,  event.side,
+            event.depth};
+  }
+  /// The event again: as it was, but that the pieces of an own crossing begin where they do, not at the
+  /// instant from which on it was looked for.
+  Event unpack(const Packed& packed, std::uint32_t slot) const {
+    Event event;
+    event.hint = packed.hint;
+    event.winner = packed.winner;
+    event.loser = packed.loser;
+    event.slot = slot;
+    event.body = packed.body;
+    event.side = packed.side;
+    event.depth = packed.depth;
+    if (packed.segment == none) {
+      const Crossing<S>& own = own_[place_[slot]];
+      event.begin = std::max(own.winner.t0, own.loser.t0);
+      event.end = std::min(own.winner.t1, own.loser.t1);
+      event.error = crossing_estimate(own).error;
+    } else {
+      const double* const times = rows_[packed.body]->times().data() + packed.segment;
+      event.begin = times[0];
+      event.end = times[1];
+      event.error = keyframed_error(event);
+    }
+    return event;
+  }
+  /// Fetches the keyframes that handling the event will read.
+  void fetch_ahead(const Event& event) const {
+    const KeyframeRows<S>& rows = *rows_[event.body];
+    if (rows.times().size() < 2) return;
+    const std::size_t k = rows.segment_at(event.begin);
+    const int axis = axis_of(event.side);
+    for (const std::uint32_t vertex : {event.winner, event.loser})
+      if (vertex < plans_[event.body]->keyframed_count()) __builtin_prefetch(rows.row(vertex, axis) + k);
+  }
+  /// All times of keyframes, ascending.
+  std::vector<double> keyframe_times() const {
+    std::vector<double> all;
+    for (const auto& rows : distinct_rows_)
+      if (rows->times().size() > 1) all.insert(all.end(), rows->times().begin(), rows->times().end());
+    std::sort(all.begin(), all.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
+    return all;
   }
 
   /// Strict weak order of events in a queue.
@@ -102,30 +180,30 @@ class EventClock {
     const FlightPlans<S>& plan = *plans_[event.body];
     if (plan.has_own_plan(event.winner) || plan.has_own_plan(event.loser))
       return first_own_failure(event, now, own, until);
-    const auto times = plan.keyframe_times();
+    const KeyframeRows<S>& rows = *rows_[event.body];
+    const auto times = rows.times();
+    if (times.size() < 2) return false;
     const int axis = axis_of(event.side);
-    const std::size_t w = std::size_t(3) * event.winner + std::size_t(axis);
-    const std::size_t l = std::size_t(3) * event.loser + std::size_t(axis);
-    const double sign = is_upper(event.side) ? 1.0 : -1.0;
-    std::size_t k = plan.segment_at(now.begin);
+    const S *const winner = rows.row(event.winner, axis), *const loser = rows.row(event.loser, axis);
+    std::size_t k = rows.segment_at(now.begin);
     // An event between plans of their own may lie keyframes after the begin of its pieces.
     while (now.exact != nullptr && k + 1 < times.size() && times[k + 1] < now.end &&
            compare_crossing_to(*now.exact, times[k + 1]) >= 0)
       ++k;
-    for (; k + 1 < times.size() && times[k] < until; ++k) {
-      const double ahead = sign * (double(plan.keyframe(k + 1)[l]) - double(plan.keyframe(k + 1)[w]));
-      if (!(ahead > 0)) continue;
-      const double behind = sign * (double(plan.keyframe(k)[w]) - double(plan.keyframe(k)[l]));
-      const double length = times[k + 1] - times[k];
-      event.begin = times[k];
-      event.end = times[k + 1];
-      event.hint = event.begin + length * (behind / (behind + ahead));
-      // Differences, sum, quotient, product and final sum are each off by at most one rounding.
-      event.error =
-          16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(event.begin), std::abs(event.end));
-      return true;
-    }
-    return false;
+    const std::size_t end =
+        std::isinf(until) ? times.size() : std::min(times.size(), rows.segment_at(until) + 2);
+    const std::size_t ahead_at = is_upper(event.side) ? rows.first_above(loser, winner, k + 1, end)
+                                                      : rows.first_above(winner, loser, k + 1, end);
+    if (ahead_at >= end || !(times[ahead_at - 1] < until)) return false;
+    k = ahead_at - 1;
+    const double ahead = std::abs(double(loser[k + 1]) - double(winner[k + 1]));
+    const double behind =
+        is_upper(event.side) ? double(winner[k]) - double(loser[k]) : double(loser[k]) - double(winner[k]);
+    event.begin = times[k];
+    event.end = times[k + 1];
+    event.hint = event.begin + (event.end - event.begin) * (behind / (behind + ahead));
+    event.error = keyframed_error(event);
+    return true;
   }
 
   /// Sign of (challenger's value - winner's value) at an instant given by a double, seen from the side: > 0
@@ -184,20 +262,25 @@ class EventClock {
     std::fill(place_.begin(), place_.end(), none);
   }
   std::size_t bytes() const {
-    return own_.capacity() * sizeof(Crossing<S>) +
-           (place_.capacity() + free_.capacity()) * sizeof(std::uint32_t);
+    std::size_t total = own_.capacity() * sizeof(Crossing<S>) +
+                        (place_.capacity() + free_.capacity()) * sizeof(std::uint32_t);
+    for (const auto& rows : distinct_rows_) total += rows->bytes();
+    return total;
   }
 
  private:
+  /// Differences, sum, quotient, product and final sum are each off by at most one rounding.
+  static double keyframed_error(const Event& event) {
+    return 16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(event.begin), std::abs(event.end));
+  }
   Crossing<S> keyframed_crossing(const Event& event) const {
     return {keyframed_piece(event, event.winner), keyframed_piece(event, event.loser)};
   }
   Piece<S> keyframed_piece(const Event& event, std::uint32_t vertex) const {
-    // Read from the keyframes themselves: they stay what they are when a vertex gets a plan of its own.
-    const FlightPlans<S>& plan = *plans_[event.body];
-    const std::size_t k = plan.segment_at(event.begin);
-    const std::size_t at = std::size_t(3) * vertex + std::size_t(axis_of(event.side));
-    return {event.begin, event.end, plan.keyframe(k)[at], plan.keyframe(k + 1)[at], PieceKind::chord};
+    // Read from the keyframes: they stay what they are when a vertex gets a plan of its own.
+    const KeyframeRows<S>& rows = *rows_[event.body];
+    const S* const values = rows.row(vertex, axis_of(event.side)) + rows.segment_at(event.begin);
+    return {event.begin, event.end, values[0], values[1], PieceKind::chord};
   }
 
   /// The piece that holds at the instant and right after it.
@@ -236,6 +319,8 @@ class EventClock {
   }
 
   std::vector<const FlightPlans<S>*> plans_;
+  std::vector<const KeyframeRows<S>*> rows_;  ///< [body]
+  std::vector<std::unique_ptr<const KeyframeRows<S>>> distinct_rows_;
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   std::vector<Crossing<S>> own_;      ///< crossings that involve a plan of its own
   std::vector<std::uint32_t> place_;  ///< [slot] in own_, or none; slots beyond have none

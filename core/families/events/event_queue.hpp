@@ -7,6 +7,7 @@
 
 #include "core/base/counters.hpp"
 #include "core/families/events/event.hpp"
+#include "core/families/events/segment_queue.hpp"
 
 namespace kbvh {
 
@@ -18,6 +19,9 @@ namespace kbvh {
 ///   grow(slots)       makes room for slots below this number, amortised O(1) each; events stay scheduled
 ///   slots()           how many there is room for
 ///   ClockType         the clock: EventClock in all but contestants that round times
+/// A queue may also have
+///   due(t)            whether the first event, if there is one, happens at or before t
+///   split_at(times)   is told where time is best divided
 /// `steps()` counts comparisons. Events and their order come from a clock: Clock::Event has a `slot`, and
 /// clock.earlier(a, b) orders by exact time first (EventClock, OverlapClock).
 
@@ -199,5 +203,7 @@ template <class S>
 using AvlQueue = AvlEventQueue<EventClock<S>>;
 template <class S>
 using BinaryHeapQueue = BinaryHeapEventQueue<EventClock<S>>;
+template <class S>
+using SegmentHeapQueue = SegmentHeapEventQueue<EventClock<S>>;
 
 }  // namespace kbvh

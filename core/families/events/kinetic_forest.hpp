@@ -24,6 +24,9 @@ class KineticForest {
     if (scene.body_count() > Event::most_bodies)
       throw std::length_error("a scene of " + std::to_string(scene.body_count()) +
                               " bodies, but events number " + std::to_string(Event::most_bodies));
+    if constexpr (requires { queue_.split_at(clock_.keyframe_times()); })
+      queue_.split_at(clock_.keyframe_times());
+    if constexpr (requires { queue_.serve(*this); }) queue_.serve(*this);
     std::uint32_t first_slot = 0;
     trees_.reserve(topologies.size());
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
@@ -46,13 +49,24 @@ class KineticForest {
   void advance(double t) {
     while (due(t)) handle_next();
   }
-  bool due(double t) const { return !queue_.empty() && clock_.due(queue_.top(), t); }
+  bool due(double t) const {
+    if constexpr (requires { queue_.due(t); })
+      return queue_.due(t);
+    else
+      return !queue_.empty() && clock_.due(queue_.top(), t);
+  }
   /// Takes the first event off the queue and handles it.
   void handle_next() {
     const Event event = queue_.top();
     queue_.pop();
     count_->add(Counter::queue_operations);
     trees_[event.body].handle(event);
+  }
+
+  /// Fetches what handling the event will read.
+  void fetch_ahead(const Event& event) const {
+    clock_.fetch_ahead(event);
+    if constexpr (requires { trees_[event.body].fetch_ahead(event); }) trees_[event.body].fetch_ahead(event);
   }
 
   /// Follows changes of plans at t that the motion shows already; of each body's tree once.

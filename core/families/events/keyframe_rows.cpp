@@ -1,0 +1,59 @@
+#include "core/families/events/keyframe_rows.hpp"
+
+#include <algorithm>
+
+#include "core/kernels/kernel_set.hpp"
+
+namespace kbvh {
+
+template <>
+const RowScanKernels<float>& row_scan_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, row_scan_float);
+}
+template <>
+const RowScanKernels<double>& row_scan_kernels(KernelSet set) {
+  return KBVH_SELECT_KERNELS(set, row_scan_double);
+}
+
+template <class S>
+KeyframeRows<S>::KeyframeRows(const FlightPlans<S>& plans)
+    : times_(plans.keyframe_times()),
+      vertices_(plans.keyframed_count()),
+      kernels_(&row_scan_kernels<S>(active_kernel_set())) {
+  const std::size_t keyframes = times_.size();
+  if (keyframes < 2 || vertices_ == 0) return;
+  const double duration = times_.back() - times_.front();
+  per_second_ = double(keyframes - 1) / duration;
+  values_.resize(3 * vertices_ * keyframes + row_padding, S(0));
+  // Blocks that stay in the cache on both sides.
+  constexpr std::size_t block = 64;
+  for (std::size_t first = 0; first < vertices_; first += block)
+    for (std::size_t begin = 0; begin < keyframes; begin += block) {
+      const std::size_t end = std::min(begin + block, keyframes);
+      for (std::size_t v = first; v < std::min(first + block, vertices_); ++v)
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          S* const to = values_.data() + (axis * vertices_ + v) * keyframes;
+          for (std::size_t k = begin; k < end; ++k) to[k] = plans.keyframe(k)[3 * v + axis];
+        }
+    }
+}
+
+template <class S>
+std::size_t KeyframeRows<S>::segment_at(double t) const {
+  const double guess = (t - times_.front()) * per_second_;
+  const std::size_t last = times_.size() - 1;
+  if (guess >= 0 && guess <= double(last)) {
+    std::size_t k = std::size_t(guess);
+    // Rounding misses evenly spaced keyframes by one at most.
+    if (t < times_[k] && k > 0) --k;
+    if (k < last && t >= times_[k + 1]) ++k;
+    if (t >= times_[k] && (k == last || t < times_[k + 1])) return k;
+  }
+  const auto above = std::upper_bound(times_.begin(), times_.end(), t);
+  return above == times_.begin() ? 0 : std::size_t(above - times_.begin()) - 1;
+}
+
+template class KeyframeRows<float>;
+template class KeyframeRows<double>;
+
+}  // namespace kbvh

@@ -1,0 +1,368 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "core/base/assert.hpp"
+#include "core/families/events/event.hpp"
+
+namespace kbvh {
+
+/// How a queue keeps an event of a clock that has a shorter form of its events; else the event as it is.
+template <class Clock>
+struct StoredEvent {
+  using type = typename Clock::Event;
+};
+template <class Clock>
+requires requires {
+  typename Clock::Packed;
+}
+struct StoredEvent<Clock> {
+  using type = typename Clock::Packed;
+};
+
+/// An event queue (event_queue.hpp) in three parts, each event in the last one that its time allows:
+///   segments  unsorted lists, one for each span between the times of `split_at`
+///   bins      the present segment, cut into equal spans of some twenty events, unsorted
+///   heap      the present bin: a 4-ary heap by time and error bound, compared exactly where these overlap
+/// Segments and bins order events by the earliest time that their error bounds allow, which proves that what
+/// waits comes later than any event that is over before the next bin begins; so an event is first in the
+/// queue only if it is over by then. What lies after the last of the times is cut again and again, at the
+/// median of what waits there.
+///
+/// `schedule` and `cancel` are O(1) but for events of the present bin, which are O(log bin); what was
+/// cancelled stays in its list until that is opened, or until half of all that waits is such.
+template <class Clock>
+class SegmentHeapEventQueue {
+  using Event = typename Clock::Event;
+  using Stored = typename StoredEvent<Clock>::type;
+  static constexpr bool packed = !std::is_same_v<Stored, Event>;
+  /// By value where it is made on demand.
+  using Returned = std::conditional_t<packed, Event, const Event&>;
+
+ public:
+  using ClockType = Clock;
+  static constexpr const char* name = "segment_heap";
+  SegmentHeapEventQueue(const Clock& clock, std::uint32_t slots)
+      : clock_(&clock), records_(slots), segments_(1) {}
+
+  /// Cuts time at `times` (ascending), where many events are expected on either side. Only while the queue is
+  /// empty.
+  void split_at(std::span<const double> times) {
+    KBVH_ASSERT(empty());
+    cuts_.assign(times.begin(), times.end());
+    cuts_per_second_ = times.size() < 2 ? 0 : double(times.size() - 1) / (times.back() - times.front());
+    segments_.resize(times.size() + 1);
+    clear();
+  }
+
+  /// Calls owner.fetch_ahead(event) for each event that will come soon; not for all.
+  template <class Owner>
+  void serve(Owner& owner) {
+    owner_ = &owner;
+    fetch_ahead_ = [](void* self, const Event& event) { static_cast<Owner*>(self)->fetch_ahead(event); };
+  }
+
+  void schedule(const Event& event) {
+    Record& record = records_[event.slot];
+    withdraw(record);
+    if constexpr (packed)
+      record.event = clock_->pack(event);
+    else
+      record.event = event;
+    const double begin = event.hint - event.error;
+    if (const std::int32_t number = number_of(begin); number > opened_) {
+      wait(event.slot, record, number);
+    } else {
+      push({event.hint, error_above(event.error), event.slot});
+    }
+  }
+  bool cancel(std::uint32_t slot) { return withdraw(records_[slot]); }
+  bool scheduled(std::uint32_t slot) const { return records_[slot].place != nowhere; }
+  Returned event(std::uint32_t slot) const {
+    if constexpr (packed)
+      return clock_->unpack(records_[slot].event, slot);
+    else
+      return records_[slot].event;
+  }
+  Returned top() const {
+    find_first();
+    return event(heap_.front().slot);
+  }
+  void pop() {
+    find_first();
+    withdraw(records_[heap_.front().slot]);
+  }
+  /// Does the first event happen at or before t?
+  bool due(double t) const {
+    if (empty()) return false;
+    find_first();
+    const Entry& first = heap_.front();
+    if (first.hint + double(first.error) < t) return true;
+    if (first.hint - double(first.error) > t) return false;
+    return clock_->due(event(first.slot), t);
+  }
+  bool empty() const { return size() == 0; }
+  std::size_t size() const { return heap_.size() + waiting_; }
+  void clear() {
+    for (auto& list : segments_) list.clear();
+    for (auto& list : bins_) list.clear();
+    for (Record& record : records_) record.place = nowhere;
+    heap_.clear();
+    waiting_ = entries_ = 0;
+    segment_ = 0;
+    bin_count_ = 0;
+    opened_ = -1;
+    limit_ = -infinity;
+  }
+  std::uint32_t slots() const { return std::uint32_t(records_.size()); }
+  void grow(std::uint32_t slots) {
+    if (slots > records_.size()) records_.resize(slots);
+  }
+  std::uint64_t steps() const { return steps_; }
+  std::size_t bytes() const {
+    std::size_t total = records_.capacity() * sizeof(Record) + heap_.capacity() * sizeof(Entry) +
+                        cuts_.size() * sizeof(double);
+    for (const auto& list : segments_) total += list.capacity() * sizeof(std::uint32_t);
+    for (const auto& list : bins_) total += list.capacity() * sizeof(std::uint32_t);
+    return total + (segments_.size() + bins_.size()) * sizeof(std::vector<std::uint32_t>) +
+           keys_.capacity() * sizeof(double);
+  }
+
+ private:
+  static constexpr double infinity = std::numeric_limits<double>::infinity();
+  static constexpr std::uint32_t nowhere = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::uint32_t waits = 1U
+                                         << 31;  ///< in `place`, with the number of a list; else in the heap
+  static constexpr std::uint32_t seen = 1U << 30;  ///< in `place`, while lists are tidied up
+  static constexpr std::int32_t most_bins = 1 << 14;
+  static constexpr std::size_t events_per_bin = 24;
+
+  struct Record {
+    Stored event{};
+    std::uint32_t place = nowhere;
+  };
+  struct Entry {
+    double hint;
+    float error;
+    std::uint32_t slot;
+  };
+
+  static float error_above(double error) {
+    const auto rounded = float(error);
+    return double(rounded) >= error ? rounded
+                                    : std::nextafter(rounded, std::numeric_limits<float>::infinity());
+  }
+
+  // ---- Lists of what waits
+
+  /// Bins are numbered from 0, segments from most_bins; rises with the time.
+  std::int32_t number_of(double time) const {
+    if (time < limit_) {
+      const double share = (time - bins_begin_) * bins_per_second_;
+      return share <= 0 ? 0 : share >= double(bin_count_ - 1) ? bin_count_ - 1 : std::int32_t(share);
+    }
+    return most_bins + std::int32_t(segment_of(time));
+  }
+  std::size_t segment_of(double time) const {
+    if (cuts_.empty() || time < cuts_.front()) return 0;
+    if (time >= cuts_.back()) return cuts_.size();
+    auto guess = std::size_t((time - cuts_.front()) * cuts_per_second_);
+    guess = std::min(guess, cuts_.size() - 2);
+    if (time < cuts_[guess] && guess > 0) --guess;
+    if (time >= cuts_[guess + 1]) ++guess;
+    if (time >= cuts_[guess] && time < cuts_[guess + 1]) return guess + 1;
+    return std::size_t(std::upper_bound(cuts_.begin(), cuts_.end(), time) - cuts_.begin());
+  }
+  std::vector<std::uint32_t>& list(std::int32_t number) const {
+    return number < most_bins ? bins_[std::size_t(number)] : segments_[std::size_t(number - most_bins)];
+  }
+  void wait(std::uint32_t slot, Record& record, std::int32_t number) {
+    record.place = waits | std::uint32_t(number);
+    list(number).push_back(slot);
+    ++waiting_;
+    if (++entries_ > 2 * waiting_ + 4096) tidy_up();
+  }
+  /// Forgets entries of what is not there any more, and double ones.
+  void tidy_up() {
+    entries_ = 0;
+    for (std::int32_t number = 0; number < most_bins + std::int32_t(segments_.size()); ++number) {
+      if (number == bin_count_) number = most_bins;
+      auto& entries = list(number);
+      std::erase_if(entries, [&](std::uint32_t slot) {
+        if (records_[slot].place != (waits | std::uint32_t(number))) return true;
+        records_[slot].place |= seen;
+        return false;
+      });
+      for (const std::uint32_t slot : entries) records_[slot].place &= ~seen;
+      entries_ += entries.size();
+    }
+  }
+
+  /// Takes an event out, wherever it is.
+  bool withdraw(Record& record) {
+    const std::uint32_t place = record.place;
+    if (place == nowhere) return false;
+    record.place = nowhere;
+    if ((place & waits) != 0)
+      --waiting_;
+    else
+      erase(place);
+    return true;
+  }
+
+  /// Opens bins until the first event of the heap is the first of all.
+  void find_first() const {
+    KBVH_ASSERT(!empty());
+    while (waiting_ > 0) {
+      if (!heap_.empty()) {
+        const Entry& first = heap_.front();
+        if (number_of(first.hint + double(first.error)) <= opened_) return;
+      }
+      open_next();
+    }
+  }
+  void open_next() const {
+    while (++opened_ < bin_count_) {
+      auto& entries = bins_[std::size_t(opened_)];
+      if (entries.empty()) continue;
+      for (const std::uint32_t slot : entries) prefetch(slot);
+      for (const std::uint32_t slot : entries)
+        if (records_[slot].place == (waits | std::uint32_t(opened_))) {
+          --waiting_;
+          const auto& next = event(slot);
+          if (fetch_ahead_ != nullptr) fetch_ahead_(owner_, next);
+          push({next.hint, error_above(next.error), slot});
+        }
+      entries_ -= entries.size();
+      entries.clear();
+      return;
+    }
+    cut_segment();
+  }
+  /// Cuts the first segment with events into bins. None of them is open then.
+  void cut_segment() const {
+    while (segments_[segment_].empty()) ++segment_;
+    auto& entries = segments_[segment_];
+    const std::uint32_t here = waits | std::uint32_t(most_bins + std::int32_t(segment_));
+    keys_.clear();
+    std::size_t kept = 0;
+    constexpr std::size_t ahead = 16;
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      if (i + ahead < entries.size()) prefetch(entries[i + ahead]);
+      const std::uint32_t slot = entries[i];
+      if (records_[slot].place != here) continue;
+      records_[slot].place |= seen;
+      const auto& next = event(slot);
+      keys_.push_back(next.hint - next.error);
+      entries[kept++] = slot;
+    }
+    entries_ -= entries.size() - kept;
+    entries.resize(kept);
+    const auto [least, largest] = std::minmax_element(keys_.begin(), keys_.end());
+    double begin = kept == 0 ? 0 : *least, end = kept == 0 ? 0 : *largest;
+    opened_ = -1;
+    if (segment_ < cuts_.size()) {
+      limit_ = cuts_[segment_];
+    } else if (kept <= events_per_bin || begin == end) {
+      limit_ = std::nextafter(end, infinity);
+    } else {
+      // The first half, or all but the largest where so many are equal.
+      sorted_ = keys_;
+      const auto middle = sorted_.begin() + std::ptrdiff_t(kept / 2);
+      std::nth_element(sorted_.begin(), middle, sorted_.end());
+      end = *middle > begin ? *middle : end;
+      limit_ = end;
+    }
+    bin_count_ = std::int32_t(std::min(kept / events_per_bin + 1, std::size_t(most_bins)));
+    if (bins_.size() < std::size_t(bin_count_)) bins_.resize(std::size_t(bin_count_));
+    bins_begin_ = begin;
+    bins_per_second_ = end > begin ? double(bin_count_) / (end - begin) : 0;
+    if (!std::isfinite(bins_per_second_)) bins_per_second_ = 0;
+    std::size_t rest = 0;
+    for (std::size_t i = 0; i < kept; ++i) {
+      const std::uint32_t slot = entries[i];
+      const std::int32_t number = number_of(keys_[i]);
+      records_[slot].place = waits | std::uint32_t(number);
+      if (number < most_bins)
+        bins_[std::size_t(number)].push_back(slot);
+      else
+        entries[rest++] = slot;
+    }
+    entries.resize(rest);
+  }
+  void prefetch(std::uint32_t slot) const { __builtin_prefetch(&records_[slot]); }
+
+  // ---- The heap
+
+  bool earlier(const Entry& a, const Entry& b) const {
+    ++steps_;
+    const double error = double(a.error) + double(b.error);
+    if (a.hint + error < b.hint) return true;
+    if (b.hint + error < a.hint) return false;
+    return clock_->earlier(event(a.slot), event(b.slot));
+  }
+  void put(const Entry& entry, std::size_t at) const {
+    heap_[at] = entry;
+    records_[entry.slot].place = std::uint32_t(at);
+  }
+  void push(const Entry& entry) const {
+    heap_.push_back(entry);
+    sift_up(entry, heap_.size() - 1);
+  }
+  void erase(std::size_t at) {
+    const Entry last = heap_.back();
+    heap_.pop_back();
+    if (at == heap_.size()) return;
+    if (at > 0 && earlier(last, heap_[(at - 1) / 4]))
+      sift_up(last, at);
+    else
+      sift_down(last, at);
+  }
+  void sift_up(const Entry& entry, std::size_t at) const {
+    while (at > 0) {
+      const std::size_t parent = (at - 1) / 4;
+      if (!earlier(entry, heap_[parent])) break;
+      put(heap_[parent], at);
+      at = parent;
+    }
+    put(entry, at);
+  }
+  void sift_down(const Entry& entry, std::size_t at) const {
+    for (;;) {
+      const std::size_t begin = 4 * at + 1, end = std::min(begin + 4, heap_.size());
+      if (begin >= end) break;
+      std::size_t first = begin;
+      for (std::size_t child = begin + 1; child < end; ++child)
+        if (earlier(heap_[child], heap_[first])) first = child;
+      if (!earlier(heap_[first], entry)) break;
+      put(heap_[first], at);
+      at = first;
+    }
+    put(entry, at);
+  }
+
+  const Clock* clock_;
+  void* owner_ = nullptr;
+  void (*fetch_ahead_)(void* owner, const Event& event) = nullptr;
+  // Which part an event is in changes when the first one is looked for; what the queue holds does not.
+  mutable std::vector<Record> records_;                       ///< by slot
+  mutable std::vector<std::vector<std::uint32_t>> segments_;  ///< slots; one more than cuts
+  mutable std::vector<std::vector<std::uint32_t>> bins_;      ///< slots
+  mutable std::vector<Entry> heap_;
+  mutable std::vector<double> keys_, sorted_;
+  mutable std::size_t waiting_ = 0, entries_ = 0;  ///< events in lists, and entries
+  mutable std::size_t segment_ = 0;                ///< the one that is cut into bins
+  mutable std::int32_t bin_count_ = 0, opened_ = -1;
+  mutable double limit_ = -infinity;  ///< bins are for earlier times
+  mutable double bins_begin_ = 0, bins_per_second_ = 0;
+  std::vector<double> cuts_;
+  double cuts_per_second_ = 0;
+  mutable std::uint64_t steps_ = 0;
+};
+
+}  // namespace kbvh
