@@ -12,7 +12,7 @@ struct Point {
   double x[3];
 };
 
-double dot(const double* a, const double* b) {
+double scalar_product(const double* a, const double* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
@@ -32,7 +32,7 @@ class Polygon {
     int kept_count = 0;
     for (int i = 0; i < count_; ++i) {
       const Point &p = corners_[i], &q = corners_[(i + 1) % count_];
-      const double at_p = dot(normal, p.x) - offset, at_q = dot(normal, q.x) - offset;
+      const double at_p = scalar_product(normal, p.x) - offset, at_q = scalar_product(normal, q.x) - offset;
       if (at_p <= 0) kept[kept_count++] = p;
       if ((at_p < 0 && at_q > 0) || (at_p > 0 && at_q < 0)) {
         const double share = at_p / (at_p - at_q);
@@ -55,7 +55,7 @@ class Polygon {
       for (int d = 0; d < 3; ++d)
         twice[d] += a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3];
     }
-    return 0.5 * std::sqrt(dot(twice, twice));
+    return 0.5 * std::sqrt(scalar_product(twice, twice));
   }
 
  private:
@@ -66,7 +66,7 @@ class Polygon {
 
 /// Two unit vectors that span the plane of a normal.
 void span_plane(const double* normal, Point& u, Point& v) {
-  const double length = std::sqrt(dot(normal, normal));
+  const double length = std::sqrt(scalar_product(normal, normal));
   int least = 0;
   for (int d = 1; d < 3; ++d)
     if (std::fabs(normal[d]) < std::fabs(normal[least])) least = d;
@@ -93,7 +93,7 @@ double slab_area(std::span<const Slab> slabs) {
   Slab relative[32];
   for (std::size_t i = 0; i < slabs.size(); ++i) {
     relative[i] = slabs[i];
-    const double at = dot(slabs[i].normal, middle);
+    const double at = scalar_product(slabs[i].normal, middle);
     relative[i].lower = (slabs[i].lower - at) / reach;
     relative[i].upper = (slabs[i].upper - at) / reach;
   }
@@ -102,7 +102,7 @@ double slab_area(std::span<const Slab> slabs) {
     for (const double offset : {relative[i].lower, relative[i].upper}) {
       const double* const normal = relative[i].normal;
       Point foot, u, v;
-      for (int d = 0; d < 3; ++d) foot.x[d] = normal[d] * offset / dot(normal, normal);
+      for (int d = 0; d < 3; ++d) foot.x[d] = normal[d] * offset / scalar_product(normal, normal);
       span_plane(normal, u, v);
       Polygon polygon(foot, u, v, 2.0);
       for (std::size_t j = 0; j < slabs.size(); ++j) {
