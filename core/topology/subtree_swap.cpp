@@ -16,7 +16,10 @@ std::uint32_t pair_of(const Topology& topology, std::uint32_t node) {
 }
 
 bool is_above(const Topology& topology, std::uint32_t upper, std::uint32_t node) {
-  while (node > upper) node = topology.parents[node];  // parents have smaller ids
+  while (node > upper) {  // parents have smaller ids
+    KBVH_ASSERT(topology.parents[node] < node);
+    node = topology.parents[node];
+  }
   return node == upper;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "core/geometry/volumes/bounding_volume.hpp"
