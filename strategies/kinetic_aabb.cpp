@@ -8,11 +8,11 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count>
-class KineticAabb final : public KineticAabbStrategy<S, Count, AvlQueue<S>, BinaryHeapQueue<S>> {
+class KineticAabb final : public ExactKineticAabbStrategy<S, Count, AvlQueue<S>, BinaryHeapQueue<S>> {
  public:
   KineticAabb(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
               const Params& params)
-      : KineticAabbStrategy<S, Count, AvlQueue<S>, BinaryHeapQueue<S>>(
+      : ExactKineticAabbStrategy<S, Count, AvlQueue<S>, BinaryHeapQueue<S>>(
             scene, motion, std::move(topologies), params.word("queue") == AvlQueue<S>::name ? 0 : 1) {}
 };
 
@@ -27,11 +27,7 @@ KBVH_STRATEGY(kinetic_aabb) {
       .family = "kinetic",
       .citation = "Zachmann & Weller 2006, s.4",
       .positions = PositionUse::fetched,
-      .can = {.event_driven = true,
-              .continuous = true,
-              .plan_changes = true,
-              .geometry_changes = true,
-              .time_budget = true},
+      .declares = {.continuous = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"queue",
                       "avl",
