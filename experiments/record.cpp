@@ -46,15 +46,7 @@ const char* word(Foresight foresight) {
 }
 
 const char* word(PrimitiveKind kind) {
-  switch (kind) {
-    case PrimitiveKind::points:
-      return "points";
-    case PrimitiveKind::control_nets:
-      return "control_nets";
-    case PrimitiveKind::polygons:
-      break;
-  }
-  return "polygons";
+  return name(kind);
 }
 
 const char* word(SceneOrigin origin) {
@@ -140,6 +132,7 @@ json strategy_record(const ContestantSpec& spec) {
           {"label", spec.label},
           {"title", info.title},
           {"family", info.family},
+          {"baseline", info.baseline},
           {"guarantee", word(info.guarantee)},
           {"tightness", word(info.tightness)},
           {"foresight", word(info.foresight)},
