@@ -48,47 +48,40 @@ AuditView breadth_first(Handle root, const Primitive& primitive, const Children&
 
 /// What both have in common: which bodies move, and that time does not run backwards.
 template <class Count>
-class Contestant : public Strategy<float> {
+class Contestant : public CountedStrategy<float, Count>, public TakesPlanChanges<float> {
  public:
   static constexpr Foresight foresight = Foresight::none;
 
   Contestant(const SceneView<float>& scene, const SampledMotion<float>& motion)
-      : Strategy<float>(scene, motion),
+      : CountedStrategy<float, Count>(scene, motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         moves_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
   }
 
-  void reset(double t) final {
-    this->start_at(t);
+  void reset_to(double /*t*/) final {
     for (std::uint32_t body = 0; body < moves_.size(); ++body) moves_[body] = this->scene_.moving(body);
     update_all();
-    count_.table = {};
   }
 
-  void advance(double t) final {
-    this->move_to(t);
-    update_moving();
-  }
+  void advance_to(double /*t*/) final { update_moving(); }
 
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<float>> changes) final {
+  void follow_plans(double /*t*/, std::span<const PlanChange<float>> changes) final {
     for (const auto& change : changes) moves_[change.body] = true;
   }
 
  protected:
   virtual void update_all() = 0;
   virtual void update_moving() = 0;
-  Counters counted() const final { return count_.table; }
   void count_refit(std::uint64_t primitives) {
-    count_.add(Counter::nodes_visited, 2 * primitives - 1);
-    count_.add(Counter::values_written, 6 * (2 * primitives - 1));
-    count_.add(Counter::vertex_reads, 3 * primitives);
+    this->count_.add(Counter::nodes_visited, 2 * primitives - 1);
+    this->count_.add(Counter::values_written, 6 * (2 * primitives - 1));
+    this->count_.add(Counter::vertex_reads, 3 * primitives);
   }
 
   NearBodies near_bodies_;
   std::vector<std::uint8_t> moves_;
-  Count count_;
 };
 
 /// What the registration of both says.
@@ -100,7 +93,6 @@ inline Info info(const char* id, const char* title) {
   made.citation = "Coumans, Bullet 3.24";
   made.guarantee = Guarantee::candidate_superset;
   made.positions = PositionUse::all;
-  made.can.plan_changes = true;
   made.topology.own = true;
   made.own_scalar = "float";
   return made;

@@ -68,7 +68,7 @@ class BulletBvh final : public Contestant<Count> {
     }
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     std::uint64_t tests = 0;
     // The box of a body's vertices, rounded to cells as both queries round: what overlaps there may do so
     // here.

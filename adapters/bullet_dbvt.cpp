@@ -43,7 +43,7 @@ class BulletDbvt final : public Contestant<Count> {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) build(body);
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     hits_.out = &out;
     std::uint64_t tests = 0;
     const auto box_of = [&](std::uint32_t body) {
@@ -210,7 +210,7 @@ KBVH_STRATEGY(bullet_dbvt) {
   using namespace kbvh;
   Info info = bullet::info("bullet_dbvt", "Bullet dynamic tree");
   info.tightness = Tightness::tight;
-  info.can.restructures = true;  // with update=leaves
+  info.declares.restructures = true;  // with update=leaves
   info.parameters.push_back(
       {"update", "refit", {"refit", "leaves"}, "recompute all nodes, or btDbvt::update leaf by leaf", 0});
   return {make_entry<bullet::BulletDbvt, Scalars::float_only>(std::move(info))};

@@ -107,7 +107,7 @@ struct RefitScene {
 };
 
 template <class S, class Count>
-class EmbreeRefit final : public Strategy<S> {
+class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
   static_assert(std::is_same_v<S, float>);
 
  public:
@@ -115,7 +115,7 @@ class EmbreeRefit final : public Strategy<S> {
 
   EmbreeRefit(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*none*/,
               const Params& params)
-      : Strategy<S>(scene, motion),
+      : CountedStrategy<S, Count>(scene, motion),
         refits_(params.word("geometry") == "triangles" ? Refits::triangles : Refits::boxes),
         bodies_(scene.body_count()),
         near_bodies_(scene.pairs(), scene.body_count()) {
@@ -132,22 +132,19 @@ class EmbreeRefit final : public Strategy<S> {
     check();
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     for (BodyState& state : bodies_) {
       state.moves = this->scene_.moving(state.body);
       update(state);
     }
-    count_.table = {};
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double /*t*/) override {
     for (BodyState& state : bodies_)
       if (state.moves) update(state);
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     const KeepFloatingPointState keep;
     for (BodyState& state : bodies_)
       if (state.boxes_are_old) {
@@ -180,12 +177,12 @@ class EmbreeRefit final : public Strategy<S> {
       append_overlapping(collected_, collected_.from_others);
       collected_.from_others.clear();
     }
-    count_.add(Counter::box_tests, tests + std::exchange(collected_.box_tests, 0));
+    this->count_.add(Counter::box_tests, tests + std::exchange(collected_.box_tests, 0));
     check();
     return {};
   }
 
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> changes) override {
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     for (const auto& change : changes) bodies_[change.body].moves = true;
   }
 
@@ -293,7 +290,7 @@ class EmbreeRefit final : public Strategy<S> {
     }
     check();
     // Nodes and writes are Embree's secret.
-    count_.add(Counter::vertex_reads, state.primitives->vertices.size());
+    this->count_.add(Counter::vertex_reads, state.primitives->vertices.size());
   }
 
   void refit_boxes(BodyState& state) {
@@ -411,10 +408,6 @@ class EmbreeRefit final : public Strategy<S> {
   std::vector<BodyState> bodies_;
   NearBodies near_bodies_;
   Collected collected_;
-  Count count_;
-
- protected:
-  Counters counted() const override { return count_.table; }
 };
 
 }  // namespace
@@ -430,7 +423,6 @@ KBVH_STRATEGY(embree) {
   info.tightness = Tightness::conservative;
   info.guarantee = Guarantee::candidate_superset;
   info.positions = PositionUse::all;
-  info.can.plan_changes = true;
   info.topology.own = true;
   info.own_scalar = "float";
   info.parameters = {

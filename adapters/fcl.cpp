@@ -53,7 +53,7 @@ class LeafCollector final : public fcl::detail::MeshCollisionTraversalNode<fcl::
 };
 
 template <class Own, Mode mode, Verdict verdict, class S, class Count>
-class Fcl final : public Strategy<S> {
+class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
   static_assert(sizeof(Own) >= sizeof(S), "rounding positions would lose pairs");
   using Model = fcl::BVHModel<fcl::AABB<Own>>;
   using Vector = fcl::Vector3<Own>;
@@ -63,7 +63,7 @@ class Fcl final : public Strategy<S> {
 
   Fcl(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*none*/,
       const Params& /*params*/)
-      : Strategy<S>(scene, motion),
+      : CountedStrategy<S, Count>(scene, motion),
         bodies_(scene.body_count()),
         near_bodies_(scene.pairs(), scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
@@ -75,22 +75,19 @@ class Fcl final : public Strategy<S> {
       if (bodies_[pair.first].model && bodies_[pair.second].model) collectors_.push_back(collector(pair));
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
       bodies_[body].moves = this->scene_.moving(body);
       update(body);
     }
-    count_.table = {};
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double /*t*/) override {
     for (std::uint32_t body = 0; body < bodies_.size(); ++body)
       if (bodies_[body].moves) update(body);
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     for (const auto& node : collectors_) collide(*node, out);
     if (!near_bodies_.searches()) return {};
     std::uint64_t tests = 0;
@@ -100,18 +97,18 @@ class Fcl final : public Strategy<S> {
     };
     for (const std::uint32_t i : near_bodies_.find(box_of, tests))
       collide(*collector(this->scene_.pairs()[i]), out);
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
     return {};
   }
 
-  void confirm(double t, PairBuffer& pairs) override {
+  void confirm_candidates(double t, PairBuffer& pairs) override {
     if constexpr (verdict == Verdict::kbvh)
-      Strategy<S>::confirm(t, pairs);
+      Strategy<S>::confirm_candidates(t, pairs);
     else
       std::erase_if(pairs, [&](const PrimitivePair& pair) { return !own_verdict(pair); });
   }
 
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> changes) override {
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     for (const auto& change : changes) bodies_[change.body].moves = true;
   }
 
@@ -198,7 +195,7 @@ class Fcl final : public Strategy<S> {
     node.out = &out;
     node.num_bv_tests = 0;
     fcl::detail::collide<Own>(&node);
-    count_.add(Counter::box_tests, std::uint64_t(node.num_bv_tests));
+    this->count_.add(Counter::box_tests, std::uint64_t(node.num_bv_tests));
   }
   static Box<double> box_in(const Model& model, int node) {
     Box<double> box;
@@ -250,9 +247,9 @@ class Fcl final : public Strategy<S> {
       // A rebuild reads what lies below a node to fit its box, to find its mean, and to divide it.
       const auto nodes = std::uint64_t(model.getNumBVs());
       if (mode == Mode::rebuild) state.fitted_vertices = 3 * vertices_below_nodes(model);
-      count_.add(Counter::nodes_visited, nodes);
-      count_.add(Counter::values_written, 6 * nodes);
-      count_.add(Counter::vertex_reads, state.fitted_vertices);
+      this->count_.add(Counter::nodes_visited, nodes);
+      this->count_.add(Counter::values_written, 6 * nodes);
+      this->count_.add(Counter::vertex_reads, state.fitted_vertices);
     }
   }
 
@@ -302,10 +299,6 @@ class Fcl final : public Strategy<S> {
   NearBodies near_bodies_;
   fcl::CollisionResult<Own> result_;  // stays empty: no leaf is tested by FCL
   std::vector<std::unique_ptr<LeafCollector<Own>>> collectors_;
-  Count count_;
-
- protected:
-  Counters counted() const override { return count_.table; }
 };
 
 template <class Own, Mode mode, Verdict verdict = Verdict::kbvh>
@@ -346,8 +339,7 @@ StrategyEntry entry(const std::string& name, const std::string& title) {
   info.tightness = Tightness::tight;
   info.guarantee = verdict == Verdict::own ? Guarantee::approximate : Guarantee::candidate_superset;
   info.positions = PositionUse::all;
-  info.can.restructures = mode == Mode::rebuild;
-  info.can.plan_changes = true;
+  info.declares.restructures = mode == Mode::rebuild;
   info.topology.own = true;
   if (verdict == Verdict::own && !single) info.own_impact = fcl_impact;
   return make_entry<Bind<Own, mode, verdict>::template Type, scalars>(std::move(info));

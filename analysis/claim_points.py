@@ -30,6 +30,8 @@ COUNTED: dict[str, str] = {
 }
 SLACK = 1.25  #: measured sizes reach a claimed one within this factor
 MEASURES = ("ratio", "value", "exponent", "next_l", "ten_l", "across")
+#: What a term names of a run, by the column that says it.
+NAMED = {"id": "strategy", "family": "family", "baseline": "baseline"}
 RELATIONS = ("<", "<=", ">", ">=", "within a factor of")
 
 
@@ -156,7 +158,7 @@ class Table:
 
 def _fits(row: dict[str, Any], term: dict[str, Any], quantity: str) -> bool:
     """Is a run one that the term means?"""
-    if any(row[column] != term[name] for column, name in (("id", "strategy"), ("family", "family")) if name in term):
+    if any(row[column] != term[name] for column, name in NAMED.items() if name in term):
         return False
     if row["guarantee"] == "approximate" or row["id"] in term.get("not_for", {}).get(quantity, []):
         return False
@@ -196,7 +198,7 @@ def words_of(term: dict[str, Any]) -> str:
     """A term in words, for what is missing."""
     settings = {**term.get("builder", {}), **term.get("params", {})}
     told = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in settings.items())
-    who = term["strategy"] if "strategy" in term else f"any {term['family']}"
+    who = term.get("strategy") or ("any baseline" if "baseline" in term else f"any {term['family']}")
     return f"{who} ({told})" if told else who
 
 

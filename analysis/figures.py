@@ -43,8 +43,11 @@ WIDTH = 10.5  #: of every figure, in inches
 #: Bars longer than this many times the fastest are torn off, or the others could not be read.
 TORN = 12.0
 
-#: Families that refit every box in every frame; only the first holds the best one.
-REFITS = ("refit", "period")
+
+
+def _refits(rows: pd.DataFrame) -> pd.Series:
+    """Which rows refit every box in every frame: baselines, their family, and the refit as in 2006."""
+    return rows["baseline"] | rows["family"].isin(("refit", "period"))
 
 Looks = dict[str, Look]
 
@@ -263,15 +266,15 @@ def over_frames_per_keyframe(rows: pd.DataFrame, looks: Looks) -> Optional[Figur
     found: list[tuple[Axes, list[tuple[float, float]], list[str]]] = []
     for axes, (column, _) in zip(all_axes, panels):
         points: list[tuple[float, float]] = []
-        for reference, colour, family in (
-            (best_refit_line(rows, column, "l"), "#0072B2", "refit"),
-            (period_line(rows, column, "l"), "#7A7A7A", "period"),
+        baseline, period = rows["baseline"], rows["family"] == "period"
+        for reference, colour, left_out in (
+            (best_refit_line(rows, column, "l"), "#0072B2", baseline),
+            (period_line(rows, column, "l"), "#7A7A7A", baseline | period),
         ):
             if reference is None:
                 continue
             axes.plot(reference.index, reference, color=colour, alpha=0.22, linewidth=7, solid_capstyle="round", zorder=1)
-            others = rows[~rows["family"].isin(REFITS)] if family == "period" else rows[rows["family"] != family]
-            for _, line in others.groupby("contestant"):
+            for _, line in rows[~left_out].groupby("contestant"):
                 own = line.set_index("l")[column].sort_index()
                 shared = own.index.intersection(reference.index)
                 if (own.loc[shared] > 0).all():
@@ -323,7 +326,7 @@ def counters(group: pd.DataFrame, over: pd.DataFrame, looks: Looks) -> Optional[
     """
     several = over["moving"].nunique() > 1
     rows = over if several else group
-    rows = rows[(rows["certificates_failed_per_frame"] > 0) | rows["family"].isin(REFITS)]
+    rows = rows[(rows["certificates_failed_per_frame"] > 0) | _refits(rows)]
     wanted = [
         ("certificates_failed_per_frame", "events per frame"),
         ("values_written_per_frame", "bound values written per frame"),

@@ -137,8 +137,8 @@ def _absent(study: Study) -> tuple[str, str]:
     counted = timed[[f"{name}_per_frame" for name in COUNTERS]].notna().any(axis=1)
     if len(timed) and not counted.all():
         words.append(f"{text.plural(int((~counted).sum()), 'run')} of {len(timed)} recorded no counters.")
-    if len(timed) and not (timed["family"] == "refit").any():
-        words.append("No refit was timed: there is nothing to compare with.")
+    if len(timed) and not timed["baseline"].any():
+        words.append("No baseline was timed: there is nothing to compare with.")
     if len(study.refused):
         words.append(f"{text.plural(len(study.refused), 'contestant run')} got no time; the reason stands below its table.")
     if len(timed) and not (timed["over_time"].map(len) > 0).any():

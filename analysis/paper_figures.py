@@ -197,7 +197,7 @@ def lines_of(
                     y.append(float(np.median(known)))
                     last = table.row(run)
             if last is not None:
-                look = Look(*FAMILIES["refit"], "-", True) if "family" in term else looks[last["contestant"]]
+                look = Look(*FAMILIES["refit"], "-", True) if "baseline" in term or "family" in term else looks[last["contestant"]]
                 look = replace(look, filled=True)  # open markers are for the second quantity here
                 result.append(Line(name, look, quantity, x, y, number > 0))
     if panel.x == "l":

@@ -41,8 +41,8 @@ def times_of(study: Study, run: int, scope: str) -> np.ndarray:
 
 
 def best_refit(study: Study, group: pd.DataFrame, scope: str) -> Optional[int]:
-    """The run of the fastest verified refit of a group, by the median over repetitions; None without one."""
-    refits = group[(group["family"] == "refit") & (group["guarantee"] != "approximate") & (group["refused"] == "")]
+    """The run of the fastest verified baseline of a group, by the median over repetitions; None without one."""
+    refits = group[group["baseline"] & (group["guarantee"] != "approximate") & (group["refused"] == "")]
     medians = {int(run): float(np.median(times_of(study, int(run), scope))) for run in refits["run"]}
     return min(medians, key=lambda run: (medians[run], run)) if medians else None
 
@@ -106,8 +106,8 @@ def fastest_configurations(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def best_refit_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Series]:
-    """The smallest time of any refit at each x."""
-    refits = rows[(rows["family"] == "refit") & (rows["guarantee"] != "approximate")]
+    """The smallest time of any baseline at each x."""
+    refits = rows[rows["baseline"] & (rows["guarantee"] != "approximate")]
     best = refits.groupby(x)[column].min()
     best = best[best > 0]
     return best if len(best) else None

@@ -204,7 +204,7 @@ def glance(study: Study, all_ratios: Ratios, shown: list[Group]) -> list[Glance]
         if not references:
             continue
         reference = timed[timed["run"] == references[-1]].iloc[0]
-        others = timed[timed["family"] != "refit"]
+        others = timed[~timed["baseline"]]
         exact = _first(others[others["guarantee"] != "approximate"])
         # Limits (moved bytes, plain interpolation) answer nothing: they are no contestants.
         loose = _first(others[(others["guarantee"] == "approximate") & (others["family"] != "limit")])
@@ -244,7 +244,7 @@ def break_even(rows: pd.DataFrame) -> list[tuple[str, ...]]:
         for line in (ratios.best_refit_line, ratios.period_line)
         for column in ("updating", "total_motion")
     ]
-    for contestant, line in rows[rows["family"] != "refit"].groupby("contestant"):
+    for contestant, line in rows[~rows["baseline"]].groupby("contestant"):
         words = []
         for column, best in lines:
             own = line.set_index("l")[column].sort_index()

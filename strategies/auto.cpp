@@ -76,12 +76,12 @@ const std::vector<Candidate>& candidates() {
 }
 
 template <class S, class Count>
-class Auto final : public Strategy<S> {
+class Auto final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
 
   Auto(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params& params)
-      : Strategy<S>(scene, motion), motion_(motion), gain_(params.number("gain")) {
+      : CountedStrategy<S, Count>(scene, motion), motion_(motion), gain_(params.number("gain")) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) measure(topologies[body], body);
     constexpr auto policy = Count::enabled ? CountingPolicy::counting : CountingPolicy::silent;
     for (const Candidate& candidate : candidates()) {
@@ -97,9 +97,7 @@ class Auto final : public Strategy<S> {
     velocities_.resize(scene.body_count());
   }
 
-  void reset(double t) override {
-    this->start_at(t);
-    first_fetch_ = this->sampled_.fetched();
+  void reset_to(double t) override {
     for (Runner& runner : runners_) {
       runner.strategy->reset(t);
       runner.fresh = true;
@@ -120,9 +118,8 @@ class Auto final : public Strategy<S> {
     for (const double reads : reads_) seen_.reads += reads;
   }
 
-  void advance(double t) override {
-    const double before = this->time();
-    this->move_to(t);
+  void advance_to(double t) override {
+    const double before = this->previous_time();
     ++frame_;
     seen_.changes_per_frame += ((changes_ ? 1.0 : 0.0) - seen_.changes_per_frame) / std::min(frame_, 16);
     changes_ = false;
@@ -148,7 +145,7 @@ class Auto final : public Strategy<S> {
     ++runner.frames;
   }
 
-  QueryStatus candidates_at(double t, PairBuffer& out, const Budget& /*budget*/) override {
+  QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*budget*/) override {
     const std::size_t before = out.size();
     // Not all that it chooses from honour a budget.
     const QueryStatus status = runners_[active_].strategy->candidates_at(t, out, {});
@@ -162,10 +159,11 @@ class Auto final : public Strategy<S> {
     return status;
   }
 
-  void confirm(double t, PairBuffer& pairs) override { runners_[active_].strategy->confirm(t, pairs); }
+  void confirm_candidates(double t, PairBuffer& pairs) override {
+    runners_[active_].strategy->confirm(t, pairs);
+  }
 
-  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    this->stand_at(t);
+  void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
     for (const PlanChange<S>& change : changes) {
       if (body_changed_[change.body] != 0) continue;
       body_changed_[change.body] = 1;
@@ -206,11 +204,9 @@ class Auto final : public Strategy<S> {
   }
 
  protected:
-  Counters counted() const override {
-    Counters table = retired_;
+  void add_counts(Counters& table) const override {
+    add(table, retired_);
     for (const Runner& runner : runners_) add(table, runner.strategy->counters());
-    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
-    return table;
   }
 
  private:
@@ -236,6 +232,7 @@ class Auto final : public Strategy<S> {
     for (std::size_t c = 0; c < sum.values.size(); ++c) sum.values[c] += other.values[c];
     // All instances read the same positions, and each counts what any of them fetches.
     sum[Counter::positions_fetched] = fetched;
+    for (const Counters::Named& counter : other.named) sum.add(counter.name, counter.value);
   }
 
   /// Of a body's hierarchy: the mean side of leaves' boxes at present, and the vertices in its leaves.
@@ -370,7 +367,6 @@ class Auto final : public Strategy<S> {
   std::vector<Velocities> velocities_;     ///< by body, per second
   Counters retired_;                       ///< of what was counted before an instance started anew
   std::size_t active_ = 0;
-  std::uint64_t first_fetch_ = 0;
   int frame_ = 0, chosen_at_ = 0, stay_ = shortest_stay;
   double step_ = 0, segment_end_ = 0;   ///< seconds
   double chosen_candidates_ = 0;        ///< that were there when the choice was made
@@ -393,7 +389,6 @@ KBVH_STRATEGY(auto) {
       .citation = "kbvh",
       .tightness = Tightness::conservative,
       .positions = PositionUse::varying,
-      .can = {.plan_changes = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters =
           {{"gain",

@@ -2,6 +2,8 @@
 // wide nodes in structure-of-arrays form, over unique vertices in padded lists
 // (core/families/wide/kernels/wide_refit.cpp). Every ratio that is printed is against this one.
 
+#include <algorithm>
+
 #include "core/contract/registry.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
 
@@ -19,38 +21,27 @@ KernelSet chosen_kernels(const Params& params) {
   return word == "auto" ? active_kernel_set() : kernel_set(word);
 }
 
-/// Any number, or without TBB just one.
-std::vector<std::string> thread_words() {
-#if defined(KBVH_WITH_TBB)
-  return {};
-#else
-  return {"1"};
-#endif
-}
-
 std::vector<std::string> kernel_words() {
   std::vector<std::string> words{"auto"};
   for (const KernelSet set : supported_kernel_sets()) words.push_back(name(set));
   return words;
 }
 
-int chosen_threads(const Params& params) {
-  const double wanted = params.number("threads");
-  if (wanted < 1 || wanted > 1024 || wanted != double(int(wanted)))
-    throw ConfigError("bottom_up: threads must be a whole number from 1 to 1024, got " +
-                      params.word("threads"));
+/// More would be cut to this number without a word, and a result would say what was not used.
+double most_threads() {
 #if defined(KBVH_WITH_TBB)
-  // More would be cut to this number without a word, and a result would say what was not used.
-  const auto most = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-  if (wanted > double(most))
-    throw ConfigError("bottom_up: threads=" + params.word("threads") + ", but this machine runs " +
-                      std::to_string(most) + " at a time");
+  return double(std::min<std::size_t>(
+      1024, tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
+#else
+  return 1;
 #endif
-  return int(wanted);
 }
 
 template <class S, class Count>
-class BottomUp final : public StoredHierarchyStrategy<S, Count> {
+class BottomUp final : public StoredHierarchyStrategy<S, Count>,
+                       public AnswersSelfPairs,
+                       public AnswersSweeps<S>,
+                       public TakesGeometryChanges<S> {
   using Base = StoredHierarchyStrategy<S, Count>;
 
  public:
@@ -58,18 +49,19 @@ class BottomUp final : public StoredHierarchyStrategy<S, Count> {
   BottomUp(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
            const Params& params)
       : Base(scene, motion, std::move(topologies), params, chosen_kernels(params)),
-        threads_(chosen_threads(params)) {
+        threads_(int(params.number("threads"))) {
 #if defined(KBVH_WITH_TBB)
     if (threads_ > 1) arena_.initialize(threads_);
 #endif
   }
 
-  void geometry_changed(double /*t*/, const GeometryChange<S>& change) override {
+  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
     this->edit_geometry(change);
   }
 
-  void swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) override {
-    this->sweep(t0, t1, before, out);
+  void find_swept_pairs(double /*t0*/, double /*t1*/, std::span<const S* const> before,
+                        PairBuffer& out) override {
+    this->sweep(before, out);
   }
 
  private:
@@ -117,15 +109,19 @@ KBVH_STRATEGY(bottom_up) {
       .title = "bottom-up refit",
       .family = "refit",
       .citation = "van den Bergen 1997; Z&W 2006, s.2; wide nodes after Wald et al. 2008",
-      .can = {.plan_changes = true,
-              .geometry_changes = true,
-              .self_pairs = true,
-              .time_budget = true,
-              .contacts = true},
+      .baseline = true,
+      .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = {{"kernels", "auto", kernel_words(),
-                      "instruction set of refit and query; auto: the widest of this machine"},
-                     {"threads", "1", thread_words(),
-                      "threads of the refit (TBB); times with more than one are reported apart", 1}},
+      .parameters =
+          {{"kernels", "auto", kernel_words(),
+            "instruction set of refit and query; auto: the widest of this machine"},
+           {"threads",
+            "1",
+            {},
+            "threads of the refit (TBB), at most those of this machine; times with more than one are "
+            "reported apart",
+            1,
+            most_threads(),
+            Numbers::whole}},
   })};
 }

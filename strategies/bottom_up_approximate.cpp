@@ -19,8 +19,8 @@ double with_digits(double x, int digits, bool down) {
 }
 
 template <class S, class Count>
-class BottomUpApproximate final : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+class BottomUpApproximate final : public FixedPlansHierarchyStrategy<S, Count> {
+  using Base = FixedPlansHierarchyStrategy<S, Count>;
 
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
@@ -33,17 +33,12 @@ class BottomUpApproximate final : public StoredHierarchyStrategy<S, Count> {
         outward_(params.word("rounding") == "outward"),
         plain_positions_(scene.body_count()) {}
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     this->near_bodies_.start_over();
     for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) {
       this->hierarchies_[body].positions_changed();
       update(body);
     }
-    this->count_.table = {};
-  }
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
-    this->unsupported("flight-plan changes");
   }
 
  private:

@@ -22,35 +22,32 @@ struct PeriodNode {
 };
 
 template <class S, class Count>
-class BottomUpPeriod final : public Strategy<S> {
+class BottomUpPeriod final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
   using Node = PeriodNode<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
   BottomUpPeriod(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                  const Params& /*params*/)
-      : Strategy<S>(scene, motion),
+      : CountedStrategy<S, Count>(scene, motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         topologies_(std::move(topologies)) {
     for (const Topology& topology : topologies_)
       roots_.push_back(topology.empty() ? nullptr : link(topology, 0));
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     plans_changed_ = false;
     near_bodies_.start_over();
     for (std::uint32_t body = 0; body < roots_.size(); ++body) update(body);
-    count_.table = {};
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double /*t*/) override {
     for (std::uint32_t body = 0; body < roots_.size(); ++body)
       if (this->scene_.moving(body) || plans_changed_) update(body);
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
     std::uint64_t tests = 0;
     const auto box_of = [&](std::uint32_t body) {
       return roots_[body] == nullptr ? Box<double>{} : to_double(roots_[body]->box);
@@ -60,11 +57,11 @@ class BottomUpPeriod final : public Strategy<S> {
       if (roots_[pair.first] != nullptr && roots_[pair.second] != nullptr)
         check(*roots_[pair.first], *roots_[pair.second], pair, out);
     }
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
     return {};
   }
 
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     plans_changed_ = true;
   }
 
@@ -77,9 +74,6 @@ class BottomUpPeriod final : public Strategy<S> {
   std::size_t bytes() const override {
     return near_bodies_.bytes() + nodes_.size() * (sizeof(Node) + sizeof(void*));
   }
-
- protected:
-  Counters counted() const override { return count_.table; }
 
  private:
   /// Nodes are allocated one by one in the order of the recursion, as `new Node` in a recursive build does.
@@ -109,12 +103,12 @@ class BottomUpPeriod final : public Strategy<S> {
   }
 
   void refit(Node& node, const Primitives& primitives, const S* positions) {
-    count_.add(Counter::nodes_visited);
-    count_.add(Counter::values_written, 6);
+    this->count_.add(Counter::nodes_visited);
+    this->count_.add(Counter::values_written, 6);
     node.box = Box<S>{};
     if (node.is_leaf()) {
       for (std::uint32_t v : primitives[node.primitive]) node.box.extend(positions + std::size_t(3) * v);
-      count_.add(Counter::vertex_reads, primitives[node.primitive].size());
+      this->count_.add(Counter::vertex_reads, primitives[node.primitive].size());
       return;
     }
     refit(*node.left, primitives, positions);
@@ -125,7 +119,7 @@ class BottomUpPeriod final : public Strategy<S> {
 
   /// Algorithm 2 of the paper, with the case of a leaf against an inner node that it leaves out.
   void check(const Node& a, const Node& b, const BodyPair& pair, PairBuffer& out) {
-    count_.add(Counter::box_tests);
+    this->count_.add(Counter::box_tests);
     if (!overlap(a.box, b.box)) return;
     if (a.is_leaf() && b.is_leaf()) {
       out.push_back({pair.first, a.primitive, pair.second, b.primitive});
@@ -147,7 +141,6 @@ class BottomUpPeriod final : public Strategy<S> {
   Topologies topologies_;
   std::vector<std::unique_ptr<Node>> nodes_;
   std::vector<Node*> roots_;
-  Count count_;
   bool plans_changed_ = false;
 };
 
@@ -161,7 +154,6 @@ KBVH_STRATEGY(bottom_up_period) {
       .title = "bottom-up refit, 2006 style",
       .family = "period",
       .citation = "Z&W 2006, s.2 and Algorithm 2",
-      .can = {.plan_changes = true},
       .topology = {.widths = {2},
                    .max_leaf_size = 1,
                    .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},

@@ -25,14 +25,14 @@ struct RecursiveBody {
 
 /// Both recursions are as deep as the topologies: log2 n for the median.
 template <class S, class Count>
-class BottomUpRecursive final : public Strategy<S> {
+class BottomUpRecursive final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
   using Body = RecursiveBody<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
   BottomUpRecursive(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                     const Params& /*params*/)
-      : Strategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+      : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const std::uint32_t nodes = topologies[body].size();
       bodies_.push_back({std::move(topologies[body]), std::vector<Box<S>>(nodes), &scene.primitives(body),
@@ -40,21 +40,18 @@ class BottomUpRecursive final : public Strategy<S> {
     }
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     plans_changed_ = false;
     near_bodies_.start_over();
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
-    count_.table = {};
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double /*t*/) override {
     for (std::uint32_t body = 0; body < bodies_.size(); ++body)
       if (this->scene_.moving(body) || plans_changed_) update(body);
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     std::uint64_t tests = 0;
     const auto box_of = [&](std::uint32_t body) {
       return bodies_[body].topology.empty() ? Box<double>{} : to_double(bodies_[body].boxes[0]);
@@ -64,11 +61,11 @@ class BottomUpRecursive final : public Strategy<S> {
       const Body &a = bodies_[pair.first], &b = bodies_[pair.second];
       if (!a.topology.empty() && !b.topology.empty()) check(pair, a, 0, b, 0, out);
     }
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
     return {};
   }
 
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     plans_changed_ = true;
   }
 
@@ -83,9 +80,6 @@ class BottomUpRecursive final : public Strategy<S> {
     for (const Body& body : bodies_) total += body.topology.bytes() + body.boxes.size() * sizeof(Box<S>);
     return total;
   }
-
- protected:
-  Counters counted() const override { return count_.table; }
 
  private:
   void update(std::uint32_t body) {
@@ -103,7 +97,7 @@ class BottomUpRecursive final : public Strategy<S> {
       for (std::uint32_t i = 0; i < node.count(); ++i) {
         const std::uint32_t primitive = body.topology.primitives[node.first() + i];
         for (std::uint32_t v : (*body.primitives)[primitive]) box.extend(body.positions + std::size_t(3) * v);
-        count_.add(Counter::vertex_reads, (*body.primitives)[primitive].size());
+        this->count_.add(Counter::vertex_reads, (*body.primitives)[primitive].size());
       }
     } else {
       for (std::uint32_t child = node.first(); child < node.first() + node.count(); ++child) {
@@ -111,14 +105,14 @@ class BottomUpRecursive final : public Strategy<S> {
         box.extend(body.boxes[child]);
       }
     }
-    count_.add(Counter::nodes_visited);
-    count_.add(Counter::values_written, 6);
+    this->count_.add(Counter::nodes_visited);
+    this->count_.add(Counter::values_written, 6);
   }
 
   /// Z&W Algorithm 2, for any width, and with the case of a leaf against an inner node that it leaves out.
   void check(const BodyPair& pair, const Body& a, std::uint32_t id_a, const Body& b, std::uint32_t id_b,
              PairBuffer& out) {
-    count_.add(Counter::box_tests);
+    this->count_.add(Counter::box_tests);
     if (!overlap(a.boxes[id_a], b.boxes[id_b])) return;
     const TopologyNode node_a = a.topology.nodes[id_a], node_b = b.topology.nodes[id_b];
     if (node_a.is_leaf() && node_b.is_leaf()) {
@@ -143,7 +137,7 @@ class BottomUpRecursive final : public Strategy<S> {
         const std::uint32_t primitive_a = a.topology.primitives[leaf_a.first() + i];
         const std::uint32_t primitive_b = b.topology.primitives[leaf_b.first() + j];
         if (!single) {
-          count_.add(Counter::box_tests);
+          this->count_.add(Counter::box_tests);
           if (!overlap(a.box_of(primitive_a), b.box_of(primitive_b))) continue;
         }
         out.push_back({pair.first, primitive_a, pair.second, primitive_b});
@@ -152,7 +146,6 @@ class BottomUpRecursive final : public Strategy<S> {
 
   NearBodies near_bodies_;
   std::vector<Body> bodies_;
-  Count count_;
   bool plans_changed_ = false;
 };
 
@@ -166,7 +159,7 @@ KBVH_STRATEGY(bottom_up_recursive) {
       .title = "recursive refit, naive",
       .family = "refit",
       .citation = "van den Bergen 1997; Z&W 2006, s.2 and Algorithm 2",
-      .can = {.plan_changes = true},
+      .baseline = true,
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
   })};
 }

@@ -46,7 +46,7 @@ KBVH_STRATEGY(bottom_up_volumes) {
                   "Källberg 2011 (oriented boxes)",
       // Boxes are tight, k-DOPs over polygons, too; spheres and oriented boxes are only large enough.
       .tightness = Tightness::conservative,
-      .can = {.plan_changes = true, .geometry_changes = true, .self_pairs = true, .time_budget = true},
+      .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters =
           {{"volume", "aabb", volume_words(),

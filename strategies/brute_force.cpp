@@ -8,28 +8,25 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count>
-class BruteForce final : public Strategy<S> {
+class BruteForce final : public CountedStrategy<S, Count>,
+                         public AnswersSelfPairs,
+                         public AnswersSweeps<S>,
+                         public TakesPlanChanges<S>,
+                         public TakesGeometryChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::none;
   BruteForce(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*topologies*/,
              const Params& /*params*/)
-      : Strategy<S>(scene, motion), boxes_(scene.body_count()) {
+      : CountedStrategy<S, Count>(scene, motion), boxes_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       boxes_[body].resize(scene.primitives(body).count());
   }
 
-  void reset(double t) override {
-    this->start_at(t);
-    update();
-    count_.table = {};
-  }
+  void reset_to(double /*t*/) override { update(); }
 
-  void advance(double t) override {
-    this->move_to(t);
-    update();
-  }
+  void advance_to(double /*t*/) override { update(); }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
     for (const BodyPair& pair : this->scene_.pairs()) {
@@ -46,18 +43,17 @@ class BruteForce final : public Strategy<S> {
         tests += b.size() - first;
       }
     }
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
     return status;
   }
 
-  void swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) override {
-    this->stand_at(t0);
-    this->move_to(t1);
+  void find_swept_pairs(double /*t0*/, double /*t1*/, std::span<const S* const> before,
+                        PairBuffer& out) override {
     std::vector<std::vector<Box<S>>> swept(boxes_.size());
     for (std::uint32_t body = 0; body < boxes_.size(); ++body) {
       const Primitives& primitives = this->scene_.primitives(body);
-      count_.add(Counter::values_written, std::uint64_t(6) * primitives.count());
-      count_.add(Counter::vertex_reads, 2 * primitives.vertices.size());
+      this->count_.add(Counter::values_written, std::uint64_t(6) * primitives.count());
+      this->count_.add(Counter::vertex_reads, 2 * primitives.vertices.size());
       for (std::uint32_t p = 0; p < primitives.count(); ++p) {
         Box<S> box = primitive_box(primitives[p], before[body]);
         box.extend(primitive_box(primitives[p], this->sampled_.positions(body)));
@@ -71,21 +67,18 @@ class BruteForce final : public Strategy<S> {
              ++j, ++tests)
           if (overlap(swept[pair.first][i], swept[pair.second][j]))
             out.push_back({pair.first, i, pair.second, j});
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
   }
 
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}
 
-  void geometry_changed(double /*t*/, const GeometryChange<S>& /*change*/) override { update(); }
+  void follow_geometry(double /*t*/, const GeometryChange<S>& /*change*/) override { update(); }
 
   std::size_t bytes() const override {
     std::size_t total = 0;
     for (const auto& boxes : boxes_) total += boxes.size() * sizeof(Box<S>);
     return total;
   }
-
- protected:
-  Counters counted() const override { return count_.table; }
 
  private:
   bool neighbours(std::uint32_t body, std::uint32_t i, std::uint32_t j) const {
@@ -101,13 +94,12 @@ class BruteForce final : public Strategy<S> {
       for (std::uint32_t p = 0; p < primitives.count(); ++p)
         boxes_[body][p] =
             primitives.alive(p) ? primitive_box(primitives[p], this->sampled_.positions(body)) : Box<S>{};
-      count_.add(Counter::values_written, std::uint64_t(6) * primitives.count());
-      count_.add(Counter::vertex_reads, primitives.vertices.size());
+      this->count_.add(Counter::values_written, std::uint64_t(6) * primitives.count());
+      this->count_.add(Counter::vertex_reads, primitives.vertices.size());
     }
   }
 
   std::vector<std::vector<Box<S>>> boxes_;
-  Count count_;
 };
 
 }  // namespace
@@ -121,11 +113,7 @@ KBVH_STRATEGY(brute_force) {
       .family = "oracle",
       .citation = "all pairs",
       .tightness = Tightness::none,
-      .can = {.plan_changes = true,
-              .geometry_changes = true,
-              .self_pairs = true,
-              .time_budget = true,
-              .contacts = true},
+      .declares = {.time_budget = true},
       .topology = {.own = true},
       .max_primitive_pairs = 100'000'000,
   })};

@@ -25,14 +25,14 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count, class Motion>
-class DriftStrategy : public Strategy<S> {
+class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
   using Body = DriftBody<S>;
   using Watch = typename Body::Watch;
   static constexpr bool bounded = std::is_same_v<Motion, SteppedMotion<S>>;
 
  public:
   DriftStrategy(const SceneView<S>& scene, const Motion& motion, Topologies topologies, const Params& params)
-      : Strategy<S>(scene, motion),
+      : CountedStrategy<S, Count>(scene, motion),
         motion_(motion),
         kernels_(active_kernel_set()),
         lists_(params.word("lists") == "never" ? Lists::never : Lists::tuned),
@@ -48,8 +48,7 @@ class DriftStrategy : public Strategy<S> {
         scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     model_ = {};
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
       Body& body = bodies_[index];
@@ -77,20 +76,17 @@ class DriftStrategy : public Strategy<S> {
     period_ = 0;
     plain_left_ = 1;
     search_due_ = plans_changed_ = false;
-    count_.table = {};
-    first_fetch_ = this->sampled_.fetched();
   }
 
-  void advance(double t) override {
-    const double last = this->time();
-    this->move_to(t);
+  void advance_to(double t) override {
+    const double last = this->previous_time();
     ++frames_;
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) observe(index, last, t);
     bring_up_to_date();
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) count_skipped(index);
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
     std::uint64_t tests = 0;
     const std::size_t before = out.size();
     if (search_due_) search(tests);
@@ -103,12 +99,11 @@ class DriftStrategy : public Strategy<S> {
                    this->sampled_, {}, out, tests);
     }
     if (period_ == 0) model_.queried(double(tests), double(out.size() - before));
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
     return {};
   }
 
-  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    this->stand_at(t);
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     for (const PlanChange<S>& change : changes) {
       Body& body = bodies_[change.body];
       body.changed = true;
@@ -148,13 +143,6 @@ class DriftStrategy : public Strategy<S> {
            near_pairs_.capacity() * sizeof(std::uint32_t);
   }
 
- protected:
-  Counters counted() const override {
-    Counters table = count_.table;
-    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
-    return table;
-  }
-
  private:
   enum class Lists : std::uint8_t { tuned, never };
 
@@ -184,8 +172,8 @@ class DriftStrategy : public Strategy<S> {
   void count_skipped(std::uint32_t index) {
     const Body& body = bodies_[index];
     if (body.remade) return;
-    count_.add(Counter::nodes_skipped, hierarchies_[index].topology().size());
-    if (body.watch == Watch::nothing || (!body.near && !body.read)) count_.add(Counter::bodies_skipped);
+    this->count_.add(Counter::nodes_skipped, hierarchies_[index].topology().size());
+    if (body.watch == Watch::nothing || (!body.near && !body.read)) this->count_.add(Counter::bodies_skipped);
   }
 
   /// The box of all vertices now.
@@ -198,7 +186,7 @@ class DriftStrategy : public Strategy<S> {
       bodies_[index].box.lower[axis] = double(box[axis]);
       bodies_[index].box.upper[axis] = double(box[axis + 4]);
     }
-    count_.add(Counter::vertex_reads, all.count);
+    this->count_.add(Counter::vertex_reads, all.count);
   }
 
   void read_drift(std::uint32_t index) {
@@ -208,7 +196,7 @@ class DriftStrategy : public Strategy<S> {
     near_kernels<S>(kernels_).drift(this->sampled_.positions(index), body.before.data(), count, interval);
     body.drifted_by(interval, frames_);
     body.read = true;
-    count_.add(Counter::vertex_reads, 2 * std::uint64_t(count));
+    this->count_.add(Counter::vertex_reads, 2 * std::uint64_t(count));
   }
 
   // ---- What a period of frames has in common --------------------------------------------------------------
@@ -363,9 +351,9 @@ class DriftStrategy : public Strategy<S> {
     body.box = body.box_then = to_double(hierarchy.box(0));
     body.stand();
     const std::uint32_t nodes = hierarchy.topology().size();
-    count_.add(Counter::nodes_visited, nodes);
-    count_.add(Counter::values_written, std::uint64_t(6) * nodes);
-    count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
+    this->count_.add(Counter::nodes_visited, nodes);
+    this->count_.add(Counter::values_written, std::uint64_t(6) * nodes);
+    this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
   }
   void remember(std::uint32_t index) {
     if (bounded || !may_move(index)) return;
@@ -462,8 +450,6 @@ class DriftStrategy : public Strategy<S> {
   int period_ = 0;      ///< frames that one search is to last; 0: refits and queries at every frame
   int plain_left_ = 0;  ///< such frames, until lists are tried again
   bool search_due_ = false, plans_changed_ = false;
-  Count count_;
-  std::uint64_t first_fetch_ = 0;
 };
 
 template <class S, class Count>
@@ -485,7 +471,6 @@ Info drift_info() {
       .family = "lazy",
       .citation = "kbvh; lists of neighbours after Verlet 1967",
       .tightness = Tightness::conservative,
-      .can = {.plan_changes = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"lists",
                       "tuned",

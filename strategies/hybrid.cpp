@@ -64,12 +64,12 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) prepare(body);
   }
 
-  void reset(double t) override {
-    Base::reset(t);
+  void reset_to(double t) override {
+    Base::reset_to(t);
     for (auto& body : bodies_) std::fill(body.stale.begin(), body.stale.end(), 0);
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
     this->for_near_bodies(tests, [&](const BodyPair& pair) {
@@ -283,7 +283,8 @@ KBVH_STRATEGY(hybrid) {
       .title = "hybrid refit",
       .family = "refit",
       .citation = "van den Bergen 1998; Larsson & Akenine-Möller 2001",
-      .can = {.plan_changes = true, .time_budget = true},
+      .baseline = true,
+      .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters =
           {{"levels",

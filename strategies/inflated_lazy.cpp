@@ -59,8 +59,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
       bodies_[body].remade.assign(this->hierarchies_[body].node_count(), 0);
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     this->near_bodies_.start_over();
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
       Body& body = bodies_[index];
@@ -75,13 +74,10 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
       body.margin = wanted_margin(index);
       if (body.margin > 0) check_margins(index, WhichStay::none);
     }
-    this->count_.table = {};
-    first_fetch_ = this->sampled_.fetched();
   }
 
-  void advance(double t) override {
-    const double before = this->time();
-    this->move_to(t);
+  void advance_to(double t) override {
+    const double before = this->previous_time();
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
       bodies_[index].looked = false;
       if (!may_move(index)) continue;
@@ -93,7 +89,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     }
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     for (Body& body : bodies_) body.tests = 0;
     std::uint64_t all = 0;
@@ -118,18 +114,10 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
   }
 
   /// The way so far stays bounded; from the stored position on, rounding starts over.
-  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    this->stand_at(t);
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     for (const PlanChange<S>& change : changes) bodies_[change.body].changed = true;
     for (Body& body : bodies_)
       if (body.changed) body.moved = above(body.moved + body.rounding);
-  }
-
- protected:
-  Counters counted() const override {
-    Counters table = this->count_.table;
-    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
-    return table;
   }
 
  private:
@@ -285,7 +273,6 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
   double margin_;
   bool bounded_;
   std::vector<Body> bodies_;
-  std::uint64_t first_fetch_ = 0;
 };
 
 }  // namespace
@@ -300,7 +287,7 @@ KBVH_STRATEGY(inflated_lazy) {
       .citation = "Mezger, Kimmerle & Etzmuss 2003",
       .tightness = Tightness::conservative,
       .positions = PositionUse::fetched,
-      .can = {.plan_changes = true, .time_budget = true},
+      .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"margin_is",
                       "tuned",

@@ -44,7 +44,10 @@ struct WorkAhead {
 /// With foresight of the whole clip the next segment's answer is made during the present one, a part at each
 /// frame; else all of it at the first frame that asks.
 template <class S, class Count, Foresight F>
-class IntervalJoinStrategy final : public Strategy<S> {
+class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
+                                   public AnswersSelfPairs,
+                                   public AnswersSweeps<S>,
+                                   public TakesPlanChanges<S> {
   static constexpr bool works_ahead = F == Foresight::whole_clip;
   using Motion = MotionView<F, S>;
 
@@ -53,7 +56,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
 
   IntervalJoinStrategy(const SceneView<S>& scene, const Motion& motion, Topologies topologies,
                        const Params& params)
-      : Strategy<S>(scene, motion),
+      : CountedStrategy<S, Count>(scene, motion),
         motion_(motion),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), linear_settings(params)),
         together_(scene.pairs().size() > most_joins),
@@ -71,27 +74,23 @@ class IntervalJoinStrategy final : public Strategy<S> {
     any_by_spans_ = std::find(by_spans_.begin(), by_spans_.end(), true) != by_spans_.end();
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double t) override {
     for (Joins<S>* one : {&now_, &next_})
       for (auto& answers : one->answers) answers.clear_counts();
     bounds_.start();
     new_segment();
     before_ = t;
     plans_changed_ = false;
-    count_.table = {};
-    first_fetch_ = this->sampled_.fetched();
   }
 
-  void advance(double t) override {
-    before_ = this->time();
-    this->move_to(t);
+  void advance_to(double /*t*/) override {
+    before_ = this->previous_time();
     if (bounds_.advance()) new_segment();
     if constexpr (works_ahead) make_bounds_ahead();
   }
 
   /// With span tests these are no candidates that are apart for certain, and first those that intersect.
-  QueryStatus candidates_at(double t, PairBuffer& out, const Budget& /*budget*/) override {
+  QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*budget*/) override {
     if (!joined_) join();
     const float fraction = float(bounds_.fraction(t));
     const std::size_t before = out.size();
@@ -113,8 +112,8 @@ class IntervalJoinStrategy final : public Strategy<S> {
   }
 
   /// What is not certain is tested at the frame's positions.
-  void confirm(double t, PairBuffer& pairs) override {
-    if (!any_by_spans_ || pairs != answered_) return Strategy<S>::confirm(t, pairs);
+  void confirm_candidates(double t, PairBuffer& pairs) override {
+    if (!any_by_spans_ || pairs != answered_) return Strategy<S>::confirm_candidates(t, pairs);
     to_test_.clear();
     std::size_t kept = 0, at = 0;
     for (const Block& block : blocks_) {
@@ -130,11 +129,10 @@ class IntervalJoinStrategy final : public Strategy<S> {
     pairs.insert(pairs.end(), to_test_.begin(), to_test_.end());
   }
 
-  void start_sweep(double t) override {
-    this->stand_at(t);
+  void prepare_sweep(double /*t*/) override {
     if (plans_changed_) return;  // lines may have no end: the sweep's own ends are known when it is over
     bounds_.enter();
-    if constexpr (Count::enabled) updates_.add_to(count_, bounds_);
+    if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
     ahead_ = {};
     joined_ = false;
     if (!sweeps_.empty()) return;
@@ -143,15 +141,13 @@ class IntervalJoinStrategy final : public Strategy<S> {
   }
 
   /// All pairs of the segment, whenever their boxes overlap in it.
-  void swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) override {
-    this->stand_at(t0);
-    this->move_to(t1);
+  void find_swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) override {
     if (plans_changed_) return sweep_both_ends(before, out);
     if (!(bounds_.begin() <= t0 && t1 <= bounds_.end()))
       throw std::invalid_argument("contacts are asked for across a knot of a plan");
     for (std::size_t i = 0; i < sweeps_.size(); ++i) {
       sweeps_[i].join(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i));
-      count_.add(Counter::box_tests, sweeps_[i].tests());
+      this->count_.add(Counter::box_tests, sweeps_[i].tests());
       const auto pairs = sweeps_[i].pairs();
       for (std::size_t k = 0; k < pairs.size(); ++k) {
         const BodyPair bodies = sweeps_[i].bodies_of(k);
@@ -160,8 +156,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
     }
   }
 
-  void flight_plans_changed(double t, std::span<const PlanChange<S>> /*changes*/) override {
-    this->stand_at(t);
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     bounds_.plans_changed();
     new_segment();
     plans_changed_ = true;
@@ -178,16 +173,12 @@ class IntervalJoinStrategy final : public Strategy<S> {
   }
 
  protected:
-  Counters counted() const override {
-    Counters table = count_.table;
-    if constexpr (!Count::enabled) return table;
-    table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
+  void add_counts(Counters& table) const override {
     for (const Joins<S>* one : {&now_, &next_})
       for (const auto& answers : one->answers) {
         table[Counter::span_tests] += answers.attempts();
         table[Counter::span_verdicts] += answers.decided();
       }
-    return table;
   }
 
  private:
@@ -217,17 +208,17 @@ class IntervalJoinStrategy final : public Strategy<S> {
     swept_->refit(before, this->sampled_);
     std::uint64_t tests = 0;
     swept_->pairs(query_, out, tests);
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
     for (std::uint32_t body = 0; body < bounds_.body_count(); ++body) {
       const std::uint64_t nodes = bounds_.hierarchy(body).topology().size();
-      count_.add(Counter::nodes_visited, nodes);
-      count_.add(Counter::values_written, 6 * nodes);
-      count_.add(Counter::vertex_reads, 2 * bounds_.hierarchy(body).leaf_vertex_count());
+      this->count_.add(Counter::nodes_visited, nodes);
+      this->count_.add(Counter::values_written, 6 * nodes);
+      this->count_.add(Counter::vertex_reads, 2 * bounds_.hierarchy(body).leaf_vertex_count());
     }
   }
 
   void new_segment() {
-    if constexpr (Count::enabled) updates_.add_to(count_, bounds_);
+    if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
     joined_ = false;
     if (bounds_.came_ahead() && ahead_.joins_begun) {
       join_ahead(bounds_.segment(), 1);
@@ -243,7 +234,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
     for (std::size_t i = 0; i < now_.joins.size(); ++i) {
       now_.joins[i].join(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i));
       if (by_spans_[i]) now_.answers[i].start(now_.joins[i]);
-      count_.add(Counter::box_tests, now_.joins[i].tests());
+      this->count_.add(Counter::box_tests, now_.joins[i].tests());
     }
     joined_ = true;
   }
@@ -273,7 +264,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
       ahead_.stage = Stage::joins;
     else if (!bounds_.has_ahead())
       ahead_.stage = Stage::nothing;
-    if constexpr (Count::enabled) updates_.add_to(count_, bounds_);
+    if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
     ahead_.done += std::clamp(wanted, 0.0, node_cost * double(bounds_.nodes_of_segment()));
   }
   /// Brings the work on joins and answers ahead to a share of it; all of it from 1 on.
@@ -294,7 +285,7 @@ class IntervalJoinStrategy final : public Strategy<S> {
         const std::uint64_t before = ahead_.begun ? join.tests() : 0;
         ahead_.begun = !join.step(tests_at_once);
         ahead_.done += double(join.tests() - before);
-        count_.add(Counter::box_tests, join.tests() - before);
+        this->count_.add(Counter::box_tests, join.tests() - before);
       } else {
         if (by_spans_[i] && !ahead_.begun) next_.answers[i].start_ahead(join);
         ahead_.begun = by_spans_[i] && !next_.answers[i].step(segment, this->scene_, join, answers_at_once);
@@ -325,8 +316,6 @@ class IntervalJoinStrategy final : public Strategy<S> {
   std::vector<Block> blocks_;
   PairBuffer answered_, to_test_;
   LinearCounts<S> updates_;
-  Count count_;
-  std::uint64_t first_fetch_ = 0;
 };
 
 template <class S, class Count>
@@ -356,7 +345,7 @@ KBVH_STRATEGY(interval_join) {
         .citation = "kbvh",
         .tightness = Tightness::conservative,
         .positions = PositionUse::fetched,
-        .can = {.continuous = true, .plan_changes = true, .self_pairs = true, .contacts = true},
+        .declares = {.continuous = true},
         .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
         .parameters = join_parameters(),
     };

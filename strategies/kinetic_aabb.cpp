@@ -8,7 +8,7 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count>
-using OnAnyQueue = KineticAabbStrategy<S, Count, SegmentHeapQueue<S>, AvlQueue<S>, BinaryHeapQueue<S>>;
+using OnAnyQueue = ExactKineticAabbStrategy<S, Count, SegmentHeapQueue<S>, AvlQueue<S>, BinaryHeapQueue<S>>;
 
 template <class S, class Count>
 class KineticAabb final : public OnAnyQueue<S, Count> {
@@ -32,11 +32,7 @@ KBVH_STRATEGY(kinetic_aabb) {
       .family = "kinetic",
       .citation = "Zachmann & Weller 2006, s.4",
       .positions = PositionUse::fetched,
-      .can = {.event_driven = true,
-              .continuous = true,
-              .plan_changes = true,
-              .geometry_changes = true,
-              .time_budget = true},
+      .declares = {.continuous = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"queue",
                       "segment_heap",

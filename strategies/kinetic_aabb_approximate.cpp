@@ -26,13 +26,6 @@ class KineticAabbApproximate final : public Approximate<S, Count> {
       : Approximate<S, Count>(scene, motion, std::move(topologies),
                               (params.word("event_times") == "float" ? 2u : 0u) +
                                   (params.word("formula") == "textbook" ? 1u : 0u)) {}
-
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
-    this->unsupported("flight-plan changes");
-  }
-  void geometry_changed(double /*t*/, const GeometryChange<S>& /*change*/) override {
-    this->unsupported("geometry changes");
-  }
 };
 
 }  // namespace
@@ -48,7 +41,7 @@ KBVH_STRATEGY(kinetic_aabb_approximate) {
       .tightness = Tightness::none,
       .guarantee = Guarantee::approximate,
       .positions = PositionUse::fetched,
-      .can = {.event_driven = true, .continuous = true, .time_budget = true},
+      .declares = {.event_driven = true, .continuous = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"event_times",
                       "double",

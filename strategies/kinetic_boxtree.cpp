@@ -2,13 +2,13 @@
 // other sides inherited, valid at every time, updated at events only; parts that have degenerated can be
 // rebuilt.
 
-#include <cmath>
 #include <numeric>
 #include <variant>
 
 #include "core/contract/registry.hpp"
 #include "core/families/boxtree/boxtree_degradation.hpp"
 #include "core/families/boxtree/kinetic_boxtree.hpp"
+#include "core/families/events/event_log.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/topology/leaf_pairs.hpp"
@@ -16,41 +16,38 @@
 namespace kbvh {
 namespace {
 
-/// The parameter check_every. Throws ConfigError unless it is a whole number that a counter can reach.
-std::uint64_t chosen_frames_per_check(const Params& params) {
-  const double wanted = params.number("check_every");
-  if (!(wanted <= 1e15) || wanted != std::floor(wanted))
-    throw ConfigError("kinetic_boxtree: check_every must be a whole number from 1 to 1e15, got " +
-                      params.word("check_every"));
-  return std::uint64_t(wanted);
-}
-
 template <class S, class Count>
-class KineticBox final : public Strategy<S> {
+class KineticBox final : public CountedStrategy<S, Count>,
+                         public EventSource<S>,
+                         public TakesPlanChanges<S>,
+                         public TakesGeometryChanges<S> {
+  template <class Queue>
+  using Forest = KineticBoxForest<S, Queue, Count, BoundObserver<S>>;
+
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
 
   KineticBox(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
              const Params& params)
-      : Strategy<S>(scene, motion),
+      : CountedStrategy<S, Count>(scene, motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         leaf_boxes_(params.word("leaf_boxes") == "tight" ? LeafBoxes::tight : LeafBoxes::inherited),
         rebuilds_(params.word("rebuild") != "never"),
         threshold_(params.number("degradation")),
-        frames_per_check_(chosen_frames_per_check(params)) {
+        frames_per_check_(std::uint64_t(params.number("check_every"))) {
     if (rebuilds_) method_ = build_method(params.word("rebuild"));
     for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
     if (rebuilds_) degradations_.resize(topologies.size());
+    const BoundObserver<S> observer{&watch_};
     if (params.word("queue") == AvlQueue<S>::name)
-      forest_ = std::make_unique<KineticBoxForest<S, AvlQueue<S>, Count>>(scene, motion,
-                                                                          std::move(topologies), count_);
+      forest_ =
+          std::make_unique<Forest<AvlQueue<S>>>(scene, motion, std::move(topologies), this->count_, observer);
     else
-      forest_ = std::make_unique<KineticBoxForest<S, BinaryHeapQueue<S>, Count>>(
-          scene, motion, std::move(topologies), count_);
+      forest_ = std::make_unique<Forest<BinaryHeapQueue<S>>>(scene, motion, std::move(topologies),
+                                                             this->count_, observer);
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double t) override {
     near_bodies_.start_over();
     on_forest([&](auto& forest) { forest.reset(t); });
     new_frame();
@@ -62,14 +59,9 @@ class KineticBox final : public Strategy<S> {
         const auto boxes = all_boxes(tree, body);
         degradations_[body].start(tree.topology(), order_, boxes);
       });
-    // What starting costs is not what running costs: counts begin here.
-    count_.table = {};
-    first_step_ = on_forest([](auto& forest) { return forest.queue().steps(); });
-    first_fetch_ = this->sampled_.fetched();
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double t) override {
     on_forest([&](auto& forest) { forest.advance(t); });
     new_frame();
     if (rebuilds_ && ++frames_ % frames_per_check_ == 0)
@@ -77,7 +69,7 @@ class KineticBox final : public Strategy<S> {
         if (this->scene_.moving(body) || plans_changed_) rebuild_degenerate(body);
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     BoxTests tests;
     on_forest([&](auto& forest) {
@@ -111,18 +103,17 @@ class KineticBox final : public Strategy<S> {
                               .pending;
       }
     });
-    count_.add(Counter::box_tests, tests.made);
+    this->count_.add(Counter::box_tests, tests.made);
     return status;
   }
 
-  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    this->stand_at(t);
+  void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
     on_forest([&](auto& forest) { forest.plans_changed(t, changes); });
     plans_changed_ = true;
     new_frame();  // realisers may differ now
   }
 
-  void geometry_changed(double t, const GeometryChange<S>& change) override {
+  void follow_geometry(double t, const GeometryChange<S>& change) override {
     const std::vector<BodyChange> changes = body_changes(this->scene_, change);
     on_forest([&](auto& forest) {
       forest.geometry_changed(t, this->scene_, this->sampled_, changes);
@@ -139,6 +130,23 @@ class KineticBox final : public Strategy<S> {
       }
     });
   }
+
+  std::optional<ScheduledEvent<S>> next_event() const override {
+    return on_forest([](auto& forest) {
+      return forest.queue().empty() ? std::optional<ScheduledEvent<S>>()
+                                    : described(forest, forest.queue().top());
+    });
+  }
+  void scheduled_events(std::vector<ScheduledEvent<S>>& out) const override {
+    on_forest([&](auto& forest) { list_events(forest, out); });
+  }
+  const Topology& tree(std::uint32_t body) const override {
+    return on_forest([&](auto& forest) -> const Topology& { return forest.tree(body).topology(); });
+  }
+  std::uint32_t realiser(std::uint32_t body, std::uint32_t node, std::uint32_t side) const override {
+    return on_forest([&](auto& forest) { return forest.tree(body).realiser_or_none(node, side); });
+  }
+  void watch_bounds(std::vector<BoundNotice<S>>* log) override { watch_.log = log; }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     return on_forest([&](auto& forest) {
@@ -165,14 +173,15 @@ class KineticBox final : public Strategy<S> {
   }
 
  protected:
-  Counters counted() const override {
-    Counters table = count_.table;
-    if constexpr (Count::enabled) {
-      table[Counter::queue_steps] =
-          on_forest([](auto& forest) { return forest.queue().steps(); }) - first_step_;
-      table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
-    }
-    return table;
+  bool step(double until, EventDescription<S>& out) override {
+    return on_forest([&](auto& forest) { return step_forest(forest, watch_, until, out); });
+  }
+  void counts_cleared() override {
+    first_step_ = on_forest([](auto& forest) { return forest.queue().steps(); });
+  }
+  void add_counts(Counters& table) const override {
+    table[Counter::queue_steps] =
+        on_forest([](auto& forest) { return forest.queue().steps(); }) - first_step_;
   }
 
  private:
@@ -212,26 +221,24 @@ class KineticBox final : public Strategy<S> {
     on_forest([&](auto& forest) {
       auto& tree = forest.tree(body);
       auto all = all_boxes(tree, body);
-      count_.add(Counter::nodes_visited, tree.topology().size());
+      this->count_.add(Counter::nodes_visited, tree.topology().size());
       const auto& nodes = degradations_[body].beyond(threshold_, tree.topology(), order_, all);
       if (nodes.empty()) return;
       for (const std::uint32_t node : nodes) tree.rebuild_below(node, all(node), this->sampled_, method_);
       caches_[body].new_frame();
       const auto rebuilt = all_boxes(tree, body);
       degradations_[body].rebuilt(tree.topology(), order_, rebuilt);
-      count_.add(Counter::nodes_visited, tree.topology().size());
+      this->count_.add(Counter::nodes_visited, tree.topology().size());
     });
   }
 
-  Count count_;
-  std::variant<std::unique_ptr<KineticBoxForest<S, AvlQueue<S>, Count>>,
-               std::unique_ptr<KineticBoxForest<S, BinaryHeapQueue<S>, Count>>>
-      forest_;
+  BoundWatch<S> watch_;
+  std::variant<std::unique_ptr<Forest<AvlQueue<S>>>, std::unique_ptr<Forest<BinaryHeapQueue<S>>>> forest_;
   NearBodies near_bodies_;
   std::vector<BoxCache<S>> caches_;
   std::vector<NodePair> stack_;
   std::vector<std::uint32_t> order_;
-  std::uint64_t first_step_ = 0, first_fetch_ = 0;
+  std::uint64_t first_step_ = 0;
   LeafBoxes leaf_boxes_;
   bool rebuilds_;
   bool plans_changed_ = false;
@@ -253,12 +260,9 @@ KBVH_STRATEGY(kinetic_boxtree) {
       .citation = "Zachmann & Weller 2006, s.6; Zachmann 1995",
       .tightness = Tightness::conservative,
       .positions = PositionUse::fetched,
-      .can = {.event_driven = true,
-              .continuous = true,
-              .restructures = true,  // with rebuild=median or sah
-              .plan_changes = true,
-              .geometry_changes = true,
-              .time_budget = true},
+      .declares = {.continuous = true,
+                   .restructures = true /* with rebuild=median or sah */,
+                   .time_budget = true},
       .topology = {.widths = {2}, .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters =
           {{"queue",
@@ -279,6 +283,12 @@ KBVH_STRATEGY(kinetic_boxtree) {
             "a subtree is rebuilt when its summed box area over its own box's exceeds this many times "
             "what it was when built",
             1},
-           {"check_every", "10", {}, "frames from one check for degradation to the next", 1}},
+           {"check_every",
+            "10",
+            {},
+            "frames from one check for degradation to the next",
+            1,
+            1e15,
+            Numbers::whole}},
   })};
 }

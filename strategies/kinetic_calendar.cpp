@@ -10,7 +10,7 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count>
-class KineticCalendar final : public RealiserStrategy<S, Count> {
+class KineticCalendar final : public RealiserStrategy<S, Count>, public TakesPlanChanges<S> {
   using Base = RealiserStrategy<S, Count>;
 
  public:
@@ -23,26 +23,22 @@ class KineticCalendar final : public RealiserStrategy<S, Count> {
       trees_.emplace_back(this->bodies_[body].hierarchy, motion, body);
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     this->near_bodies_.start_over();
     for (std::uint32_t body = 0; body < trees_.size(); ++body) {
       trees_[body].reset(this->bodies_[body].hierarchy, this->bodies_[body].realisers);
       this->new_frame(body);
       trees_[body].clear_counts();
     }
-    this->count_.table = {};
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double /*t*/) override {
     for (std::uint32_t body = 0; body < trees_.size(); ++body)
       if (trees_[body].advance(this->bodies_[body].hierarchy, this->bodies_[body].realisers))
         this->new_frame(body);
   }
 
-  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    this->stand_at(t);
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     body_changed_.assign(trees_.size(), 0);
     for (const PlanChange<S>& change : changes) body_changed_[change.body] = 1;
     for (std::uint32_t body = 0; body < trees_.size(); ++body) {
@@ -59,19 +55,16 @@ class KineticCalendar final : public RealiserStrategy<S, Count> {
   }
 
  protected:
-  Counters counted() const override {
-    Counters table = this->count_.table;
-    if constexpr (Count::enabled)
-      for (const auto& tree : trees_) {
-        const CalendarCounts& counts = tree.counts();
-        table[Counter::nodes_visited] += counts.sides;
-        table[Counter::values_written] += counts.changes;
-        table[Counter::vertex_reads] += counts.reads;
-        table[Counter::certificates_made] += counts.certificates;
-        table[Counter::certificates_failed] += counts.failed;
-        table[Counter::internal_events] += counts.idle;
-      }
-    return table;
+  void add_counts(Counters& table) const override {
+    for (const auto& tree : trees_) {
+      const CalendarCounts& counts = tree.counts();
+      table[Counter::nodes_visited] += counts.sides;
+      table[Counter::values_written] += counts.changes;
+      table[Counter::vertex_reads] += counts.reads;
+      table[Counter::certificates_made] += counts.certificates;
+      table[Counter::certificates_failed] += counts.failed;
+      table[Counter::internal_events] += counts.idle;
+    }
   }
 
  private:
@@ -90,7 +83,7 @@ KBVH_STRATEGY(kinetic_calendar) {
       .family = "kinetic",
       .citation =
           "kbvh; a calendar of certificates instead of the event queue of Zachmann & Weller 2006, s.4",
-      .can = {.event_driven = true, .plan_changes = true, .time_budget = true},
+      .declares = {.event_driven = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
   })};
 }

@@ -26,7 +26,7 @@ enum class Next : std::uint8_t {
 };
 
 template <class S, class Count, Foresight F>
-class Envelopes final : public RealiserStrategy<S, Count> {
+class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChanges<S> {
   using Base = RealiserStrategy<S, Count>;
   static constexpr bool ahead = F == Foresight::whole_clip;
   static constexpr std::uint32_t slices = 64;  ///< of segments of small bodies
@@ -45,21 +45,16 @@ class Envelopes final : public RealiserStrategy<S, Count> {
     }
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     this->near_bodies_.start_over();
     for (std::uint32_t body = 0; body < states_.size(); ++body) {
       states_[body].known = Known::nothing;
       begin_segment(body);
     }
-    this->count_.table = {};
-    for (State& state : states_) state.envelope.clear_counts();
-    first_fetch_ = this->sampled_.fetched();
   }
 
-  void advance(double t) override {
-    const double step = t - this->time();
-    this->move_to(t);
+  void advance_to(double t) override {
+    const double step = t - this->previous_time();
     for (std::uint32_t body = 0; body < states_.size(); ++body) {
       State& state = states_[body];
       if (state.known == Known::refitted) {
@@ -75,8 +70,7 @@ class Envelopes final : public RealiserStrategy<S, Count> {
     }
   }
 
-  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    this->stand_at(t);
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     for (const PlanChange<S>& change : changes) {
       if (states_[change.body].known == Known::refitted) continue;
       states_[change.body].known = Known::refitted;
@@ -95,18 +89,16 @@ class Envelopes final : public RealiserStrategy<S, Count> {
   }
 
  protected:
-  Counters counted() const override {
-    Counters table = this->count_.table;
-    if constexpr (Count::enabled) {
-      table[Counter::positions_fetched] += this->sampled_.fetched() - first_fetch_;
-      for (const State& state : states_) {
-        const EnvelopeCounts& counts = state.envelope.counts();
-        table[Counter::certificates_made] += counts.crossings;
-        table[Counter::certificates_failed] += counts.stores;
-        table[Counter::values_written] += counts.stores;
-      }
+  void counts_cleared() override {
+    for (State& state : states_) state.envelope.clear_counts();
+  }
+  void add_counts(Counters& table) const override {
+    for (const State& state : states_) {
+      const EnvelopeCounts& counts = state.envelope.counts();
+      table[Counter::certificates_made] += counts.crossings;
+      table[Counter::certificates_failed] += counts.stores;
+      table[Counter::values_written] += counts.stores;
     }
-    return table;
   }
 
  private:
@@ -236,7 +228,6 @@ class Envelopes final : public RealiserStrategy<S, Count> {
 
   MotionView<F, S> view_;
   std::vector<State> states_;
-  std::uint64_t first_fetch_ = 0;
 };
 
 template <class S, class Count>
@@ -251,7 +242,7 @@ Info info_of(std::string id, std::string title) {
       .family = "kinetic",
       .citation = "kbvh; upper envelopes of lines instead of the event queue of Zachmann & Weller 2006, s.4",
       .positions = PositionUse::fetched,
-      .can = {.event_driven = true, .continuous = true, .plan_changes = true, .time_budget = true},
+      .declares = {.event_driven = true, .continuous = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4}},
   };
 }

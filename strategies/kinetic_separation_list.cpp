@@ -14,7 +14,13 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count>
-class KineticSeparationList final : public Strategy<S> {
+class KineticSeparationList final : public CountedStrategy<S, Count>,
+                                    public AnswersSelfPairs,
+                                    public AnswersSpans<S>,
+                                    public AnswersSweeps<S>,
+                                    public EventSource<S>,
+                                    public TakesPlanChanges<S>,
+                                    public TakesGeometryChanges<S> {
   template <template <class> class Queue>
   using Collision = KineticCollision<S, Queue, Count>;
 
@@ -23,37 +29,30 @@ class KineticSeparationList final : public Strategy<S> {
 
   KineticSeparationList(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                         const Params& params)
-      : Strategy<S>(scene, motion) {
+      : CountedStrategy<S, Count>(scene, motion) {
     const int look_ahead = std::stoi(params.word("look_ahead"));
     if (params.word("queue") == AvlQueue<S>::name)
-      collision_ = std::make_unique<Collision<AvlEventQueue>>(scene, motion, std::move(topologies), count_,
-                                                              look_ahead);
+      collision_ = std::make_unique<Collision<AvlEventQueue>>(scene, motion, std::move(topologies),
+                                                              this->count_, look_ahead);
     else
       collision_ = std::make_unique<Collision<BinaryHeapEventQueue>>(scene, motion, std::move(topologies),
-                                                                     count_, look_ahead);
+                                                                     this->count_, look_ahead);
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double t) override {
     on_collision([&](auto& collision) { collision.reset(t); });
-    // What starting costs is not what running costs: counts begin here.
-    count_.table = {};
-    first_step_ = on_collision([](auto& collision) { return collision.queue_steps(); });
-    first_fetch_ = this->sampled_.fetched();
-    on_collision([&](auto& collision) { count_.peak(Counter::list_peak, collision.list().size()); });
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double t) override {
     on_collision([&](auto& collision) { collision.advance(t); });
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
     on_collision([&](auto& collision) {
       for_body_pairs(collision, [&](std::uint32_t i, const BodyPair& pair) {
         LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first,
                                    collision.forest().tree(pair.first).topology(), pair.second,
-                                   collision.forest().tree(pair.second).topology(), count_, out);
+                                   collision.forest().tree(pair.second).topology(), this->count_, out);
         for (const auto& leaf : collision.list().leaf_pairs(i)) leaves(leaf.a, leaf.b);
         for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) { leaves(leaf, leaf); });
       });
@@ -61,9 +60,7 @@ class KineticSeparationList final : public Strategy<S> {
     return {};
   }
 
-  void spans(double t0, double t1, SpanBuffer& out) override {
-    this->stand_at(t0);
-    this->move_to(t1);
+  void find_spans(double t0, double t1, SpanBuffer& out) override {
     on_collision([&](auto& collision) {
       auto& list = collision.list();
       list.start_spans(t0);
@@ -81,9 +78,8 @@ class KineticSeparationList final : public Strategy<S> {
   }
 
   /// All leaves that overlap at some time between. What overlaps twice is found twice.
-  void swept_pairs(double t0, double t1, std::span<const S* const> /*before*/, PairBuffer& out) override {
-    this->stand_at(t0);
-    this->move_to(t1);
+  void find_swept_pairs(double t0, double t1, std::span<const S* const> /*before*/,
+                        PairBuffer& out) override {
     on_collision([&](auto& collision) {
       auto& list = collision.list();
       list.start_spans(t0);
@@ -104,15 +100,31 @@ class KineticSeparationList final : public Strategy<S> {
     });
   }
 
-  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    this->stand_at(t);
+  void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
     on_collision([&](auto& collision) { collision.plans_changed(t, changes); });
   }
 
-  void geometry_changed(double t, const GeometryChange<S>& change) override {
+  void follow_geometry(double t, const GeometryChange<S>& change) override {
     const std::vector<BodyChange> changes = body_changes(this->scene_, change);
     on_collision(
         [&](auto& collision) { collision.geometry_changed(t, this->scene_, this->sampled_, changes); });
+  }
+
+  std::optional<ScheduledEvent<S>> next_event() const override {
+    return on_collision([](auto& collision) { return collision.next_event(); });
+  }
+  void scheduled_events(std::vector<ScheduledEvent<S>>& out) const override {
+    on_collision([&](auto& collision) { collision.scheduled_events(out); });
+  }
+  const Topology& tree(std::uint32_t body) const override {
+    return on_collision(
+        [&](auto& collision) -> const Topology& { return collision.forest().tree(body).topology(); });
+  }
+  std::uint32_t realiser(std::uint32_t body, std::uint32_t node, std::uint32_t side) const override {
+    return on_collision([&](auto& collision) { return collision.forest().tree(body).realiser(node, side); });
+  }
+  void watch_bounds(std::vector<BoundNotice<S>>* log) override {
+    on_collision([&](auto& collision) { collision.watch().log = log; });
   }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
@@ -131,14 +143,18 @@ class KineticSeparationList final : public Strategy<S> {
   }
 
  protected:
-  Counters counted() const override {
-    Counters table = count_.table;
-    if constexpr (Count::enabled) {
-      table[Counter::queue_steps] =
-          on_collision([](auto& collision) { return collision.queue_steps(); }) - first_step_;
-      table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
-    }
-    return table;
+  bool step(double until, EventDescription<S>& out) override {
+    return on_collision([&](auto& collision) { return collision.step(until, out); });
+  }
+  void counts_cleared() override {
+    on_collision([&](auto& collision) {
+      first_step_ = collision.queue_steps();
+      this->count_.peak(Counter::list_peak, collision.list().size());
+    });
+  }
+  void add_counts(Counters& table) const override {
+    table[Counter::queue_steps] =
+        on_collision([](auto& collision) { return collision.queue_steps(); }) - first_step_;
   }
 
  private:
@@ -212,11 +228,10 @@ class KineticSeparationList final : public Strategy<S> {
       }
   }
 
-  Count count_;
   std::vector<SweptLeaves> swept_leaves_;
   std::variant<std::unique_ptr<Collision<AvlEventQueue>>, std::unique_ptr<Collision<BinaryHeapEventQueue>>>
       collision_;
-  std::uint64_t first_step_ = 0, first_fetch_ = 0;
+  std::uint64_t first_step_ = 0;
 };
 
 }  // namespace
@@ -230,13 +245,7 @@ KBVH_STRATEGY(kinetic_separation_list) {
       .family = "kinetic",
       .citation = "Zachmann & Weller 2006, s.7",
       .positions = PositionUse::fetched,
-      .can = {.event_driven = true,
-              .continuous = true,
-              .plan_changes = true,
-              .geometry_changes = true,
-              .spans = true,
-              .self_pairs = true,
-              .contacts = true},
+      .declares = {.continuous = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"queue",
                       "avl",

@@ -19,15 +19,9 @@ class Limit : public Strategy<S> {
   Limit(const SceneView<S>& scene, const SampledMotion<S>& motion)
       : Strategy<S>(scene, motion), kernels_(&limit_kernels(active_kernel_set())) {}
 
-  void reset(double t) override {
-    this->start_at(t);
-    update_all(t);
-  }
-  void advance(double t) override {
-    this->move_to(t);
-    update_all(t);
-  }
-  QueryStatus candidates_at(double /*t*/, PairBuffer& /*out*/, const Budget& /*budget*/) override {
+  void reset_to(double t) override { update_all(t); }
+  void advance_to(double t) override { update_all(t); }
+  QueryStatus find_candidates(double /*t*/, PairBuffer& /*out*/, const Budget& /*budget*/) override {
     return {};
   }
 

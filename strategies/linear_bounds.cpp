@@ -9,13 +9,13 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count>
-class LinearBoundsStrategy final : public Strategy<S> {
+class LinearBoundsStrategy final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
 
   LinearBoundsStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
                        const Params& params)
-      : Strategy<S>(scene, motion),
+      : CountedStrategy<S, Count>(scene, motion),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), linear_settings(params)),
         stale_(scene.body_count()),
         updates_(scene.body_count()) {
@@ -23,22 +23,18 @@ class LinearBoundsStrategy final : public Strategy<S> {
       stale_[body].resize(bounds_.hierarchy(body).node_count());
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     bounds_.start();
     new_frame();
     updates_.skip(bounds_);
-    count_.table = {};
-    first_fetch_ = this->sampled_.fetched();
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double /*t*/) override {
     if (bounds_.advance()) count_update();
     new_frame();
   }
 
-  QueryStatus candidates_at(double t, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double t, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
     for (const std::uint32_t i : bounds_.segment().near_pairs) {
@@ -53,12 +49,11 @@ class LinearBoundsStrategy final : public Strategy<S> {
                                     this->scene_, this->sampled_, rest_of(budget, tests), out, tests)
                             .pending;
     }
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
     return status;
   }
 
-  void flight_plans_changed(double t, std::span<const PlanChange<S>> /*changes*/) override {
-    this->stand_at(t);
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     bounds_.plans_changed();
     count_update();
     new_frame();
@@ -74,13 +69,6 @@ class LinearBoundsStrategy final : public Strategy<S> {
     return total;
   }
 
- protected:
-  Counters counted() const override {
-    Counters table = count_.table;
-    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
-    return table;
-  }
-
  private:
   void new_frame() {
     for (std::uint32_t body = 0; body < bounds_.body_count(); ++body) {
@@ -93,15 +81,13 @@ class LinearBoundsStrategy final : public Strategy<S> {
             bounds_.fraction(t)};
   }
   void count_update() {
-    if constexpr (Count::enabled) updates_.add_to(count_, bounds_);
+    if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
   }
 
   LinearBounds<S> bounds_;
   WideQuery<S> query_;
   std::vector<std::vector<std::uint8_t>> stale_;  ///< [body][wide node]
   LinearCounts<S> updates_;
-  Count count_;
-  std::uint64_t first_fetch_ = 0;
 };
 
 }  // namespace
@@ -117,7 +103,7 @@ KBVH_STRATEGY(linear_bounds) {
           "kbvh; linear boxes of moving triangles as in motion-blur hierarchies (Christensen et al. 2006)",
       .tightness = Tightness::conservative,
       .positions = PositionUse::fetched,
-      .can = {.continuous = true, .plan_changes = true, .time_budget = true},
+      .declares = {.continuous = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = linear_parameters(),
   })};

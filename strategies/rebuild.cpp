@@ -8,7 +8,9 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count>
-class Rebuild final : public StoredHierarchyStrategy<S, Count> {
+class Rebuild final : public StoredHierarchyStrategy<S, Count>,
+                      public AnswersSelfPairs,
+                      public TakesGeometryChanges<S> {
   using Base = StoredHierarchyStrategy<S, Count>;
 
  public:
@@ -24,14 +26,13 @@ class Rebuild final : public StoredHierarchyStrategy<S, Count> {
   }
 
   /// As for any other frame: what was built later is not to be seen.
-  void reset(double t) override {
-    Base::reset(t);
+  void reset_to(double t) override {
+    Base::reset_to(t);
     for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) update(body);
-    this->count_.table = {};
   }
 
   /// A body at rest is built anew, too.
-  void geometry_changed(double /*t*/, const GeometryChange<S>& change) override {
+  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
     this->plans_changed_ = true;
     for (const BodyChange& own : body_changes(this->scene_, change)) update(own.body);
   }
@@ -61,11 +62,7 @@ KBVH_STRATEGY(rebuild) {
       .title = "rebuild",
       .family = "rebuild",
       .citation = "van den Bergen 1997 (as the alternative to refitting)",
-      .can = {.restructures = true,
-              .plan_changes = true,
-              .geometry_changes = true,
-              .self_pairs = true,
-              .time_budget = true},
+      .declares = {.restructures = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"method", "median", {"median", "sah", "morton"}, "how the new topology is built"}},
   })};

@@ -9,7 +9,9 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count>
-class TopDown final : public StoredHierarchyStrategy<S, Count> {
+class TopDown final : public StoredHierarchyStrategy<S, Count>,
+                      public AnswersSelfPairs,
+                      public TakesGeometryChanges<S> {
   using Base = StoredHierarchyStrategy<S, Count>;
 
  public:
@@ -21,7 +23,7 @@ class TopDown final : public StoredHierarchyStrategy<S, Count> {
       ranges_.push_back(primitive_ranges(this->hierarchies_[body].topology()));
   }
 
-  void geometry_changed(double /*t*/, const GeometryChange<S>& change) override {
+  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
     this->edit_geometry(change);
   }
 
@@ -81,7 +83,8 @@ KBVH_STRATEGY(top_down) {
       .title = "top-down refit",
       .family = "refit",
       .citation = "van den Bergen 1998; Larsson & Akenine-Möller 2001",
-      .can = {.plan_changes = true, .geometry_changes = true, .self_pairs = true, .time_budget = true},
+      .baseline = true,
+      .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
   })};
 }

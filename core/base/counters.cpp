@@ -1,5 +1,8 @@
 #include "core/base/counters.hpp"
 
+#include <stdexcept>
+#include <string>
+
 namespace kbvh {
 
 const char* name(Counter counter) {
@@ -60,6 +63,19 @@ const char* name(Counter counter) {
       break;
   }
   return "?";
+}
+
+void Counters::add(std::string_view own, std::uint64_t n) {
+  for (Named& counter : named)
+    if (counter.name == own) {
+      counter.value += n;
+      return;
+    }
+  for (std::size_t c = 0; c < values.size(); ++c)
+    if (own == name(Counter(c)))
+      throw std::logic_error("a strategy's own counter is called '" + std::string(own) +
+                             "', as one that all strategies share");
+  named.push_back({own, n});
 }
 
 }  // namespace kbvh

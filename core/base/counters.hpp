@@ -3,6 +3,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
+#include <vector>
 
 namespace kbvh {
 
@@ -48,6 +50,16 @@ struct Counters {
   std::array<std::uint64_t, 64> events_at_depth{};
   std::uint64_t& operator[](Counter c) { return values[std::size_t(c)]; }
   std::uint64_t operator[](Counter c) const { return values[std::size_t(c)]; }
+
+  /// A counter of a strategy's own.
+  struct Named {
+    std::string_view name;  ///< snake_case; must outlive the table: a string literal
+    std::uint64_t value = 0;
+  };
+  std::vector<Named> named{};
+  /// Adds n to a counter of a strategy's own, which begins at 0. Throws std::logic_error if a counter of the
+  /// enum has that name. O(named counters).
+  void add(std::string_view own, std::uint64_t n);
 };
 
 /// Counting policies: strategies are compiled with both; times come from the silent one.

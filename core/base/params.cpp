@@ -6,6 +6,37 @@
 
 namespace kbvh {
 
+namespace {
+
+/// As short as can be read back: 1, 1e+15, 0.1.
+std::string shown(double number) {
+  char text[32];
+  return std::string(text, std::to_chars(text, text + sizeof text, number).ptr);
+}
+
+bool takes(const Parameter& parameter, const std::string& value) {
+  if (!parameter.allowed.empty())
+    return std::find(parameter.allowed.begin(), parameter.allowed.end(), value) != parameter.allowed.end();
+  double number = 0;
+  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
+  return error == std::errc() && end == value.data() + value.size() && std::isfinite(number) &&
+         number >= parameter.least && number <= parameter.most &&
+         (parameter.numbers == Numbers::any || number == std::floor(number));
+}
+
+}  // namespace
+
+std::string admissible(const Parameter& parameter) {
+  if (!parameter.allowed.empty()) {
+    std::string words;
+    for (const std::string& word : parameter.allowed) words += (words.empty() ? "" : " | ") + word;
+    return words;
+  }
+  const std::string number = parameter.numbers == Numbers::whole ? "a whole number" : "a number";
+  if (std::isinf(parameter.most)) return number + " of at least " + shown(parameter.least);
+  return number + " from " + shown(parameter.least) + " to " + shown(parameter.most);
+}
+
 Params::Params(const std::string& owner, const std::vector<Parameter>& declared,
                const std::map<std::string, std::string>& given) {
   for (const Parameter& parameter : declared) values_[parameter.name] = parameter.default_value;
@@ -18,25 +49,9 @@ Params::Params(const std::string& owner, const std::vector<Parameter>& declared,
       throw ConfigError("'" + owner + "' has no parameter '" + key + "'; it has " +
                         (known.empty() ? "none" : known));
     }
-    if (!parameter->allowed.empty()) {
-      if (std::find(parameter->allowed.begin(), parameter->allowed.end(), value) ==
-          parameter->allowed.end()) {
-        std::string allowed;
-        for (const std::string& word : parameter->allowed) allowed += (allowed.empty() ? "" : ", ") + word;
-        throw ConfigError("parameter '" + key + "' of '" + owner + "' cannot be '" + value +
-                          "'; allowed are " + allowed);
-      }
-    } else {
-      double number = 0;
-      const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
-      if (error != std::errc() || end != value.data() + value.size() || !std::isfinite(number) ||
-          number < parameter->minimum) {
-        char least[32];
-        const std::string shortest(least, std::to_chars(least, least + sizeof least, parameter->minimum).ptr);
-        throw ConfigError("parameter '" + key + "' of '" + owner + "' cannot be '" + value +
-                          "'; it is a finite number of at least " + shortest);
-      }
-    }
+    if (!takes(*parameter, value))
+      throw ConfigError("parameter '" + key + "' of '" + owner + "' cannot be '" + value + "': it is " +
+                        admissible(*parameter));
     values_[key] = value;
   }
 }

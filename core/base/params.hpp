@@ -1,4 +1,6 @@
 #pragma once
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -6,15 +8,24 @@
 
 namespace kbvh {
 
-/// A parameter of a strategy as data. `allowed` lists the admissible words; empty: any finite number >=
-/// `minimum`.
+/// Which numbers a parameter takes.
+enum class Numbers : std::uint8_t { any, whole };
+
+/// A parameter of a strategy as data. `allowed` lists the admissible words; empty: numbers from `least` to
+/// `most`, both included.
 struct Parameter {
   std::string name;
   std::string default_value;
   std::vector<std::string> allowed;
   std::string meaning;
-  double minimum = 0;
+  double least = 0;
+  double most = std::numeric_limits<double>::infinity();  ///< infinite: any finite number from `least` on
+  Numbers numbers = Numbers::any;
 };
+
+/// What a parameter takes, in words: "avl | binary_heap", "a whole number from 1 to 64", "a number of at
+/// least 0".
+std::string admissible(const Parameter& parameter);
 
 /// What is wrong with a configuration: names the offending key and value and what would be admissible.
 struct ConfigError : std::invalid_argument {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/scene/self_pairs.hpp"
+
 namespace kbvh {
 
 BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> method,
@@ -19,6 +21,21 @@ BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> meth
                       std::to_string(info.topology.max_leaf_size) + " primitives per leaf, not " +
                       std::to_string(config.leaf_size));
   return config;
+}
+
+template <class S>
+std::string unsuitable_bodies(const Info& info, const Scene<S>& scene) {
+  if (has_self_pairs(scene.pairs) && !info.can.self_pairs) return "cannot answer pairs within one body";
+  for (const Body<S>& body : scene.bodies) {
+    const auto& kinds = info.primitives;
+    if (body.primitives.count() > 0 &&
+        std::find(kinds.begin(), kinds.end(), body.primitives.kind) == kinds.end())
+      return std::string("does not take ") + name(body.primitives.kind) + ", as in body '" + body.name + "'";
+    if (body.plans.is_handed_in() && info.foresight != Foresight::none)
+      return "has to know the motion beforehand, and the positions of body '" + body.name +
+             "' are handed in frame by frame";
+  }
+  return {};
 }
 
 template <class S>
@@ -42,6 +59,7 @@ std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<
 }
 
 #define KBVH_INSTANTIATE(S)                                                                             \
+  template std::string unsuitable_bodies(const Info&, const Scene<S>&);                                 \
   template Topologies build_topologies(const SceneView<S>&, Playback<S>&, const BuilderConfig&);        \
   template std::unique_ptr<Strategy<S>> create(const StrategyEntry&, const SceneView<S>&, Playback<S>&, \
                                                Topologies, const Params&, CountingPolicy);

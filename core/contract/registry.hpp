@@ -28,6 +28,27 @@ struct StrategyEntry {
 };
 
 namespace detail {
+/// Does T derive from the interface, and in a way that `Strategy` can use?
+template <class T, class Interface>
+constexpr bool has() {
+  static_assert(std::is_base_of_v<Interface, T> == std::is_convertible_v<T*, Interface*>,
+                "derive from an interface of the contract publicly, and once");
+  return std::is_base_of_v<Interface, T>;
+}
+template <class T, class S>
+Capabilities capabilities(const Declared& declared) {
+  constexpr bool events = has<T, EventSource<S>>();
+  return {.event_driven = events || declared.event_driven,
+          .continuous = declared.continuous,
+          .restructures = declared.restructures,
+          .time_budget = declared.time_budget,
+          .events = events,
+          .plan_changes = has<T, TakesPlanChanges<S>>(),
+          .geometry_changes = has<T, TakesGeometryChanges<S>>(),
+          .spans = has<T, AnswersSpans<S>>(),
+          .self_pairs = has<T, AnswersSelfPairs>(),
+          .contacts = has<T, AnswersSweeps<S>>()};
+}
 template <template <class, class> class T, class S, class Count>
 std::unique_ptr<Strategy<S>> construct(const SceneView<S>& scene, Playback<S>& playback,
                                        Topologies&& topologies, const Params& params) {
@@ -47,14 +68,16 @@ std::unique_ptr<Strategy<S>> make(const SceneView<S>& scene, Playback<S>& playba
 enum class Scalars : std::uint8_t { both, float_only, double_only };
 
 /// Registers the class template T<Scalar, CountingPolicy>, which must
-///   - derive from Strategy<Scalar>,
+///   - derive from Strategy<Scalar>, and from the interfaces for what else it can do,
 ///   - say `static constexpr Foresight foresight`,
 ///   - be constructible from (SceneView<S>, MotionView<foresight, S>, Topologies, const Params&).
+/// What it can do is read off the class: `Info::can` as given does not count.
 template <template <class, class> class T, Scalars scalars = Scalars::both>
 StrategyEntry make_entry(Info info) {
   using Any = std::conditional_t<scalars == Scalars::double_only, double, float>;
   StrategyEntry entry;
   info.foresight = T<Any, Silent>::foresight;
+  info.can = detail::capabilities<T<Any, Silent>, Any>(info.declares);
   info.has_float = scalars != Scalars::double_only;
   info.has_double = scalars != Scalars::float_only;
   entry.info = std::move(info);
@@ -77,6 +100,11 @@ const StrategyEntry& find_strategy(std::string_view id);
 /// ConfigError if the strategy cannot take it.
 BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> method,
                                std::optional<std::uint32_t> width, std::optional<std::uint32_t> leaf_size);
+
+/// Why the strategy cannot play a scene of these bodies, as the end of a sentence that begins with its id;
+/// empty if it can: pairs within a body, kinds of primitives, positions handed in frame by frame.
+template <class S>
+std::string unsuitable_bodies(const Info& info, const Scene<S>& scene);
 
 /// Topologies of all bodies, built from the positions at the playback's current time.
 template <class S>

@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/continuous/contacts.hpp"
@@ -67,10 +68,14 @@ class Session {
       geometry_changed_ = false;
     }
     watch_.start(playback_);
-    playback_.seek(t);
+    seek(t);
     playback_.evaluate_all();
     strategy_->reset(t);
   }
+  /// Keeps an array with a body's positions for the next call that moves to another time (`reset`, `advance`,
+  /// `contacts`), and the frames after that (Playback::hand_in). For contacts the array that was handed in
+  /// before has to hold the positions of before until then.
+  void hand_in(std::uint32_t body, const S* positions) { handed_in_.push_back({body, positions}); }
   /// Moves to t, with positions if the strategy wants all of them, and advances. Throws
   /// std::invalid_argument, with nothing changed, if t is before the present time, not finite or not
   /// admissible, or a vertex has left the admissible range by then.
@@ -79,7 +84,7 @@ class Session {
       throw std::invalid_argument("cannot advance from t = " + std::to_string(playback_.time()) +
                                   " back to " + std::to_string(t));
     watch_.check(playback_, t);
-    playback_.seek(t);
+    seek(t);
     if (info_->positions == PositionUse::all ||
         (info_->positions == PositionUse::varying && strategy_->wants_all_positions()))
       timed(times.motion, [&] { playback_.evaluate_all(); });
@@ -93,11 +98,14 @@ class Session {
     timed(times.triangle_tests, [&] { strategy_->confirm(playback_.time(), pairs); });
     return status;
   }
+  /// Performs the first event if it is due by time `until` (Strategy::step_event); the motion stays where it
+  /// is until the next `advance`.
+  bool step_event(double until, EventDescription<S>& out) { return strategy_->step_event(until, out); }
   /// Moves to t and appends the pairs of the interval that this takes, for strategies that declare spans.
   void spans(double t, SpanBuffer& out) {
     const double from = playback_.time();
     watch_.check(playback_, t);
-    playback_.seek(t);
+    seek(t);
     strategy_->spans(from, t, out);
   }
   /// Moves to t and appends the contacts of features on the way, for strategies that declare contacts: every
@@ -120,7 +128,7 @@ class Session {
     finder_->start(playback_);
     const double from = playback_.time();
     timed(times.update, [&] { strategy_->start_sweep(from); });
-    playback_.seek(t);
+    seek(t);
     timed(times.motion, [&] { playback_.evaluate_all(); });
     before_.clear();
     for (std::uint32_t body = 0; body < playback_.body_count(); ++body)
@@ -180,12 +188,17 @@ class Session {
 
  private:
   void make_strategy() {
-    if (has_self_pairs(view_.pairs()) && !info_->can.self_pairs)
-      throw ConfigError("'" + info_->id + "' does not declare self pairs, which the scene asks for");
+    if (const std::string why = unsuitable_bodies(*info_, *scene_); !why.empty())
+      throw ConfigError("'" + info_->id + "' " + why);
     const Params params(info_->id, info_->parameters, contestant_.params);
     Topologies topologies;
     if (!info_->topology.own) topologies = build_topologies(view_, playback_, contestant_.builder);
     strategy_ = create(*contestant_.entry, view_, playback_, std::move(topologies), params, policy_);
+  }
+  void seek(double t) {
+    playback_.seek(t);
+    for (const auto& [body, positions] : handed_in_) playback_.hand_in(body, positions);
+    handed_in_.clear();
   }
   template <class Work>
   static void timed(double& seconds, Work&& work) {
@@ -204,6 +217,7 @@ class Session {
   RangeWatch<S> watch_;
   std::unique_ptr<Strategy<S>> strategy_;
   bool geometry_changed_ = false;
+  std::vector<std::pair<std::uint32_t, const S*>> handed_in_;
   std::optional<ContactFinder<S>> finder_;
   std::vector<const S*> before_;
   PairBuffer swept_;

@@ -193,7 +193,7 @@ double FlightPlans<S>::lines_end(double t) const {
 template <class S>
 bool FlightPlans<S>::at_rest(double t) const {
   const auto& times = keyframes_->times;
-  return own_.empty() && (!has_knots() || t < times.front() || t >= times.back());
+  return !handed_in_ && own_.empty() && (!has_knots() || t < times.front() || t >= times.back());
 }
 
 template <class S>

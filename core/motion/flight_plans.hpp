@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/motion/piece.hpp"
@@ -42,6 +43,15 @@ class FlightPlans {
   /// sizes that do not match, times not strictly increasing, values not finite or beyond the admissible
   /// range.
   FlightPlans(std::uint32_t vertex_count, std::vector<double> times, std::vector<S> positions);
+  /// The plans of a body whose positions are handed in frame by frame (Playback::hand_in), so that nothing is
+  /// known of its motion but that it moves. `positions` [vertex][3] are those until the first are handed in.
+  /// Throws std::invalid_argument as the constructor does.
+  static FlightPlans handed_in(std::uint32_t vertex_count, std::vector<S> positions) {
+    FlightPlans plans(vertex_count, {0.0}, std::move(positions));
+    plans.handed_in_ = true;
+    return plans;
+  }
+  bool is_handed_in() const { return handed_in_; }
 
   /// All vertices, those added at run time included.
   std::uint32_t vertex_count() const { return vertex_count_; }
@@ -52,7 +62,7 @@ class FlightPlans {
   /// Positions of keyframe k, [keyframed vertex][3]; own plans are not in them. One scalar past the end may
   /// be read.
   const S* keyframe(std::size_t k) const { return keyframes_->positions.data() + 3 * k * keyframed_count_; }
-  bool moving() const { return keyframe_count() > 1 || !own_.empty(); }
+  bool moving() const { return handed_in_ || keyframe_count() > 1 || !own_.empty(); }
   /// Do its keyframes end lines? A single one is where the body is at all times.
   bool has_knots() const { return keyframed_count_ > 0 && keyframe_count() > 1; }
   bool has_own_plans() const { return !own_.empty(); }
@@ -141,6 +151,7 @@ class FlightPlans {
   void evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out) const;
 
   std::uint32_t vertex_count_ = 0, keyframed_count_ = 0;
+  bool handed_in_ = false;
   std::shared_ptr<const Keyframes> keyframes_;
   std::vector<std::uint32_t> own_of_vertex_;
   std::vector<OwnPlan> own_;

@@ -35,7 +35,7 @@ void Playback<S>::seek(double t) {
   }
   for (auto& state : bodies_) {
     state.fetched = 0;
-    if (state.plans.moving()) state.all_current = false;
+    if (state.plans.moving() && !state.plans.is_handed_in()) state.all_current = false;
   }
 }
 
@@ -46,6 +46,14 @@ void Playback<S>::evaluate_all() {
     state.plans.evaluate(time_, state.positions.data());
     state.all_current = true;
   }
+}
+
+template <class S>
+void Playback<S>::hand_in(std::uint32_t body, const S* positions) {
+  if (body >= bodies_.size() || !bodies_[body].plans.is_handed_in())
+    throw std::invalid_argument("positions are handed in for body " + std::to_string(body) +
+                                ", which is none of those that wait for them");
+  bodies_[body].given = positions;
 }
 
 template <class S>
@@ -90,6 +98,9 @@ void Playback<S>::change_plans(double t, std::span<const PlanChange<S>> changes)
       throw std::invalid_argument("plan change for body " + std::to_string(change.body) + " of " +
                                   std::to_string(bodies_.size()));
     const FlightPlans<S>& plans = bodies_[change.body].plans;
+    if (plans.is_handed_in())
+      throw std::invalid_argument("plan change for body " + std::to_string(change.body) +
+                                  ", whose positions are handed in");
     plans.check_vertex(change.vertex);
     plans.check_change(t, change, position(change.body, change.vertex));
   }

@@ -36,16 +36,21 @@ class Playback {
   const S* position(std::uint32_t body, std::uint32_t vertex) {
     BodyState& state = bodies_[body];
     if (!state.all_current && state.stamp[vertex] != epoch_) fetch_stale(state, {&vertex, 1});
-    return state.positions.data() + std::size_t(3) * vertex;
+    return state.data() + std::size_t(3) * vertex;
   }
   /// Positions [vertex][3] of a body, followed by one scalar of padding, so that a fourth lane may be read.
   /// Only vertices evaluated or fetched for the current time are meaningful.
-  const S* positions(std::uint32_t body) const { return bodies_[body].positions.data(); }
+  const S* positions(std::uint32_t body) const { return bodies_[body].data(); }
   bool all_current(std::uint32_t body) const { return bodies_[body].all_current; }
+
+  /// Takes the positions of a body from the caller's array from now on: [vertex][3] and one scalar of
+  /// padding, not copied, to be kept until others are handed in. Only for bodies whose plans are handed in;
+  /// their positions are current at every time. Throws std::invalid_argument for other bodies. O(1).
+  void hand_in(std::uint32_t body, const S* positions);
 
   /// Each changed vertex starts its new plan at the current time from its stored position.
   /// Of several changes of one vertex the last counts. Throws std::invalid_argument, with nothing changed, if
-  /// t is not the current time or a change is not valid.
+  /// t is not the current time, a change is not valid, or a body's positions are handed in.
   void change_plans(double t, std::span<const PlanChange<S>> changes);
   /// Forgets every change: the plans are the scene's again, and positions are to be evaluated anew after the
   /// next `seek`.
@@ -64,9 +69,12 @@ class Playback {
   struct BodyState {
     FlightPlans<S> plans, scene_plans;  ///< as changed, and as the scene has them
     std::vector<S> positions;
+    const S* given = nullptr;  ///< the caller's array, if positions were handed in
     std::vector<std::uint32_t> stamp;
     std::uint32_t fetched = 0;  ///< at the current time
     bool all_current = false;
+
+    const S* data() const { return given != nullptr ? given : positions.data(); }
   };
   void fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices);
   void fetch_all(BodyState& state);

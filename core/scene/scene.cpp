@@ -8,6 +8,18 @@
 
 namespace kbvh {
 
+const char* name(PrimitiveKind kind) {
+  switch (kind) {
+    case PrimitiveKind::points:
+      return "points";
+    case PrimitiveKind::control_nets:
+      return "control_nets";
+    case PrimitiveKind::polygons:
+      break;
+  }
+  return "polygons";
+}
+
 template <class S>
 void validate(const Scene<S>& scene) {
   for (const auto& body : scene.bodies) {

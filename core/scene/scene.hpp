@@ -17,6 +17,9 @@ enum class PrimitiveKind : std::uint8_t {
   control_nets,  ///< k control points; conservative by the convex-hull property; candidate level
 };
 
+/// The kind in words: polygons, points, control_nets.
+const char* name(PrimitiveKind kind);
+
 /// Primitives of one body as CSR lists: primitive p has vertices[offsets[p] .. offsets[p + 1]).
 /// A primitive that was removed at run time (geometry_change.hpp) keeps its id and its list, but no hierarchy
 /// holds it and no answer names it.

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
 
 #include "experiments/cli/commands.hpp"
@@ -29,6 +30,7 @@ std::vector<std::string> scalars_of(const Info& info) {
 
 std::vector<std::string> capabilities_of(const Info& info) {
   const std::pair<bool, const char*> all[] = {{info.can.event_driven, "event_driven"},
+                                              {info.can.events, "events"},
                                               {info.can.continuous, "continuous"},
                                               {info.can.restructures, "restructures"},
                                               {info.can.plan_changes, "plan_changes"},
@@ -43,14 +45,23 @@ std::vector<std::string> capabilities_of(const Info& info) {
   return words;
 }
 
+std::vector<std::string> primitives_of(const Info& info) {
+  std::vector<std::string> words;
+  for (const PrimitiveKind kind : info.primitives) words.push_back(name(kind));
+  return words;
+}
+
 json strategy_json(const Info& info) {
   json parameters = json::array();
   for (const Parameter& parameter : info.parameters) {
     json one{{"name", parameter.name}, {"default", parameter.default_value}, {"meaning", parameter.meaning}};
-    if (parameter.allowed.empty())
-      one["minimum"] = parameter.minimum;
-    else
+    if (parameter.allowed.empty()) {
+      one["minimum"] = parameter.least;
+      if (std::isfinite(parameter.most)) one["maximum"] = parameter.most;
+      one["whole"] = parameter.numbers == Numbers::whole;
+    } else {
       one["allowed"] = parameter.allowed;
+    }
     parameters.push_back(std::move(one));
   }
   json topology;
@@ -65,6 +76,7 @@ json strategy_json(const Info& info) {
   return {{"id", info.id},
           {"title", info.title},
           {"family", info.family},
+          {"baseline", info.baseline},
           {"citation", info.citation},
           {"foresight", word(info.foresight)},
           {"tightness", word(info.tightness)},
@@ -75,6 +87,7 @@ json strategy_json(const Info& info) {
           {"scalars", scalars_of(info)},
           {"own_scalar", info.own_scalar},
           {"capabilities", capabilities_of(info)},
+          {"primitives", primitives_of(info)},
           {"parameters", parameters},
           {"topology", topology},
           {"max_primitive_pairs", info.max_primitive_pairs}};
@@ -106,13 +119,14 @@ void print_strategy(const Info& info) {
                         name(info.topology.preferred.method), info.topology.preferred.width,
                         info.topology.preferred.leaf_size);
   if (const auto words = capabilities_of(info); !words.empty()) text += "    can: " + joined(words) + "\n";
+  if (info.baseline) text += "    a baseline: ratios are against the fastest one\n";
+  if (const auto words = primitives_of(info); words.size() < 3)
+    text += "    takes only " + joined(words, " and ") + "\n";
   if (info.max_primitive_pairs > 0)
     text += fmt::format("    only up to {} primitive pairs of two bodies\n", info.max_primitive_pairs);
   for (const Parameter& parameter : info.parameters) {
-    const std::string allowed = parameter.allowed.empty() ? fmt::format("number >= {:g}", parameter.minimum)
-                                                          : joined(parameter.allowed, " | ");
-    text += fmt::format("    {}={} ({}): {}\n", parameter.name, parameter.default_value, allowed,
-                        parameter.meaning);
+    text += fmt::format("    {}={} ({}): {}\n", parameter.name, parameter.default_value,
+                        admissible(parameter), parameter.meaning);
   }
   print(text);
 }

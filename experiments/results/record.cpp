@@ -8,15 +8,7 @@ namespace kbvh::experiments {
 using nlohmann::json;
 
 const char* word(PrimitiveKind kind) {
-  switch (kind) {
-    case PrimitiveKind::points:
-      return "points";
-    case PrimitiveKind::control_nets:
-      return "control_nets";
-    case PrimitiveKind::polygons:
-      break;
-  }
-  return "polygons";
+  return name(kind);
 }
 
 const char* word(SceneOrigin origin) {

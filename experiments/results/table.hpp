@@ -21,7 +21,11 @@ bool has_times(const nlohmann::json& record);
 /// update, query and plan changes); of a record with times.
 double median_phase(const nlohmann::json& record, const std::string& phase);
 
-/// The fastest verified contestant of family "refit" by update + query among the records, or nullptr.
+/// Is the record of a baseline (Info::baseline)? Records from before baselines were declared go by the family
+/// "refit".
+bool is_baseline(const nlohmann::json& record);
+
+/// The fastest verified baseline by update + query among the records, or nullptr.
 const nlohmann::json* best_refit(const std::vector<nlohmann::json>& records);
 
 /// The table that `run` and `bench` print for records of one scene, l and scalar: times in ms per frame

@@ -254,7 +254,7 @@ std::string unsuitable(const Info& info, const Scene<S>& scene, const PlanScript
     return std::string("has no ") + (sizeof(S) == 4 ? "float" : "double") + " version";
   if (script.changes_plans() && !info.can.plan_changes) return "cannot take changes of plans";
   if (script.changes_geometry() && !info.can.geometry_changes) return "cannot take changes of geometry";
-  if (has_self_pairs(scene.pairs) && !info.can.self_pairs) return "cannot answer pairs within one body";
+  if (std::string why = unsuitable_bodies(info, scene); !why.empty()) return why;
   if (info.max_primitive_pairs == 0) return {};
   for (const BodyPair& pair : scene.pairs) {
     const std::uint64_t pairs = std::uint64_t(scene.bodies[pair.first].primitives.count()) *

@@ -228,6 +228,7 @@ json counters_record(const Counters& counters) {
   json record = json::object();
   for (std::size_t c = 0; c < std::size_t(Counter::count); ++c)
     record[name(Counter(c))] = counters[Counter(c)];
+  for (const Counters::Named& counter : counters.named) record[std::string(counter.name)] = counter.value;
   return record;
 }
 

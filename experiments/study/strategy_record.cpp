@@ -55,6 +55,7 @@ json strategy_record(const ContestantSpec& spec) {
           {"label", spec.label},
           {"title", info.title},
           {"family", info.family},
+          {"baseline", info.baseline},
           {"guarantee", word(info.guarantee)},
           {"tightness", word(info.tightness)},
           {"foresight", word(info.foresight)},

@@ -1,49 +1,26 @@
 #pragma once
 #include <algorithm>
+#include <map>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "core/families/events/kinetic_forest.hpp"
+#include "core/families/events/kinetic_aabb_strategy.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/theory/envelope.hpp"
 
 namespace kbvh::theory {
 
-/// A change notice as it came, with the numbers of its instant copied.
+/// A change of a bound as an event source told it.
 template <class S>
-struct Notice {
-  std::uint32_t body, node, side, old_vertex, new_vertex;
-  double begin;
-  bool at_event;
-  Crossing<S> crossing;
-  std::uint64_t event;  ///< how many events were handled before this one; not part of what is compared
+struct Notice : BoundNotice<S> {
+  std::uint64_t event = 0;  ///< how many events were handled before this one; not part of what is compared
 
   bool operator==(const Notice& other) const {
-    const auto same = [](const Piece<S>& a, const Piece<S>& b) {
-      return a.t0 == b.t0 && a.t1 == b.t1 && a.x0 == b.x0 && a.x1 == b.x1 && a.kind == b.kind;
-    };
-    return body == other.body && node == other.node && side == other.side && old_vertex == other.old_vertex &&
-           new_vertex == other.new_vertex && at_event == other.at_event &&
-           (at_event
-                ? same(crossing.winner, other.crossing.winner) && same(crossing.loser, other.crossing.loser)
-                : begin == other.begin);
+    return static_cast<const BoundNotice<S>&>(*this) == static_cast<const BoundNotice<S>&>(other);
   }
-};
-
-template <class S>
-struct Recorder {
-  std::vector<Notice<S>>* log;
-  const std::uint64_t* event;
-
-  template <class T>
-  void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t old_vertex,
-                        std::uint32_t new_vertex, const Instant<T>& now) {
-    log->push_back({body, node, side, old_vertex, new_vertex, now.begin, now.exact != nullptr,
-                    now.exact != nullptr ? *now.exact : Crossing<S>{}, *event});
-  }
-  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
 };
 
 /// What happened between two changes of plans (or the ends of the clip): the plans that held, the notices of
@@ -92,21 +69,21 @@ struct Play {
   std::vector<double> frames{};    ///< ascending; empty: as frames_per_keyframe says
 };
 
-/// Told what a kinetic forest does while it is recorded: `event` after each one it handled, `stop` at each
-/// time that it was brought to (frames, instants), and before and after each change of plans.
+/// Told what a strategy does while it is recorded: `event` after each event, with its description, and `stop`
+/// at each time that the strategy was brought to (frames, instants).
 struct NoWatcher {
-  template <class Forest>
-  void event(const Forest&, const Event&) {}
-  template <class Forest>
-  void stop(const Forest&, double) {}
+  template <class S>
+  void event(const EventSource<S>&, const EventDescription<S>&) {}
+  template <class S>
+  void stop(const EventSource<S>&, double) {}
 };
 
-/// Plays a scene, with plan changes if there are any, through a kinetic forest and keeps all that its
-/// observer was told. Throws std::bad_alloc where the log does not fit: 100 bytes and more per change.
-template <class S, template <class> class Queue, class Watcher = NoWatcher>
-Recording<S> record(const Scene<S>& scene, const PlanScript<S>& script, const Play& play,
-                    Watcher&& watcher = {}) {
-  using Forest = KineticForest<S, Queue<S>, Counting, Recorder<S>>;
+/// Plays a scene, with plan changes if there are any, through a strategy that is an event source, event by
+/// event, and keeps every change of a bound. `make(view, playback, topologies)` makes the strategy. Throws
+/// std::bad_alloc where the log does not fit: 100 bytes and more per change.
+template <class S, class Make, class Watcher>
+Recording<S> record_events(const Scene<S>& scene, const PlanScript<S>& script, const Play& play, Make&& make,
+                           Watcher&& watcher) {
   const SceneView<S> view(scene);
   std::vector<double> frames =
       play.frames.empty() ? frame_times(scene, play.frames_per_keyframe) : play.frames;
@@ -120,27 +97,36 @@ Recording<S> record(const Scene<S>& scene, const PlanScript<S>& script, const Pl
   playback.seek(first);
   Recording<S> recording;
   recording.topologies = build_topologies(view, playback, play.builder);
+  const std::unique_ptr<Strategy<S>> strategy = make(view, playback, recording.topologies);
+  EventSource<S>* const source = strategy->events();
+  if (source == nullptr) throw std::logic_error("what is to be recorded event by event has no events");
+  strategy->reset(first);
+  std::vector<BoundNotice<S>> told;
+  source->watch_bounds(&told);
   std::vector<Notice<S>> log;
   std::uint64_t handled = 0;
-  Counting count;
-  Forest forest(view, ClipMotion<S>(playback), recording.topologies, count, Recorder<S>{&log, &handled});
-  forest.reset(first);
+  const auto keep = [&] {
+    for (const BoundNotice<S>& notice : told) log.push_back({notice, handled});
+    told.clear();
+  };
+  EventDescription<S> done;
   const auto advance = [&](double t) {
-    while (forest.due(t)) {
-      const Event event = forest.queue().top();
-      forest.handle_next();
-      watcher.event(forest, event);
+    while (strategy->step_event(t, done)) {
+      keep();
       ++handled;
+      watcher.event(*source, done);
     }
-    watcher.stop(forest, t);
+    strategy->advance(t);
+    watcher.stop(*source, t);
   };
 
   const std::uint32_t bodies = view.body_count();
   const auto realisers = [&] {
     std::vector<std::vector<std::uint32_t>> all(bodies);
     for (std::uint32_t body = 0; body < bodies; ++body)
-      if (const auto& tree = forest.tree(body); !tree.topology().empty())
-        all[body].assign(tree.realisers(0), tree.realisers(0) + std::size_t(6) * tree.topology().size());
+      for (std::uint32_t node = 0; node < source->tree(body).size(); ++node)
+        for (std::uint32_t side = 0; side < 6; ++side)
+          all[body].push_back(source->realiser(body, node, side));
     return all;
   };
   Epoch<S> epoch;
@@ -177,7 +163,8 @@ Recording<S> record(const Scene<S>& scene, const PlanScript<S>& script, const Pl
       epoch.plans[change.body].own[change.vertex] = knots;
     }
     playback.change_plans(t, step->changes);
-    forest.plans_changed(t, step->changes);
+    strategy->flight_plans_changed(t, step->changes);
+    keep();
     ++step;
     epoch.begin = t;
     epoch.before = epoch.end;
@@ -187,11 +174,40 @@ Recording<S> record(const Scene<S>& scene, const PlanScript<S>& script, const Pl
   }
   // Past the last keyframe bodies rest; plans of their own go on.
   last += script.steps.empty() ? 1.0 : 3.0;
+  playback.seek(last);
   advance(last);
   close(last);
-  recording.events = count.table[Counter::certificates_failed];
-  recording.values_written = count.table[Counter::values_written];
+  const Counters counters = strategy->counters();
+  recording.events = counters[Counter::certificates_failed];
+  recording.values_written = counters[Counter::values_written];
   return recording;
+}
+
+/// Records kinetic AABB trees on an event queue of one's own choice.
+template <class S, template <class> class Queue, class Watcher = NoWatcher>
+Recording<S> record(const Scene<S>& scene, const PlanScript<S>& script, const Play& play,
+                    Watcher&& watcher = {}) {
+  using Recorded = ExactKineticAabbStrategy<S, Counting, Queue<S>>;
+  return record_events(
+      scene, script, play,
+      [](const SceneView<S>& view, Playback<S>& playback, const Topologies& topologies) {
+        return std::make_unique<Recorded>(view, ClipMotion<S>(playback), topologies, 0);
+      },
+      watcher);
+}
+
+/// Records a registered strategy that is an event source.
+template <class S, class Watcher = NoWatcher>
+Recording<S> record_strategy(const StrategyEntry& entry, const Scene<S>& scene, const PlanScript<S>& script,
+                             const Play& play, Watcher&& watcher = {},
+                             const std::map<std::string, std::string>& params = {}) {
+  return record_events(
+      scene, script, play,
+      [&](const SceneView<S>& view, Playback<S>& playback, const Topologies& topologies) {
+        return create(entry, view, playback, topologies, Params(entry.info.id, entry.info.parameters, params),
+                      CountingPolicy::counting);
+      },
+      watcher);
 }
 
 inline VerticesBelow vertices_below(const Topology& topology, const Primitives& primitives) {

@@ -21,8 +21,9 @@ struct BoxTreeObserver {
                         std::uint32_t new_vertex, const Instant<S>& now) {
     ++*notices;
     if (log != nullptr)
-      log->push_back({body, node, side, old_vertex, new_vertex, now.begin, now.exact != nullptr,
-                      now.exact != nullptr ? *now.exact : Crossing<S>{}, 0});
+      log->push_back({{body, node, side, old_vertex, new_vertex, now.begin, now.exact != nullptr,
+                       now.exact != nullptr ? *now.exact : Crossing<S>{}},
+                      0});
   }
 };
 

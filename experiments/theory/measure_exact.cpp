@@ -21,22 +21,23 @@ bool ahead(const ExactMotion& motion, const Where& where, Side side, std::uint32
 
 /// Candidates of a bound that are further out than its realiser, or 1 if that is not a candidate itself. None
 /// at any node: by induction from the leaves every realiser is an extremum of all vertices below.
-template <class Tree, class Where>
-std::uint64_t exceeded(const Tree& tree, const ExactMotion& motion, const Where& where, std::uint32_t node,
+template <class Where>
+std::uint64_t exceeded(const EventSource<float>& source, const LeafVertices& leaves,
+                       const ExactMotion& motion, const Where& where, std::uint32_t body, std::uint32_t node,
                        Side side, std::uint64_t& compared) {
-  const std::uint32_t realiser = tree.realiser(node, side);
+  const std::uint32_t realiser = source.realiser(body, node, side);
   std::uint64_t faults = 0;
   bool known = false;
   const auto look = [&](std::uint32_t candidate) {
     known = known || candidate == realiser;
     faults += ahead(motion, where, side, candidate, realiser);
   };
-  const TopologyNode n = tree.topology().nodes[node];
+  const TopologyNode n = source.tree(body).nodes[node];
   if (n.is_leaf())
-    for (const std::uint32_t v : tree.leaf_vertices(node)) look(v);
+    for (const std::uint32_t v : leaves[node]) look(v);
   else
     for (std::uint32_t child = n.first(); child < n.first() + n.count(); ++child)
-      look(tree.realiser(child, side));
+      look(source.realiser(body, child, side));
   ++compared;
   return faults + !known;
 }
@@ -44,42 +45,50 @@ std::uint64_t exceeded(const Tree& tree, const ExactMotion& motion, const Where&
 /// Audits while a clip is recorded: everything at each stop, its path after each event.
 class Auditor {
  public:
-  Auditor(const Scene<float>& scene, ExactRun& run) : run_(&run) {
+  Auditor(const Scene<float>& scene, ExactRun& run) : scene_(&scene), run_(&run) {
     const std::vector<double> keyframes = overlaid_keyframes(scene);
     for (const Body<float>& body : scene.bodies)
       motions_.emplace_back(stored_plans(body.plans), keyframes.front(), keyframes.back());
   }
 
-  template <class Forest>
-  void event(Forest& forest, const Event& event) {
-    const auto& tree = forest.tree(event.body);
+  void event(const EventSource<float>& source, const EventDescription<float>& done) {
+    find_leaves(source);
+    const ScheduledEvent<float>& event = done.event;
     const ExactMotion& motion = motions_[event.body];
-    const When when = when_of(forest.clock().crossing(event), motion);
-    std::uint32_t node = tree.node_of(event.slot);
+    const When when = when_of(event.crossing, motion);
+    std::uint32_t node = event.node;
     for (;;) {
-      const bool passed = tree.realiser(node, event.side) == event.loser;
-      run_->path_faults += exceeded(tree, motion, when, node, event.side, run_->path_bounds);
+      const bool passed = source.realiser(event.body, node, event.side) == event.loser;
+      run_->path_faults += exceeded(source, leaves_[event.body], motion, when, event.body, node, event.side,
+                                    run_->path_bounds);
       if (node == 0 || !passed) break;
-      node = tree.topology().parents[node];
+      node = source.tree(event.body).parents[node];
     }
   }
 
-  template <class Forest>
-  void stop(Forest& forest, double t) {
+  void stop(const EventSource<float>& source, double t) {
+    find_leaves(source);
     ++run_->audited_instants;
     for (std::uint32_t body = 0; body < motions_.size(); ++body) {
-      const auto& tree = forest.tree(body);
       const When when = motions_[body].locate(exact(std::min(t, last_time(body))));
-      for (std::uint32_t node = 0; node < tree.topology().size(); ++node)
+      for (std::uint32_t node = 0; node < source.tree(body).size(); ++node)
         for (Side side = 0; side < 6; ++side)
-          run_->faults += exceeded(tree, motions_[body], when, node, side, run_->audited);
+          run_->faults +=
+              exceeded(source, leaves_[body], motions_[body], when, body, node, side, run_->audited);
     }
   }
 
  private:
+  void find_leaves(const EventSource<float>& source) {
+    if (!leaves_.empty()) return;
+    for (std::uint32_t body = 0; body < motions_.size(); ++body)
+      leaves_.push_back(unique_leaf_vertices(source.tree(body), scene_->bodies[body].primitives));
+  }
   double last_time(std::uint32_t body) const { return motions_[body].times()[motions_[body].last_row()]; }
+  const Scene<float>* scene_;
   ExactRun* run_;
   std::vector<ExactMotion> motions_;
+  std::vector<LeafVertices> leaves_;  ///< [body]
 };
 
 /// Events all of whose changes last for no time: the next change of the same bound has the same instant.
@@ -113,7 +122,8 @@ ExactRun measure_exact(const Scene<float>& scene, std::uint32_t instants) {
   for (std::uint32_t i = 0; i < instants; ++i)
     play.instants.push_back(keyframes.front() +
                             (0.5 + 0.5 * noise.signed_unit(i)) * (keyframes.back() - keyframes.front()));
-  const auto recording = record<float, AvlQueue>(scene, {}, play, Auditor(scene, run));
+  const auto recording =
+      record_strategy<float>(find_strategy("kinetic_aabb"), scene, {}, play, Auditor(scene, run));
   run.events = recording.events;
 
   EnvelopeReport total;
@@ -160,12 +170,10 @@ std::uint64_t exceeded_anywhere(const ExactMotion& motion, const When& when, con
 struct SameNodes {
   const Topologies* built;
   std::uint64_t* changes;
-  template <class Forest>
-  void event(Forest&, const Event&) {}
-  template <class Forest>
-  void stop(Forest& forest, double) {
+  void event(const EventSource<float>&, const EventDescription<float>&) {}
+  void stop(const EventSource<float>& source, double) {
     for (std::uint32_t body = 0; body < built->size(); ++body)
-      *changes += !(forest.tree(body).topology() == (*built)[body]);
+      *changes += !(source.tree(body) == (*built)[body]);
   }
 };
 }  // namespace
@@ -181,8 +189,8 @@ PlanRun measure_plan_changes(const Scene<float>& scene, const PlanScript<float>&
   Playback<float> playback(scene);
   playback.seek(keyframes.front());
   const Topologies topologies = build_topologies(view, playback, play.builder);
-  const auto recording =
-      record<float, AvlQueue>(scene, script, play, SameNodes{&topologies, &run.topology_changes});
+  const auto recording = record_strategy<float>(find_strategy("kinetic_aabb"), scene, script, play,
+                                                SameNodes{&topologies, &run.topology_changes});
   run.violation = check(scene, recording).violation;
   run.updates = script.steps.size();
   for (const auto& step : script.steps) run.changed_plans += step.changes.size();

@@ -29,6 +29,12 @@ struct FrameCount {
   std::uint64_t values = 0;
   std::uint32_t most = 0;
 
+  void add(std::uint32_t body, std::uint32_t node, Side side) {
+    const std::uint32_t bound = 6 * node + side;
+    touched.emplace_back(body, bound);
+    most = std::max(most, ++of_bound[body][bound]);
+    ++values;
+  }
   void new_frame() {
     for (const auto& [body, bound] : touched) of_bound[body][bound] = 0;
     touched.clear();
@@ -36,19 +42,6 @@ struct FrameCount {
     most = 0;
   }
 };
-struct FrameObserver {
-  FrameCount* count;
-  template <class S>
-  void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t, std::uint32_t,
-                        const Instant<S>&) {
-    const std::uint32_t bound = 6 * node + side;
-    count->touched.emplace_back(body, bound);
-    count->most = std::max(count->most, ++count->of_bound[body][bound]);
-    ++count->values;
-  }
-  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
-};
-
 /// Frame by frame against bottom-up, which writes every bound of every body that moves in every frame.
 void compare_frames(const Scene<float>& scene, std::span<const double> frames, FrameRun& run) {
   const SceneView<float> view(scene);
@@ -61,13 +54,18 @@ void compare_frames(const Scene<float>& scene, std::span<const double> frames, F
     count.of_bound.emplace_back(std::size_t(6) * topology.size(), 0);
     bottom_up += std::uint64_t(6) * topology.size();
   }
-  Counting counters;
-  KineticForest<float, AvlQueue<float>, Counting, FrameObserver> forest(
-      view, ClipMotion<float>(playback), topologies, counters, FrameObserver{&count});
-  forest.reset(frames.front());
+  const StrategyEntry& entry = find_strategy("kinetic_aabb");
+  const auto strategy = create(entry, view, playback, topologies,
+                               Params(entry.info.id, entry.info.parameters, {}), CountingPolicy::silent);
+  strategy->reset(frames.front());
+  std::vector<BoundNotice<float>> told;
+  strategy->events()->watch_bounds(&told);
   for (const double t : frames.subspan(1)) {
     count.new_frame();
-    forest.advance(t);
+    told.clear();
+    playback.seek(t);
+    strategy->advance(t);
+    for (const BoundNotice<float>& notice : told) count.add(notice.body, notice.node, notice.side);
     const bool worse = count.values > bottom_up, repeated = count.most > 1;
     run.worse_frames += worse;
     run.repeated_frames += repeated;
@@ -81,16 +79,15 @@ void compare_frames(const Scene<float>& scene, std::span<const double> frames, F
 struct Classify {
   TranslationRun* run;
   const Scene<float>* scene;
-  template <class Forest>
-  void event(const Forest&, const Event& event) {
+  void event(const EventSource<float>&, const EventDescription<float>& done) {
+    const ScheduledEvent<float>& event = done.event;
     const FlightPlans<float>& plans = scene->bodies[event.body].plans;
-    const float* stored = plans.keyframe(plans.segment_at(event.begin));
+    const float* stored = plans.keyframe(plans.segment_at(event.crossing.winner.t0));
     const auto axis = std::size_t(axis_of(event.side));
     run->separated_ties +=
         stored[3 * std::size_t(event.winner) + axis] == stored[3 * std::size_t(event.loser) + axis];
   }
-  template <class Forest>
-  void stop(const Forest&, double) {}
+  void stop(const EventSource<float>&, double) {}
 };
 
 }  // namespace
@@ -105,7 +102,8 @@ std::vector<FrameRun> measure_frames(const Scene<float>& scene, std::span<const 
     run.triangles = scene.primitive_count();
     run.l = l;
     run.frames = frames.size() - 1;
-    const auto recording = record<float, AvlQueue>(scene, {}, Play{paper_builder, l});
+    const auto recording =
+        record_strategy<float>(find_strategy("kinetic_aabb"), scene, {}, Play{paper_builder, l});
     run.events = recording.events;
     run.values = recording.values_written;
     auto log = recording.log();
@@ -126,7 +124,9 @@ TranslationRun measure_translation(const Scene<float>& scene, std::uint64_t roun
   run.triangles = scene.primitive_count();
   run.vertices = scene.vertex_count();
   run.keyframes = overlaid_keyframes(scene).size();
-  run.events = record<float, AvlQueue>(scene, {}, Play{paper_builder, 1}, Classify{&run, &scene}).events;
+  run.events = record_strategy<float>(find_strategy("kinetic_aabb"), scene, {}, Play{paper_builder, 1},
+                                      Classify{&run, &scene})
+                   .events;
   return run;
 }
 

@@ -59,6 +59,20 @@ class TestRatios(unittest.TestCase):
         lines = [line("f", "fcl", [0], [1]), line("sloppy", "refit", [0], [1], guarantee="approximate"), line("a", "refit", [0], [2])]
         self.assertEqual(ratios_of(lines, "with_motion")["f"].middle, 2.0)
 
+    def test_only_declared_baselines_are_a_reference(self) -> None:
+        fast, slow = line("mine", "refit", [0], [1]), line("bottom_up", "refit", [0], [4])
+        fast["strategy"]["baseline"], slow["strategy"]["baseline"] = False, True
+        found = ratios_of([fast, slow], "with_motion")
+        self.assertEqual({name: one.middle for name, one in found.items()}, {"mine": 4.0, "bottom_up": 1.0})
+        other = line("new", "mine", [0], [2])
+        other["strategy"]["baseline"] = True
+        self.assertEqual(ratios_of([fast, slow, other], "with_motion")["mine"].middle, 2.0)
+
+    def test_records_without_the_field_go_by_the_family(self) -> None:
+        old, new = line("old", "refit", [0], [3]), line("k", "kinetic", [0], [1])
+        self.assertNotIn("baseline", old["strategy"])
+        self.assertEqual(ratios_of([old, new], "with_motion")["k"].middle, 3.0)
+
     def test_unequal_repetitions_or_sessions_are_not_paired(self) -> None:
         uneven = [line("a", "refit", [0, 0, 0], [2, 4, 6]), line("k", "kinetic", [0, 0], [1, 2])]
         found = ratios_of(uneven, "with_motion")["k"]

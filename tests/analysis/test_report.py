@@ -63,6 +63,18 @@ class TestPage(ReportCase):
             self.assertTrue(attribute.startswith(("data:", "#")), attribute[:60])
         self.assertNotRegex(page, r"@import|url\(")
 
+    def test_a_refit_that_is_no_baseline_is_shown_and_is_no_denominator(self) -> None:
+        lines = small()
+        for l in (1, 30):
+            mine = dict(id="my_refit", title="My own refit", family="refit", update=0.2, query=0.1, builder=(8, 16))
+            lines.append(synthetic.record(mine, "tablecloth", 2000, "float", l))
+        for line in lines:
+            line["strategy"]["baseline"] = line["strategy"]["id"] == "bottom_up"
+        page = self.page(lines)
+        glance = page[page.index('id="glance"') : page.index("</table>", page.index('id="glance"'))]
+        self.assertIn("My own refit", glance, "the fastest that is no baseline stands in the summary")
+        self.assertIn("Bottom-up refit", glance)
+
     def test_figures_come_as_png_and_pdf(self) -> None:
         self.page(small(), figures="main")
         names = {file.name for file in (self.folder / "figures").iterdir()}

@@ -34,8 +34,8 @@ class FaultyRefit : public StoredHierarchyStrategy<S, Count> {
   static constexpr Foresight foresight = Foresight::none;
   using Base::Base;
 
-  QueryStatus candidates_at(double t, PairBuffer& out, const Budget& budget) override {
-    const QueryStatus status = Base::candidates_at(t, out, budget);
+  QueryStatus find_candidates(double t, PairBuffer& out, const Budget& budget) override {
+    const QueryStatus status = Base::find_candidates(t, out, budget);
     if (out.empty()) return status;
     if constexpr (fault == Fault::repeated_pair) out.push_back(out.front());
     if constexpr (fault == Fault::lost_pair) out.resize(out.size() / 2);
@@ -114,15 +114,15 @@ class LostEvent : public Strategy<S> {
   static constexpr Foresight foresight = Foresight::whole_clip;
   LostEvent(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params&)
       : Strategy<S>(scene, motion), forest_(scene, motion, std::move(topologies), count_) {}
-  void reset(double t) override { forest_.reset(t); }
-  void advance(double t) override {
+  void reset_to(double t) override { forest_.reset(t); }
+  void advance_to(double t) override {
     while (forest_.due(t))
       if (++events_ == 20)
         forest_.queue().pop();
       else
         forest_.handle_next();
   }
-  QueryStatus candidates_at(double, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double, PairBuffer& out, const Budget& budget) override {
     return implicit_candidates<S, Count>(forest_, this->scene_, this->sampled_, stack_, count_, out, budget);
   }
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
@@ -157,13 +157,13 @@ class FaultyMargin : public StoredHierarchyStrategy<S, Count> {
   FaultyMargin(const SceneView<S>& scene, const SteppedMotion<S>& motion, Topologies topologies,
                const Params& params)
       : Base(scene, motion, std::move(topologies), params), motion_(motion), moved_(scene.body_count(), 0) {}
-  void reset(double t) override {
-    Base::reset(t);
+  void reset_to(double t) override {
+    Base::reset_to(t);
     last_ = t;
     for (std::uint32_t body = 0; body < moved_.size(); ++body) inflate(body);
   }
-  void advance(double t) override {
-    Base::advance(t);
+  void advance_to(double t) override {
+    Base::advance_to(t);
     last_ = t;
   }
 
@@ -209,7 +209,7 @@ class FaultyLazy : public StoredHierarchyStrategy<S, Count> {
  public:
   static constexpr Foresight foresight = Foresight::none;
   using Base::Base;
-  QueryStatus candidates_at(double, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double, PairBuffer& out, const Budget& budget) override {
     std::uint64_t tests = 0;
     for (const BodyPair& pair : this->scene_.pairs()) {
       const auto a = side(pair.first), b = side(pair.second);
@@ -272,19 +272,19 @@ class ForgetfulQueue : public AvlQueue<S> {
 /// A kinetic tree that, when geometry changes, repairs leaves and what is near them, but not the certificates
 /// of the ancestors far above.
 template <class S, class Count, bool faulty>
-class LocalRepair : public Strategy<S> {
+class LocalRepair : public Strategy<S>, public TakesGeometryChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
   LocalRepair(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params&)
       : Strategy<S>(scene, motion), motion_(motion), forest_(scene, motion, std::move(topologies), count_) {}
-  void reset(double t) override { forest_.reset(t); }
-  void advance(double t) override { forest_.advance(t); }
-  void geometry_changed(double t, const GeometryChange<S>& change) override {
+  void reset_to(double t) override { forest_.reset(t); }
+  void advance_to(double t) override { forest_.advance(t); }
+  void follow_geometry(double t, const GeometryChange<S>& change) override {
     forest_.queue().forgets = faulty;
     forest_.geometry_changed(t, this->scene_, motion_, body_changes(this->scene_, change));
     forest_.queue().forgets = false;
   }
-  QueryStatus candidates_at(double, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double, PairBuffer& out, const Budget& budget) override {
     return implicit_candidates<S, Count>(forest_, this->scene_, this->sampled_, stack_, count_, out, budget);
   }
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
@@ -320,7 +320,6 @@ std::string violation(const char* id, Tightness tightness = Tightness::tight, co
                       std::uint32_t frames_per_keyframe = 7) {
   StrategyEntry entry = make_entry<Strategy>(info(id));
   entry.info.tightness = tightness;
-  entry.info.can.plan_changes = true;
   const BuilderConfig& builder = entry.info.topology.preferred;
   const std::uint32_t l = frames_per_keyframe;
   return check(entry, synthetic_scene<float>(scene, l), l, {}, builder) + "|" +
@@ -387,7 +386,6 @@ TEST(Faults, LostEvent) {
 template <template <class, class> class Strategy>
 std::string violation_with_changing_geometry(const char* id) {
   Info described = info(id);
-  described.can.geometry_changes = true;
   described.topology.preferred.leaf_size = 1;
   const StrategyEntry entry = make_entry<Strategy>(described);
   const BuilderConfig builder = entry.info.topology.preferred;

@@ -48,12 +48,12 @@ class FaultyVolumes : public VolumeStrategy<S, Count, V> {
   FaultyVolumes(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                 const Params&)
       : Base(scene, motion, std::move(topologies), 0) {}
-  void reset(double t) override {
-    Base::reset(t);
+  void reset_to(double t) override {
+    Base::reset_to(t);
     shrink();
   }
-  void advance(double t) override {
-    Base::advance(t);
+  void advance_to(double t) override {
+    Base::advance_to(t);
     shrink();
   }
   std::optional<AuditView> audit_view(std::uint32_t body) const override {

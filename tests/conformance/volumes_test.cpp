@@ -111,8 +111,8 @@ class Rotating : public VolumeStrategy<S, Count, V> {
  public:
   Rotating(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params&)
       : Base(scene, motion, std::move(topologies), 0) {}
-  void advance(double t) override {
-    Base::advance(t);
+  void advance_to(double t) override {
+    Base::advance_to(t);
     this->on_bodies([&](auto& bodies) {
       for (auto& body : bodies)
         for (int i = 0; i < 8; ++i) rotate_one(body);
@@ -149,11 +149,7 @@ StrategyEntry rotating(Tightness tightness) {
   Info info;
   info.id = "rotating";
   info.tightness = tightness;
-  info.can = {.restructures = true,
-              .plan_changes = true,
-              .geometry_changes = true,
-              .self_pairs = true,
-              .time_budget = true};
+  info.declares = {.restructures = true, .time_budget = true};
   info.topology.widths = {2};
   info.topology.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 2};
   return make_entry<T>(std::move(info));

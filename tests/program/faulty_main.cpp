@@ -18,12 +18,12 @@ class EveryPair : public Strategy<S> {
   static constexpr Foresight foresight = Foresight::none;
   EveryPair(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies, const Params&)
       : Strategy<S>(scene, motion) {}
-  void reset(double t) override { this->start_at(t); }
-  void advance(double) override {
+  void reset_to(double) override {}
+  void advance_to(double) override {
     if (fault == Fault::throws) throw std::runtime_error("out of luck");
     if (fault == Fault::needs_memory && ++advances_ > memory_for()) throw std::bad_alloc();
   }
-  QueryStatus candidates_at(double, PairBuffer& out, const Budget&) override {
+  QueryStatus find_candidates(double, PairBuffer& out, const Budget&) override {
     for (const BodyPair& pair : this->scene_.pairs())
       for (std::uint32_t a = 0; a < this->scene_.primitives(pair.first).count(); ++a)
         for (std::uint32_t b = 0; b < this->scene_.primitives(pair.second).count(); ++b)
@@ -31,8 +31,8 @@ class EveryPair : public Strategy<S> {
     if (fault == Fault::repeats_a_pair && !out.empty()) out.push_back(out.front());
     return {};
   }
-  void confirm(double t, PairBuffer& pairs) override {
-    Strategy<S>::confirm(t, pairs);
+  void confirm_candidates(double t, PairBuffer& pairs) override {
+    Strategy<S>::confirm_candidates(t, pairs);
     if (fault == Fault::loses_a_pair && !pairs.empty()) pairs.pop_back();
   }
   std::size_t bytes() const override { return 0; }

@@ -272,12 +272,17 @@ TEST_F(Options, MisspeltNamesGetASuggestion) {
 
 TEST_F(Options, ParametersAreRefusedBeforeAnythingIsMeasured) {
   const std::pair<std::string, std::string> cases[] = {
-      {"interval_join.pieces=1.5", "pieces must be a whole number from 1 to 64, got 1.5"},
-      {"interval_join.remember_mb=1e7", "remember_mb must be from 0 to a million, got 10000000"},
-      {"bottom_up.threads=2.5", "threads must be a whole number from 1 to 1024, got 2.5"},
-      {"bottom_up_budget.box_tests=1e300", "box_tests must be a whole number from 1 to 1e15, got 1e+300"},
-      {"bottom_up_budget.box_tests=2.5", "box_tests must be a whole number from 1 to 1e15, got 2.5"},
-      {"kinetic_boxtree.check_every=1e300", "check_every must be a whole number from 1 to 1e15, got 1e+300"},
+      {"interval_join.pieces=1.5",
+       "'pieces' of 'interval_join' cannot be '1.5': it is a whole number from 1 to 64"},
+      {"interval_join.remember_mb=1e7",
+       "'remember_mb' of 'interval_join' cannot be '10000000': it is a number from 0 to 1e+06"},
+      {"bottom_up.threads=2.5", "'threads' of 'bottom_up' cannot be '2.5': it is a whole number from 1 to"},
+      {"bottom_up_budget.box_tests=1e300",
+       "'box_tests' of 'bottom_up_budget' cannot be '1e+300': it is a whole number from 1 to 1e+15"},
+      {"bottom_up_budget.box_tests=2.5",
+       "'box_tests' of 'bottom_up_budget' cannot be '2.5': it is a whole number from 1 to 1e+15"},
+      {"kinetic_boxtree.check_every=1e300",
+       "'check_every' of 'kinetic_boxtree' cannot be '1e+300': it is a whole number from 1 to 1e+15"},
       {"bottom_up.threads=", "threads"},
       {"bottom_up.threads=nan", "'nan'"},
       {"bottom_up.threads=1e999", "'1e999'"}};

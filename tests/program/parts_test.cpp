@@ -509,6 +509,27 @@ TEST(Table, RatiosAreAgainstTheBestRefit) {
             "  wrong is refused a time: it is wrong\n");
 }
 
+// A refit of one's own is shown in the table, and no ratio is against it unless it is declared a baseline.
+TEST(Table, OnlyDeclaredBaselinesAreTheDenominator) {
+  std::vector<json> records{example_record("mine", "refit", 1), example_record("bottom_up", "refit", 4),
+                            example_record("new", "other", 2)};
+  records[0]["strategy"]["baseline"] = false;
+  records[1]["strategy"]["baseline"] = true;
+  records[2]["strategy"]["baseline"] = false;
+  EXPECT_EQ(best_refit(records), &records[1]);
+  EXPECT_NE(results_table(records).find("\nmine            1       2      0        4"), std::string::npos)
+      << results_table(records);
+  records[2]["strategy"]["baseline"] = true;
+  EXPECT_EQ(best_refit(records), &records[2]);
+}
+
+TEST(Table, CountersOfAStrategysOwnAreShown) {
+  std::vector<json> records{example_record("mine", "refit", 1)};
+  records[0]["counters"] = {{"box_tests", 5}, {"restarts", 7}, {"never", 0}};
+  EXPECT_NE(results_table(records).find("  mine counted restarts 7\n"), std::string::npos)
+      << results_table(records);
+}
+
 TEST(Table, ColumnsCountCharacters) {
   EXPECT_EQ(columns({{"ä", "b"}, {"long", "2"}}), "ä     b\nlong  2\n");
 }

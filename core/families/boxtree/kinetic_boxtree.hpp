@@ -89,6 +89,20 @@ class KineticBoxTree {
   /// The vertex that realises a node's own side; any side of the root.
   std::uint32_t realiser(std::uint32_t node, Side side) const { return realisers_[place(node, side)]; }
   std::uint32_t realiser(std::uint32_t node) const { return realisers_[node + 5]; }
+  /// The vertex that realises a side of a node; `no_vertex` for a side that it inherits.
+  std::uint32_t realiser_or_none(std::uint32_t node, Side side) const {
+    return (sides_of(node) >> side & 1) != 0 ? realiser(node, side) : no_vertex;
+  }
+  /// Of a side that the node owns.
+  std::uint32_t slot(std::uint32_t node, Side side) const {
+    return slots_.slot(std::uint32_t(place(node, side)));
+  }
+  /// The node whose certificate has this node's realiser among its candidates; not of the root.
+  std::uint32_t certificate_above(std::uint32_t node, Side side) const {
+    do node = topology_.parents[node];
+    while ((sides_of(node) >> side & 1) == 0);
+    return node;
+  }
   /// Of the root: [lower x, upper x, lower y, ...].
   const std::uint32_t* root_realisers() const { return realisers_.data(); }
   /// Unique, ascending; of a leaf.
@@ -260,9 +274,6 @@ class KineticBoxTree {
   static constexpr std::uint32_t marked_only = 0x40;  ///< above all sides: a node on a marked path
 
   std::size_t place(std::uint32_t node, Side side) const { return node == 0 ? side : node + 5; }
-  std::uint32_t slot(std::uint32_t node, Side side) const {
-    return slots_.slot(std::uint32_t(place(node, side)));
-  }
   /// The sides that the node owns, one bit each.
   std::uint32_t sides_of(std::uint32_t node) const { return node == 0 ? all_sides : 1u << own_sides_[node]; }
   /// The node whose certificate has this node's realiser among its candidates.

@@ -18,10 +18,12 @@ namespace kbvh {
 /// lie in, so that it runs on the same kernels as that of a refit. Nodes that the last queries came to are
 /// made in one go beforehand: call by call, a coordinate costs several times as much.
 template <class S, class Count>
-class RealiserStrategy : public Strategy<S> {
+class RealiserStrategy : public CountedStrategy<S, Count> {
  public:
   RealiserStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies)
-      : Strategy<S>(scene, motion), motion_(motion), near_bodies_(scene.pairs(), scene.body_count()) {
+      : CountedStrategy<S, Count>(scene, motion),
+        motion_(motion),
+        near_bodies_(scene.pairs(), scene.body_count()) {
     bodies_.resize(scene.body_count());
     for (std::uint32_t index = 0; index < scene.body_count(); ++index) {
       Body& body = bodies_[index];
@@ -33,7 +35,7 @@ class RealiserStrategy : public Strategy<S> {
         scene.pairs(), [&](std::uint32_t body) -> const auto& { return bodies_[body].hierarchy; });
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) make_visited(index);
@@ -58,7 +60,7 @@ class RealiserStrategy : public Strategy<S> {
       }
       status.pending += query_.lazy_status().pending;
     }
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
     return status;
   }
 
@@ -120,7 +122,6 @@ class RealiserStrategy : public Strategy<S> {
   SegmentMotion<S> motion_;
   NearBodies near_bodies_;
   std::vector<Body> bodies_;
-  Count count_;
 
  private:
   static constexpr std::uint32_t visits_kept = 16;  ///< frames; then they are learnt anew
@@ -168,7 +169,7 @@ class RealiserStrategy : public Strategy<S> {
         kernels.collect(places, this->sampled_.positions(index), scalars, values + i * scalars);
       }
       if (on_lines) {
-        count_.add(Counter::positions_fetched, many * scalars / 3);
+        this->count_.add(Counter::positions_fetched, many * scalars / 3);
         round_chord(values, ends, many * scalars, body.line_times[0], body.line_times[1], this->time(),
                     values);
       }

@@ -3,6 +3,7 @@
 #include <variant>
 
 #include "core/contract/strategy.hpp"
+#include "core/families/events/event_log.hpp"
 #include "core/families/events/kinetic_forest.hpp"
 #include "core/families/events/realiser_boxes.hpp"
 #include "core/families/wide/near_bodies.hpp"
@@ -13,9 +14,9 @@ namespace kbvh {
 /// A strategy of kinetic AABB trees (Z&W s.4) and nothing else: boxes are read from the realisers when a
 /// query asks. `Queues` are the event queues that it can be made with; their clock decides what an event is.
 template <class S, class Count, class... Queues>
-class KineticAabbStrategy : public Strategy<S> {
+class KineticAabbStrategy : public CountedStrategy<S, Count> {
   template <class Queue>
-  using Forest = KineticForest<S, Queue, Count>;
+  using Forest = KineticForest<S, Queue, Count, BoundObserver<S>>;
 
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
@@ -23,33 +24,28 @@ class KineticAabbStrategy : public Strategy<S> {
   /// `queue` is the index among Queues of the one to use.
   KineticAabbStrategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                       std::size_t queue)
-      : Strategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+      : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
     for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
     std::size_t index = 0;
     (void)((index++ == queue &&
-            (forest_ = std::make_unique<Forest<Queues>>(scene, motion, std::move(topologies), count_),
+            (forest_ = std::make_unique<Forest<Queues>>(scene, motion, std::move(topologies), this->count_,
+                                                        BoundObserver<S>{&watch_}),
              true)) ||
            ...);
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double t) override {
     near_bodies_.start_over();
     on_forest([&](auto& forest) { forest.reset(t); });
-    // What starting costs is not what running costs: counts begin here.
-    count_.table = {};
-    first_step_ = on_forest([](auto& forest) { return forest.queue().steps(); });
-    first_fetch_ = this->sampled_.fetched();
     new_frame();
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double t) override {
     on_forest([&](auto& forest) { forest.advance(t); });
     new_frame();
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     BoxTests tests;
     on_forest([&](auto& forest) {
@@ -76,23 +72,8 @@ class KineticAabbStrategy : public Strategy<S> {
                               .pending;
       }
     });
-    count_.add(Counter::box_tests, tests.made);
+    this->count_.add(Counter::box_tests, tests.made);
     return status;
-  }
-
-  void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) override {
-    this->stand_at(t);
-    on_forest([&](auto& forest) { forest.plans_changed(t, changes); });
-    new_frame();  // realisers may differ now
-  }
-
-  void geometry_changed(double t, const GeometryChange<S>& change) override {
-    const std::vector<BodyChange> changes = body_changes(this->scene_, change);
-    on_forest([&](auto& forest) {
-      forest.geometry_changed(t, this->scene_, this->sampled_, changes);
-      for (const BodyChange& own : changes) caches_[own.body].resize(forest.tree(own.body).topology().size());
-    });
-    new_frame();
   }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
@@ -117,31 +98,84 @@ class KineticAabbStrategy : public Strategy<S> {
   }
 
  protected:
-  Counters counted() const override {
-    Counters table = count_.table;
-    if constexpr (Count::enabled) {
-      table[Counter::queue_steps] =
-          on_forest([](auto& forest) { return forest.queue().steps(); }) - first_step_;
-      table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
-    }
-    return table;
+  /// What a derived class does in `follow_plans` if it takes changes of plans.
+  void change_plans(double t, std::span<const PlanChange<S>> changes) {
+    on_forest([&](auto& forest) { forest.plans_changed(t, changes); });
+    new_frame();  // realisers may differ now
   }
 
- private:
+  /// What a derived class does in `follow_geometry` if it takes changes of geometry.
+  void change_geometry(double t, const GeometryChange<S>& change) {
+    const std::vector<BodyChange> changes = body_changes(this->scene_, change);
+    on_forest([&](auto& forest) {
+      forest.geometry_changed(t, this->scene_, this->sampled_, changes);
+      for (const BodyChange& own : changes) caches_[own.body].resize(forest.tree(own.body).topology().size());
+    });
+    new_frame();
+  }
+
+  void counts_cleared() override {
+    first_step_ = on_forest([](auto& forest) { return forest.queue().steps(); });
+  }
+  void add_counts(Counters& table) const override {
+    table[Counter::queue_steps] =
+        on_forest([](auto& forest) { return forest.queue().steps(); }) - first_step_;
+  }
+
   template <class Work>
   decltype(auto) on_forest(Work&& work) const {
     return std::visit([&](const auto& forest) -> decltype(auto) { return work(*forest); }, forest_);
   }
+  BoundWatch<S> watch_;
+
+ private:
   void new_frame() {
     for (auto& cache : caches_) cache.new_frame();
   }
 
-  Count count_;
   std::variant<std::unique_ptr<Forest<Queues>>...> forest_;
   NearBodies near_bodies_;
   std::vector<BoxCache<S>> caches_;
   std::vector<NodePair> stack_;
-  std::uint64_t first_step_ = 0, first_fetch_ = 0;
+  std::uint64_t first_step_ = 0;
+};
+
+/// The same on clocks that are exact (EventClock): plans and geometry may change, and events can be stepped.
+template <class S, class Count, class... Queues>
+class ExactKineticAabbStrategy : public KineticAabbStrategy<S, Count, Queues...>,
+                                 public EventSource<S>,
+                                 public TakesPlanChanges<S>,
+                                 public TakesGeometryChanges<S> {
+ public:
+  using KineticAabbStrategy<S, Count, Queues...>::KineticAabbStrategy;
+
+  std::optional<ScheduledEvent<S>> next_event() const override {
+    return this->on_forest([](auto& forest) {
+      return forest.queue().empty() ? std::optional<ScheduledEvent<S>>()
+                                    : described(forest, forest.queue().top());
+    });
+  }
+  void scheduled_events(std::vector<ScheduledEvent<S>>& out) const override {
+    this->on_forest([&](auto& forest) { list_events(forest, out); });
+  }
+  const Topology& tree(std::uint32_t body) const override {
+    return this->on_forest([&](auto& forest) -> const Topology& { return forest.tree(body).topology(); });
+  }
+  std::uint32_t realiser(std::uint32_t body, std::uint32_t node, std::uint32_t side) const override {
+    return this->on_forest([&](auto& forest) { return forest.tree(body).realiser(node, side); });
+  }
+  void watch_bounds(std::vector<BoundNotice<S>>* log) override { this->watch_.log = log; }
+
+ protected:
+  bool step(double until, EventDescription<S>& out) override {
+    return this->on_forest([&](auto& forest) { return step_forest(forest, this->watch_, until, out); });
+  }
+  void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
+    this->change_plans(t, changes);
+  }
+  void follow_geometry(double t, const GeometryChange<S>& change) override {
+    this->change_geometry(t, change);
+  }
 };
 
 }  // namespace kbvh

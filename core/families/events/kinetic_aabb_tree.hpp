@@ -9,6 +9,7 @@
 #include "core/base/assert.hpp"
 #include "core/base/counters.hpp"
 #include "core/base/list_pool.hpp"
+#include "core/contract/event_source.hpp"
 #include "core/families/events/certificate_slots.hpp"
 #include "core/families/events/event.hpp"
 #include "core/families/events/realiser_boxes.hpp"
@@ -17,9 +18,6 @@
 #include "core/topology/topology_edit.hpp"
 
 namespace kbvh {
-
-/// The realiser of a bound that did not exist before (in notices).
-inline constexpr std::uint32_t no_vertex = std::numeric_limits<std::uint32_t>::max();
 
 /// Change notices for a kinetic tree that nobody watches.
 ///
@@ -85,6 +83,9 @@ class KineticAabbTree {
   std::uint32_t slot(std::uint32_t node, Side side) const { return slots_.slot(6 * node + side); }
   /// The node that a slot of the queue belongs to.
   std::uint32_t node_of(std::uint32_t slot) const { return slots_.place(slot) / 6; }
+  /// The node whose certificate is concerned, but for its own, when a realiser of `node` changes; not of the
+  /// root.
+  std::uint32_t certificate_above(std::uint32_t node, Side /*side*/) const { return topology_.parents[node]; }
   std::uint32_t realiser(std::uint32_t node, Side side) const {
     return realisers_[std::size_t(6) * node + side];
   }

@@ -15,6 +15,7 @@ template <class S, class Queue, class Count, class Observer = NoObserver,
           template <class, class, class, class> class KineticTree = KineticAabbTree>
 class KineticForest {
  public:
+  using Scalar = S;
   using Tree = KineticTree<S, Queue, Count, Observer>;
   using Clock = typename Queue::ClockType;
 

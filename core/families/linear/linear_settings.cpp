@@ -1,7 +1,5 @@
 #include "core/families/linear/linear_settings.hpp"
 
-#include <cmath>
-
 namespace kbvh {
 
 std::vector<Parameter> linear_parameters() {
@@ -9,8 +7,10 @@ std::vector<Parameter> linear_parameters() {
       {"pieces",
        "1",
        {},
-       "each segment between keyframes is cut into so many, for tighter boxes; 1 to 64",
-       1},
+       "each segment between keyframes is cut into so many, for tighter boxes",
+       1,
+       SegmentCuts::most,
+       Numbers::whole},
       {"max_looseness",
        "0",
        {},
@@ -22,19 +22,13 @@ std::vector<Parameter> linear_parameters() {
        {},
        "megabytes for boxes at ends of segments that are used again when the clip plays again; a study plays "
        "it again for each repetition, so that its times are then those of a loop and not of a first time",
-       0}};
+       0,
+       1e6}};
 }
 
 LinearSettings linear_settings(const Params& params) {
-  const double wanted = params.number("pieces"), looseness = params.number("max_looseness");
-  if (!(wanted >= 1 && wanted <= SegmentCuts::most) || wanted != std::floor(wanted))
-    throw ConfigError("pieces must be a whole number from 1 to 64, got " + params.word("pieces"));
-  if (!(looseness >= 0))
-    throw ConfigError("max_looseness must not be negative, got " + params.word("max_looseness"));
-  const double remembered = params.number("remember_mb");
-  if (!(remembered >= 0 && remembered < 1e6))
-    throw ConfigError("remember_mb must be from 0 to a million, got " + params.word("remember_mb"));
-  return {{std::uint32_t(wanted), looseness}, std::size_t(remembered * 1e6)};
+  return {{std::uint32_t(params.number("pieces")), params.number("max_looseness")},
+          std::size_t(params.number("remember_mb") * 1e6)};
 }
 
 }  // namespace kbvh

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/families/events/event.hpp"
+#include "core/families/events/event_log.hpp"
 
 namespace kbvh {
 
@@ -38,6 +38,19 @@ struct ChangedBoxes {
     nodes->push_back({body, to, false});
   }
   void subtree_rebuilt(std::uint32_t body, std::uint32_t node) { nodes->push_back({body, node, false}); }
+};
+
+/// The same, also for who watches changes of bounds.
+template <class S>
+struct WatchedBoxes : ChangedBoxes {
+  BoundObserver<S> bounds;
+
+  template <class T>
+  void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t old_vertex,
+                        std::uint32_t new_vertex, const Instant<T>& now) {
+    ChangedBoxes::realiser_changed(body, node, side, old_vertex, new_vertex, now);
+    bounds.realiser_changed(body, node, side, old_vertex, new_vertex, now);
+  }
 };
 
 }  // namespace kbvh

@@ -19,7 +19,7 @@ namespace kbvh {
 template <class S, template <class> class Queue, class Count>
 class KineticCollision {
  public:
-  using Forest = KineticForest<S, Queue<EventClock<S>>, Count, ChangedBoxes>;
+  using Forest = KineticForest<S, Queue<EventClock<S>>, Count, WatchedBoxes<S>>;
   using List = SeparationList<S, Queue, Count>;
 
   KineticCollision(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
@@ -28,7 +28,8 @@ class KineticCollision {
         near_bodies_(scene.pairs(), scene.body_count()),
         body_pairs_(scene.pairs()),
         count_(&count),
-        forest_(scene, motion, std::move(topologies), count, ChangedBoxes{&changed_, &nodes_}),
+        forest_(scene, motion, std::move(topologies), count,
+                WatchedBoxes<S>{{&changed_, &nodes_}, {&watch_}}),
         list_(scene, forest_, count, look_ahead,
               near_bodies_.searches() ? List::BodyPairs::none : List::BodyPairs::all),
         number_of_(near_bodies_.searches() ? body_pairs_.size() : 0, List::none) {}
@@ -66,6 +67,39 @@ class KineticCollision {
     if (pair.hint + error < tree.hint) return false;
     return compare_crossings(forest_.clock().crossing(tree), pair.crossing) <= 0;
   }
+
+  /// The first event of all; nothing if none is scheduled.
+  std::optional<ScheduledEvent<S>> next_event() const {
+    if (window_end_ < never && !forest_.due(window_end_) && !list_.due(window_end_)) return window_event();
+    if (tree_is_first())
+      return forest_.queue().empty() ? std::optional<ScheduledEvent<S>>()
+                                     : described(forest_, forest_.queue().top());
+    return list_.described(list_.top());
+  }
+  /// Replaces `out` by all scheduled events, first event first.
+  void scheduled_events(std::vector<ScheduledEvent<S>>& out) const {
+    std::vector<ScheduledEvent<S>> pairs;
+    list_events(forest_, out);
+    list_.list_events(pairs);
+    if (window_end_ < never) pairs.push_back(window_event());
+    out.insert(out.end(), pairs.begin(), pairs.end());
+    // Each part is in order already; at one instant trees come first, and a window opens last.
+    std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return comes_before(a, b); });
+  }
+  /// Handles the first event of all if it is due by `until`, and describes it.
+  bool step(double until, EventDescription<S>& out) {
+    if (!due(until)) return false;
+    out.event = *next_event();
+    out.rescheduled.clear();
+    {
+      const WatchedEvent<S> watched(watch_, out.touched);
+      handle_next();
+    }
+    append_rescheduled(forest_, out.touched, out.rescheduled);
+    return true;
+  }
+  /// Where changes of bounds are written.
+  BoundWatch<S>& watch() { return watch_; }
 
   /// A double after the first event of all, if by little.
   double after_next() const {
@@ -121,6 +155,21 @@ class KineticCollision {
   }
 
  private:
+  ScheduledEvent<S> window_event() const {
+    ScheduledEvent<S> event;
+    event.kind = EventKind::window;
+    event.time = {window_end_, 0};
+    return event;
+  }
+  static bool comes_before(const ScheduledEvent<S>& a, const ScheduledEvent<S>& b) {
+    const double error = a.time.error + b.time.error;
+    if (a.time.time + error < b.time.time) return true;
+    if (b.time.time + error < a.time.time) return false;
+    if (a.has_crossing && b.has_crossing) return compare_crossings(a.crossing, b.crossing) < 0;
+    if (a.has_crossing) return compare_crossing_to(a.crossing, b.time.time) < 0;
+    if (b.has_crossing) return compare_crossing_to(b.crossing, a.time.time) > 0;
+    return a.time.time < b.time.time;
+  }
   static constexpr double never = std::numeric_limits<double>::infinity();
   static constexpr int most_halvings = 40;
 
@@ -209,6 +258,7 @@ class KineticCollision {
   NearBodies near_bodies_;
   std::span<const BodyPair> body_pairs_;  ///< of the scene
   Count* count_;
+  BoundWatch<S> watch_;
   std::vector<ChangedBoxes::Box> changed_;
   std::vector<ChangedBoxes::Node> nodes_;
   Forest forest_;

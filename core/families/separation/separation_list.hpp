@@ -215,6 +215,32 @@ class SeparationList {
     return work_done_;
   }
 
+  /// An event of the list as the contract describes it.
+  ScheduledEvent<S> described(const Event& event) const {
+    const Pair& pair = pairs_[event.slot];
+    ScheduledEvent<S> out;
+    out.kind = event.review       ? EventKind::review
+               : pair.overlapping ? EventKind::boxes_separate
+                                  : EventKind::boxes_meet;
+    out.body = body_of(pair, 0);
+    out.node = pair.a;
+    out.other_body = body_of(pair, 1);
+    out.other_node = pair.b;
+    out.time = {event.hint, event.error};
+    out.has_crossing = !event.review;
+    if (out.has_crossing) out.crossing = event.crossing;
+    return out;
+  }
+  /// Appends all scheduled events in their order.
+  void list_events(std::vector<ScheduledEvent<S>>& out) const {
+    std::vector<Event> events;
+    for (std::uint32_t slot = 0; slot < queue_.slots(); ++slot)
+      if (queue_.scheduled(slot)) events.push_back(queue_.event(slot));
+    std::sort(events.begin(), events.end(),
+              [&](const Event& a, const Event& b) { return clock_.earlier(a, b); });
+    for (const Event& event : events) out.push_back(described(event));
+  }
+
   /// The overlapping leaves of one body pair, in no order.
   std::span<const LeafPair> leaf_pairs(std::size_t body_pair) const { return leaves_[body_pair]; }
   /// Pairs in the list: apart, or overlapping leaves.

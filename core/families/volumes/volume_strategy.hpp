@@ -17,7 +17,10 @@ namespace kbvh {
 ///
 /// Within one body the traversal meets each two leaves in both orders; one is dropped.
 template <class S, class Count, BoundingVolume... Volumes>
-class VolumeStrategy : public Strategy<S> {
+class VolumeStrategy : public CountedStrategy<S, Count>,
+                       public TakesPlanChanges<S>,
+                       public TakesGeometryChanges<S>,
+                       public AnswersSelfPairs {
   template <class V>
   using Bodies = std::vector<VolumeHierarchy<V>>;
 
@@ -27,7 +30,7 @@ class VolumeStrategy : public Strategy<S> {
   /// `kind` is the index among Volumes of the kind to use.
   VolumeStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                  std::size_t kind)
-      : Strategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+      : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
     std::size_t index = 0;
     (void)((index++ == kind && (bodies_.template emplace<Bodies<Volumes>>(), true)) || ...);
     const std::vector<Cover> cover = covers(scene);
@@ -39,8 +42,7 @@ class VolumeStrategy : public Strategy<S> {
 
   /// Starts over with the topologies of the start, or of the last change of geometry: what exchanged subtrees
   /// since then is taken back.
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     plans_changed_ = false;
     near_bodies_.start_over();
     on_bodies([&](auto& bodies) {
@@ -49,18 +51,16 @@ class VolumeStrategy : public Strategy<S> {
         update(bodies[body], body);
       }
     });
-    count_.table = {};
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double /*t*/) override {
     on_bodies([&](auto& bodies) {
       for (std::uint32_t body = 0; body < bodies.size(); ++body)
         if (this->scene_.moving(body) || plans_changed_) update(bodies[body], body);
     });
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     BoxTests tests;
     on_bodies([&](auto& bodies) {
@@ -85,18 +85,18 @@ class VolumeStrategy : public Strategy<S> {
                               .pending;
       }
     });
-    count_.add(Counter::box_tests, tests.made);
+    this->count_.add(Counter::box_tests, tests.made);
     return status;
   }
 
   /// Positions are all it reads: no body is at rest for certain any more.
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     plans_changed_ = true;
   }
 
   /// Edits the topologies locally, guided by boxes, and lays them out anew: O(nodes) for each body that
   /// changes.
-  void geometry_changed(double /*t*/, const GeometryChange<S>& change) override {
+  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
     plans_changed_ = true;  // new vertices have plans of their own
     on_bodies([&](auto& bodies) {
       for (const BodyChange& own : body_changes(this->scene_, change)) {
@@ -125,8 +125,6 @@ class VolumeStrategy : public Strategy<S> {
   }
 
  protected:
-  Counters counted() const override { return count_.table; }
-
   /// Calls work(bodies) with the hierarchies of all bodies, of the kind in use.
   template <class Work>
   decltype(auto) on_bodies(Work&& work) {
@@ -167,9 +165,9 @@ class VolumeStrategy : public Strategy<S> {
   void update(VolumeHierarchy<V>& hierarchy, std::uint32_t body) {
     hierarchy.refit(this->sampled_.positions(body));
     const std::uint64_t nodes = hierarchy.topology().size();
-    count_.add(Counter::nodes_visited, nodes);
-    count_.add(Counter::values_written, nodes * (sizeof(V) / sizeof(S)));
-    count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
+    this->count_.add(Counter::nodes_visited, nodes);
+    this->count_.add(Counter::values_written, nodes * (sizeof(V) / sizeof(S)));
+    this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
   }
 
   template <class V>
@@ -185,7 +183,6 @@ class VolumeStrategy : public Strategy<S> {
   NearBodies near_bodies_;
   std::variant<Bodies<Volumes>...> bodies_;
   std::vector<NodePair> stack_;
-  Count count_;
   bool plans_changed_ = false;
 };
 

@@ -17,13 +17,15 @@ inline Box<S> leaf_box(std::span<const std::uint32_t> vertices, const S* positio
 }
 
 /// Everything that strategies with stored boxes share, the query included: `update(body)` is all that a
-/// derived class must say. Bodies that cannot move are brought up to date at `reset` only.
+/// derived class must say. Bodies that cannot move are brought up to date at `reset` only. Most strategies
+/// derive from StoredHierarchyStrategy, which takes changes of plans, too.
 template <class S, class Count>
-class StoredHierarchyStrategy : public Strategy<S> {
+class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
  public:
-  StoredHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
-                          const Params& /*params*/, KernelSet kernels = active_kernel_set())
-      : Strategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+  FixedPlansHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion,
+                              Topologies topologies, const Params& /*params*/,
+                              KernelSet kernels = active_kernel_set())
+      : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
     hierarchies_.resize(scene.body_count());
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), kernels);
@@ -31,19 +33,16 @@ class StoredHierarchyStrategy : public Strategy<S> {
         scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
   }
 
-  void reset(double t) override {
-    this->start_at(t);
+  void reset_to(double /*t*/) override {
     plans_changed_ = false;
     near_bodies_.start_over();
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
       hierarchies_[body].positions_changed();
       refit(body);
     }
-    count_.table = {};
   }
 
-  void advance(double t) override {
-    this->move_to(t);
+  void advance_to(double /*t*/) override {
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body)
       if (this->scene_.moving(body) || plans_changed_) {
         hierarchies_[body].positions_changed();
@@ -51,7 +50,7 @@ class StoredHierarchyStrategy : public Strategy<S> {
       }
   }
 
-  QueryStatus candidates_at(double /*t*/, PairBuffer& out, const Budget& budget) override {
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
     for_near_bodies(tests, [&](const BodyPair& pair) {
@@ -63,13 +62,8 @@ class StoredHierarchyStrategy : public Strategy<S> {
                          this->scene_, this->sampled_, rest_of(budget, tests), out, tests)
                     .pending;
     });
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
     return status;
-  }
-
-  /// Positions are all it reads: nothing to do but to remember that no body is at rest for certain.
-  void flight_plans_changed(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
-    plans_changed_ = true;
   }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
@@ -110,22 +104,20 @@ class StoredHierarchyStrategy : public Strategy<S> {
   virtual void topology_changed(std::uint32_t /*body*/) {}
   /// The broad phase of contacts by one refit to both ends of the motion, on the topologies as they are at
   /// its first call: what a strategy that declares contacts can do in `swept_pairs`.
-  void sweep(double t0, double t1, std::span<const S* const> before, PairBuffer& out) {
-    this->stand_at(t0);
-    this->move_to(t1);
+  void sweep(std::span<const S* const> before, PairBuffer& out) {
     if (!swept_)
       swept_.emplace(
           this->scene_, [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
     swept_->refit(before, this->sampled_);
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
       const std::uint64_t nodes = hierarchies_[body].topology().size();
-      count_.add(Counter::nodes_visited, nodes);
-      count_.add(Counter::values_written, 6 * nodes);
-      count_.add(Counter::vertex_reads, 2 * hierarchies_[body].leaf_vertex_count());
+      this->count_.add(Counter::nodes_visited, nodes);
+      this->count_.add(Counter::values_written, 6 * nodes);
+      this->count_.add(Counter::vertex_reads, 2 * hierarchies_[body].leaf_vertex_count());
     }
     std::uint64_t tests = 0;
     swept_->pairs(query_, out, tests);
-    count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, tests);
   }
   /// Calls work(pair) for each pair of the scene's bodies whose boxes overlap, or for all where these are
   /// few.
@@ -137,14 +129,25 @@ class StoredHierarchyStrategy : public Strategy<S> {
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) work(this->scene_.pairs()[i]);
   }
   void refit(std::uint32_t body) { hierarchies_[body].refit(this->sampled_.positions(body)); }
-  Counters counted() const override { return count_.table; }
 
   std::vector<WideHierarchy<S>> hierarchies_;
   NearBodies near_bodies_;
   WideQuery<S> query_;
-  Count count_;
   bool plans_changed_ = false;
   std::optional<SweptHierarchies<S>> swept_;  ///< made when contacts are first asked for
+};
+
+/// The same for plans that change, too.
+template <class S, class Count>
+class StoredHierarchyStrategy : public FixedPlansHierarchyStrategy<S, Count>, public TakesPlanChanges<S> {
+ public:
+  using FixedPlansHierarchyStrategy<S, Count>::FixedPlansHierarchyStrategy;
+
+ protected:
+  /// Positions are all it reads: nothing to do but to remember that no body is at rest for certain.
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+    this->plans_changed_ = true;
+  }
 };
 
 }  // namespace kbvh

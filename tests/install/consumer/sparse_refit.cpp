@@ -27,8 +27,8 @@ class SparseRefit final : public kbvh::StoredHierarchyStrategy<S, Count> {
     }
   }
 
-  void reset(double t) override {
-    Base::reset(t);
+  void reset_to(double t) override {
+    Base::reset_to(t);
     for (std::uint32_t body = 0; body < seen_.size(); ++body)
       std::copy_n(this->sampled_.positions(body), seen_[body].positions.size(),
                   seen_[body].positions.begin());
@@ -110,7 +110,7 @@ KBVH_STRATEGY(sparse_refit) {
       .title = "refit of what moved",
       .family = "refit",
       .citation = "kbvh's example of a strategy from outside its tree",
-      .can = {.plan_changes = true, .time_budget = true},
+      .declares = {.time_budget = true},
       .topology = {.preferred = {.method = kbvh::BuildMethod::median, .width = 2, .leaf_size = 4}},
   })};
 }

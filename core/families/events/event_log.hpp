@@ -1,0 +1,114 @@
+#pragma once
+#include <algorithm>
+#include <vector>
+
+#include "core/contract/event_source.hpp"
+#include "core/families/events/event.hpp"
+
+namespace kbvh {
+
+/// Where changes of bounds are written while somebody watches.
+template <class S>
+struct BoundWatch {
+  std::vector<BoundNotice<S>>* log = nullptr;    ///< of who watches all the time, or null
+  std::vector<BoundNotice<S>>* event = nullptr;  ///< of the event that is being stepped, or null
+};
+
+/// Writes changes of bounds to `touched` for as long as it lives.
+template <class S>
+class WatchedEvent {
+ public:
+  WatchedEvent(BoundWatch<S>& watch, std::vector<BoundNotice<S>>& touched) : watch_(&watch) {
+    touched.clear();
+    watch.event = &touched;
+  }
+  ~WatchedEvent() { watch_->event = nullptr; }
+  WatchedEvent(const WatchedEvent&) = delete;
+  WatchedEvent& operator=(const WatchedEvent&) = delete;
+
+ private:
+  BoundWatch<S>* watch_;
+};
+
+/// An observer of kinetic trees (see NoObserver) that writes changes of bounds where `watch` says.
+template <class S>
+struct BoundObserver {
+  const BoundWatch<S>* watch = nullptr;
+
+  template <class T>
+  void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t old_vertex,
+                        std::uint32_t new_vertex, const Instant<T>& now) {
+    if (watch->log == nullptr && watch->event == nullptr) return;
+    const BoundNotice<S> change{body,
+                                node,
+                                side,
+                                old_vertex,
+                                new_vertex,
+                                now.begin,
+                                now.exact != nullptr,
+                                now.exact != nullptr ? *now.exact : Crossing<S>{}};
+    if (watch->log != nullptr) watch->log->push_back(change);
+    if (watch->event != nullptr) watch->event->push_back(change);
+  }
+  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
+};
+
+/// An event of a kinetic forest as the contract describes it.
+template <class Forest, class S = typename Forest::Scalar>
+ScheduledEvent<S> described(const Forest& forest, const Event& event) {
+  ScheduledEvent<S> out;
+  out.kind = EventKind::bound;
+  out.body = event.body;
+  out.node = forest.tree(event.body).node_of(event.slot);
+  out.side = event.side;
+  out.winner = event.winner;
+  out.loser = event.loser;
+  out.time = {event.hint, event.error};
+  out.has_crossing = true;
+  out.crossing = forest.clock().crossing(event);
+  return out;
+}
+
+/// Replaces `out` by what the forest's queue holds, first event first. O(slots + events log events).
+template <class Forest, class S = typename Forest::Scalar>
+void list_events(const Forest& forest, std::vector<ScheduledEvent<S>>& out) {
+  std::vector<Event> events;
+  const auto& queue = forest.queue();
+  for (std::uint32_t slot = 0; slot < queue.slots(); ++slot)
+    if (queue.scheduled(slot)) events.push_back(queue.event(slot));
+  std::sort(events.begin(), events.end(),
+            [&](const Event& a, const Event& b) { return forest.clock().earlier(a, b); });
+  out.clear();
+  for (const Event& event : events) out.push_back(described(forest, event));
+}
+
+/// Appends the certificates of the bounds that an event changed, as they stand now, and that of the bound
+/// above the last of them, whose candidates are others. A certificate that never fails is left out.
+template <class Forest, class S = typename Forest::Scalar>
+void append_rescheduled(const Forest& forest, const std::vector<BoundNotice<S>>& touched,
+                        std::vector<ScheduledEvent<S>>& out) {
+  const auto append = [&](std::uint32_t body, std::uint32_t node, Side side) {
+    const std::uint32_t slot = forest.tree(body).slot(node, side);
+    if (forest.queue().scheduled(slot)) out.push_back(described(forest, forest.queue().event(slot)));
+  };
+  for (const BoundNotice<S>& change : touched) append(change.body, change.node, change.side);
+  if (touched.empty() || touched.back().node == 0) return;
+  const BoundNotice<S>& last = touched.back();
+  append(last.body, forest.tree(last.body).certificate_above(last.node, last.side), last.side);
+}
+
+/// Handles the first event of a forest if it is due by `until`, and describes it.
+template <class Forest, class S = typename Forest::Scalar>
+bool step_forest(Forest& forest, BoundWatch<S>& watch, double until, EventDescription<S>& out) {
+  if (!forest.due(until)) return false;
+  out.event = described(forest, forest.queue().top());
+  out.rescheduled.clear();
+  {
+    const WatchedEvent<S> watched(watch, out.touched);
+    forest.handle_next();
+  }
+  append_rescheduled(forest, out.touched, out.rescheduled);
+  return true;
+}
+
+}  // namespace kbvh

@@ -1,0 +1,150 @@
+// Events, stepped one by one through the contract, do what `advance` does, and are described as they are.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "core/contract/registry.hpp"
+#include "core/judge/session.hpp"
+#include "tests/support/synthetic_scenes.hpp"
+
+namespace kbvh::test {
+namespace {
+
+std::vector<const StrategyEntry*> sources() {
+  std::vector<const StrategyEntry*> found;
+  for (const StrategyEntry& entry : registry())
+    if (entry.info.can.events) found.push_back(&entry);
+  return found;
+}
+
+template <class S>
+std::vector<Box<double>> boxes_of(Session<S>& session) {
+  std::vector<Box<double>> all;
+  session.playback().evaluate_all();
+  for (std::uint32_t body = 0; body < session.scene().bodies.size(); ++body)
+    if (const auto view = session.strategy().audit_view(body))
+      all.insert(all.end(), view->boxes.begin(), view->boxes.end());
+  return all;
+}
+
+/// Plays a scene twice, by frames and by events; everything has to be the same.
+template <class S>
+void compare(const StrategyEntry& entry, const std::string& name,
+             const std::map<std::string, std::string>& params) {
+  SCOPED_TRACE(entry.info.id + " on " + name + (sizeof(S) == 4 ? " in float" : " in double"));
+  const TestScene<S> test = synthetic_scene<S>(name, 3);
+  if (has_self_pairs(test.scene.pairs) && !entry.info.can.self_pairs) return;
+  const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 3) : test.frames;
+  const Contestant contestant{&entry, params, entry.info.topology.preferred};
+  Session<S> by_frames(test.scene, contestant, CountingPolicy::counting);
+  Session<S> by_events(test.scene, contestant, CountingPolicy::counting);
+  ScriptCursor<S> cursor_a(test.script.empty() ? nullptr : &test.script), cursor_b = cursor_a;
+  PhaseTimes times;
+  PairBuffer pairs_a, pairs_b;
+  std::vector<BoundNotice<S>> log_a, log_b, described;
+  by_frames.reset(frames[0]);
+  by_events.reset(frames[0]);
+  by_frames.strategy().events()->watch_bounds(&log_a);
+  EventSource<S>& source = *by_events.strategy().events();
+  source.watch_bounds(&log_b);
+  EventDescription<S> done;
+  std::vector<ScheduledEvent<S>> queue;
+  std::uint64_t events = 0;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    const double t = frames[f];
+    if (f > 0) {
+      by_frames.advance(t, times);
+      for (;;) {
+        const bool listed = events < 8 || events % 128 == 0;  // the whole queue: that takes time
+        const auto next = source.next_event();
+        ASSERT_EQ(source.next_event_time(), next ? next->time.time : std::numeric_limits<double>::infinity());
+        if (listed) {
+          source.scheduled_events(queue);
+          ASSERT_EQ(next.has_value(), !queue.empty());
+          if (next) {
+            ASSERT_EQ(*next, queue.front());
+          }
+          for (std::size_t i = 1; i < queue.size(); ++i) {
+            const auto &a = queue[i - 1], &b = queue[i];
+            if (a.has_crossing && b.has_crossing) {
+              ASSERT_LE(compare_crossings(a.crossing, b.crossing), 0) << "the queue is not in order";
+            }
+          }
+        }
+        const std::size_t logged = log_b.size();
+        if (!by_events.step_event(t, done)) break;
+        ++events;
+        ASSERT_EQ(done.event, *next) << "another event than the first";
+        if (done.event.has_crossing) {
+          ASSERT_LE(compare_crossing_to(done.event.crossing, t), 0) << "not due yet";
+        }
+        ASSERT_TRUE(std::equal(done.touched.begin(), done.touched.end(),
+                               log_b.begin() + std::ptrdiff_t(logged), log_b.end()));
+        for (const BoundNotice<S>& notice : done.touched) {
+          ASSERT_EQ(notice.crossing, done.event.crossing);
+          ASSERT_EQ(source.realiser(notice.body, notice.node, notice.side), notice.new_vertex);
+        }
+        if (done.event.kind == EventKind::bound) {
+          ASSERT_FALSE(done.touched.empty());
+          ASSERT_EQ(done.touched[0].node, done.event.node);
+          ASSERT_EQ(done.touched[0].old_vertex, done.event.winner);
+          ASSERT_EQ(done.touched[0].new_vertex, done.event.loser);
+        } else {
+          ASSERT_TRUE(done.touched.empty());
+        }
+        if (listed) {
+          source.scheduled_events(queue);
+          for (const ScheduledEvent<S>& made : done.rescheduled)
+            ASSERT_NE(std::find(queue.begin(), queue.end(), made), queue.end()) << "is not in the queue";
+        }
+        if (events % 32 == 1) {
+          ASSERT_THROW(by_events.strategy().candidates_at(by_events.playback().time(), pairs_b, {}),
+                       std::invalid_argument)
+              << "answers between frames";
+          ASSERT_THROW(by_events.strategy().advance(frames[f - 1]), std::invalid_argument);
+        }
+      }
+      by_events.advance(t, times);
+    }
+    by_frames.query(pairs_a, times);
+    by_events.query(pairs_b, times);
+    ASSERT_EQ(pairs_a, pairs_b) << "t = " << t;
+    ASSERT_EQ(boxes_of(by_frames), boxes_of(by_events)) << "t = " << t;
+    by_frames.follow(cursor_a.at(t), times);
+    by_events.follow(cursor_b.at(t), times);
+    ASSERT_EQ(log_a, log_b) << "t = " << t;
+  }
+  const Counters a = by_frames.strategy().counters(), b = by_events.strategy().counters();
+  for (std::size_t c = 0; c < a.values.size(); ++c)
+    if (Counter(c) != Counter::bytes && Counter(c) != Counter::positions_fetched) {
+      EXPECT_EQ(a.values[c], b.values[c]) << kbvh::name(Counter(c));
+    }
+  if (name == "soups") {
+    EXPECT_GT(events, 20u);
+    EXPECT_FALSE(log_a.empty());
+  }
+}
+
+TEST(EventSource, TheStructuresOfThePaperHaveEvents) {
+  std::vector<std::string> ids;
+  for (const StrategyEntry* entry : sources()) ids.push_back(entry->info.id);
+  for (const char* id : {"kinetic_aabb", "kinetic_boxtree", "kinetic_separation_list"})
+    EXPECT_NE(std::find(ids.begin(), ids.end(), id), ids.end()) << id;
+}
+
+TEST(EventSource, SteppingIsAdvancing) {
+  for (const StrategyEntry* entry : sources()) {
+    for (const char* scene : {"soups", "plan_changes", "geometry_changes_shared"})
+      compare<float>(*entry, scene, {});
+    compare<double>(*entry, "soups", {});
+    for (const Parameter& parameter : entry->info.parameters)
+      if (parameter.name == "queue")
+        for (const std::string& word : parameter.allowed)
+          if (word != parameter.default_value) compare<float>(*entry, "soups", {{"queue", word}});
+  }
+}
+
+}  // namespace
+}  // namespace kbvh::test

@@ -1,0 +1,312 @@
+// The façade answers what the library answers, says what is wrong with what it is given, and walks from event
+// to event as the theory checks do.
+
+#include "core/facade/world.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "core/contract/registry.hpp"
+#include "experiments/theory/kinetic_log.hpp"
+#include "tests/support/synthetic_scenes.hpp"
+
+namespace kbvh::test {
+namespace {
+
+template <class S>
+World world_of(const Scene<S>& scene) {
+  World world(sizeof(S) == 4 ? Precision::float32 : Precision::float64);
+  for (const Body<S>& body : scene.bodies) {
+    const FlightPlans<S>& plans = body.plans;
+    const std::vector<S> positions(
+        plans.keyframe(0),
+        plans.keyframe(0) + std::size_t(3) * plans.keyframed_count() * plans.keyframe_count());
+    world.add_body(body.name, {body.primitives.vertices, body.primitives.offsets}, plans.keyframe_times(),
+                   std::span<const S>(positions));
+  }
+  for (const BodyPair& pair : scene.pairs) world.add_pair(pair.first, pair.second);
+  return world;
+}
+
+template <class S>
+void expect_the_same(const StrategyEntry& entry, const char* name) {
+  SCOPED_TRACE(entry.info.id + " on " + name);
+  const TestScene<S> test = synthetic_scene<S>(name, 3);
+  if (!unsuitable_bodies(entry.info, test.scene).empty() || entry.factory<S>() == nullptr) return;
+  const std::vector<double> frames = frame_times(test.scene, 3);
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+  World world = world_of(test.scene);
+  world.start(entry.info.id, {}, frames[0]);
+  session.reset(frames[0]);
+  PairBuffer expected;
+  std::vector<WorldPair> pairs;
+  PhaseTimes times;
+  WorldHierarchy hierarchy;
+  for (const double t : frames) {
+    if (t > frames[0]) {
+      session.advance(t, times);
+      world.advance(t);
+    }
+    session.query(expected, times);
+    world.pairs(pairs);
+    ASSERT_EQ(pairs.size(), expected.size());
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+      ASSERT_EQ(pairs[i], (WorldPair{expected[i].body_a, expected[i].primitive_a, expected[i].body_b,
+                                     expected[i].primitive_b}));
+    for (std::uint32_t body = 0; body < test.scene.bodies.size(); ++body) {
+      const auto view = session.strategy().audit_view(body);
+      ASSERT_EQ(world.hierarchy(body, hierarchy), view.has_value());
+      if (!view) continue;
+      ASSERT_EQ(hierarchy.nodes.size(), view->boxes.size());
+      for (std::size_t node = 0; node < view->boxes.size(); ++node)
+        for (int axis = 0; axis < 3; ++axis) {
+          ASSERT_EQ(hierarchy.nodes[node].lower[axis], view->boxes[node].lower[axis]);
+          ASSERT_EQ(hierarchy.nodes[node].upper[axis], view->boxes[node].upper[axis]);
+        }
+    }
+  }
+  const Counters counters = session.strategy().counters();
+  for (const WorldCounter& counter : world.counters())
+    for (std::size_t c = 0; c < counters.values.size(); ++c)
+      if (counter.name == kbvh::name(Counter(c)) && Counter(c) != Counter::bytes &&
+          Counter(c) != Counter::positions_fetched) {
+        EXPECT_EQ(counter.value, counters.values[c]) << counter.name;
+      }
+}
+
+TEST(World, AnswersWhatTheLibraryAnswers) {
+  for (const StrategyEntry& entry : registry())
+    for (const char* scene : {"soups", "self_rolled_cloth"}) {
+      expect_the_same<float>(entry, scene);
+      expect_the_same<double>(entry, scene);
+    }
+}
+
+const std::vector<std::uint32_t> triangle{0, 1, 2};
+std::vector<float> triangle_at(float z, bool padded = false) {
+  std::vector<float> positions{0, 0, z, 1, 0, z, 0, 1, z};
+  if (padded) positions.push_back(0);
+  return positions;
+}
+
+TEST(World, PositionsFrameByFrame) {
+  for (const bool padded : {false, true}) {
+    World world;
+    const auto table = world.add_body("table", {triangle}, std::vector<double>{0}, triangle_at(0));
+    const auto leaf = world.add_body("leaf", {triangle}, triangle_at(1));
+    world.start("bottom_up");
+    std::vector<WorldPair> pairs;
+    world.pairs(pairs);
+    EXPECT_TRUE(pairs.empty());
+    std::vector<float> array;
+    for (const float z : {0.5F, 0.0F, -0.5F}) {
+      array = triangle_at(z, padded);
+      world.set_positions(leaf, array);
+      world.advance(1 - double(z));
+      world.pairs(pairs);
+      EXPECT_EQ(pairs.size(), z == 0 ? 1u : 0u) << z;
+    }
+    std::vector<double> now;
+    world.positions(leaf, now);
+    EXPECT_EQ(now, (std::vector<double>{0, 0, -0.5, 1, 0, -0.5, 0, 1, -0.5}));
+    EXPECT_THROW(world.set_positions(table, array), std::logic_error);
+    array[4] = std::nanf("");
+    EXPECT_THROW(world.set_positions(leaf, array), std::invalid_argument);
+    EXPECT_THROW(world.set_positions(leaf, std::vector<float>(8)), std::invalid_argument);
+  }
+  World world;
+  world.add_body("a", {triangle}, triangle_at(1));
+  world.add_body("b", {triangle}, triangle_at(0));
+  EXPECT_THROW(world.start("interval_join"), std::invalid_argument);
+  world.start("rebuild");  // what does not suit one strategy may suit another
+}
+
+TEST(World, ContactsFrameByFrame) {
+  World world(Precision::float64);
+  world.add_body("table", {triangle}, std::vector<double>{0}, triangle_at(0));
+  const auto leaf = world.add_body("leaf", {triangle}, triangle_at(1));
+  world.start("bottom_up");
+  std::vector<WorldContact> contacts;
+  std::vector<std::size_t> found;
+  float z = 1;
+  for (const double t : {1.0, 2.0, 3.0}) {
+    z -= 0.75F;
+    world.set_positions(leaf, triangle_at(5));  // the last ones before the world moves count
+    world.set_positions(leaf, triangle_at(-5));
+    world.set_positions(leaf, triangle_at(z));
+    world.contacts(t, contacts);
+    found.push_back(contacts.size());
+    for (const WorldContact& contact : contacts) {
+      EXPECT_LE(contact.begin, 1 + 1 / 3.0);
+      EXPECT_GE(contact.end, 1 + 1 / 3.0);
+    }
+  }
+  EXPECT_EQ(found[0], 0u);
+  EXPECT_GT(found[1], 0u);  // from 0.25 to -0.5
+  EXPECT_EQ(found[2], 0u);
+}
+
+// Contacts after a change of plans: the leaf turns round before it has come down.
+TEST(World, ContactsAfterChangesOfPlans) {
+  for (const StrategyEntry& entry : registry()) {
+    if (!entry.info.can.contacts || !entry.info.can.plan_changes || entry.factory<float>() == nullptr)
+      continue;
+    for (const bool turns : {false, true}) {
+      World world;
+      world.add_body("table", {triangle}, std::vector<double>{0}, triangle_at(0));
+      std::vector<float> keyframes = triangle_at(1), end = triangle_at(-1);
+      keyframes.insert(keyframes.end(), end.begin(), end.end());
+      const auto leaf = world.add_body("leaf", {triangle}, std::vector<double>{0, 2}, keyframes);
+      world.start(entry.info.id);
+      std::vector<WorldContact> contacts;
+      world.contacts(0.5, contacts);
+      EXPECT_TRUE(contacts.empty()) << entry.info.id;
+      if (turns) {
+        std::vector<WorldPlan> plans(3);
+        for (std::uint32_t v = 0; v < 3; ++v) plans[v] = {.body = leaf, .vertex = v, .velocity = {0, 0, 1}};
+        world.change_plans(plans);
+      }
+      world.contacts(2, contacts);
+      EXPECT_EQ(contacts.empty(), turns) << entry.info.id;
+    }
+  }
+}
+
+TEST(World, GeometryComesAndGoes) {
+  World world;
+  const auto table = world.add_body("table", {triangle}, std::vector<double>{0, 1},
+                                    std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0});
+  world.add_body("leaf", {triangle}, std::vector<double>{0}, triangle_at(1));
+  world.start("kinetic_aabb");
+  std::vector<WorldPair> pairs;
+  world.pairs(pairs);
+  EXPECT_TRUE(pairs.empty());
+  world.advance(0.5);
+  WorldEdit edit;
+  for (const double z : {0.5, 1.5, 1.5}) edit.vertices.push_back({table, {0.2 * z, 0.3, z}, {0, 0, 0}});
+  edit.vertices[2].position[0] = 0.1;
+  edit.primitives.push_back({table, {3, 4, 5}});
+  world.change_geometry(edit);
+  world.pairs(pairs);
+  ASSERT_EQ(pairs.size(), 1u);
+  EXPECT_EQ(pairs[0], (WorldPair{table, 1, 1, 0}));
+  WorldEdit removal;
+  removal.removed_primitives.push_back({table, 1});
+  world.advance(0.75);
+  world.change_geometry(removal);
+  world.pairs(pairs);
+  EXPECT_TRUE(pairs.empty());
+}
+
+TEST(World, SaysWhatIsWrong) {
+  const auto said = [](auto&& call) -> std::string {
+    try {
+      call();
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "nothing";
+  };
+  World world;
+  std::vector<WorldPair> pairs;
+  EXPECT_NE(said([&] { world.pairs(pairs); }).find("has not started"), std::string::npos);
+  EXPECT_NE(said([&] {
+              world.add_body("x", {std::vector<std::uint32_t>{0, 1}}, std::vector<double>{0}, triangle_at(0));
+            }).find("2 indices"),
+            std::string::npos);
+  EXPECT_NE(
+      said([&] {
+        world.add_body("x", {std::vector<std::uint32_t>{0, 1, 7}}, std::vector<double>{0}, triangle_at(0));
+      }).find("7"),
+      std::string::npos);
+  EXPECT_NE(said([&] {
+              world.add_body("x", {triangle}, std::vector<double>{0, 1}, triangle_at(0));
+            }).find("9 coordinates for 2 keyframes"),
+            std::string::npos);
+  world.add_body("a", {triangle}, std::vector<double>{0}, triangle_at(0));
+  world.add_body("b", {triangle}, std::vector<double>{0}, triangle_at(1));
+  EXPECT_NE(said([&] { world.add_pair(0, 2); }).find("no body 2"), std::string::npos);
+  EXPECT_NE(said([&] { world.start("bottom_up", {{"threads", "x"}}); }).find("'threads'"), std::string::npos);
+  EXPECT_NE(said([&] { world.start("nobody"); }).find("'nobody'"), std::string::npos);
+  EXPECT_NE(said([&] {
+              world.start("bottom_up", {}, 0, {{"width", "3"}});
+            }).find("width 3"),
+            std::string::npos);
+  EXPECT_NE(said([&] {
+              world.start("bottom_up", {}, 0, {{"depth", "3"}});
+            }).find("'depth'"),
+            std::string::npos);
+  world.start("bottom_up");
+  EXPECT_NE(said([&] { world.add_pair(0, 1); }).find("has started"), std::string::npos);
+  EXPECT_NE(said([&] { world.advance(-1); }).find("back to"), std::string::npos);
+  WorldStep step;
+  EXPECT_FALSE(world.has_events());
+  EXPECT_NE(said([&] { world.step_event(1, step); }).find("events"), std::string::npos);
+  std::vector<WorldSpan> spans;
+  EXPECT_NE(said([&] { world.spans(1, spans); }).find("spans"), std::string::npos);
+  EXPECT_EQ(world.time(), 0);
+}
+
+// The walk from event to event shows what `kbvh theory` proves: the same changes of bounds, in the same
+// order, with the same exact times.
+template <class S>
+void expect_the_same_log(const char* name) {
+  const TestScene<S> test = synthetic_scene<S>(name, 3);
+  const StrategyEntry& entry = find_strategy("kinetic_aabb");
+  theory::Play play;
+  play.builder = entry.info.topology.preferred;
+  play.frames_per_keyframe = 3;
+  const auto log = theory::record_strategy<S>(entry, test.scene, {}, play).log();
+  const std::vector<double> frames = frame_times(test.scene, 3);
+  World world = world_of(test.scene);
+  world.start("kinetic_aabb", {}, frames[0]);
+  WorldStep step;
+  std::vector<WorldEvent> queue;
+  std::size_t at = 0, events = 0;
+  for (const double t : frames) {
+    for (;;) {
+      world.scheduled_events(queue);
+      if (!world.step_event(t, step)) break;
+      ASSERT_EQ(step.event, queue.front());
+      ++events;
+      for (const WorldBoundChange& change : step.touched) {
+        ASSERT_LT(at, log.size());
+        const theory::Notice<S>& notice = log[at++];
+        ASSERT_EQ(change, (WorldBoundChange{notice.body, notice.node, notice.side, notice.old_vertex,
+                                            notice.new_vertex}));
+        ASSERT_EQ(step.event.winner_piece.t0, notice.crossing.winner.t0);
+        ASSERT_EQ(step.event.winner_piece.x0, double(notice.crossing.winner.x0));
+        ASSERT_EQ(step.event.loser_piece.x1, double(notice.crossing.loser.x1));
+        ASSERT_EQ(notice.event + 1, events);
+      }
+    }
+    world.advance(t);
+  }
+  EXPECT_EQ(at, log.size());
+  EXPECT_GT(events, 20u);
+  EXPECT_TRUE(std::isinf(world.next_event_time()));
+}
+
+TEST(World, TheWalkFromEventToEventIsTheLogOfTheTheoryChecks) {
+  for (const char* name : {"soups", "integer_ties"}) {
+    expect_the_same_log<float>(name);
+    expect_the_same_log<double>(name);
+  }
+}
+
+// Callers of the façade see no template of the library.
+TEST(World, ItsHeaderIncludesNoOtherHeaderOfTheLibrary) {
+  std::ifstream header(KBVH_SOURCE_DIR "/core/facade/world.hpp");
+  ASSERT_TRUE(header.good());
+  for (std::string line; std::getline(header, line);) {
+    EXPECT_EQ(line.find("#include \""), std::string::npos) << line;
+    EXPECT_FALSE(line.starts_with("template")) << line;
+  }
+}
+
+}  // namespace
+}  // namespace kbvh::test
