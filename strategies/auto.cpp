@@ -75,13 +75,15 @@ const std::vector<Candidate>& candidates() {
   return list;
 }
 
+/// Counts nothing of its own: its counters are those of its instances, with the triangle tests of silent
+/// ones, so it is no CountedStrategy.
 template <class S, class Count>
-class Auto final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
 
   Auto(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params& params)
-      : CountedStrategy<S, Count>(scene, motion), motion_(motion), gain_(params.number("gain")) {
+      : Strategy<S>(scene, motion), motion_(motion), gain_(params.number("gain")) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) measure(topologies[body], body);
     constexpr auto policy = Count::enabled ? CountingPolicy::counting : CountingPolicy::silent;
     for (const Candidate& candidate : candidates()) {
@@ -204,9 +206,12 @@ class Auto final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> 
   }
 
  protected:
-  void add_counts(Counters& table) const override {
-    add(table, retired_);
+  void start_counting() override { first_fetch_ = this->sampled_.fetched(); }
+  Counters counted() const override {
+    Counters table = retired_;
     for (const Runner& runner : runners_) add(table, runner.strategy->counters());
+    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
+    return table;
   }
 
  private:
@@ -367,6 +372,7 @@ class Auto final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> 
   std::vector<Velocities> velocities_;     ///< by body, per second
   Counters retired_;                       ///< of what was counted before an instance started anew
   std::size_t active_ = 0;
+  std::uint64_t first_fetch_ = 0;
   int frame_ = 0, chosen_at_ = 0, stay_ = shortest_stay;
   double step_ = 0, segment_end_ = 0;   ///< seconds
   double chosen_candidates_ = 0;        ///< that were there when the choice was made

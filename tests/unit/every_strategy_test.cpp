@@ -37,6 +37,32 @@ TEST(EveryStrategy, ASilentInstanceCountsNothing) {
   EXPECT_GT(found, 0u);
 }
 
+// Triangle tests are counted by the base class, in silent instances, too, also of one that consists of
+// others.
+TEST(EveryStrategy, TriangleTestsOfASilentInstanceAreCounted) {
+  const Scene<float> scene = grids<float>(24, 0.2, [](std::uint32_t i) { return 0.1 * std::sin(0.3 * i); });
+  std::uint64_t total = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (entry.factory<float>() == nullptr) continue;
+    std::uint64_t tests[2] = {};
+    for (const CountingPolicy policy : {CountingPolicy::counting, CountingPolicy::silent}) {
+      Session<float> session(scene, {&entry, {}, entry.info.topology.preferred}, policy);
+      PhaseTimes times;
+      PairBuffer pairs;
+      session.reset(0);
+      for (const double t : {0.5, 1.0, 1.5}) {
+        session.advance(t, times);
+        session.query(pairs, times);
+      }
+      tests[policy == CountingPolicy::silent ? 1 : 0] =
+          session.strategy().counters()[Counter::triangle_tests];
+    }
+    EXPECT_EQ(tests[0], tests[1]) << entry.info.id;
+    total += tests[1];
+  }
+  EXPECT_GT(total, 0u);
+}
+
 /// Copies of two grids that cut each other, far apart from the other copies; their pairs alone.
 Scene<float> couples(std::uint32_t count) {
   Scene<float> scene;
