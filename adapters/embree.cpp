@@ -121,9 +121,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
         near_bodies_(scene.pairs(), scene.body_count()) {
     const KeepFloatingPointState keep;
     device_.reset(rtcNewDevice("threads=1,set_affinity=0"));
-    if (!device_)
-      throw std::runtime_error("Embree cannot make a device: error " +
-                               std::to_string(int(rtcGetDeviceError(nullptr))));
+    if (!device_) fail("Embree cannot make a device", rtcGetDeviceError(nullptr));
     rtcSetDeviceMemoryMonitorFunction(device_.get(), &count_memory, &memory_);
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
@@ -398,8 +396,13 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
 
   void check() const {
     const RTCError error = rtcGetDeviceError(device_.get());
-    if (error != RTC_ERROR_NONE)
-      throw std::runtime_error("Embree reports error " + std::to_string(int(error)));
+    if (error != RTC_ERROR_NONE) fail("Embree reports an error", error);
+  }
+
+  /// Throws std::bad_alloc where memory was wanting: that says nothing about Embree.
+  [[noreturn]] static void fail(const char* what, RTCError error) {
+    if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+    throw std::runtime_error(what + (": number " + std::to_string(int(error))));
   }
 
   Refits refits_;

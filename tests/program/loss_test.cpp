@@ -15,6 +15,7 @@
 #include "experiments/results/result_file.hpp"
 #include "experiments/results/results.hpp"
 #include "experiments/results/table.hpp"
+#include "experiments/study/contestants.hpp"
 #include "experiments/run/bench_harness.hpp"
 
 namespace kbvh::experiments {
@@ -51,6 +52,26 @@ TEST_F(Binary, OutOfMemoryIsNoBrokenGuaranteeAndIsMeasuredAgain) {
       EXPECT_TRUE(all[2].at("times").is_object());
       EXPECT_EQ(kbvh(arguments, "", KBVH_FAULTY_PROGRAM).code, 0) << "a good result is not measured again";
     }
+}
+
+// Wherever memory ends, that is no fault of a contestant.
+TEST_F(Binary, WantOfMemoryIsNeverABrokenGuarantee) {
+  if (known_strategy("embree_refit") == nullptr) GTEST_SKIP() << "built without Embree";
+  for (const std::string kilobytes : {"120000", "180000", "200000", "250000"}) {
+    const Outcome run = shell("ulimit -v " + kilobytes + "; '" KBVH_PROGRAM "' run " + tiny +
+                              "--strategies embree_refit,bottom_up --out m" + kilobytes);
+    EXPECT_NE(run.code, 1) << kilobytes << ": " << run.err;
+    EXPECT_EQ(run.err.find("breaks what it guarantees"), std::string::npos) << run.err;
+  }
+}
+
+TEST_F(Binary, ALimitOnTheSizeOfFilesIsAFullDisk) {
+  for (const std::string command : {"run ", "bench "}) {
+    const Outcome run = shell("ulimit -f 8; '" KBVH_PROGRAM "' " + command + tiny +
+                              "--strategies bottom_up,rebuild --l 1,2 --out out");
+    EXPECT_TRUE(run.code == 2 || run.code == 3) << run.code << run.err;
+    EXPECT_NE(run.err.find("File too large"), std::string::npos) << run.err;
+  }
 }
 
 TEST_F(Binary, RecordsThatCannotBeUsedAreNamedAndMeasuredAgain) {
