@@ -170,20 +170,21 @@ class Runner {
   template <class S>
   void contact_group(const Study& study, const std::vector<ContestantSpec>& contestants,
                      const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script) {
-    if (!script.empty()) {
+    if (script.changes_geometry()) {
       note("note: " + scene.name +
-           " is left out: contacts between keyframes know nothing of changes of plans");
+           " is left out: contacts between keyframes know nothing of changes of geometry");
       return;
     }
-    std::vector<double> knots = overlaid_keyframes(scene);
+    std::vector<double> knots = script.empty() ? overlaid_keyframes(scene)
+                                               : contact_times(frames_of(scene, loaded, script, 1), script);
     if (study.frames_limit > 0 && knots.size() > study.frames_limit + 1) knots.resize(study.frames_limit + 1);
     if (knots.size() < 2) {
       note("note: " + scene.name + " is left out: nothing moves, so there are no contacts between keyframes");
       return;
     }
     progress_.show(scene.name + ": finding the true contacts");
-    ContactMeasurement<S> measurement(scene, knots);
-    json about_scene = scene_record(scene, loaded, 1, std::span<const double>(knots));
+    ContactMeasurement<S> measurement(scene, knots, script.empty() ? nullptr : &script);
+    json about_scene = scene_record(scene, loaded, 1, std::span<const double>(knots), script);
     about_scene["frames"] = knots.size() - 1;
     about_scene["name"] = scene.name + " (contacts)";
     about_scene["continuous"] = true;

@@ -38,14 +38,31 @@ void compare(const ContactBuffer& found, const ContactBuffer& truth, std::size_t
 }  // namespace
 
 template <class S>
-ContactMeasurement<S>::ContactMeasurement(const Scene<S>& scene, std::vector<double> knots)
-    : scene_(&scene), knots_(std::move(knots)) {
+std::vector<double> contact_times(std::vector<double> frames, const PlanScript<S>& script) {
+  const double last = frames.back();
+  for (const auto& step : script.steps)
+    for (const PlanChange<S>& change : step.changes)
+      for (const double t : change.times)
+        if (t < last) frames.push_back(t);
+  std::sort(frames.begin(), frames.end());
+  frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+  return frames;
+}
+template std::vector<double> contact_times(std::vector<double>, const PlanScript<float>&);
+template std::vector<double> contact_times(std::vector<double>, const PlanScript<double>&);
+
+template <class S>
+ContactMeasurement<S>::ContactMeasurement(const Scene<S>& scene, std::vector<double> knots,
+                                          const PlanScript<S>* script)
+    : scene_(&scene), knots_(std::move(knots)), script_(script) {
   try {
+    ScriptCursor<S> cursor(script_);
     ContactFinder<S> finder(scene);
     Playback<S> playback(scene);
     for (std::size_t k = 0; k + 1 < knots_.size(); ++k) {
       playback.seek(knots_[k]);
       playback.evaluate_all();
+      if (const auto* step = cursor.at(knots_[k])) playback.change_plans(knots_[k], step->changes);
       finder.start(playback);
       playback.seek(knots_[k + 1]);
       playback.evaluate_all();
@@ -69,7 +86,9 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
       Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
       PhaseTimes ignored;
       session.reset(knots_[0]);
+      ScriptCursor<S> cursor(script_);
       for (std::size_t k = 0; k < truth_.size(); ++k) {
+        session.follow(cursor.at(knots_[k]), ignored);
         contacts_.clear();
         measured.verification.candidates += session.contacts(knots_[k + 1], contacts_, ignored);
         if (k % oracle_every != 0 && k + 1 != truth_.size()) continue;
@@ -87,7 +106,9 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
       measured.build_seconds = seconds_since(begin);
       // Warm: buffers grow, and hierarchies for sweeps are made when they are first asked for.
       PhaseTimes ignored;
+      ScriptCursor<S> cursor(script_);
       entrant.session->reset(knots_[0]);
+      entrant.session->follow(cursor.at(knots_[0]), ignored);
       contacts_.clear();
       entrant.session->contacts(knots_[1], contacts_, ignored);
     }
@@ -108,9 +129,11 @@ const ClipTimes* ContactMeasurement<S>::play(std::size_t i) {
     const auto begin = std::chrono::steady_clock::now();
     entrant.session->reset(knots_[0]);
     clip.reset_seconds = seconds_since(begin);
+    ScriptCursor<S> cursor(script_);
     for (std::size_t k = 1; k < knots_.size(); ++k) {
       contacts_.clear();
       clip.frames.emplace_back();
+      entrant.session->follow(cursor.at(knots_[k - 1]), clip.frames.back());
       entrant.session->contacts(knots_[k], contacts_, clip.frames.back());
     }
     entrant.measured.repetitions.push_back(std::move(clip));

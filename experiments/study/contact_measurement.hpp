@@ -7,13 +7,19 @@
 
 namespace kbvh::experiments {
 
+/// The times between which contacts are found where plans change: the frames, and in between every knot that
+/// a changed plan may have.
+template <class S>
+std::vector<double> contact_times(std::vector<double> frames, const PlanScript<S>& script);
+
 /// As Measurement, for the contacts of features while vertices move from one time of `knots` to the next.
 template <class S>
 class ContactMeasurement {
  public:
-  /// Finds the true contacts, by sorting and sweeping. Throws io::InputError unless all bodies that are in
-  /// pairs consist of triangles.
-  ContactMeasurement(const Scene<S>& scene, std::vector<double> knots);
+  /// Finds the true contacts, by sorting and sweeping. The script changes plans at some of the knots, and
+  /// nothing else; null: there is none. Throws io::InputError unless all bodies that are in pairs consist of
+  /// triangles.
+  ContactMeasurement(const Scene<S>& scene, std::vector<double> knots, const PlanScript<S>* script);
 
   /// Verifies a contestant, comparing every n-th interval and the last.
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
@@ -31,6 +37,7 @@ class ContactMeasurement {
   };
   const Scene<S>* scene_;
   std::vector<double> knots_;
+  const PlanScript<S>* script_;
   std::vector<ContactBuffer> truth_;  ///< [interval], sorted
   std::vector<Entrant> entrants_;
   ContactBuffer contacts_;

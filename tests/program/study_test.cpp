@@ -92,6 +92,22 @@ TEST_F(Binary, ContactsBetweenKeyframesAreMeasuredAndKept) {
   EXPECT_EQ(records().size(), found.size() + 1);
 }
 
+TEST_F(Binary, ContactsAreMeasuredWherePlansChange) {
+  const Outcome run = kbvh(
+      "run --scene reversing_spheres --triangles 160 --repetitions 1 --continuous --strategies "
+      "bottom_up,interval_join,kinetic_separation_list,kinetic_aabb --out out");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.out.find("plans change while it runs"), std::string::npos) << run.out;
+  EXPECT_NE(run.err.find("kinetic_aabb is left out"), std::string::npos) << run.err;
+  const auto found = records();
+  ASSERT_EQ(found.size(), 3u);
+  for (const json& record : found) {
+    EXPECT_TRUE(record.at("verified").at("holds")) << record.at("verified").dump();
+    EXPECT_GT(record.at("verified").at("pairs"), 0);
+    EXPECT_GT(record.at("scene").at("script").at("changes"), 0);
+  }
+}
+
 TEST_F(Binary, PairsWithinBodiesAreCountedWhereTheyAreAskedFor) {
   // Two squares of one body, as a tent of which each side goes through the other.
   write_text(folder_ / "tent.obj",
