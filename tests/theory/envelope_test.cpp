@@ -30,12 +30,21 @@ std::string summary(const EnvelopeReport& r) {
          std::to_string(r.several_steps) + ", choices " + std::to_string(r.choices);
 }
 
+/// Looks at each certificate again at every keyframe.
+template <class S>
+class ShortSightedQueue : public SegmentHeapQueue<S> {
+ public:
+  using SegmentHeapQueue<S>::SegmentHeapQueue;
+  static constexpr std::size_t look_ahead = 1;
+};
+
 /// All queues over one play: their logs must be one, which is then proved.
 template <class S>
 EnvelopeReport prove(const TestScene<S>& test, const Play& play) {
   const auto recording = test::record<S, AvlQueue>(test, play);
   EXPECT_EQ(recording.log(), (record<S, BinaryHeapQueue>(test, play).log())) << "queues differ";
   EXPECT_EQ(recording.log(), (record<S, SegmentHeapQueue>(test, play).log())) << "queues differ";
+  EXPECT_EQ(recording.log(), (record<S, ShortSightedQueue>(test, play).log())) << "looks one keyframe ahead";
   const EnvelopeReport report = check(test.scene, recording);
   EXPECT_EQ(report.violation, "");
   EXPECT_EQ(report.net, report.envelope);

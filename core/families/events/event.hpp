@@ -35,9 +35,13 @@ struct Event {
   std::uint32_t side : 3 = 0;
   std::uint32_t depth : 8 = 0;  ///< of the node; deeper events of one instant come first
 
+  /// Which segment of the body's keyframes [begin, end) is, if it is one and that is known.
+  std::uint32_t segment = no_segment;
+
   static constexpr std::uint32_t most_bodies = 1U << 21;
+  static constexpr std::uint32_t no_segment = std::numeric_limits<std::uint32_t>::max();
 };
-static_assert(sizeof(Event) == 48);
+static_assert(sizeof(Event) == 56);
 
 /// What a queue of many events keeps of one: half as much. The rest follows from the keyframes, or from the
 /// crossing that the clock remembers.
@@ -57,7 +61,8 @@ template <class S>
 struct Instant {
   double begin;  ///< not after the instant
   double end;    ///< after the instant, or equal to begin if the instant is begin itself
-  const Crossing<S>* exact = nullptr;  ///< the event's exact time; null: the instant is `begin`
+  const Crossing<S>* exact = nullptr;         ///< the event's exact time; null: the instant is `begin`
+  std::uint32_t segment = Event::no_segment;  ///< as the event's
 
   static Instant at(double t) { return {t, t, nullptr}; }
 };
@@ -93,10 +98,8 @@ class EventClock {
   /// The short form of an event that is about to be scheduled, its crossing remembered.
   Packed pack(const Event& event) const {
     const bool own = event.slot < place_.size() && place_[event.slot] != none;
-    return {event.hint,  event.winner,
-            event.loser, own ? none : std::uint32_t(rows_[event.body]->segment_at(event.begin)),
-            event.body,  event.side,
-            event.depth};
+    return {event.hint, event.winner, event.loser, own ? none : segment_of(event),
+            event.body, event.side,   event.depth};
   }
   /// The event again: as it was, but that the pieces of an own crossing begin where they do, not at the
   /// instant from which on it was looked for.
@@ -118,19 +121,34 @@ class EventClock {
       const double* const times = rows_[packed.body]->times().data() + packed.segment;
       event.begin = times[0];
       event.end = times[1];
-      event.error = keyframed_error(event);
+      event.error = keyframed_error(event.begin, event.end);
+      event.segment = packed.segment;
     }
     return event;
   }
-  /// Fetches the keyframes that handling the event will read.
-  void fetch_ahead(const Event& event) const {
-    const KeyframeRows<S>& rows = *rows_[event.body];
-    if (rows.times().size() < 2) return;
-    const std::size_t k = rows.segment_at(event.begin);
-    const int axis = axis_of(event.side);
-    for (const std::uint32_t vertex : {event.winner, event.loser})
-      if (vertex < plans_[event.body]->keyframed_count()) __builtin_prefetch(rows.row(vertex, axis) + k);
+  /// The error bound of an event in short form.
+  double error_of(const Packed& packed, std::uint32_t slot) const {
+    if (packed.segment == none) return crossing_estimate(own_[place_[slot]]).error;
+    const double* const times = rows_[packed.body]->times().data() + packed.segment;
+    return keyframed_error(times[0], times[1]);
   }
+  /// Fetches what the event's handling will read of a vertex's keyframes.
+  void fetch_ahead(const Packed& packed, std::uint32_t vertex) const {
+    if (packed.segment != none && vertex < plans_[packed.body]->keyframed_count())
+      __builtin_prefetch(rows_[packed.body]->row(vertex, axis_of(packed.side)) + packed.segment);
+  }
+  /// How far to look ahead from an instant: the time so many keyframes later, or infinity. Realisers seldom
+  /// last through a long clip, and looking to its end each time would be quadratic in its keyframes.
+  double horizon(std::uint32_t body, const Instant<S>& now, std::size_t look_ahead) const {
+    constexpr double never = std::numeric_limits<double>::infinity();
+    const auto times = rows_[body]->times();
+    if (times.size() <= look_ahead) return never;
+    const std::size_t k = segment_of(body, now);
+    // Events between plans of their own may lie anywhere.
+    if (k + look_ahead + 1 >= times.size() || (now.exact != nullptr && now.end > times[k + 1])) return never;
+    return times[k + look_ahead];
+  }
+  std::size_t keyframe_count(std::uint32_t body) const { return rows_[body]->times().size(); }
   /// All times of keyframes, ascending.
   std::vector<double> keyframe_times() const {
     std::vector<double> all;
@@ -149,6 +167,16 @@ class EventClock {
     return a.slot < b.slot;
   }
 
+  /// The same for short forms and their slots. Often two vertices exchange their ranks in several nodes at
+  /// once, on both sides of an axis.
+  bool earlier(const Packed& a, std::uint32_t slot_a, const Packed& b, std::uint32_t slot_b) const {
+    const bool same_pair =
+        (a.winner == b.winner && a.loser == b.loser) || (a.winner == b.loser && a.loser == b.winner);
+    if (!same_pair || a.segment == none || a.segment != b.segment || a.body != b.body ||
+        axis_of(a.side) != axis_of(b.side))
+      return earlier(unpack(a, slot_a), unpack(b, slot_b));
+    return a.depth != b.depth ? a.depth > b.depth : slot_a < slot_b;
+  }
   /// Sign of (a's time - b's time), exact.
   int compare_times(const Event& a, const Event& b) const {
     if (a.end <= b.begin) return -1;
@@ -180,30 +208,55 @@ class EventClock {
     const FlightPlans<S>& plan = *plans_[event.body];
     if (plan.has_own_plan(event.winner) || plan.has_own_plan(event.loser))
       return first_own_failure(event, now, own, until);
-    const KeyframeRows<S>& rows = *rows_[event.body];
+    if (rows_[event.body]->times().size() < 2) return false;
+    const KeyframeSearch search = keyframe_search(event.body, event.side, now, until);
+    const std::size_t ahead_at = search.first_ahead(event.loser, event.winner, search.end);
+    if (ahead_at >= search.end) return false;
+    set_failure(event, ahead_at);
+    return true;
+  }
+
+  /// Where certificates of one side of a body that takes part with keyframes only look for their failures.
+  struct KeyframeSearch {
+    const KeyframeRows<S>* rows;
+    int axis;
+    bool upper;
+    std::size_t begin, end;  ///< keyframes at which a loser can be ahead for the first time
+
+    /// The first of these, before `limit`, at which `loser` is strictly ahead of `winner`; else `limit`.
+    std::size_t first_ahead(std::uint32_t loser, std::uint32_t winner, std::size_t limit) const {
+      const S *const l = rows->row(loser, axis), *const w = rows->row(winner, axis);
+      return upper ? rows->first_above(l, w, begin, limit) : rows->first_above(w, l, begin, limit);
+    }
+  };
+  /// From an instant on, in segments that begin before `until`. Only for bodies with several keyframes.
+  KeyframeSearch keyframe_search(std::uint32_t body, Side side, const Instant<S>& now, double until) const {
+    const KeyframeRows<S>& rows = *rows_[body];
     const auto times = rows.times();
-    if (times.size() < 2) return false;
-    const int axis = axis_of(event.side);
-    const S *const winner = rows.row(event.winner, axis), *const loser = rows.row(event.loser, axis);
-    std::size_t k = rows.segment_at(now.begin);
+    std::size_t k = segment_of(body, now), end = times.size();
     // An event between plans of their own may lie keyframes after the begin of its pieces.
     while (now.exact != nullptr && k + 1 < times.size() && times[k + 1] < now.end &&
            compare_crossing_to(*now.exact, times[k + 1]) >= 0)
       ++k;
-    const std::size_t end =
-        std::isinf(until) ? times.size() : std::min(times.size(), rows.segment_at(until) + 2);
-    const std::size_t ahead_at = is_upper(event.side) ? rows.first_above(loser, winner, k + 1, end)
-                                                      : rows.first_above(winner, loser, k + 1, end);
-    if (ahead_at >= end || !(times[ahead_at - 1] < until)) return false;
-    k = ahead_at - 1;
-    const double ahead = std::abs(double(loser[k + 1]) - double(winner[k + 1]));
-    const double behind =
-        is_upper(event.side) ? double(winner[k]) - double(loser[k]) : double(loser[k]) - double(winner[k]);
-    event.begin = times[k];
-    event.end = times[k + 1];
+    if (!std::isinf(until)) {
+      const std::size_t last = rows.segment_at(until);
+      end = std::min(end, last + (times[last] < until ? 2 : 1));
+    }
+    return {&rows, axis_of(side), is_upper(side), k + 1, std::max(end, k + 1)};
+  }
+  /// Fills hint, error, begin and end of an event whose loser is ahead for the first time at a keyframe.
+  void set_failure(Event& event, std::size_t ahead_at) const {
+    const KeyframeRows<S>& rows = *rows_[event.body];
+    const int axis = axis_of(event.side);
+    const S* const winner = rows.row(event.winner, axis) + ahead_at - 1;
+    const S* const loser = rows.row(event.loser, axis) + ahead_at - 1;
+    const double ahead = std::abs(double(loser[1]) - double(winner[1]));
+    const double behind = std::abs(double(winner[0]) - double(loser[0]));
+    event.segment = std::uint32_t(ahead_at - 1);
+    event.begin = rows.times()[ahead_at - 1];
+    event.end = rows.times()[ahead_at];
     event.hint = event.begin + (event.end - event.begin) * (behind / (behind + ahead));
-    event.error = keyframed_error(event);
-    return true;
+    event.error = keyframed_error(event.begin, event.end);
   }
 
   /// Sign of (challenger's value - winner's value) at an instant given by a double, seen from the side: > 0
@@ -269,9 +322,16 @@ class EventClock {
   }
 
  private:
+  std::uint32_t segment_of(const Event& event) const {
+    if (event.segment != Event::no_segment) return event.segment;
+    return std::uint32_t(rows_[event.body]->segment_at(event.begin));
+  }
+  std::size_t segment_of(std::uint32_t body, const Instant<S>& now) const {
+    return now.segment != Event::no_segment ? now.segment : rows_[body]->segment_at(now.begin);
+  }
   /// Differences, sum, quotient, product and final sum are each off by at most one rounding.
-  static double keyframed_error(const Event& event) {
-    return 16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(event.begin), std::abs(event.end));
+  static double keyframed_error(double begin, double end) {
+    return 16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(begin), std::abs(end));
   }
   Crossing<S> keyframed_crossing(const Event& event) const {
     return {keyframed_piece(event, event.winner), keyframed_piece(event, event.loser)};
@@ -279,7 +339,7 @@ class EventClock {
   Piece<S> keyframed_piece(const Event& event, std::uint32_t vertex) const {
     // Read from the keyframes: they stay what they are when a vertex gets a plan of its own.
     const KeyframeRows<S>& rows = *rows_[event.body];
-    const S* const values = rows.row(vertex, axis_of(event.side)) + rows.segment_at(event.begin);
+    const S* const values = rows.row(vertex, axis_of(event.side)) + segment_of(event);
     return {event.begin, event.end, values[0], values[1], PieceKind::chord};
   }
 
@@ -304,6 +364,7 @@ class EventClock {
         const Crossing<S> crossing{winner, loser};
         const TimeEstimate estimate = crossing_estimate(crossing);
         if (!std::isfinite(estimate.time)) return false;  // beyond any time that can be asked for
+        event.segment = Event::no_segment;
         event.begin = std::max(begin, std::max(winner.t0, loser.t0));
         event.end = end;
         event.hint = estimate.time;

@@ -19,6 +19,8 @@ namespace kbvh {
 ///   grow(slots)       makes room for slots below this number, amortised O(1) each; events stay scheduled
 ///   slots()           how many there is room for
 ///   ClockType         the clock: EventClock in all but contestants that round times
+///   look_ahead        0, or how many keyframes to look for a failure at once: there is review(event, time)
+///                     then, for certificates that are known to stand until that time
 /// A queue may also have
 ///   due(t)            whether the first event, if there is one, happens at or before t
 ///   split_at(times)   is told where time is best divided
@@ -46,6 +48,7 @@ class AvlEventQueue {
  public:
   using ClockType = Clock;
   static constexpr const char* name = "avl";
+  static constexpr std::size_t look_ahead = 0;
   AvlEventQueue(const Clock& clock, std::uint32_t slots)
       : steps_(std::make_unique<std::uint64_t>(0)), nodes_(slots), tree_(Less{&clock, steps_.get()}) {}
   ~AvlEventQueue() { tree_.clear(); }
@@ -109,6 +112,7 @@ class BinaryHeapEventQueue {
  public:
   using ClockType = Clock;
   static constexpr const char* name = "binary_heap";
+  static constexpr std::size_t look_ahead = 0;
   BinaryHeapEventQueue(const Clock& clock, std::uint32_t slots)
       : clock_(&clock), events_(slots), place_(slots, none) {
     heap_.reserve(slots);

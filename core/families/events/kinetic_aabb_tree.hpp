@@ -4,6 +4,7 @@
 #include <numeric>
 #include <optional>
 #include <stdexcept>
+#include <type_traits>
 #include <vector>
 
 #include "core/base/assert.hpp"
@@ -115,8 +116,12 @@ class KineticAabbTree {
   /// the winner realises (leaf and tree events, Z&W s.4). O(depth) certificates.
   void handle(const Event& event) {
     KBVH_ASSERT(event.body == body_);
-    const Crossing<S> crossing = clock_->crossing(event);
-    const Instant<S> now{event.begin, event.end, &crossing};
+    // Who looks at keyframes only needs no more than the segment.
+    constexpr bool observed = !std::is_same_v<Observer, NoObserver>;
+    const bool exact = observed || event.segment == Event::no_segment || clock_->plans(body_).has_own_plans();
+    Crossing<S> crossing;
+    if (exact) crossing = clock_->crossing(event);
+    const Instant<S> now{event.begin, event.end, exact ? &crossing : nullptr, event.segment};
     const Side side = event.side;
     std::uint32_t node = node_of(event.slot);
     KBVH_ASSERT(realiser(node, side) == event.winner);
@@ -133,12 +138,40 @@ class KineticAabbTree {
     certify(node, side, now);  // one of its challengers has changed
   }
 
-  /// Fetches what handling the event will read first.
-  void fetch_ahead(const Event& event) const {
-    const std::uint32_t node = node_of(event.slot);
-    __builtin_prefetch(realisers_.data() + std::size_t(6) * node);
-    __builtin_prefetch(topology_.nodes.data() + node);
-    __builtin_prefetch(topology_.parents.data() + node);
+  /// Looks again for the next failure of a certificate, which stands at t, a keyframe.
+  void review(const Event& event, double t) {
+    count_->add(Counter::queue_operations);
+    certify(node_of(event.slot), event.side, Instant<S>::at(t));
+  }
+  /// Fetches what handling the event will read: first what is the node's, then what is its parent's, then the
+  /// keyframes of the other vertices that take part.
+  void fetch_ahead(const PackedEvent& event, std::uint32_t slot_of_event, int step) const {
+    const std::uint32_t node = node_of(slot_of_event);
+    const Side side = event.side;
+    if (step == 0) {
+      __builtin_prefetch(realisers(node));
+      __builtin_prefetch(topology_.nodes.data() + node);
+      __builtin_prefetch(topology_.parents.data() + node);
+      return;
+    }
+    const std::uint32_t parent = topology_.parents[node];
+    if (step == 1) {
+      __builtin_prefetch(realisers(parent));
+      __builtin_prefetch(topology_.nodes.data() + parent);
+      __builtin_prefetch(topology_.parents.data() + parent);
+      if constexpr (requires { queue_->prefetch(0); }) queue_->prefetch(slot(parent, side));
+      return;
+    }
+    if (topology_.nodes[node].is_leaf())
+      for (const std::uint32_t vertex : leaf_vertices_[node]) clock_->fetch_ahead(event, vertex);
+    if (realiser(parent, side) != event.winner) {
+      clock_->fetch_ahead(event, realiser(parent, side));
+      return;
+    }
+    const TopologyNode siblings = topology_.nodes[parent];
+    for (std::uint32_t i = 0; i < siblings.count(); ++i)
+      clock_->fetch_ahead(event, realiser(siblings.first() + i, side));
+    if constexpr (requires { queue_->prefetch(0); }) queue_->prefetch(slot(topology_.parents[parent], side));
   }
 
   /// The plans of `vertices` (ascending, unique) changed at t, each from its stored position: rechecks every
@@ -253,6 +286,8 @@ class KineticAabbTree {
   }
   /// Schedules the earliest failure of the side's certificate from now on, in place of the one that stood.
   void certify(std::uint32_t node, Side side, const Instant<S>& now) {
+    if constexpr (requires { clock_->keyframe_search(body_, side, now, 0.0); })
+      if (!clock_->plans(body_).has_own_plans()) return certify_keyframed(node, side, now);
     const std::uint32_t slot = this->slot(node, side), winner = realiser(node, side);
     const std::uint32_t n = candidate_count(node);
     Event event, earliest;
@@ -265,21 +300,102 @@ class KineticAabbTree {
     // The queue must not hold this slot while the clock learns its new crossing.
     discard(slot);
     std::optional<Crossing<S>> own, earliest_own;
-    for (std::uint32_t i = 0; i < n; ++i) {
-      event.loser = candidate(node, side, i);
-      if (event.loser == winner) continue;
-      count_->add(Counter::certificates_made);
-      if (!clock_->first_failure(event, now, own)) continue;
-      if (found && !clock_->overtakes_first(event, own, earliest, earliest_own)) continue;
-      found = true;
-      earliest = event;
-      earliest_own = own;
+    double horizon = never;
+    if constexpr (Queue::look_ahead > 0) horizon = clock_->horizon(body_, now, Queue::look_ahead);
+    for (;;) {
+      double until = horizon;
+      for (std::uint32_t i = 0; i < n; ++i) {
+        event.loser = candidate(node, side, i);
+        if (event.loser == winner) continue;
+        count_->add(Counter::certificates_made);
+        if (!clock_->first_failure(event, now, own, until)) continue;
+        if (found && !clock_->overtakes_first(event, own, earliest, earliest_own)) continue;
+        found = true;
+        earliest = event;
+        earliest_own = own;
+        until = std::min(until, earliest.end);
+      }
+      if (std::isinf(horizon)) break;
+      if (found && (earliest.end <= horizon || earliest.hint + earliest.error < horizon)) break;
+      clock_->remember(slot, {});
+      count_->add(Counter::queue_operations);
+      event.begin = horizon;
+      event.segment = Event::no_segment;
+      if (review_at(event, horizon)) return;
+      horizon = never;
+      found = false;
     }
     clock_->remember(slot, earliest_own);
     if (!found) return;
     queue_->schedule(earliest);
     count_->add(Counter::queue_operations);
     count_->peak(Counter::queue_peak, queue_->size());
+  }
+
+  /// `certify` where no vertex has a plan of its own.
+  void certify_keyframed(std::uint32_t node, Side side, const Instant<S>& now) {
+    const std::uint32_t slot = this->slot(node, side), winner = realiser(node, side);
+    discard(slot);
+    if (clock_->keyframe_count(body_) < 2) return;
+    double horizon = never;
+    if constexpr (Queue::look_ahead > 0) horizon = clock_->horizon(body_, now, Queue::look_ahead);
+    Event event;
+    event.winner = winner;
+    event.slot = slot;
+    event.body = body_ % Event::most_bodies;
+    event.side = side & 7U;
+    event.depth = topology_.depths[node];
+    if (find_failure(event, node, clock_->keyframe_search(body_, side, now, horizon))) {
+      queue_->schedule(event);
+    } else {
+      if (horizon == never) return;
+      event.begin = horizon;
+      event.loser = winner;
+      if (!review_at(event, horizon)) {
+        if (!find_failure(event, node, clock_->keyframe_search(body_, side, now, never))) return;
+        queue_->schedule(event);
+      }
+    }
+    count_->add(Counter::queue_operations);
+    count_->peak(Counter::queue_peak, queue_->size());
+  }
+  bool review_at(const Event& event, double time) {
+    if constexpr (Queue::look_ahead > 0)
+      return queue_->review(event, time);
+    else
+      return false;
+  }
+  /// Fills in the earliest failure of a certificate, if there is one.
+  template <class Search>
+  bool find_failure(Event& event, std::uint32_t node, const Search& search) {
+    std::size_t limit = search.end, made = 0;
+    bool found = false;
+    const auto consider = [&](std::uint32_t challenger) {
+      if (challenger == event.winner) return;
+      ++made;
+      const std::size_t ahead_at = search.first_ahead(challenger, event.winner, limit);
+      if (ahead_at == limit) return;
+      if (found && ahead_at + 1 == limit && !comes_first(event, challenger, ahead_at)) return;
+      found = true;
+      event.loser = challenger;
+      limit = ahead_at + 1;
+    };
+    const TopologyNode n = topology_.nodes[node];
+    if (n.is_leaf())
+      for (const std::uint32_t vertex : leaf_vertices_[node]) consider(vertex);
+    else
+      for (std::uint32_t i = 0; i < n.count(); ++i) consider(realiser(n.first() + i, event.side));
+    count_->add(Counter::certificates_made, made);
+    if (found) clock_->set_failure(event, limit - 1);
+    return found;
+  }
+  /// Of two that get ahead in one segment.
+  bool comes_first(const Event& than, std::uint32_t challenger, std::size_t ahead_at) const {
+    Event first = than, other = than;
+    first.loser = challenger;
+    clock_->set_failure(first, ahead_at);
+    clock_->set_failure(other, ahead_at);
+    return clock_->overtakes_first(first, {}, other, {});
   }
 
   static ListPool packed_leaf_vertices(const Topology& topology, const Primitives& primitives) {
@@ -411,6 +527,7 @@ class KineticAabbTree {
   }
   bool side_moved(std::uint32_t node, Side side) const { return (moved_[node] >> side) & 1; }
 
+  static constexpr double never = std::numeric_limits<double>::infinity();
   static constexpr std::uint8_t other_candidates = 1 << 6;  ///< in `moved_`
 
   Topology topology_;

@@ -58,16 +58,21 @@ class KineticForest {
   }
   /// Takes the first event off the queue and handles it.
   void handle_next() {
-    const Event event = queue_.top();
-    queue_.pop();
+    const Event event = first_event();
     count_->add(Counter::queue_operations);
     trees_[event.body].handle(event);
   }
 
-  /// Fetches what handling the event will read.
-  void fetch_ahead(const Event& event) const {
-    clock_.fetch_ahead(event);
-    if constexpr (requires { trees_[event.body].fetch_ahead(event); }) trees_[event.body].fetch_ahead(event);
+  /// Fetches what handling the event will read: of what step 0 fetched, step 1 says what else, and so on.
+  void fetch_ahead(const PackedEvent& event, std::uint32_t slot, int step) const {
+    if (step == 0)
+      for (const std::uint32_t vertex : {event.winner, event.loser}) clock_.fetch_ahead(event, vertex);
+    if constexpr (requires { trees_[event.body].fetch_ahead(event, slot, step); })
+      trees_[event.body].fetch_ahead(event, slot, step);
+  }
+  /// Looks again for the failure of a certificate that stands at t.
+  void review(const Event& event, double t) {
+    if constexpr (requires { trees_[event.body].review(event, t); }) trees_[event.body].review(event, t);
   }
 
   /// Follows changes of plans at t that the motion shows already; of each body's tree once.
@@ -111,6 +116,12 @@ class KineticForest {
   }
 
  private:
+  Event first_event() {
+    if constexpr (requires { queue_.take(); }) return queue_.take();
+    const Event event = queue_.top();
+    queue_.pop();
+    return event;
+  }
   static std::vector<const FlightPlans<S>*> plans_of(const SceneView<S>& scene, const ClipMotion<S>& motion) {
     std::vector<const FlightPlans<S>*> plans;
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) plans.push_back(&motion.plans(body));

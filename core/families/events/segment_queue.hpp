@@ -47,24 +47,31 @@ class SegmentHeapEventQueue {
  public:
   using ClockType = Clock;
   static constexpr const char* name = "segment_heap";
+  /// Keyframes: a clip's end is seldom reached by a certificate, so that looking for its failure costs no
+  /// more than this many. 64: the next keyframes of one vertex in a few cache lines.
+  static constexpr std::size_t look_ahead = 64;
   SegmentHeapEventQueue(const Clock& clock, std::uint32_t slots)
       : clock_(&clock), records_(slots), segments_(1) {}
 
   /// Cuts time at `times` (ascending), where many events are expected on either side. Only while the queue is
   /// empty.
   void split_at(std::span<const double> times) {
-    KBVH_ASSERT(empty());
+    KBVH_ASSERT(size() == 0);
     cuts_.assign(times.begin(), times.end());
     cuts_per_second_ = times.size() < 2 ? 0 : double(times.size() - 1) / (times.back() - times.front());
     segments_.resize(times.size() + 1);
     clear();
   }
 
-  /// Calls owner.fetch_ahead(event) for each event that will come soon; not for all.
+  /// Calls owner.fetch_ahead(stored event, slot, step) for many events that will come soon, with steps 0, 1
+  /// and 2 one after the other; and owner.review(event, time) where `review` asked for it.
   template <class Owner>
   void serve(Owner& owner) {
     owner_ = &owner;
-    fetch_ahead_ = [](void* self, const Event& event) { static_cast<Owner*>(self)->fetch_ahead(event); };
+    fetch_ahead_ = [](void* self, const Stored& event, std::uint32_t slot, int step) {
+      static_cast<Owner*>(self)->fetch_ahead(event, slot, step);
+    };
+    review_ = [](void* self, const Event& event, double t) { static_cast<Owner*>(self)->review(event, t); };
   }
 
   void schedule(const Event& event) {
@@ -74,15 +81,36 @@ class SegmentHeapEventQueue {
       record.event = clock_->pack(event);
     else
       record.event = event;
-    const double begin = event.hint - event.error;
+    const float error = error_above(event.error);
+    const double begin = event.hint - double(error);
     if (const std::int32_t number = number_of(begin); number > opened_) {
       wait(event.slot, record, number);
     } else {
-      push({event.hint, error_above(event.error), event.slot});
+      push({event.hint, error, event.slot});
     }
   }
+  /// Until `time`, one of the times of `split_at`, the certificate does not fail: it is to be looked at again
+  /// before any event from then on comes first. Takes the place of the slot's event. False, with nothing
+  /// done, if that is too late: later events have been compared already.
+  bool review(const Event& event, double time) {
+    const std::size_t segment = segment_of(time);
+    if (segment <= segment_) return false;
+    Record& record = records_[event.slot];
+    withdraw(record);
+    if constexpr (packed)
+      record.event = clock_->pack(event);
+    else
+      record.event = event;
+    wait(event.slot, record, most_bins + std::int32_t(segment), reviewed);
+    return true;
+  }
   bool cancel(std::uint32_t slot) { return withdraw(records_[slot]); }
-  bool scheduled(std::uint32_t slot) const { return records_[slot].place != nowhere; }
+  bool scheduled(std::uint32_t slot) const {
+    return records_[slot].place != nowhere &&
+           (records_[slot].place & (waits | reviewed)) != (waits | reviewed);
+  }
+  /// The slot has no event, but is to be looked at again.
+  bool reviewing(std::uint32_t slot) const { return records_[slot].place != nowhere && !scheduled(slot); }
   Returned event(std::uint32_t slot) const {
     if constexpr (packed)
       return clock_->unpack(records_[slot].event, slot);
@@ -97,16 +125,27 @@ class SegmentHeapEventQueue {
     find_first();
     withdraw(records_[heap_.front().slot]);
   }
+  /// `top` and `pop` at once.
+  Event take() {
+    find_first();
+    const std::uint32_t slot = heap_.front().slot;
+    const Event first = event(slot);
+    withdraw(records_[slot]);
+    return first;
+  }
   /// Does the first event happen at or before t?
   bool due(double t) const {
     if (empty()) return false;
-    find_first();
     const Entry& first = heap_.front();
     if (first.hint + double(first.error) < t) return true;
     if (first.hint - double(first.error) > t) return false;
     return clock_->due(event(first.slot), t);
   }
-  bool empty() const { return size() == 0; }
+  bool empty() const {
+    find_first();
+    return heap_.empty();
+  }
+  /// Certificates to be looked at again included.
   std::size_t size() const { return heap_.size() + waiting_; }
   void clear() {
     for (auto& list : segments_) list.clear();
@@ -119,6 +158,8 @@ class SegmentHeapEventQueue {
     opened_ = -1;
     limit_ = -infinity;
   }
+  /// Fetches what is kept of a slot.
+  void prefetch(std::uint32_t slot) const { __builtin_prefetch(&records_[slot]); }
   std::uint32_t slots() const { return std::uint32_t(records_.size()); }
   void grow(std::uint32_t slots) {
     if (slots > records_.size()) records_.resize(slots);
@@ -138,7 +179,8 @@ class SegmentHeapEventQueue {
   static constexpr std::uint32_t nowhere = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::uint32_t waits = 1U
                                          << 31;  ///< in `place`, with the number of a list; else in the heap
-  static constexpr std::uint32_t seen = 1U << 30;  ///< in `place`, while lists are tidied up
+  static constexpr std::uint32_t seen = 1U << 30;      ///< in `place`, while lists are tidied up
+  static constexpr std::uint32_t reviewed = 1U << 29;  ///< in `place`, of what waits: no event
   static constexpr std::int32_t most_bins = 1 << 14;
   static constexpr std::size_t events_per_bin = 24;
 
@@ -158,6 +200,14 @@ class SegmentHeapEventQueue {
                                     : std::nextafter(rounded, std::numeric_limits<float>::infinity());
   }
 
+  Entry entry(std::uint32_t slot) const {
+    const Stored& stored = records_[slot].event;
+    if constexpr (packed)
+      return {stored.hint, error_above(clock_->error_of(stored, slot)), slot};
+    else
+      return {stored.hint, error_above(stored.error), slot};
+  }
+
   // ---- Lists of what waits
 
   /// Bins are numbered from 0, segments from most_bins; rises with the time.
@@ -166,7 +216,7 @@ class SegmentHeapEventQueue {
       const double share = (time - bins_begin_) * bins_per_second_;
       return share <= 0 ? 0 : share >= double(bin_count_ - 1) ? bin_count_ - 1 : std::int32_t(share);
     }
-    return most_bins + std::int32_t(segment_of(time));
+    return most_bins + std::int32_t(std::max(segment_of(time), segment_));
   }
   std::size_t segment_of(double time) const {
     if (cuts_.empty() || time < cuts_.front()) return 0;
@@ -181,8 +231,8 @@ class SegmentHeapEventQueue {
   std::vector<std::uint32_t>& list(std::int32_t number) const {
     return number < most_bins ? bins_[std::size_t(number)] : segments_[std::size_t(number - most_bins)];
   }
-  void wait(std::uint32_t slot, Record& record, std::int32_t number) {
-    record.place = waits | std::uint32_t(number);
+  void wait(std::uint32_t slot, Record& record, std::int32_t number, std::uint32_t kind = 0) {
+    record.place = waits | kind | std::uint32_t(number);
     list(number).push_back(slot);
     ++waiting_;
     if (++entries_ > 2 * waiting_ + 4096) tidy_up();
@@ -194,7 +244,7 @@ class SegmentHeapEventQueue {
       if (number == bin_count_) number = most_bins;
       auto& entries = list(number);
       std::erase_if(entries, [&](std::uint32_t slot) {
-        if (records_[slot].place != (waits | std::uint32_t(number))) return true;
+        if ((records_[slot].place & ~reviewed) != (waits | std::uint32_t(number))) return true;
         records_[slot].place |= seen;
         return false;
       });
@@ -203,21 +253,21 @@ class SegmentHeapEventQueue {
     }
   }
 
-  /// Takes an event out, wherever it is.
+  /// Takes an event out, wherever it is; says whether it was one.
   bool withdraw(Record& record) {
     const std::uint32_t place = record.place;
     if (place == nowhere) return false;
     record.place = nowhere;
-    if ((place & waits) != 0)
-      --waiting_;
-    else
+    if ((place & waits) == 0) {
       erase(place);
-    return true;
+      return true;
+    }
+    --waiting_;
+    return (place & reviewed) == 0;
   }
 
-  /// Opens bins until the first event of the heap is the first of all.
+  /// Opens bins until the first event of the heap is the first of all, or there is none.
   void find_first() const {
-    KBVH_ASSERT(!empty());
     while (waiting_ > 0) {
       if (!heap_.empty()) {
         const Entry& first = heap_.front();
@@ -234,21 +284,41 @@ class SegmentHeapEventQueue {
       for (const std::uint32_t slot : entries)
         if (records_[slot].place == (waits | std::uint32_t(opened_))) {
           --waiting_;
-          const auto& next = event(slot);
-          if (fetch_ahead_ != nullptr) fetch_ahead_(owner_, next);
-          push({next.hint, error_above(next.error), slot});
+          if (fetch_ahead_ != nullptr) fetch_ahead_(owner_, records_[slot].event, slot, 0);
+          push(entry(slot));
         }
+      if (fetch_ahead_ != nullptr)
+        for (const int step : {1, 2})
+          for (const std::uint32_t slot : entries)
+            if (records_[slot].place < waits) fetch_ahead_(owner_, records_[slot].event, slot, step);
       entries_ -= entries.size();
       entries.clear();
       return;
     }
     cut_segment();
   }
+  /// Looks again at what asked for it when the segment begins: some of it gets events.
+  void review_segment(std::uint32_t here) const {
+    reviews_.clear();
+    for (const std::uint32_t slot : segments_[segment_]) {
+      if (records_[slot].place != (here | reviewed)) continue;
+      records_[slot].place = nowhere;
+      --waiting_;
+      reviews_.push_back(slot);
+    }
+    constexpr std::size_t ahead = 8;
+    for (std::size_t i = 0; i < reviews_.size(); ++i) {
+      if (i + ahead < reviews_.size())
+        fetch_ahead_(owner_, records_[reviews_[i + ahead]].event, reviews_[i + ahead], 0);
+      review_(owner_, event(reviews_[i]), cuts_[segment_ - 1]);
+    }
+  }
   /// Cuts the first segment with events into bins. None of them is open then.
   void cut_segment() const {
     while (segments_[segment_].empty()) ++segment_;
-    auto& entries = segments_[segment_];
     const std::uint32_t here = waits | std::uint32_t(most_bins + std::int32_t(segment_));
+    review_segment(here);
+    auto& entries = segments_[segment_];
     keys_.clear();
     std::size_t kept = 0;
     constexpr std::size_t ahead = 16;
@@ -257,8 +327,8 @@ class SegmentHeapEventQueue {
       const std::uint32_t slot = entries[i];
       if (records_[slot].place != here) continue;
       records_[slot].place |= seen;
-      const auto& next = event(slot);
-      keys_.push_back(next.hint - next.error);
+      const Entry next = entry(slot);
+      keys_.push_back(next.hint - double(next.error));
       entries[kept++] = slot;
     }
     entries_ -= entries.size() - kept;
@@ -295,8 +365,6 @@ class SegmentHeapEventQueue {
     }
     entries.resize(rest);
   }
-  void prefetch(std::uint32_t slot) const { __builtin_prefetch(&records_[slot]); }
-
   // ---- The heap
 
   bool earlier(const Entry& a, const Entry& b) const {
@@ -304,7 +372,10 @@ class SegmentHeapEventQueue {
     const double error = double(a.error) + double(b.error);
     if (a.hint + error < b.hint) return true;
     if (b.hint + error < a.hint) return false;
-    return clock_->earlier(event(a.slot), event(b.slot));
+    if constexpr (packed)
+      return clock_->earlier(records_[a.slot].event, a.slot, records_[b.slot].event, b.slot);
+    else
+      return clock_->earlier(event(a.slot), event(b.slot));
   }
   void put(const Entry& entry, std::size_t at) const {
     heap_[at] = entry;
@@ -348,12 +419,14 @@ class SegmentHeapEventQueue {
 
   const Clock* clock_;
   void* owner_ = nullptr;
-  void (*fetch_ahead_)(void* owner, const Event& event) = nullptr;
+  void (*fetch_ahead_)(void* owner, const Stored& event, std::uint32_t slot, int step) = nullptr;
+  void (*review_)(void* owner, const Event& event, double time) = nullptr;
   // Which part an event is in changes when the first one is looked for; what the queue holds does not.
   mutable std::vector<Record> records_;                       ///< by slot
   mutable std::vector<std::vector<std::uint32_t>> segments_;  ///< slots; one more than cuts
   mutable std::vector<std::vector<std::uint32_t>> bins_;      ///< slots
   mutable std::vector<Entry> heap_;
+  mutable std::vector<std::uint32_t> reviews_;
   mutable std::vector<double> keys_, sorted_;
   mutable std::size_t waiting_ = 0, entries_ = 0;  ///< events in lists, and entries
   mutable std::size_t segment_ = 0;                ///< the one that is cut into bins
