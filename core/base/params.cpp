@@ -14,13 +14,19 @@ std::string shown(double number) {
   return std::string(text, std::to_chars(text, text + sizeof text, number).ptr);
 }
 
+/// The number that a text is, subnormal ones included; NaN if it is none.
+double number_of(const std::string& text) {
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool whole = error == std::errc() && end == text.data() + text.size();
+  return whole ? number : std::numeric_limits<double>::quiet_NaN();
+}
+
 bool takes(const Parameter& parameter, const std::string& value) {
   if (!parameter.allowed.empty())
     return std::find(parameter.allowed.begin(), parameter.allowed.end(), value) != parameter.allowed.end();
-  double number = 0;
-  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
-  return error == std::errc() && end == value.data() + value.size() && std::isfinite(number) &&
-         number >= parameter.least && number <= parameter.most &&
+  const double number = number_of(value);
+  return std::isfinite(number) && number >= parameter.least && number <= parameter.most &&
          (parameter.numbers == Numbers::any || number == std::floor(number));
 }
 
@@ -54,6 +60,10 @@ Params::Params(const std::string& owner, const std::vector<Parameter>& declared,
                         admissible(*parameter));
     values_[key] = value;
   }
+}
+
+double Params::number(const std::string& key) const {
+  return number_of(values_.at(key));
 }
 
 }  // namespace kbvh

@@ -40,7 +40,7 @@ class Params {
   Params(const std::string& owner, const std::vector<Parameter>& declared,
          const std::map<std::string, std::string>& given);
   const std::string& word(const std::string& key) const { return values_.at(key); }
-  double number(const std::string& key) const { return std::stod(values_.at(key)); }
+  double number(const std::string& key) const;
   const std::map<std::string, std::string>& values() const { return values_; }
 
  private:

@@ -64,7 +64,7 @@ void remove_left_overs(const std::filesystem::path& folder) {
 void prepare_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (!std::filesystem::is_directory(folder))
+  if (std::error_code ignored; !std::filesystem::is_directory(folder, ignored))
     throw io::InputError("the output folder '" + folder.string() + "' cannot be made" +
                          (error ? ": " + error.message() : ""));
   if (::access(folder.c_str(), W_OK | X_OK) != 0)

@@ -213,15 +213,18 @@ namespace {
 /// nothing.
 std::vector<ImpactQueries> find_below(const fs::path& path, std::vector<fs::path>& above) {
   std::vector<ImpactQueries> found;
-  if (!fs::exists(path)) io::fail(path, "", "does not exist");
-  if (fs::is_directory(path) && is_frame_pair(path)) {
+  std::error_code problem;
+  const fs::file_status status = fs::status(path, problem);
+  if (!fs::exists(status))
+    io::fail(path, "", status.type() == fs::file_type::none ? problem.message() : "does not exist");
+  if (fs::is_directory(status) && is_frame_pair(path)) {
     const FramePair pair = read_frame_pair(path);
     for (const Contact::Kind kind : {Contact::Kind::vertex_face, Contact::Kind::edge_edge}) {
       found.push_back({pair.name + "/" + word(kind), {}});
       for (const auto& listed : pair.listed)
         if (listed.kind == kind) found.back().queries.push_back(pair.query(listed));
     }
-  } else if (fs::is_directory(path)) {
+  } else if (fs::is_directory(status)) {
     std::error_code error;  // of a link that leads nowhere, which is no folder
     std::vector<fs::path> inside;
     for (const auto& entry : fs::directory_iterator(path))

@@ -85,18 +85,20 @@ TEST_P(Configurations, AllConform) {
   };
   for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes", "geometry_changes",
                                        "self_rolled_cloth", "self_plan_changes"}) {
-    const auto in_float = synthetic_scene<float>(scene_name, 7);
-    const auto in_double = synthetic_scene<double>(scene_name, 7);
+    // Scripts make every frame dear: fewer of them.
+    const std::uint32_t l = scene_name == "sheets" || scene_name == "integer_ties" ? 7 : 2;
+    const auto in_float = synthetic_scene<float>(scene_name, l);
+    const auto in_double = synthetic_scene<double>(scene_name, l);
     sweep(scene_name, [&](const BuilderConfig& builder, const std::string& where) {
-      expect_conforms(check(entry, in_float, 7, {}, builder), GetParam() + " on " + where + ", float");
-      expect_conforms(check(entry, in_double, 7, {}, builder), GetParam() + " on " + where + ", double");
+      expect_conforms(check(entry, in_float, l, {}, builder), GetParam() + " on " + where + ", float");
+      expect_conforms(check(entry, in_double, l, {}, builder), GetParam() + " on " + where + ", double");
     });
     for (const Parameter& parameter : entry.info.parameters)
       for (const std::string& word : parameter.allowed) {
         const std::map<std::string, std::string> params{{parameter.name, word}};
         const std::string where = GetParam() + " on " + scene_name + " with " + parameter.name + "=" + word;
-        expect_conforms(check(entry, in_float, 7, params, entry.info.topology.preferred), where + ", float");
-        expect_conforms(check(entry, in_double, 7, params, entry.info.topology.preferred),
+        expect_conforms(check(entry, in_float, l, params, entry.info.topology.preferred), where + ", float");
+        expect_conforms(check(entry, in_double, l, params, entry.info.topology.preferred),
                         where + ", double");
       }
   }

@@ -15,8 +15,8 @@
 #include "experiments/results/result_file.hpp"
 #include "experiments/results/results.hpp"
 #include "experiments/results/table.hpp"
-#include "experiments/study/contestants.hpp"
 #include "experiments/run/bench_harness.hpp"
+#include "experiments/study/contestants.hpp"
 
 namespace kbvh::experiments {
 namespace {
@@ -72,6 +72,26 @@ TEST_F(Binary, ALimitOnTheSizeOfFilesIsAFullDisk) {
     EXPECT_TRUE(run.code == 2 || run.code == 3) << run.code << run.err;
     EXPECT_NE(run.err.find("File too large"), std::string::npos) << run.err;
   }
+}
+
+TEST_F(Binary, FoldersThatCannotBeAreNamed) {
+  std::filesystem::create_symlink("loop", folder_ / "loop");
+  for (const std::string& name : {std::string("loop"), std::string(300, 'a')}) {
+    for (const std::string command : {"run " + one, std::string("stress --scenes 1 "), std::string("ccd "),
+                                      std::string("theory --scenes waving_sheet --sizes 50 ")}) {
+      const Outcome run = kbvh(command + "--out " + name);
+      EXPECT_EQ(run.code, 2) << command << run.err;
+      EXPECT_EQ(run.err.find("internal error"), std::string::npos) << run.err;
+    }
+    const Outcome read = kbvh("ccd " + name);
+    EXPECT_EQ(read.code, 2) << read.err;
+    EXPECT_EQ(read.err.find("internal error"), std::string::npos) << read.err;
+  }
+}
+
+TEST_F(Binary, ParametersMayBeSubnormal) {
+  const Outcome run = kbvh("run " + tiny + "--strategies inflated_lazy --param margin=1e-320");
+  EXPECT_EQ(run.code, 0) << run.err;
 }
 
 TEST_F(Binary, RecordsThatCannotBeUsedAreNamedAndMeasuredAgain) {
