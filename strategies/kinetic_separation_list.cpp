@@ -31,7 +31,10 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
                         const Params& params)
       : CountedStrategy<S, Count>(scene, motion) {
     const int look_ahead = std::stoi(params.word("look_ahead"));
-    if (params.word("queue") == AvlQueue<S>::name)
+    if (params.word("queue") == SegmentHeapQueue<S>::name)
+      collision_ = std::make_unique<Collision<SegmentHeapEventQueue>>(scene, motion, std::move(topologies),
+                                                                      this->count_, look_ahead);
+    else if (params.word("queue") == AvlQueue<S>::name)
       collision_ = std::make_unique<Collision<AvlEventQueue>>(scene, motion, std::move(topologies),
                                                               this->count_, look_ahead);
     else
@@ -229,7 +232,8 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   }
 
   std::vector<SweptLeaves> swept_leaves_;
-  std::variant<std::unique_ptr<Collision<AvlEventQueue>>, std::unique_ptr<Collision<BinaryHeapEventQueue>>>
+  std::variant<std::unique_ptr<Collision<SegmentHeapEventQueue>>, std::unique_ptr<Collision<AvlEventQueue>>,
+               std::unique_ptr<Collision<BinaryHeapEventQueue>>>
       collision_;
   std::uint64_t first_step_ = 0;
 };
@@ -249,8 +253,9 @@ KBVH_STRATEGY(kinetic_separation_list) {
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"queue",
                       "avl",
-                      {"avl", "binary_heap"},
-                      "event queue: the paper's AVL tree, or an indexed binary heap"},
+                      {"segment_heap", "avl", "binary_heap"},
+                      "event queue: lists by segment and a heap of what comes next, the paper's AVL tree, or "
+                      "an indexed binary heap"},
                      {"look_ahead",
                       "32",
                       {"1", "32", "1000000"},

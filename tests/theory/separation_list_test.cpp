@@ -205,6 +205,7 @@ class SeparationLists : public testing::TestWithParam<std::string> {};
 TEST_P(SeparationLists, EqualATraversalBetweenEvents) {
   const Kinds kinds = play<float, AvlEventQueue>(GetParam(), {.width = 2, .leaf_size = 1}, 40);
   play<double, BinaryHeapEventQueue>(GetParam(), {.width = 4, .leaf_size = 3}, 20);
+  EXPECT_EQ(kinds, (play<float, SegmentHeapEventQueue>(GetParam(), {.width = 2, .leaf_size = 1}, 40)));
   // Who looks less far ahead sees the same.
   for (const int look_ahead : {1, 2})
     EXPECT_EQ(kinds, (play<float, AvlEventQueue>(GetParam(), {.width = 2, .leaf_size = 1}, 20, look_ahead)));
@@ -220,7 +221,7 @@ TEST_P(SeparationListsOfChangingGeometry, EqualATraversal) {
     for (const std::uint32_t leaf_size : {1u, 3u}) {
       const BuilderConfig builder{.width = width, .leaf_size = leaf_size};
       EXPECT_GT((play<float, AvlEventQueue>(GetParam(), builder, 40).geometry), 0u);
-      EXPECT_GT((play<double, BinaryHeapEventQueue>(GetParam(), builder, 20).geometry), 0u);
+      EXPECT_GT((play<double, SegmentHeapEventQueue>(GetParam(), builder, 20).geometry), 0u);
     }
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, SeparationListsOfChangingGeometry, testing::ValuesIn(geometry_scene_names()),

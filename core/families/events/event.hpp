@@ -250,8 +250,9 @@ class EventClock {
     const int axis = axis_of(event.side);
     const S* const winner = rows.row(event.winner, axis) + ahead_at - 1;
     const S* const loser = rows.row(event.loser, axis) + ahead_at - 1;
-    const double ahead = std::abs(double(loser[1]) - double(winner[1]));
-    const double behind = std::abs(double(winner[0]) - double(loser[0]));
+    const double sign = is_upper(event.side) ? 1.0 : -1.0;
+    const double ahead = sign * (double(loser[1]) - double(winner[1]));
+    const double behind = sign * (double(winner[0]) - double(loser[0]));
     event.segment = std::uint32_t(ahead_at - 1);
     event.begin = rows.times()[ahead_at - 1];
     event.end = rows.times()[ahead_at];

@@ -90,6 +90,8 @@ class SeparationList {
       bodies_.push_back({&tree.topology(), nullptr, &forest.clock().plans(body), {}, {}});
       block_ = std::max(block_, tree.topology().width * tree.topology().width);
     }
+    if constexpr (requires { queue_.split_at(forest.clock().keyframe_times()); })
+      queue_.split_at(forest.clock().keyframe_times());
     read_trees(forest);
     if (pairs == BodyPairs::none) return;
     for (const BodyPair& pair : scene.pairs()) number(pair);
