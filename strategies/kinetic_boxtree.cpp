@@ -41,7 +41,10 @@ class KineticBox final : public Strategy<S> {
     if (rebuilds_) method_ = build_method(params.word("rebuild"));
     for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
     if (rebuilds_) degradations_.resize(topologies.size());
-    if (params.word("queue") == AvlQueue<S>::name)
+    if (params.word("queue") == SegmentHeapQueue<S>::name)
+      forest_ = std::make_unique<KineticBoxForest<S, SegmentHeapQueue<S>, Count>>(
+          scene, motion, std::move(topologies), count_);
+    else if (params.word("queue") == AvlQueue<S>::name)
       forest_ = std::make_unique<KineticBoxForest<S, AvlQueue<S>, Count>>(scene, motion,
                                                                           std::move(topologies), count_);
     else
@@ -224,7 +227,8 @@ class KineticBox final : public Strategy<S> {
   }
 
   Count count_;
-  std::variant<std::unique_ptr<KineticBoxForest<S, AvlQueue<S>, Count>>,
+  std::variant<std::unique_ptr<KineticBoxForest<S, SegmentHeapQueue<S>, Count>>,
+               std::unique_ptr<KineticBoxForest<S, AvlQueue<S>, Count>>,
                std::unique_ptr<KineticBoxForest<S, BinaryHeapQueue<S>, Count>>>
       forest_;
   NearBodies near_bodies_;
@@ -263,8 +267,9 @@ KBVH_STRATEGY(kinetic_boxtree) {
       .parameters =
           {{"queue",
             "avl",
-            {"avl", "binary_heap"},
-            "event queue: the paper's AVL tree, or an indexed binary heap"},
+            {"segment_heap", "avl", "binary_heap"},
+            "event queue: lists by segment and a heap of what comes next, the paper's AVL tree, or "
+            "an indexed binary heap"},
            {"leaf_boxes",
             "inherited",
             {"inherited", "tight"},
