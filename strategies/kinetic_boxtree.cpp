@@ -39,7 +39,10 @@ class KineticBox final : public CountedStrategy<S, Count>,
     for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
     if (rebuilds_) degradations_.resize(topologies.size());
     const BoundObserver<S> observer{&watch_};
-    if (params.word("queue") == AvlQueue<S>::name)
+    if (params.word("queue") == SegmentHeapQueue<S>::name)
+      forest_ = std::make_unique<Forest<SegmentHeapQueue<S>>>(scene, motion, std::move(topologies),
+                                                              this->count_, observer);
+    else if (params.word("queue") == AvlQueue<S>::name)
       forest_ =
           std::make_unique<Forest<AvlQueue<S>>>(scene, motion, std::move(topologies), this->count_, observer);
     else
@@ -232,8 +235,13 @@ class KineticBox final : public CountedStrategy<S, Count>,
     });
   }
 
-  BoundWatch<S> watch_;
-  std::variant<std::unique_ptr<Forest<AvlQueue<S>>>, std::unique_ptr<Forest<BinaryHeapQueue<S>>>> forest_;
+  const BoundObserver<S> observer{&watch_};
+  if (params.word("queue") == SegmentHeapQueue<S>::name)
+    forest_ = std::make_unique<Forest<SegmentHeapQueue<S>>>(scene, motion, std::move(topologies),
+                                                            this->count_, observer);
+  else if (params.word("queue") == AvlQueue<S>::name)
+    forest_ =
+        std::make_unique<Forest<AvlQueue<S>>>(scene, motion, std::move(topologies), this->count_, observer);
   NearBodies near_bodies_;
   std::vector<BoxCache<S>> caches_;
   std::vector<NodePair> stack_;
@@ -267,8 +275,9 @@ KBVH_STRATEGY(kinetic_boxtree) {
       .parameters =
           {{"queue",
             "avl",
-            {"avl", "binary_heap"},
-            "event queue: the paper's AVL tree, or an indexed binary heap"},
+            {"segment_heap", "avl", "binary_heap"},
+            "event queue: lists by segment and a heap of what comes next, the paper's AVL tree, or "
+            "an indexed binary heap"},
            {"leaf_boxes",
             "inherited",
             {"inherited", "tight"},

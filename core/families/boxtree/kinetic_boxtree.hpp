@@ -146,7 +146,7 @@ class KineticBoxTree {
   void handle(const Event& event) {
     KBVH_ASSERT(event.body == body_);
     const Crossing<S> crossing = clock_->crossing(event);
-    const Instant<S> now{event.begin, event.end, &crossing};
+    const Instant<S> now{event.begin, event.end, &crossing, event.segment};
     const Side side = event.side;
     std::uint32_t node = node_of(event.slot);
     KBVH_ASSERT(realiser(node, side) == event.winner);

@@ -35,10 +35,11 @@ template <class S>
 struct BoundObserver {
   const BoundWatch<S>* watch = nullptr;
 
+  bool reads_instants() const { return watch->log != nullptr || watch->event != nullptr; }
   template <class T>
   void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t old_vertex,
                         std::uint32_t new_vertex, const Instant<T>& now) {
-    if (watch->log == nullptr && watch->event == nullptr) return;
+    if (!reads_instants()) return;
     const BoundNotice<S> change{body,
                                 node,
                                 side,

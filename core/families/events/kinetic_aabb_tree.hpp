@@ -31,8 +31,10 @@ namespace kbvh {
 ///   node_moved(body, from, to)                     what was below `from` is below `to` now, which was its
 ///                                                  parent, or a sibling that is gone; `from` means nothing
 ///   subtree_rebuilt(body, node)                    everything below an inner node is other nodes now
-/// Nodes that are new have `no_vertex` as old realisers.
+/// Nodes that are new have `no_vertex` as old realisers. An observer may have `reads_instants()`, too: while
+/// it says no, exact times of events are not made for its sake.
 struct NoObserver {
+  static constexpr bool reads_instants() { return false; }
   template <class S>
   void realiser_changed(std::uint32_t /*body*/, std::uint32_t /*node*/, Side /*side*/,
                         std::uint32_t /*old_vertex*/, std::uint32_t /*new_vertex*/,
@@ -117,8 +119,8 @@ class KineticAabbTree {
   void handle(const Event& event) {
     KBVH_ASSERT(event.body == body_);
     // Who looks at keyframes only needs no more than the segment.
-    constexpr bool observed = !std::is_same_v<Observer, NoObserver>;
-    const bool exact = observed || event.segment == Event::no_segment || clock_->plans(body_).has_own_plans();
+    const bool exact =
+        reads_instants() || event.segment == Event::no_segment || clock_->plans(body_).has_own_plans();
     Crossing<S> crossing;
     if (exact) crossing = clock_->crossing(event);
     const Instant<S> now{event.begin, event.end, exact ? &crossing : nullptr, event.segment};
@@ -136,6 +138,11 @@ class KineticAabbTree {
       if (realiser(node, side) != event.winner) break;
     }
     certify(node, side, now);  // one of its challengers has changed
+  }
+
+  bool reads_instants() const {
+    if constexpr (requires { observer_.reads_instants(); }) return observer_.reads_instants();
+    return true;
   }
 
   /// Looks again for the next failure of a certificate, which stands at t, a keyframe.
