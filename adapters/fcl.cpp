@@ -27,6 +27,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "core/continuous/impact.hpp"
 #include "core/contract/registry.hpp"
@@ -308,13 +309,20 @@ struct Bind {
 };
 
 /// FCL's own test of a vertex and a face, or of two edges, in linear motion: the cubic's roots in floating
-/// point, by bisection or Newton's method, and tolerances for what is inside.
+/// point, by bisection or Newton's method, and tolerances for what is inside. These are lengths: FCL misses
+/// whatever is small against them. Scaled by a power of two, which rounds nothing, the largest coordinate
+/// lies between 512 and 1024.
 bool fcl_impact(Contact::Kind kind, const MovingPoints& points) {
   fcl::Vector3d p[2][4];
+  double largest = 0;
+  for (const auto* end : {points.begin, points.end})
+    for (int i = 0; i < 4; ++i)
+      for (int d = 0; d < 3; ++d) largest = std::max(largest, std::abs(end[i][d]));
+  const double scale = largest > 0 ? std::ldexp(1.0, 9 - std::ilogb(largest)) : 1;
   for (int end = 0; end < 2; ++end)
     for (int i = 0; i < 4; ++i) {
       const double* x = (end == 0 ? points.begin : points.end)[i];
-      p[end][i] = fcl::Vector3d(x[0], x[1], x[2]);
+      p[end][i] = fcl::Vector3d(scale * x[0], scale * x[1], scale * x[2]);
     }
   double time = 0;
   fcl::Vector3d place;

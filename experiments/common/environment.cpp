@@ -34,8 +34,10 @@ fs::path cache_folder() {
       fs::create_directories(wanted, error);
       if (fs::is_directory(wanted, error) && ::access(wanted.c_str(), W_OK | X_OK) == 0) return wanted;
     }
-    say("warning: the cache folder '" + wanted.string() +
-        "' cannot be written, so scenes and true pairs are computed anew (KBVH_CACHE names another)");
+    say("warning: " +
+        (wanted.empty() ? "there is no cache folder, for HOME is not set"
+                        : "the cache folder '" + wanted.string() + "' cannot be written") +
+        ", so scenes and true pairs are computed anew (KBVH_CACHE names another)");
     return fs::path();
   }();
   return folder;

@@ -1,5 +1,6 @@
 #include "experiments/io/ply.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -53,6 +54,7 @@ class PlyReader {
   AnimatedMesh read() {
     read_header();
     for (const Element& element : elements_) read_element(element);
+    check_end();
     if (mesh_.vertex_count == 0) fail(file_, "", "holds no vertices");
     if (mesh_.primitive_count() == 0) make_points(mesh_);
     check_indices();
@@ -92,6 +94,7 @@ class PlyReader {
       }
       if (word == "format") {
         const std::string_view name = next_token(line);
+        if (has_format) fail(file_, place, "a second 'format' line");
         read_format(place, name, next_token(line));
         has_format = true;
       } else if (word == "element") {
@@ -204,6 +207,7 @@ class PlyReader {
     mesh_.vertex_count = static_cast<std::uint32_t>(element.count);
     mesh_.positions.resize(3 * element.count);
     for (std::uint64_t i = 0; i < element.count; ++i) {
+      begin_row();
       for (std::size_t p = 0; p < axis_of.size(); ++p) {
         const Property& property = element.properties[p];
         if (axis_of[p] < 0) {
@@ -225,11 +229,13 @@ class PlyReader {
   /// Calls use(element number, list) for each element's list of vertex indices.
   template <class Use>
   void read_lists(const Element& element, Use use) {
-    bool has_list = false;
-    for (const Property& p : element.properties) has_list = has_list || is_index_list(p);
-    if (!has_list && element.count > 0) fail(file_, "element " + element.name, "has no list vertex_indices");
+    const auto lists = std::count_if(element.properties.begin(), element.properties.end(),
+                                     [&](const Property& p) { return is_index_list(p); });
+    if (lists > 1) fail(file_, "element " + element.name, "has two lists of vertex indices");
+    if (lists == 0 && element.count > 0) fail(file_, "element " + element.name, "has no list vertex_indices");
     std::vector<std::int64_t> list;
     for (std::uint64_t i = 0; i < element.count; ++i) {
+      begin_row();
       for (const Property& p : element.properties) {
         if (!is_index_list(p)) {
           skip(p, element, i);
@@ -295,7 +301,32 @@ class PlyReader {
     }
   }
 
+  /// Refuses data behind the last element: then the header counts too few.
+  void check_end() const {
+    const std::string_view blanks(" \t\r\n\v\f\0", 7);
+    const std::size_t more = bytes_.find_first_not_of(blanks, at_);
+    if (more == std::string::npos) return;
+    fail(file_, format_ == Format::ascii ? place_in_text(bytes_, more) : "byte " + std::to_string(more),
+         "data behind the last element that the header counts");
+  }
+
   // ---- numbers
+
+  /// In text a vertex or a face is a line: values that are missing or too many would shift all that follow.
+  void begin_row() {
+    last_row_ = row_;
+    row_ = 0;
+  }
+  void check_row(const Element& element, std::uint64_t i) {
+    if (element.name != "vertex" && element.name != "face") return;
+    if (row_ == 0 && line_ == last_row_)
+      fail(file_, place_of(element, i), "begins on the line of the one before it, which has too many values");
+    if (row_ != 0 && line_ != row_) {
+      line_ = row_;
+      fail(file_, place_of(element, i), "the line ends before all its values");
+    }
+    row_ = line_;
+  }
 
   [[noreturn]] void truncated(const Element& element, std::uint64_t i) const {
     fail(file_, place_of(element, i),
@@ -315,6 +346,7 @@ class PlyReader {
       if (bytes_[at_++] == line_end_) ++line_;
     }
     if (at_ == bytes_.size()) truncated(element, i);
+    check_row(element, i);
     const std::size_t begin = at_;
     while (at_ < bytes_.size() && blanks.find(bytes_[at_]) == std::string_view::npos) ++at_;
     return std::string_view(bytes_).substr(begin, at_ - begin);
@@ -394,8 +426,9 @@ class PlyReader {
   std::filesystem::path file_;
   std::string bytes_;
   std::size_t at_ = 0;
-  char line_end_ = '\n';  // of "\r\n" the second
-  std::size_t line_ = 1;  // of ascii bodies
+  char line_end_ = '\n';                // of "\r\n" the second
+  std::size_t line_ = 1;                // of ascii bodies
+  std::size_t row_ = 0, last_row_ = 0;  // lines of the element that is read, and of the one before; 0: none
   Format format_ = Format::ascii;
   std::vector<Element> elements_;
   AnimatedMesh mesh_;
