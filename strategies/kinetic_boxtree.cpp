@@ -235,13 +235,10 @@ class KineticBox final : public CountedStrategy<S, Count>,
     });
   }
 
-  const BoundObserver<S> observer{&watch_};
-  if (params.word("queue") == SegmentHeapQueue<S>::name)
-    forest_ = std::make_unique<Forest<SegmentHeapQueue<S>>>(scene, motion, std::move(topologies),
-                                                            this->count_, observer);
-  else if (params.word("queue") == AvlQueue<S>::name)
-    forest_ =
-        std::make_unique<Forest<AvlQueue<S>>>(scene, motion, std::move(topologies), this->count_, observer);
+  BoundWatch<S> watch_;
+  std::variant<std::unique_ptr<Forest<SegmentHeapQueue<S>>>, std::unique_ptr<Forest<AvlQueue<S>>>,
+               std::unique_ptr<Forest<BinaryHeapQueue<S>>>>
+      forest_;
   NearBodies near_bodies_;
   std::vector<BoxCache<S>> caches_;
   std::vector<NodePair> stack_;

@@ -77,8 +77,8 @@ TEST_F(Binary, ALimitOnTheSizeOfFilesIsAFullDisk) {
 TEST_F(Binary, FoldersThatCannotBeAreNamed) {
   std::filesystem::create_symlink("loop", folder_ / "loop");
   for (const std::string& name : {std::string("loop"), std::string(300, 'a')}) {
-    for (const std::string command : {"run " + one, std::string("stress --scenes 1 "), std::string("ccd "),
-                                      std::string("theory --scenes waving_sheet --sizes 50 ")}) {
+    for (const std::string& command : {"run " + one, std::string("stress --scenes 1 "), std::string("ccd "),
+                                       std::string("theory --scenes waving_sheet --sizes 50 ")}) {
       const Outcome run = kbvh(command + "--out " + name);
       EXPECT_EQ(run.code, 2) << command << run.err;
       EXPECT_EQ(run.err.find("internal error"), std::string::npos) << run.err;
