@@ -213,8 +213,9 @@ class SegmentHeapEventQueue {
   /// Bins are numbered from 0, segments from most_bins; rises with the time.
   std::int32_t number_of(double time) const {
     if (time < limit_) {
+      // Error bounds beyond float make infinite times, and no number of their differences: the first bin.
       const double share = (time - bins_begin_) * bins_per_second_;
-      return share <= 0 ? 0 : share >= double(bin_count_ - 1) ? bin_count_ - 1 : std::int32_t(share);
+      return !(share > 0) ? 0 : share >= double(bin_count_ - 1) ? bin_count_ - 1 : std::int32_t(share);
     }
     return most_bins + std::int32_t(std::max(segment_of(time), segment_));
   }
