@@ -171,8 +171,8 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
   for (CLI::Option* option : said_by_plan) plan->excludes(option);
 }
 
-void add_command(CLI::App& program, Action& action, const char* name, const char* meaning,
-                 const char* footer, Harness harness) {
+void add_command(CLI::App& program, Action& action, const char* name, const char* meaning, const char* footer,
+                 Harness harness) {
   CLI::App* command = program.add_subcommand(name, meaning);
   command->footer(footer);
   auto options = std::make_shared<StudyOptions>();

@@ -114,6 +114,9 @@ std::string unusable(const json& record) {
     what =
         wrong(record.at("strategy"), "strategy.",
               {{"id", Kind::text}, {"label", Kind::text}, {"family", Kind::text}, {"params", Kind::object}});
+  // Records from before baselines were declared have no such field.
+  if (what.empty() && !record.at("strategy").value("baseline", json(false)).is_boolean())
+    what = "strategy.baseline is not true or false";
   if (what.empty())
     what = wrong(record.at("verified"), "verified.",
                  {{"holds", Kind::truth},

@@ -354,14 +354,14 @@ TEST(Targets, RowsOfTheSamePlanAreReplacedAndOthersStay) {
   const TemporaryFolder folder;
   const auto row = [](const char* plan, int number) { return json{{"plan", plan}, {"number", number}}; };
   const auto written = [&] { return json::parse(text_of_file(folder / "targets.json")); };
-  write_targets(folder.path(), {row("a", 1), row("a", 2)});
-  write_targets(folder.path(), {row("b", 3)});
-  EXPECT_EQ(written(), json({row("a", 1), row("a", 2), row("b", 3)}));
-  write_targets(folder.path(), {row("a", 4)});
-  EXPECT_EQ(written(), json({row("b", 3), row("a", 4)}));
+  write_targets(folder.path(), json::array({row("a", 1), row("a", 2)}));
+  write_targets(folder.path(), json::array({row("b", 3)}));
+  EXPECT_EQ(written(), json::array({row("a", 1), row("a", 2), row("b", 3)}));
+  write_targets(folder.path(), json::array({row("a", 4)}));
+  EXPECT_EQ(written(), json::array({row("b", 3), row("a", 4)}));
   write_text(folder / "targets.json", "{");
-  write_targets(folder.path(), {row("a", 5)});
-  EXPECT_EQ(written(), json({row("a", 5)}));
+  write_targets(folder.path(), json::array({row("a", 5)}));
+  EXPECT_EQ(written(), json::array({row("a", 5)}));
   EXPECT_EQ(text_of_file(folder / "targets.json.damaged"), "{");
 }
 
