@@ -4,8 +4,8 @@
 
 namespace kbvh::experiments {
 
-/// Makes output safe to write: neither a closed pipe nor a limit on the size of files ends the program, and no
-/// file that is opened later takes the place of a standard stream that was closed from the start.
+/// Makes output safe to write: neither a closed pipe nor a limit on the size of files ends the program, and
+/// no file that is opened later takes the place of a standard stream that was closed from the start.
 void prepare_output();
 
 /// Prints on standard output, at once. Does not throw, because a table that cannot be shown must not lose
