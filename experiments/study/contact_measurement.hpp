@@ -30,16 +30,14 @@ class ContactMeasurement {
   nlohmann::json extras(std::size_t i) const;
 
  private:
-  struct Entrant {
-    Measured measured;
+  struct ContactEntrant : Entrant<S> {
     ImpactStats impacts;
-    std::unique_ptr<Session<S>> session;
   };
   const Scene<S>* scene_;
   std::vector<double> knots_;
   const PlanScript<S>* script_;
   std::vector<ContactBuffer> truth_;  ///< [interval], sorted
-  std::vector<Entrant> entrants_;
+  std::vector<ContactEntrant> entrants_;
   ContactBuffer contacts_;
 };
 
