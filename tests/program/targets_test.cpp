@@ -3,8 +3,7 @@
 
 #include <cmath>
 
-#include <functional>
-
+#include "complaint.hpp"
 #include "experiments/common/json_reader.hpp"
 #include "experiments/results/target_rows.hpp"
 #include "experiments/study/contestants.hpp"
@@ -16,16 +15,6 @@ namespace kbvh::experiments {
 namespace {
 
 using nlohmann::json;
-
-template <class Error = io::InputError>
-std::string complaint(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& problem) {
-    return problem.what();
-  }
-  return "nothing was thrown";
-}
 
 /// A plan with one target that is right: period over flat, on "sheet".
 json example_plan() {
