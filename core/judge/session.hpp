@@ -1,6 +1,5 @@
 #pragma once
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -10,10 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/continuous/contacts.hpp"
 #include "core/contract/registry.hpp"
-#include "core/judge/oracle.hpp"
-#include "core/judge/plan_script.hpp"
+#include "core/judge/contact_sweep.hpp"
+#include "core/judge/phase_times.hpp"
 #include "core/judge/range_watch.hpp"
 #include "core/scene/self_pairs.hpp"
 
@@ -24,15 +22,6 @@ struct Contestant {
   const StrategyEntry* entry = nullptr;
   std::map<std::string, std::string> params;
   BuilderConfig builder;  ///< ignored by strategies that build their own hierarchy
-};
-
-/// Seconds of one frame by phase. `motion` is the driver's, the same for every contestant that wants
-/// positions: evaluating them, and following changes of plans and geometry; the strategy's answers to those
-/// are phases of their own.
-struct PhaseTimes {
-  double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0, geometry_changes = 0;
-  double query() const { return traversal + triangle_tests; }
-  double total() const { return update + traversal + triangle_tests + plan_changes + geometry_changes; }
 };
 
 /// One contestant on one scene: the only driver there is; verification, benchmarks and lessons all use it.
@@ -64,7 +53,7 @@ class Session {
       changing_.emplace(*original_);
       playback_.seek(overlaid_keyframes(*original_).front());
       make_strategy();
-      finder_.reset();
+      sweep_.reset();
       geometry_changed_ = false;
     }
     watch_.start(playback_);
@@ -123,20 +112,9 @@ class Session {
     if (const double knot = next_knot(); t > knot)
       throw std::invalid_argument("contacts to t = " + std::to_string(t) + " across the knot of a plan at " +
                                   std::to_string(knot));
-    if (!finder_) finder_.emplace(*scene_);
-    playback_.evaluate_all();
-    finder_->start(playback_);
-    const double from = playback_.time();
-    timed(times.update, [&] { strategy_->start_sweep(from); });
-    seek(t);
-    timed(times.motion, [&] { playback_.evaluate_all(); });
-    before_.clear();
-    for (std::uint32_t body = 0; body < playback_.body_count(); ++body)
-      before_.push_back(finder_->before(body));
-    swept_.clear();
-    timed(times.traversal, [&] { strategy_->swept_pairs(from, t, before_, swept_); });
-    timed(times.triangle_tests, [&] { finder_->find(playback_, swept_, out); });
-    return swept_.size();
+    if (!sweep_) sweep_.emplace(*scene_);
+    return sweep_->find(
+        *strategy_, playback_, t, [this](double to) { seek(to); }, out, times);
   }
   /// The first time after the present one at which the plan of any vertex has a knot; infinite if none has.
   /// O(bodies + plans of their own).
@@ -147,9 +125,9 @@ class Session {
     return knot;
   }
   /// How contacts were decided; after the first call of `contacts`.
-  ImpactStats impact_stats() const { return finder_ ? finder_->stats() : ImpactStats{}; }
-  /// The pairs of the last call of `contacts`.
-  const PairBuffer& swept_pairs() const { return swept_; }
+  ImpactStats impact_stats() const { return sweep_ ? sweep_->stats() : ImpactStats{}; }
+  /// The swept pairs of the last call of `contacts`, which must have been called.
+  const PairBuffer& swept_pairs() const { return sweep_->pairs(); }
 
   /// Makes the changes at the current time, all of them or, if one is not valid, none
   /// (Playback::change_plans).
@@ -168,16 +146,9 @@ class Session {
     if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
     timed(times.motion, [&] { changing_->apply(change, playback_); });
     geometry_changed_ = true;
-    finder_.reset();  // its features are those of before
+    sweep_.reset();  // its features are those of before
     watch_.added(playback_, change);
     timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
-  }
-
-  /// Makes a script's changes at the current time; nullptr: there are none.
-  void follow(const typename PlanScript<S>::Step* step, PhaseTimes& times) {
-    if (step == nullptr) return;
-    if (!step->changes.empty()) change_plans(step->changes, times);
-    if (!step->geometry.empty()) change_geometry(step->geometry, times);
   }
 
   Strategy<S>& strategy() { return *strategy_; }
@@ -200,12 +171,6 @@ class Session {
     for (const auto& [body, positions] : handed_in_) playback_.hand_in(body, positions);
     handed_in_.clear();
   }
-  template <class Work>
-  static void timed(double& seconds, Work&& work) {
-    const auto begin = std::chrono::steady_clock::now();
-    work();
-    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  }
   const Scene<S>* original_;
   Contestant contestant_;
   CountingPolicy policy_;
@@ -218,9 +183,7 @@ class Session {
   std::unique_ptr<Strategy<S>> strategy_;
   bool geometry_changed_ = false;
   std::vector<std::pair<std::uint32_t, const S*>> handed_in_;
-  std::optional<ContactFinder<S>> finder_;
-  std::vector<const S*> before_;
-  PairBuffer swept_;
+  std::optional<ContactSweep<S>> sweep_;  ///< made by the first call of `contacts`
 };
 
 }  // namespace kbvh

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "core/base/hasher.hpp"
+#include "core/judge/follow_script.hpp"
 #include "core/judge/verify.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "tests/support/synthetic_scenes.hpp"
@@ -62,7 +63,7 @@ std::uint64_t hash_of(const StrategyEntry& entry, const std::vector<std::string>
       else
         session.advance(frames[f], ignored);
       add_frame(session, hasher);
-      session.follow(cursor.at(frames[f]), ignored);
+      follow(session, cursor.at(frames[f]), ignored);
     }
   }
   return hasher.value();
