@@ -3,7 +3,8 @@
 
 namespace kbvh::experiments {
 
-/// One line on standard error that says what long work is doing; silent unless that is a terminal.
+/// One line on standard error that says what long work is doing; silent unless that is a terminal. There is
+/// one at a time.
 class Progress {
  public:
   Progress();
@@ -14,6 +15,8 @@ class Progress {
   void show(const std::string& line);
   /// Removes the line, before anything else is printed.
   void clear();
+  /// The text that was shown last and is not cleared, on any standard error; empty if there is none.
+  static const std::string& activity();
 
  private:
   bool terminal_ = false;
