@@ -8,45 +8,46 @@
 
 namespace kbvh {
 
-/// What a strategy counts; one table for all of them, so that reports and theory checks can loop over it.
+/// The shared counters of strategies. One table serves all strategies, so that reports and theory checks can
+/// loop over it.
 enum class Counter : std::uint8_t {
-  nodes_visited,           ///< nodes whose bounds an update looked at
+  nodes_visited,           ///< nodes whose bounds an update visited
   values_written,          ///< bound values stored (6 per AABB written; 1 per realiser changed)
   vertex_reads,            ///< vertex positions read by updates
-  positions_fetched,       ///< positions a lazy strategy had evaluated on demand
+  positions_fetched,       ///< positions that a lazy strategy had evaluated on demand
   certificates_made,       ///< certificates computed, with or without a failure inside the clip
   certificates_failed,     ///< events processed
   certificates_discarded,  ///< scheduled failures removed before they happened
   internal_events,         ///< events that changed no bound
   overlap_events,          ///< boxes of a separation list that began to overlap
-  fathers_apart_events,    ///< inner pairs above a separation list that ceased to overlap
-  leaves_apart_events,     ///< overlapping leaves that ceased to overlap
-  bound_change_events,     ///< changes of a box that takes part in a separation list
+  fathers_apart_events,    ///< inner pairs above a separation list whose boxes ceased to overlap
+  leaves_apart_events,     ///< overlapping pairs of leaves that ceased to overlap
+  bound_change_events,     ///< changes of a box that occurs in a separation list
   list_peak,               ///< largest number of pairs in the separation list (a maximum, not a sum)
   queue_operations,        ///< insert, erase, pop and re-key on the event queue
   queue_steps,             ///< comparisons made by the queue
   queue_peak,              ///< largest number of events scheduled at once (a maximum, not a sum)
   box_tests,               ///< box-box overlap tests of the query, primitive pre-tests included
   triangle_tests,          ///< exact triangle tests
-  triangle_tests_exact,    ///< of these, the ones the filter left to exact arithmetic
+  triangle_tests_exact,    ///< exact triangle tests that the filter left to exact arithmetic
   span_tests,              ///< attempts to decide a pair of triangles for a span of time
-  span_verdicts,           ///< pairs that a frame took to intersect by an earlier frame's verdict
-  bodies_skipped,          ///< bodies of which a frame looked at nothing, or at nothing but one box
-  nodes_skipped,           ///< nodes that an update left alone, since no query of the frame could read them
-  bodies_translated,       ///< bodies whose boxes were moved as they were: so they go over the whole segment
-  bodies_remembered,       ///< bodies whose boxes were those of the last time that the clip came by
+  span_verdicts,           ///< pairs that a frame reported as intersecting by the verdict of an earlier frame
+  bodies_skipped,          ///< bodies for which a frame read at most one box
+  nodes_skipped,           ///< nodes that an update skipped because no query of the frame could read them
+  bodies_translated,       ///< bodies whose boxes were translated for a whole segment instead of refitted
+  bodies_remembered,       ///< bodies whose boxes were reused from an earlier play of the clip
   bytes,                   ///< memory held by the strategy's own structures, in bytes (a level, not a sum)
   count
 };
 
-/// Name of a counter in result files.
+/// Returns the name of a counter in result files.
 const char* name(Counter counter);
 
 /// The counter table of one strategy instance; cleared by `reset`.
 struct Counters {
   std::array<std::uint64_t, std::size_t(Counter::count)> values{};
-  /// Events of bounds by the depth of the node where they begin (0: root); the last entry has all deeper
-  /// ones.
+  /// Counts bound events by the depth of the node at which they occur (0: root); the last entry sums all
+  /// deeper levels.
   std::array<std::uint64_t, 64> events_at_depth{};
   std::uint64_t& operator[](Counter c) { return values[std::size_t(c)]; }
   std::uint64_t operator[](Counter c) const { return values[std::size_t(c)]; }
@@ -57,12 +58,12 @@ struct Counters {
     std::uint64_t value = 0;
   };
   std::vector<Named> named{};
-  /// Adds n to a counter of a strategy's own, which begins at 0. Throws std::logic_error if a counter of the
-  /// enum has that name. O(named counters).
+  /// Adds n to a strategy's own counter, which starts at 0. Throws std::logic_error if a counter of the enum
+  /// has that name. O(named counters).
   void add(std::string_view own, std::uint64_t n);
 };
 
-/// Counting policies: strategies are compiled with both; times come from the silent one.
+/// Counting policies. Every strategy is compiled with both; reported times come from the silent one.
 struct Counting {
   Counters table;
   void add(Counter c, std::uint64_t n = 1) { table[c] += n; }

@@ -1,4 +1,5 @@
-// Apart from registry.cpp, so that programs without a manifest (tests of single strategies) can use the rest.
+// Separate from registry.cpp, so that programs without a manifest (tests of single strategies) can link the
+// rest.
 
 #include "core/contract/registry.hpp"
 
