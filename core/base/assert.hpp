@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-/// Internal invariants: on in debug builds and where KBVH_CHECKED is set, gone elsewhere.
+/// Checks an internal invariant in debug builds and with KBVH_CHECKED defined; compiles to nothing otherwise.
 #if defined(KBVH_CHECKED) || !defined(NDEBUG)
 #define KBVH_ASSERT(condition)                                                                        \
   do {                                                                                                \

@@ -45,16 +45,16 @@ enum class Counter : std::uint8_t {
       count
 };
 
-/// Name of a counter in result files.
+/// Returns the name of a counter in result files.
 const char* name(Counter counter);
-/// What a counter counts, in a line.
+/// Returns what a counter counts, in a line.
 const char* meaning(Counter counter);
 
 /// The counter table of one strategy instance; cleared by `reset`.
 struct Counters {
   std::array<std::uint64_t, std::size_t(Counter::count)> values{};
-  /// Events of bounds by the depth of the node where they begin (0: root); the last entry has all deeper
-  /// ones.
+  /// Counts bound events by the depth of the node at which they occur (0: root); the last entry sums all
+  /// deeper levels.
   std::array<std::uint64_t, 64> events_at_depth{};
   std::uint64_t& operator[](Counter c) { return values[std::size_t(c)]; }
   std::uint64_t operator[](Counter c) const { return values[std::size_t(c)]; }
@@ -65,12 +65,12 @@ struct Counters {
     std::uint64_t value = 0;
   };
   std::vector<Named> named{};
-  /// Adds n to a counter of a strategy's own, which begins at 0. Throws std::logic_error if a counter of the
-  /// enum has that name. O(named counters).
+  /// Adds n to a strategy's own counter, which starts at 0. Throws std::logic_error if a counter of the enum
+  /// has that name. O(named counters).
   void add(std::string_view own, std::uint64_t n);
 };
 
-/// Counting policies: strategies are compiled with both; times come from the silent one.
+/// Counting policies. Every strategy is compiled with both; reported times come from the silent one.
 struct Counting {
   Counters table;
   void add(Counter c, std::uint64_t n = 1) { table[c] += n; }

@@ -5,7 +5,8 @@
 
 namespace kbvh {
 
-/// FNV-1a over 8-byte words with a final avalanche: fast enough for gigabytes, good enough for a cache key.
+/// Hashes with FNV-1a over 8-byte words and a final avalanche: fast enough for gigabytes, good enough for a
+/// cache key.
 class Hasher {
  public:
   void bytes(const void* data, std::size_t size) {

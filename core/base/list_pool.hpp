@@ -7,12 +7,12 @@
 
 namespace kbvh {
 
-/// Many short lists of numbers under the keys 0, 1, ...: packed like CSR lists as long as nobody changes
-/// them, with room of their own once they grow. Reading costs what CSR lists cost; changing one is O(its
-/// length), and abandoned room is used again.
+/// Many short lists of numbers under the keys 0, 1, ... Unchanged lists are packed like CSR lists; a list
+/// that grows moves to a place of its own. Reading costs the same as with CSR lists. Changing a list is O(its
+/// length). Abandoned places are recycled.
 class ListPool {
  public:
-  /// Lists as CSR: list k is values[offsets[k] .. offsets[k + 1]).
+  /// Takes lists in CSR form: list k is values[offsets[k] .. offsets[k + 1]).
   ListPool(std::span<const std::uint32_t> offsets, std::vector<std::uint32_t> values)
       : values_(std::move(values)) {
     if (offsets.empty()) return;
@@ -27,13 +27,13 @@ class ListPool {
     return {values_.data() + list.begin, list.count};
   }
   std::uint32_t keys() const { return std::uint32_t(lists_.size()); }
-  /// Adds empty lists, or drops the last ones.
+  /// Appends empty lists, or drops the last lists.
   void resize(std::uint32_t keys) {
     for (std::uint32_t key = keys; key < lists_.size(); ++key) release(lists_[key]);
     lists_.resize(keys);
   }
 
-  /// Replaces a list; `list` must not be one of the pool's.
+  /// Replaces a list; `list` must not point into the pool.
   void assign(std::uint32_t key, std::span<const std::uint32_t> list) {
     if (list.size() > room(lists_[key])) {
       release(lists_[key]);
@@ -54,7 +54,7 @@ class ListPool {
     values_[list.begin + list.count++] = value;
     lists_[key] = list;
   }
-  /// Takes one occurrence of a value out, if there is any; the order may change.
+  /// Removes one occurrence of a value, if there is one; the order may change.
   void erase(std::uint32_t key, std::uint32_t value) {
     List& list = lists_[key];
     const auto begin = values_.begin() + list.begin, end = begin + list.count;
@@ -63,7 +63,7 @@ class ListPool {
     *at = *(end - 1);
     --list.count;
   }
-  /// Puts another value in the place of one that is in the list.
+  /// Replaces one occurrence of `value` by `by`.
   void replace(std::uint32_t key, std::uint32_t value, std::uint32_t by) {
     const List list = lists_[key];
     const auto begin = values_.begin() + list.begin;
@@ -84,7 +84,7 @@ class ListPool {
  private:
   struct List {
     std::uint32_t begin = 0, count = 0;
-    std::uint32_t room = 0;  ///< of those that have been moved, a power of two; 0: as packed
+    std::uint32_t room = 0;  ///< capacity of a moved list, a power of two; 0: as packed
   };
   static constexpr std::uint32_t smallest = 4;
   static std::uint32_t room(const List& list) { return list.room != 0 ? list.room : list.count; }
@@ -109,7 +109,8 @@ class ListPool {
 
   std::vector<List> lists_;
   std::vector<std::uint32_t> values_;
-  std::vector<std::vector<std::uint32_t>> free_;  ///< begins of abandoned room, by its power of two
+  std::vector<std::vector<std::uint32_t>>
+      free_;  ///< begins of abandoned places, by the exponent of their capacity
 };
 
 }  // namespace kbvh

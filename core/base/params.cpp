@@ -8,13 +8,13 @@ namespace kbvh {
 
 namespace {
 
-/// As short as can be read back: 1, 1e+15, 0.1.
+/// Returns the shortest text that reads back as the same number: 1, 1e+15, 0.1.
 std::string shown(double number) {
   char text[32];
   return std::string(text, std::to_chars(text, text + sizeof text, number).ptr);
 }
 
-/// The number that a text is, subnormal ones included; NaN if it is none.
+/// Parses a number, subnormal ones included; returns NaN if the text is not a number.
 double number_of(const std::string& text) {
   double number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);

@@ -8,11 +8,11 @@
 
 namespace kbvh {
 
-/// Which numbers a parameter takes.
+/// The numbers that a parameter accepts.
 enum class Numbers : std::uint8_t { any, whole };
 
-/// A parameter of a strategy as data. `allowed` lists the admissible words; empty: numbers from `least` to
-/// `most`, both included.
+/// A parameter of a strategy as data. `allowed` lists the admissible words; if it is empty, the parameter
+/// accepts numbers from `least` to `most`, both included.
 struct Parameter {
   std::string name;
   std::string default_value;
@@ -23,20 +23,20 @@ struct Parameter {
   Numbers numbers = Numbers::any;
 };
 
-/// What a parameter takes, in words: "avl | binary_heap", "a whole number from 1 to 64", "a number of at
-/// least 0".
+/// Returns the admissible values in words: "avl | binary_heap", "a whole number from 1 to 64", "a number of
+/// at least 0".
 std::string admissible(const Parameter& parameter);
 
-/// What is wrong with a configuration: names the offending key and value and what would be admissible.
+/// Reports an invalid configuration: the message names the offending key and value and the admissible values.
 struct ConfigError : std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
-/// Checked values of a strategy's parameters: every declared one is present.
+/// The checked parameter values of a strategy. Every declared parameter is present.
 class Params {
  public:
   Params() = default;
-  /// Throws ConfigError on a key that is not declared or a value that is not admissible.
+  /// Throws ConfigError on an undeclared key or an inadmissible value.
   Params(const std::string& owner, const std::vector<Parameter>& declared,
          const std::map<std::string, std::string>& given);
   const std::string& word(const std::string& key) const { return values_.at(key); }

@@ -11,7 +11,7 @@ using Integer = Polynomial::Integer;
 
 namespace {
 
-/// The middle of [k, k + 1] / 2^exponent and the like: of two times with one exponent that are neighbours.
+/// Returns the middle of [k, k + 1] / 2^exponent or of any two neighbouring times with one exponent.
 DyadicTime middle(const DyadicTime& begin) {
   return {begin.numerator * 2 + 1, begin.exponent + 1};
 }
@@ -62,7 +62,7 @@ void Polynomial::drop_powers_of_two() {
   for (int i = 0; i <= degree_; ++i)
     if (!coefficient_[i].is_zero()) shift = std::min(shift, unsigned(lsb(abs(coefficient_[i]))));
   if (shift == 0) return;
-  for (int i = 0; i <= degree_; ++i) coefficient_[i] >>= shift;  // nothing is lost
+  for (int i = 0; i <= degree_; ++i) coefficient_[i] >>= shift;  // exact: the shifted-out bits are zero
 }
 
 Polynomial Polynomial::remainder(const Polynomial& divisor) const {
@@ -94,7 +94,7 @@ void Polynomial::divide_out(const Integer& numerator, const Integer& denominator
       power *= denominator;
     }
     if (!(carry * numerator + coefficient_[0] * power).is_zero()) return;
-    // Bring the coefficients to one power: all times denominator^(degree - 1).
+    // Brings the coefficients to one power: all times denominator^(degree - 1).
     Integer scale = 1;
     for (int i = 0; i < degree_; ++i) {
       quotient.coefficient_[i] *= scale;
@@ -151,7 +151,7 @@ int AlgebraicTime::sign_throughout(const Polynomial& q) const {
   const int first = q.sign_at(n, e), last = q.sign_at(end_.numerator, e);
   if (first == 0 || first != last) return 0;
   if (q.degree() < 2) return first;
-  // Twice the coefficient in the middle, times 2^(2 e).
+  // Twice the middle coefficient, times 2^(2 e).
   const Integer middle = (q[0] << (2 * e + 1)) + ((q[1] * (2 * n + 1)) << e) + 2 * q[2] * n * (n + 1);
   return middle.sign() == first ? first : 0;
 }
@@ -160,14 +160,14 @@ int AlgebraicTime::sign(const Polynomial& q) const {
   if (q.is_zero()) return 0;
   if (dyadic_) return q.sign_at(begin_.numerator, begin_.exponent);
   if (const int sign = sign_throughout(q)) return sign;
-  // A Tarski query; p' q may be reduced modulo p, which leaves the Cauchy index as it is.
+  // A Tarski query; p' q may be reduced modulo p, which preserves the Cauchy index.
   const Polynomial h = (p_.derivative() * q).remainder(p_);
   return SturmSequence(p_, h).index(begin_, end_);
 }
 
 void AlgebraicTime::refine(unsigned bits) {
   if (dyadic_ || begin_.exponent >= bits) return;
-  // A root of odd multiplicity is where the sign changes; of others only the number of roots tells.
+  // At a root of odd multiplicity the sign changes; only the number of roots reveals the others.
   const int before = p_.sign_at(begin_.numerator, begin_.exponent);
   const bool crossing = before != p_.sign_at(end_.numerator, end_.exponent);
   std::optional<SturmSequence> roots;
@@ -193,7 +193,7 @@ void AlgebraicTime::refine(unsigned bits) {
 void append_inner_roots(Polynomial p, std::vector<AlgebraicTime>& roots) {
   p.divide_out(0, 1);
   p.divide_out(1, 1);
-  // A root in the middle of an interval is taken out of the polynomial, and all begins anew.
+  // A root in the middle of an interval is divided out of the polynomial, and the search restarts.
   for (bool again = true; again && p.degree() >= 1;) {
     again = false;
     const SturmSequence count(p, p.derivative());

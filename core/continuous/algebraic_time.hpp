@@ -6,14 +6,14 @@
 
 namespace kbvh {
 
-/// A polynomial in t with integer coefficients, of degree 4 at most: coefficient[i] of t^i. Degree -1: zero.
+/// A polynomial in t with integer coefficients, of degree at most 4: coefficient[i] of t^i. Degree -1: zero.
 class Polynomial {
  public:
   using Integer = Dyadic::Integer;
   static constexpr int max_degree = 4;
 
   Polynomial() = default;
-  /// value at t = 0 and at t = 1 of a polynomial of degree 1.
+  /// Makes a polynomial of degree 1 from its values at t = 0 and t = 1.
   static Polynomial line(const Integer& begin, const Integer& end) {
     Polynomial result;
     result.coefficient_[0] = begin;
@@ -29,15 +29,15 @@ class Polynomial {
   friend Polynomial operator+(const Polynomial& a, const Polynomial& b);
   friend Polynomial operator-(const Polynomial& a, const Polynomial& b);
   friend Polynomial operator-(const Polynomial& a);
-  /// Degrees must not add to more than `max_degree`.
+  /// The sum of the degrees must not exceed `max_degree`.
   friend Polynomial operator*(const Polynomial& a, const Polynomial& b);
   Polynomial derivative() const;
-  /// A positive multiple of the remainder of this divided by `divisor`, which is not zero.
+  /// Returns a positive multiple of the remainder of the division by `divisor`, which must not be zero.
   Polynomial remainder(const Polynomial& divisor) const;
-  /// Divides by (denominator t - numerator), which must be a factor, as often as it is one.
+  /// Divides by (denominator t - numerator), which must be a factor, as often as possible.
   void divide_out(const Integer& numerator, const Integer& denominator);
 
-  /// Sign at t = numerator / 2^exponent.
+  /// Returns the sign at t = numerator / 2^exponent.
   int sign_at(const Integer& numerator, unsigned exponent) const;
 
  private:
@@ -56,9 +56,9 @@ struct DyadicTime {
   unsigned exponent = 0;
 };
 
-/// The signed remainder sequence of p and h, which knows the Cauchy index of h / p between two times that are
-/// no roots of p (Basu, Pollack & Roy 2006, theorem 2.58): with h = p' the number of distinct roots of p,
-/// with h = p' q the sum over them of the signs of q.
+/// The signed remainder sequence of p and h. It computes the Cauchy index of h / p between two times that are
+/// not roots of p (Basu, Pollack & Roy 2006, theorem 2.58): with h = p' this is the number of distinct roots
+/// of p, with h = p' q the sum over these roots of the signs of q.
 class SturmSequence {
  public:
   SturmSequence(const Polynomial& p, const Polynomial& h);
@@ -71,24 +71,25 @@ class SturmSequence {
   std::vector<Polynomial> sequence_;
 };
 
-/// An algebraic number in [0, 1]: a dyadic one, or the only root of a polynomial between two dyadic ones,
-/// which are neighbours with one exponent.
+/// An algebraic number in [0, 1]: a dyadic number, or the only root of a polynomial between two neighbouring
+/// dyadic numbers with one exponent.
 class AlgebraicTime {
  public:
   explicit AlgebraicTime(DyadicTime t) : begin_(t), end_(t), dyadic_(true) {}
   AlgebraicTime(const Polynomial& p, DyadicTime begin, DyadicTime end)
       : p_(p), begin_(std::move(begin)), end_(std::move(end)) {}
 
-  /// The sign of a polynomial of degree 2 at most. Exact.
+  /// Returns the exact sign of a polynomial of degree at most 2.
   int sign(const Polynomial& q) const;
   /// Halves the interval until it is no wider than 2^-bits.
   void refine(unsigned bits);
-  /// The interval as it is refined; exact down to a width of 2^-50, beyond that rounded outwards.
+  /// Returns the refined interval; exact down to a width of 2^-50, beyond that rounded outwards.
   double begin() const { return rounded(begin_, 0); }
   double end() const { return rounded(end_, dyadic_ && begin_.exponent <= 50 ? 0 : 1); }
 
  private:
-  /// The sign of q everywhere between the ends, by its Bernstein coefficients there; 0 if they do not tell.
+  /// Returns the sign of q everywhere between the ends, by its Bernstein coefficients there; 0 if these do
+  /// not decide.
   int sign_throughout(const Polynomial& q) const;
   static double rounded(const DyadicTime& t, unsigned up);
   Polynomial p_;
@@ -96,7 +97,7 @@ class AlgebraicTime {
   bool dyadic_ = false;
 };
 
-/// Appends the distinct roots of p, of degree 3 at most and not zero, that lie strictly between 0 and 1.
+/// Appends the distinct roots of p strictly between 0 and 1; p has degree at most 3 and is not zero.
 void append_inner_roots(Polynomial p, std::vector<AlgebraicTime>& roots);
 
 }  // namespace kbvh

@@ -154,7 +154,7 @@ void ContactFinder<S>::report(Contact contact, const MovingPoints& points, Conta
   const Impact impact = find_impact(contact.kind, points, &stats_);
   if (!impact.touches) return;
   constexpr double infinity = std::numeric_limits<double>::infinity();
-  // The length, the product and the sum are rounded: three steps outwards are more than that. Ends are exact.
+  // The length, the product and the sum are rounded; three steps outwards cover these errors. Ends are exact.
   const auto at = [&](double fraction, double outwards) {
     if (fraction == 0) return begin_;
     if (fraction == 1) return end_;

@@ -11,15 +11,16 @@ namespace kbvh {
 
 using ContactBuffer = std::vector<Contact>;
 
-/// Orders contacts by kind, features and time, and compares them: for sets of them.
+/// Orders and compares contacts by kind, features and time, for sets of contacts.
 bool operator<(const Contact& a, const Contact& b);
 bool operator==(const Contact& a, const Contact& b);
 
-/// Vertices, edges and faces of a body of triangles, for contacts. Faces are its primitives, vertices those
-/// of the faces; edges are unique and undirected, numbered by their larger and then by their smaller vertex.
+/// Vertices, edges and faces of a body of triangles, for contacts. Faces are its primitives, vertices are
+/// those of the faces. Edges are unique and undirected, numbered by their larger and then by their smaller
+/// vertex.
 ///
-/// Every vertex and every edge belongs to one face, the first that has it, so that a pair of features is
-/// found with one pair of faces only (representative triangles: Curtis, Tamstorf & Manocha 2008).
+/// Every vertex and every edge belongs to the first face that contains it, so that a pair of features is
+/// found with exactly one pair of faces (representative triangles: Curtis, Tamstorf & Manocha 2008).
 class Features {
  public:
   struct Edge {
@@ -40,32 +41,32 @@ class Features {
 
  private:
   std::vector<Edge> edges_;
-  std::vector<Face> faces_;  ///< by primitive; of removed ones nothing is owned
+  std::vector<Face> faces_;  ///< by primitive; removed primitives own no feature
 };
 
 /// The narrow phase of continuous collision detection between two frames: every vertex moves on a straight
-/// line from its position at the one (`start`) to that at the other (`find`). The positions are those of
-/// frames (truth B): at keyframes the stored ones. Keeps its buffers.
+/// line from its position at the first frame (`start`) to its position at the second (`find`). Positions are
+/// truth B: at keyframes the stored ones. Reuses its buffers.
 template <class S>
 class ContactFinder {
  public:
-  /// Throws std::invalid_argument, naming the body, unless all bodies in pairs consist of triangles.
+  /// Throws std::invalid_argument that names the body, unless all bodies in pairs consist of triangles.
   explicit ContactFinder(const Scene<S>& scene);
 
-  /// The motion begins at the playback's time, with its positions, all of which must be current.
+  /// Starts the motion at the playback's time, with its positions, all of which must be current.
   void start(const Playback<S>& playback);
-  /// It ends at the playback's time, with its positions. Appends the contacts of the features of pairs of
-  /// faces, each once if the pairs are; features that share a vertex make none. Times of impact are enclosed
-  /// to within `impact_width` of the motion's length, rounded outwards.
+  /// Ends the motion at the playback's time, with its positions. Appends the contacts of the features of
+  /// pairs of faces, each once if each pair is listed once; features that share a vertex have no contact.
+  /// Times of impact are enclosed to within `impact_width` of the motion's length, rounded outwards.
   void find(const Playback<S>& playback, std::span<const PrimitivePair> pairs, ContactBuffer& out);
-  /// The same for every vertex against every face, and every edge against every edge, of the scene's pairs of
-  /// bodies: the oracle. O(n^2).
+  /// Appends the contacts of every vertex with every face, and of every edge with every edge, for the scene's
+  /// pairs of bodies: the oracle. O(n^2).
   void find_all(const Playback<S>& playback, ContactBuffer& out);
-  /// The same as `find_all`, by sorting and sweeping the faces' boxes of the whole motion: for larger scenes.
+  /// Appends the same contacts as `find_all`, by sort-and-sweep of the faces' swept boxes: for larger scenes.
   void find_by_sweep(const Playback<S>& playback, ContactBuffer& out);
 
-  /// Positions of a body where the motion began, [vertex][3]; as in the playback, one scalar past the end may
-  /// be read.
+  /// Returns the positions of a body at the start of the motion, [vertex][3]; one scalar past the end may be
+  /// read.
   const S* before(std::uint32_t body) const { return before_[body].data(); }
   const ImpactStats& stats() const { return stats_; }
 

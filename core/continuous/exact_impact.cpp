@@ -1,4 +1,4 @@
-// Impacts by integers: roots of the cubic and of the quadratics as algebraic numbers.
+// Exact impacts by integers: roots of the cubic and of the quadratics as algebraic numbers.
 
 #include <algorithm>
 #include <vector>
@@ -11,7 +11,7 @@ namespace {
 
 using Integer = Polynomial::Integer;
 
-/// A vector that moves linearly, or the cross product of two: one polynomial for each axis.
+/// A vector that moves linearly, or the cross product of two: one polynomial per axis.
 struct MovingVector {
   Polynomial axis[3];
 };
@@ -31,7 +31,7 @@ Polynomial dot(const MovingVector& a, const MovingVector& b) {
   return a.axis[0] * b.axis[0] + a.axis[1] * b.axis[1] + a.axis[2] * b.axis[2];
 }
 
-/// All 24 coordinates as integers over one power of two: a common factor changes no verdict.
+/// Converts all 24 coordinates to integers times one power of two; a common factor changes no verdict.
 void scale(const MovingPoints& points, MovingVector (&moving)[4]) {
   Dyadic values[4][3][2];
   int lowest = 0;
@@ -57,10 +57,10 @@ void scale(const MovingPoints& points, MovingVector (&moving)[4]) {
       moving[i].axis[k] = Polynomial::line(integer(values[i][k][0]), integer(values[i][k][1]));
 }
 
-/// One query, as polynomials. Vertex-face: a and b are the edges from the face's first corner and r goes from
-/// there to the vertex; where they touch, r = y a + x b with x, y, 1 - x - y >= 0, so that a x r = x n and
-/// r x b = y n with n = a x b. Edge-edge: a and b are the edges and r goes from one start to the other; there
-/// r = y a - x b with x and y in [0, 1], so that r x a = x n and r x b = y n.
+/// One query, as polynomials. Vertex-face: a and b are the edges from the face's first corner, and r goes
+/// from there to the vertex; at contact r = y a + x b with x, y, 1 - x - y >= 0, so that a x r = x n and r x
+/// b = y n with n = a x b. Edge-edge: a and b are the edges, and r goes from one start to the other; at
+/// contact r = y a - x b with x and y in [0, 1], so that r x a = x n and r x b = y n.
 class ExactQuery {
  public:
   ExactQuery(Contact::Kind kind, const MovingPoints& points) : kind_(kind) {
@@ -109,8 +109,9 @@ class ExactQuery {
   }
 
  private:
-  /// If all is in one plane for all time. The set of times of contact is closed, and nothing changes between
-  /// roots of what `touch_at` looks at: if there is any contact, there is one at such a root or at an end.
+  /// Adds candidate times for points that stay in one plane. The set of contact times is closed, and it can
+  /// change only at roots of the polynomials that `touch_at` reads: if there is any contact, there is one at
+  /// such a root or at an end.
   void add_times_in_plane() {
     const auto add = [&](const MovingVector& vector) {
       for (const Polynomial& q : vector.axis)
@@ -129,17 +130,17 @@ class ExactQuery {
     return {{0, 2}, {0, 3}, {1, 2}, {1, 3}};
   }
 
-  /// At a time at which the four points are coplanar.
+  /// Tests contact at a time at which the four points are coplanar.
   bool touch_at(const AlgebraicTime& t) const {
     for (int k = 0; k < 3; ++k) {
       const int side = t.sign(normal_.axis[k]);
       if (side == 0) continue;
-      // Seen along axis k nothing of their plane is lost.
+      // Projecting along axis k loses nothing of the points' plane.
       for (const MovingVector& share : shares_)
         if (t.sign(share.axis[k]) * side < 0) return false;
       return true;
     }
-    // A face that is a segment or a point, or edges that are parallel or points: an end of one lies on the
+    // The face is a segment or a point, or the edges are parallel or points: an end of one must lie on the
     // other.
     if (kind_ == Contact::Kind::vertex_face)
       return on_segment(t, 0, 1, 2, shares_[0]) || on_segment(t, 0, 1, 3, shares_[1]) ||
@@ -147,7 +148,8 @@ class ExactQuery {
     return on_segment(t, 2, 0, 1, shares_[0]) || on_segment(t, 3, 0, 1, shares_[2]) ||
            on_segment(t, 0, 2, 3, shares_[1]) || on_segment(t, 1, 2, 3, shares_[3]);
   }
-  /// Is point i on the segment from j to k? `area` is twice that of the three, up to its sign.
+  /// Returns whether point i is on the segment from j to k. `area` is twice that of the three points, up to
+  /// its sign.
   bool on_segment(const AlgebraicTime& t, int i, int j, int k, const MovingVector& area) const {
     for (const Polynomial& component : area.axis)
       if (t.sign(component) != 0) return false;
@@ -161,7 +163,7 @@ class ExactQuery {
   MovingVector p_[4], normal_;
   Polynomial coplanar_;
   std::vector<MovingVector> shares_;
-  std::vector<AlgebraicTime> times_;  ///< at which there may be contact
+  std::vector<AlgebraicTime> times_;  ///< candidate times of contact
 };
 
 }  // namespace

@@ -7,15 +7,15 @@
 namespace kbvh {
 namespace {
 
-/// What a filter says of an interval of time.
+/// The filter's verdict on an interval of time.
 enum class Verdict : std::uint8_t { free, touches, open };
 
 /// Unit roundoff.
 constexpr double u = 0x1p-53;
 
-/// A cell of the subdivision: Bernstein coefficients over it of three times the cubic f = n . r, whose roots
-/// are the times at which the four points are coplanar, and along each axis of the quadratics n = a x b,
-/// x and y, as `Numbers` makes them.
+/// A cell of the subdivision: Bernstein coefficients over the cell of three times the cubic f = n . r, whose
+/// roots are the times at which the four points are coplanar, and along each axis of the quadratics n = a x
+/// b, x and y, as computed by `Numbers`.
 struct Cell {
   double f[4];
   double n[3][3], x[3][3], y[3][3];  ///< [coefficient][axis]
@@ -23,15 +23,15 @@ struct Cell {
   int depth;
 };
 
-/// Bounds on the error of every coefficient at depth 0, and what each halving adds.
+/// Bounds on the error of every coefficient at depth 0, and the increase per halving.
 ///
-/// A coefficient of a quadratic is a sum of at most four products of two differences: no term takes part in
+/// A coefficient of a quadratic is a sum of at most four products of two differences. No term takes part in
 /// more than 5 roundings, and the sum of their magnitudes is at most twice `area`, the permanent of the
 /// largest magnitudes of the differences; halved, that is 10 u area. Half the sum of two coefficients, which
-/// are at most `area` in magnitude, adds u area each time, twice for the farthest: 2 u area for each halving.
-/// Likewise the cubic: 11 roundings of terms that sum to at most 3 `volume`, and 3 halvings of 3 u volume
-/// each. A little more covers what rounding does to the bounds, and sums of up to three quadratics (`slack`).
-/// Underflow adds less than the constants: magnitudes are at most 2e100.
+/// are at most `area` in magnitude, adds u area each time, twice for the farthest coefficient: 2 u area per
+/// halving. Likewise the cubic: 11 roundings of terms that sum to at most 3 `volume`, and 3 halvings of 3 u
+/// volume each. A small surplus covers the rounding of the bounds themselves, and sums of up to three
+/// quadratics (`slack`). Underflow adds less than the constants: magnitudes are at most 2e100.
 struct Bounds {
   double area[3];
   double volume;
@@ -39,12 +39,12 @@ struct Bounds {
   double cubic(int depth) const { return (48 + 12 * depth) * u * volume + 1e-190; }
 };
 
-/// Each pair of differences a, b, r at t = 0 and 1; see exact_impact.cpp for what is made of them.
+/// Each pair of differences a, b, r at t = 0 and 1; exact_impact.cpp defines their use.
 struct Differences {
   double a[2][3], b[2][3], r[2][3];
 };
 
-/// Bernstein coefficients of the cross product of two vectors that move linearly.
+/// Computes the Bernstein coefficients of the cross product of two linearly moving vectors.
 void cross(const double (&a)[2][3], const double (&b)[2][3], double (&out)[3][3]) {
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
@@ -79,7 +79,7 @@ void halve(const double (&q)[3][3], double (&first)[3][3], double (&second)[3][3
   }
 }
 
-/// Are all coefficients beyond the bound, on one side?
+/// Tests whether all coefficients are beyond the bound, on one side.
 bool nowhere_zero(const double (&f)[4], double bound) {
   const double low = std::min(std::min(f[0], f[1]), std::min(f[2], f[3]));
   const double high = std::max(std::max(f[0], f[1]), std::max(f[2], f[3]));
@@ -146,7 +146,7 @@ class Filter {
  private:
   static constexpr int most_halvings = 24, most_cells = 96;
 
-  /// From the earliest cell on, until one is known to hold a contact, or nothing is known of one.
+  /// Visits cells from the earliest on, until one certainly contains a contact, or one is undecided.
   Verdict decide() {
     int count = 1, looked_at = 0;
     while (count > 0) {
@@ -174,8 +174,8 @@ class Filter {
     return Verdict::free;
   }
 
-  /// n and all shares of it that there are have the same sign where the points touch: two of opposite signs
-  /// prove that they do not, and where all have one sign every root of the cubic is a contact.
+  /// At contact n and all its shares have the same sign: two of opposite signs exclude a contact. Where all
+  /// have one sign, every root of the cubic is a contact.
   Verdict look_at(const Cell& cell) const {
     const double bound = bounds_.cubic(cell.depth);
     if (nowhere_zero(cell.f, bound)) return Verdict::free;
@@ -207,7 +207,7 @@ class Filter {
     return crossing && inside ? Verdict::touches : Verdict::open;
   }
 
-  /// Every root of the cubic in this cell is a contact, and there is one: encloses the first.
+  /// Encloses the first root of the cubic in a cell in which every root is a contact and at least one exists.
   Verdict first_root(const Cell& cell) {
     struct Piece {
       double f[4], begin, length;
@@ -248,7 +248,7 @@ class Filter {
   Cell cells_[most_halvings + 2];
 };
 
-/// Does an axis keep the points [0, first) from the others, on one side from t = 0 to t = 1?
+/// Tests whether an axis separates the points [0, first) from the others, on one side from t = 0 to t = 1.
 bool kept_apart(const MovingPoints& points, int first) {
   for (int k = 0; k < 3; ++k) {
     bool below = true, above = true;

@@ -5,8 +5,8 @@
 
 namespace kbvh {
 
-/// The bounding volumes of one body's nodes, for audits, where they are not axis-aligned boxes. A box around
-/// a volume proves nothing about the volume, so audits ask the volume itself.
+/// The bounding volumes of one body's nodes, for audits of volumes other than axis-aligned boxes. A box
+/// around a volume proves nothing about the volume, so audits query the volume itself.
 class AuditVolumes {
  public:
   AuditVolumes() = default;
@@ -14,15 +14,15 @@ class AuditVolumes {
   AuditVolumes(const AuditVolumes&) = delete;
   AuditVolumes& operator=(const AuditVolumes&) = delete;
 
-  /// How many nodes have a volume; an audit compares this number with the size of the topology.
+  /// Returns the number of nodes with a volume; an audit compares it with the size of the topology.
   virtual std::size_t size() const = 0;
-  /// How far a point (3 numbers) lies outside a node's volume; 0 if and only if the point lies inside,
-  /// decided exactly.
+  /// Returns the distance by which a point (3 numbers) lies outside a node's volume; 0 if and only if the
+  /// point lies inside, decided exactly.
   virtual double protrusion(std::uint32_t node, const double* point) const = 0;
-  /// Surface area of a node's volume.
+  /// Returns the surface area of a node's volume.
   virtual double surface(std::uint32_t node) const = 0;
-  /// Surface area of a volume of the same kind that is fitted to these points at once: [point][3], exact in
-  /// the strategy's scalar.
+  /// Returns the surface area of a volume of the same kind that is fitted directly to these points:
+  /// [point][3], exact in the strategy's scalar.
   virtual double tight_surface(std::span<const double> points) const = 0;
 };
 

@@ -9,28 +9,29 @@
 
 namespace kbvh {
 
-/// The realiser of a bound that does not exist: of a side that a node inherits, or of a node that is new.
+/// Marks a missing realiser: of a side that a node inherits, or of a new node.
 inline constexpr std::uint32_t no_vertex = std::numeric_limits<std::uint32_t>::max();
 
-/// What happens at an event of a kinetic structure.
+/// The kinds of events of a kinetic structure.
 enum class EventKind : std::uint8_t {
   bound,           ///< a certificate of a bound fails: one vertex overtakes another on one side of a box
   boxes_meet,      ///< two boxes of a separation list begin to overlap
   boxes_separate,  ///< two boxes of a separation list cease to overlap
-  review,          ///< nothing changes: the structure looks for the next event of a pair of boxes
-  window,          ///< nothing changes: the structure chooses anew which pairs of bodies it watches
+  review,          ///< no bound changes: the structure searches for the next event of a pair of boxes
+  window,          ///< no bound changes: the structure chooses the pairs of bodies to watch anew
 };
 
-/// One certificate and when it fails. A side is numbered 2 * axis + (0 lower, 1 upper).
+/// One certificate and its failure time. A side is numbered 2 * axis + (0 lower, 1 upper).
 template <class S>
 struct ScheduledEvent {
   EventKind kind = EventKind::bound;
-  std::uint32_t body = 0, node = 0, side = 0;  ///< kind bound: whose bound; else the first box (side unused)
+  std::uint32_t body = 0, node = 0,
+                side = 0;  ///< kind bound: node and side of the bound; else the first box (side unused)
   std::uint32_t winner = no_vertex, loser = no_vertex;  ///< kind bound: `loser` overtakes `winner`
   std::uint32_t other_body = 0, other_node = 0;  ///< boxes_meet, boxes_separate, review: the second box
   TimeEstimate time;                             ///< in seconds; |exact time - time.time| <= time.error
-  bool has_crossing = false;  ///< whether `crossing` is meaningful: not for review and window
-  Crossing<S> crossing{};     ///< the exact time: the root of two linear pieces
+  bool has_crossing = false;                     ///< whether `crossing` is valid: false for review and window
+  Crossing<S> crossing{};                        ///< the exact time: the crossing of two linear pieces
 
   bool operator==(const ScheduledEvent& other) const {
     return kind == other.kind && body == other.body && node == other.node && side == other.side &&
@@ -40,16 +41,16 @@ struct ScheduledEvent {
   }
 };
 
-/// A bound that another vertex realises from now on.
+/// A bound whose realiser changed.
 template <class S>
 struct BoundNotice {
   std::uint32_t body = 0, node = 0, side = 0;
   std::uint32_t old_vertex = no_vertex, new_vertex = no_vertex;
-  double begin = 0;        ///< a double not after the instant of the change, in seconds
-  bool at_event = false;   ///< whether the instant is `crossing`; else it is `begin` itself
+  double begin = 0;        ///< seconds; not later than the change
+  bool at_event = false;   ///< whether the change happened at `crossing`; else at `begin`
   Crossing<S> crossing{};  ///< the exact time, if `at_event`
 
-  /// Compares what happened; `begin` of a change at an event is only a hint.
+  /// Compares the changes; ignores `begin` of a change at an event, which is only a hint.
   bool operator==(const BoundNotice& other) const {
     return body == other.body && node == other.node && side == other.side && old_vertex == other.old_vertex &&
            new_vertex == other.new_vertex && at_event == other.at_event &&
@@ -57,47 +58,46 @@ struct BoundNotice {
   }
 };
 
-/// Everything that one event did.
+/// Describes the effects of one event.
 template <class S>
 struct EventDescription {
   ScheduledEvent<S> event;
   std::vector<BoundNotice<S>> touched;  ///< the bounds that changed, in the order of the changes
-  /// The certificates that the event made anew, with the failures that they have now; certificates that never
-  /// fail are left out. Of bounds only: certificates of pairs of boxes are not listed here.
+  /// The certificates that the event created, with their failure times. Certificates that never fail and
+  /// certificates of pairs of boxes are not listed.
   std::vector<ScheduledEvent<S>> rescheduled;
 };
 
 template <class S>
 class Strategy;
 
-/// An optional interface of a strategy that works at events: its event queue, opened. `Strategy::step_event`
-/// performs the events one by one. Node ids are those of `tree`.
+/// An optional interface of event-driven strategies: access to the event queue. `Strategy::step_event`
+/// performs single events. Node ids refer to `tree`.
 template <class S>
 class EventSource {
  public:
   virtual ~EventSource() = default;
 
-  /// The event that comes first; nothing if none is scheduled. O(1).
+  /// Returns the earliest event, or nothing if none is scheduled. O(1).
   virtual std::optional<ScheduledEvent<S>> next_event() const = 0;
-  /// The time of `next_event` in seconds, rounded; infinite if none is scheduled.
+  /// Returns the time of `next_event` in seconds, rounded; infinite if none is scheduled.
   double next_event_time() const {
     const auto next = next_event();
     return next ? next->time.time : std::numeric_limits<double>::infinity();
   }
-  /// Replaces `out` by all scheduled events in the order in which they come. O(certificates + events log
-  /// events).
+  /// Replaces `out` by all scheduled events in order of time. O(certificates + events log events).
   virtual void scheduled_events(std::vector<ScheduledEvent<S>>& out) const = 0;
-  /// The tree of one body whose nodes events name. Valid until the next call of the strategy.
+  /// Returns the tree of one body; events name its nodes. Valid until the next call of the strategy.
   virtual const Topology& tree(std::uint32_t body) const = 0;
-  /// The vertex that realises a side of a node now; `no_vertex` for a side that the node inherits.
+  /// Returns the vertex that currently realises a side of a node; `no_vertex` for an inherited side.
   virtual std::uint32_t realiser(std::uint32_t body, std::uint32_t node, std::uint32_t side) const = 0;
-  /// From now on appends every change of a bound to `log`, whatever causes it (events, changes of plans, but
-  /// not `reset`); null: to nothing.
+  /// Starts to append every change of a bound to `log`, for any cause (events, changes of plans) except
+  /// `reset`. Null stops the logging.
   virtual void watch_bounds(std::vector<BoundNotice<S>>* log) = 0;
 
  protected:
   friend class Strategy<S>;
-  /// Does what `Strategy::step_event` promises.
+  /// Implements `Strategy::step_event`.
   virtual bool step(double until, EventDescription<S>& out) = 0;
 };
 

@@ -9,10 +9,10 @@ namespace kbvh {
 template <class S>
 class Strategy;
 
-// What a strategy can do besides answering pairs at a time: each ability is a small interface, and a strategy
-// has the ability if and only if its class derives (publicly) from the interface. `make_entry` fills in
-// `Info::can` from the class. Callers use the functions of `Strategy`, which check times first; so the
-// functions below may rely on what their comments say.
+// The optional abilities of a strategy beyond pairs at a time. Each ability is a small interface. A strategy
+// has the ability if and only if its class derives (publicly) from the interface; `make_entry` fills in
+// `Info::can` accordingly. Callers use the functions of `Strategy`, which check times first; the functions
+// below may rely on these checks.
 
 /// Answers pairs for a span of time.
 template <class S>
@@ -22,7 +22,7 @@ class AnswersSpans {
 
  protected:
   friend class Strategy<S>;
-  /// Does what `Strategy::spans` promises. The strategy stood at t0, and `time()` is t1 already.
+  /// Implements `Strategy::spans`. The strategy stood at t0; `time()` is already t1.
   virtual void find_spans(double t0, double t1, SpanBuffer& out) = 0;
 };
 
@@ -34,13 +34,13 @@ class AnswersSweeps {
 
  protected:
   friend class Strategy<S>;
-  /// Prepares for the motion that begins at t, where the strategy and the motion view stand.
+  /// Prepares for the motion that begins at t, the current time of the strategy and of the motion view.
   virtual void prepare_sweep(double /*t*/) {}
-  /// Does what `Strategy::swept_pairs` promises. The strategy stood at t0, and `time()` is t1 already.
+  /// Implements `Strategy::swept_pairs`. The strategy stood at t0; `time()` is already t1.
   virtual void find_swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) = 0;
 };
 
-/// Follows flight plans that change while the strategy runs.
+/// Follows flight plans that change at run time.
 template <class S>
 class TakesPlanChanges {
  public:
@@ -48,11 +48,11 @@ class TakesPlanChanges {
 
  protected:
   friend class Strategy<S>;
-  /// Does what `Strategy::flight_plans_changed` promises. The strategy stands at t.
+  /// Implements `Strategy::flight_plans_changed`. The strategy stands at t.
   virtual void follow_plans(double t, std::span<const PlanChange<S>> changes) = 0;
 };
 
-/// Follows vertices and primitives that are inserted and deleted while the strategy runs.
+/// Follows insertions and deletions of vertices and primitives at run time.
 template <class S>
 class TakesGeometryChanges {
  public:
@@ -60,12 +60,12 @@ class TakesGeometryChanges {
 
  protected:
   friend class Strategy<S>;
-  /// Does what `Strategy::geometry_changed` promises. The strategy stands at t.
+  /// Implements `Strategy::geometry_changed`. The strategy stands at t.
   virtual void follow_geometry(double t, const GeometryChange<S>& change) = 0;
 };
 
-/// Answers pairs within one body, too, where the scene asks for them: primitives that share a vertex are no
-/// pair. There is no function to implement: such pairs come with all others.
+/// Also answers pairs within one body if the scene asks for them; primitives that share a vertex are not a
+/// pair. No function has to be implemented: these pairs are appended to the others.
 class AnswersSelfPairs {
  protected:
   ~AnswersSelfPairs() = default;

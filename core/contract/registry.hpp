@@ -6,10 +6,10 @@
 
 namespace kbvh {
 
-/// Which counting policy an instance is made with: benchmarks take times from silent ones.
+/// The counting policy of an instance. Benchmarks take times from silent instances.
 enum class CountingPolicy : std::uint8_t { counting, silent };
 
-/// A registered contestant: its description and how to make it.
+/// A registered contestant: its description and its factory functions.
 struct StrategyEntry {
   Info info;
   template <class S>
@@ -28,7 +28,7 @@ struct StrategyEntry {
 };
 
 namespace detail {
-/// Does T derive from the interface, and in a way that `Strategy` can use?
+/// Tests whether T derives from the interface in a way that `Strategy` can use.
 template <class T, class Interface>
 constexpr bool has() {
   static_assert(std::is_base_of_v<Interface, T> == std::is_convertible_v<T*, Interface*>,
@@ -64,14 +64,14 @@ std::unique_ptr<Strategy<S>> make(const SceneView<S>& scene, Playback<S>& playba
 }
 }  // namespace detail
 
-/// Which scene scalars a strategy takes part in.
+/// The scene scalars for which a strategy exists.
 enum class Scalars : std::uint8_t { both, float_only, double_only };
 
 /// Registers the class template T<Scalar, CountingPolicy>, which must
-///   - derive from Strategy<Scalar>, and from the interfaces for what else it can do,
-///   - say `static constexpr Foresight foresight`,
+///   - derive from Strategy<Scalar>, and from the interfaces of its optional abilities,
+///   - define `static constexpr Foresight foresight`,
 ///   - be constructible from (SceneView<S>, MotionView<foresight, S>, Topologies, const Params&).
-/// What it can do is read off the class: `Info::can` as given does not count.
+/// The abilities are derived from the class: a given `Info::can` is overwritten.
 template <template <class, class> class T, Scalars scalars = Scalars::both>
 StrategyEntry make_entry(Info info) {
   using Any = std::conditional_t<scalars == Scalars::double_only, double, float>;
@@ -86,34 +86,35 @@ StrategyEntry make_entry(Info info) {
   return entry;
 }
 
-/// Defines the one function by which the generated manifest finds a source file. In strategies/NAME.cpp:
+/// Defines the function through which the generated manifest finds a source file. In strategies/NAME.cpp:
 ///   KBVH_STRATEGY(NAME) { return {make_entry<MyStrategy>({.id = ...})}; }
 #define KBVH_STRATEGY(name) std::vector<kbvh::StrategyEntry> kbvh_strategy_##name()
 
-/// All contestants linked into this program, in manifest order. Defined by the manifest, a source that the
-/// build generates from the list of strategies: a program that links no manifest has no registry.
+/// Returns all contestants linked into this program, in manifest order. Defined by the manifest, a source
+/// that the build generates from the list of strategies: a program that links no manifest has no registry.
 const std::vector<StrategyEntry>& registry();
 
 /// Returns the entries; throws std::logic_error if two of them have one id. For manifests.
 std::vector<StrategyEntry> with_unique_ids(std::vector<StrategyEntry> entries);
 
-/// Throws ConfigError that lists the known ids.
+/// Finds a contestant. Throws ConfigError that lists the known ids.
 const StrategyEntry& find_strategy(const std::vector<StrategyEntry>& entries, std::string_view id);
 inline const StrategyEntry& find_strategy(std::string_view id) {
   return find_strategy(registry(), id);
 }
 
-/// A builder configuration that suits the strategy: `wanted` where given, clipped to nothing: throws
-/// ConfigError if the strategy cannot take it.
+/// Returns the strategy's preferred builder configuration with the given overrides. Throws ConfigError if the
+/// strategy does not support them.
 BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> method,
                                std::optional<std::uint32_t> width, std::optional<std::uint32_t> leaf_size);
 
-/// Why the strategy cannot play a scene of these bodies, as the end of a sentence that begins with its id;
-/// empty if it can: pairs within a body, kinds of primitives, positions handed in frame by frame.
+/// Returns the reason why the strategy cannot play a scene of these bodies, as the end of a sentence that
+/// begins with its id; empty if it can. Checks pairs within a body, kinds of primitives, and positions handed
+/// in frame by frame.
 template <class S>
 std::string unsuitable_bodies(const Info& info, const Scene<S>& scene);
 
-/// Topologies of all bodies, built from the positions at the playback's current time.
+/// Builds the topologies of all bodies from the positions at the playback's current time.
 template <class S>
 Topologies build_topologies(const SceneView<S>& scene, Playback<S>& playback, const BuilderConfig& config);
 
@@ -123,10 +124,10 @@ std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<
                                     Playback<S>& playback, Topologies topologies, const Params& params,
                                     CountingPolicy policy);
 
-/// Makes instances for a strategy that consists of others and hands calls on to them.
+/// Makes instances for a strategy that consists of other strategies and forwards calls to them.
 template <class S>
 struct NestedStrategies {
-  /// As `create`. Throws ConfigError, too, if the instance is to know more of the future than `motion` does.
+  /// Like `create`. Also throws ConfigError if the instance needs more foresight than `motion` has.
   template <class Motion>
   static std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<S>& scene,
                                              const Motion& motion, Topologies topologies,

@@ -10,7 +10,7 @@
 
 namespace kbvh {
 
-/// A world without its scalar.
+/// A world without its scalar type.
 class detail::WorldImplementation {
  public:
   virtual ~WorldImplementation() = default;
@@ -169,7 +169,7 @@ class TypedWorld final : public detail::WorldImplementation {
     const BuilderConfig builder = suitable_builder(
         entry.info, method == topology.end() ? std::nullopt : std::optional(build_method(method->second)),
         number_of(topology, "width"), number_of(topology, "leaf_size"));
-    Scene<S> scene = scene_;  // what was added stays if the strategy does not suit it
+    Scene<S> scene = scene_;  // the added bodies stay if the strategy does not suit them
     if (scene.pairs.empty()) scene.pairs = all_pairs(scene.bodies);
     validate(scene);
     played_ = std::make_unique<Scene<S>>(std::move(scene));
@@ -359,7 +359,7 @@ class TypedWorld final : public detail::WorldImplementation {
         session().hand_in(body, positions.data());
         return;
       }
-    // Two copies in turn: a sweep begins at the positions that the motion shows still.
+    // Two alternating copies: a sweep begins at the positions that the motion view still shows.
     std::vector<S>* const copies = given_[body].array;
     std::vector<S>& copy = copies[session().playback().positions(body) == copies[0].data() ? 1 : 0];
     copy.resize(size + 1);

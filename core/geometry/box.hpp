@@ -35,7 +35,7 @@ struct Box {
   bool operator==(const Box&) const = default;
 };
 
-/// The same box in double, exactly.
+/// Converts to a box in double, exactly.
 template <class S>
 inline Box<double> to_double(const Box<S>& box) {
   Box<double> result;
@@ -46,14 +46,14 @@ inline Box<double> to_double(const Box<S>& box) {
   return result;
 }
 
-/// Contact counts: boxes that share a single point overlap.
+/// Tests for overlap. Boxes are closed: boxes that share a single point overlap.
 template <class S>
 inline bool overlap(const Box<S>& a, const Box<S>& b) {
   return (a.lower[0] <= b.upper[0]) & (b.lower[0] <= a.upper[0]) & (a.lower[1] <= b.upper[1]) &
          (b.lower[1] <= a.upper[1]) & (a.lower[2] <= b.upper[2]) & (b.lower[2] <= a.upper[2]);
 }
 
-/// Surface area in double; 0 for the empty box.
+/// Returns the surface area in double; 0 for the empty box.
 template <class S>
 inline double surface_area(const Box<S>& box) {
   if (box.empty()) return 0.0;

@@ -8,15 +8,16 @@
 
 namespace kbvh {
 
-/// Lower and upper corner of a box in 4 lanes each; the last lane has no meaning. The lanes are vectors of
-/// the compiler, 16 bytes wide: GCC 12 turns loops over four scalars into scalar code at -O3.
+/// Lower and upper corner of a box in 4 lanes each; the last lane has no meaning. The lanes are vector types
+/// of the compiler, 16 bytes wide: GCC 12 turns loops over four scalars into scalar code at -O3.
 template <class S>
 struct LaneBox {
   using Lanes [[gnu::vector_size(16)]] = S;
   static constexpr int width = 16 / sizeof(S), parts = 4 / width;
   Lanes lower[parts], upper[parts];
 
-  /// The box of at least one vertex. Reads one scalar past the last vertex (playback positions are padded).
+  /// Computes the box of at least one vertex. Reads one scalar past the last vertex (playback positions are
+  /// padded).
   static LaneBox of(std::span<const std::uint32_t> vertices, const S* positions) {
     LaneBox box;
     std::memcpy(box.lower, positions + std::size_t(3) * vertices[0], sizeof box.lower);
@@ -46,8 +47,8 @@ struct LaneBox {
   }
 };
 
-/// The box of one primitive at the motion's current time; its vertices must be current.
-/// Reads one scalar past the last vertex.
+/// Computes the box of one primitive at the motion's current time; its vertices must be current. Reads one
+/// scalar past the last vertex.
 template <class S>
 Box<S> primitive_box(std::span<const std::uint32_t> vertices, const S* positions) {
   return LaneBox<S>::of(vertices, positions).box();

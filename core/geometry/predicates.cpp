@@ -36,20 +36,21 @@ template <class Integer>
 inline void shift_left(Integer& x, int bits) {
   x <<= bits;
 }
-/// Kept out of line: inlined into the determinants at -O3 it makes GCC 12 warn of overflows that there are
-/// not.
+/// Kept out of line: when it is inlined into the determinants at -O3, GCC 12 warns of overflows that do not
+/// exist.
 [[gnu::noinline]] void shift_left(IntAny& x, int bits) {
   x <<= bits;
 }
 
-/// N doubles as integers over one power of two. A common factor does not change the sign of a determinant.
+/// N doubles as integers times a common power of two. A common factor does not change the sign of a
+/// determinant.
 template <int N>
 struct Scaled {
   Dyadic values[N];
   int lowest = std::numeric_limits<int>::max();
-  int width = 0;  // bits of the largest magnitude, once scaled by 2^-lowest
+  int width = 0;  // bits of the largest magnitude, after scaling by 2^-lowest
 
-  /// To be called when all values are set.
+  /// Computes the scaling; call it after all values are set.
   void measure() {
     int top = std::numeric_limits<int>::min();
     for (const Dyadic& value : values) {
@@ -65,7 +66,7 @@ struct Scaled {
   template <class Integer>
   Integer get(int i) const {
     if (values[i].mantissa == 0) return Integer(0);
-    // A left shift of a negative number multiplies it: C++20 says so, and signed_magnitude integers too.
+    // A left shift of a negative number multiplies it, by C++20 and for signed_magnitude integers.
     Integer result(values[i].mantissa);
     shift_left(result, values[i].exponent - lowest);
     return result;
@@ -90,9 +91,9 @@ int orient3d_integer(const Scaled<12>& s) {
   return sign_of(det);
 }
 
-/// The same for coordinates of at most 60 bits: differences below 2^61, minors below 2^123 and the sums of
-/// the half products below 3 * 2^125, so that everything fits into 128 bits but the determinant, which is
-/// kept as high * 2^64 + low.
+/// The same for coordinates of at most 60 bits: differences are below 2^61, minors below 2^123 and the sums
+/// of the half products below 3 * 2^125. Everything fits into 128 bits except the determinant, which is kept
+/// as high * 2^64 + low.
 int orient3d_narrow(const Scaled<12>& s) {
   std::int64_t v[12];
   for (int i = 0; i < 12; ++i) v[i] = s.get<std::int64_t>(i);
@@ -106,7 +107,7 @@ int orient3d_narrow(const Scaled<12>& s) {
     high += Int128(static_cast<std::int64_t>(minors[i] >> 64)) * e[6 + i];
     low += Int128(static_cast<std::uint64_t>(minors[i])) * e[6 + i];
   }
-  high += low >> 64;  // floor: the rest of low is in [0, 2^64)
+  high += low >> 64;  // floor: the remaining low is in [0, 2^64)
   if (high != 0) return sign_of(high);
   return static_cast<std::uint64_t>(low) != 0 ? 1 : 0;
 }
@@ -123,7 +124,7 @@ int orient2d_integer(const Scaled<6>& s) {
 }  // namespace
 
 int orient3d_exact(const double* a, const double* b, const double* c, const double* d) {
-  // What lies on an axis-aligned plane (floors, tables) is the most common coplanar input.
+  // Points on an axis-aligned plane (floors, tables) are the most common coplanar input.
   for (int axis = 0; axis < 3; ++axis)
     if (a[axis] == b[axis] && a[axis] == c[axis] && a[axis] == d[axis]) return 0;
   Scaled<12> s;

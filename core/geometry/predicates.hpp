@@ -5,13 +5,14 @@
 
 namespace kbvh {
 
-/// The largest coordinate magnitude for which the predicates and the triangle test promise exact answers.
-/// Every finite S with |x| <= admissible_magnitude<S> is admissible, zeros and denormals included. The limit
-/// keeps triple products of differences finite in double (6 * (2e100)^3 < 1e303; float's is far below), so
-/// that a filter can never see an infinity or NaN. Beyond it answers may be wrong; nothing checks it here.
+/// The largest coordinate magnitude for which the predicates and the triangle test are exact. Every finite S
+/// with
+/// |x| <= admissible_magnitude<S> is admissible, zeros and denormals included. The limit keeps triple
+/// products of differences finite in double (6 * (2e100)^3 < 1e303; float's is far below), so that a filter
+/// never sees an infinity or NaN. Beyond the limit answers may be wrong; these functions do not check it.
 ///
-/// All of it needs the default floating-point environment: rounding to nearest, and neither flush-to-zero nor
-/// denormals-are-zero (some libraries set these in their worker threads).
+/// All predicates need the default floating-point environment: rounding to nearest, and neither flush-to-zero
+/// nor denormals-are-zero (some libraries set these in their worker threads).
 template <class S>
 inline constexpr S admissible_magnitude = S();
 template <>
@@ -19,16 +20,16 @@ inline constexpr float admissible_magnitude<float> = 1e30f;
 template <>
 inline constexpr double admissible_magnitude<double> = 1e100;
 
-/// What a filter returns where its error bound is larger than the value; otherwise signs are -1, 0, +1.
+/// Returned by a filter whose error bound is larger than the value; decided signs are -1, 0, +1.
 inline constexpr int undecided_sign = 2;
 
-/// The sign of `value` if its magnitude exceeds `bound`, else undecided_sign.
+/// Returns the sign of `value` if its magnitude exceeds `bound`, else undecided_sign.
 inline int sign_beyond(double value, double bound) {
   return value > bound ? 1 : value < -bound ? -1 : undecided_sign;
 }
 
-/// Filtered sign of det(b - a, c - a, d - a), see `orient3d`; undecided_sign where rounding could have
-/// changed it. Each argument points to 3 coordinates.
+/// Returns the filtered sign of det(b - a, c - a, d - a), see `orient3d`; undecided_sign where rounding could
+/// have changed the sign. Each argument points to 3 coordinates.
 inline int orient3d_filtered(const double* a, const double* b, const double* c, const double* d) {
   const double bx = b[0] - a[0], by = b[1] - a[1], bz = b[2] - a[2];
   const double cx = c[0] - a[0], cy = c[1] - a[1], cz = c[2] - a[2];
@@ -43,13 +44,14 @@ inline int orient3d_filtered(const double* a, const double* b, const double* c, 
   return sign_beyond(det, filter::relative3d * permanent + filter::absolute3d);
 }
 
-/// Exact sign of det(b - a, c - a, d - a) by integer arithmetic (Boost.Multiprecision where 192 bits do not
-/// do); for what the filter leaves. Some 50 ns if the coordinates share a range of 60 bits, microseconds if
-/// not.
+/// Returns the exact sign of det(b - a, c - a, d - a) by integer arithmetic (Boost.Multiprecision beyond 192
+/// bits); for cases that the filter leaves undecided. About 50 ns if the coordinates share a range of 60
+/// bits, microseconds if not.
 int orient3d_exact(const double* a, const double* b, const double* c, const double* d);
 
-/// On which side of the plane (a, b, c) is d? The exact sign of det(b - a, c - a, d - a): +1 where the normal
-/// (b - a) x (c - a) points to, 0 if the four points are coplanar. Each argument points to 3 coordinates.
+/// Returns the side of the plane (a, b, c) on which d lies, as the exact sign of det(b - a, c - a, d - a): +1
+/// on the side of the normal (b - a) x (c - a), 0 if the four points are coplanar. Each argument points to 3
+/// coordinates.
 inline int orient3d(const double* a, const double* b, const double* c, const double* d) {
   const int sign = orient3d_filtered(a, b, c, d);
   return sign != undecided_sign ? sign : orient3d_exact(a, b, c, d);
@@ -59,12 +61,12 @@ inline int orient3d(const double* a, const double* b, const double* c, const dou
 struct Projection {
   int u = 0, v = 1;
 };
-/// The projection along `axis` (0, 1 or 2).
+/// Returns the projection along `axis` (0, 1 or 2).
 constexpr Projection drop_axis(int axis) {
   return {(axis + 1) % 3, (axis + 2) % 3};
 }
 
-/// Filtered sign of `orient2d`; undecided_sign where rounding could have changed it.
+/// Returns the filtered sign of `orient2d`; undecided_sign where rounding could have changed the sign.
 inline int orient2d_filtered(const double* a, const double* b, const double* c, Projection p) {
   const double left = (b[p.u] - a[p.u]) * (c[p.v] - a[p.v]);
   const double right = (b[p.v] - a[p.v]) * (c[p.u] - a[p.u]);
@@ -72,11 +74,12 @@ inline int orient2d_filtered(const double* a, const double* b, const double* c, 
                      filter::relative2d * (std::fabs(left) + std::fabs(right)) + filter::absolute2d);
 }
 
-/// Exact sign of `orient2d`, for what the filter leaves.
+/// Returns the exact sign of `orient2d`, for cases that the filter leaves undecided.
 int orient2d_exact(const double* a, const double* b, const double* c, Projection p);
 
-/// Do the projections of a, b, c turn left (+1), right (-1), or not at all (0)? Exact sign of the z component
-/// of (b - a) x (c - a), axes named by the projection. Each argument points to 3 coordinates.
+/// Returns the turn of the projections of a, b, c: left (+1), right (-1), or none (0). This is the exact sign
+/// of the z component of (b - a) x (c - a), axes named by the projection. Each argument points to 3
+/// coordinates.
 inline int orient2d(const double* a, const double* b, const double* c, Projection p) {
   const int sign = orient2d_filtered(a, b, c, p);
   return sign != undecided_sign ? sign : orient2d_exact(a, b, c, p);

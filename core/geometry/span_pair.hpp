@@ -2,9 +2,9 @@
 
 namespace kbvh {
 
-/// Two triangles that move linearly over a segment, by pointers to their corners' 3 coordinates at its begin
-/// (corner[0]) and its end (corner[1]), and the part of the segment that is asked about, as fractions.
-/// Corners 0..2 are those of the one triangle, 3..5 those of the other.
+/// Two triangles that move linearly over a segment: pointers to the 3 coordinates of each corner at the
+/// segment's begin (corner[0]) and end (corner[1]), and the queried part of the segment, as fractions.
+/// Corners 0..2 belong to the first triangle, corners 3..5 to the second.
 template <class S>
 struct SpanPair {
   const S* corner[2][6];

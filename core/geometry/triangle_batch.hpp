@@ -8,13 +8,13 @@
 
 namespace kbvh {
 
-/// `triangles_intersect` for many pairs: the same exact answers, with a filter that is vectorised over pairs;
-/// pairs that it leaves open are tested one by one. Sets intersect[i] to 1 where pair i shares a point, else
-/// to 0, and counts as the single test does: `exact` is the same for every kernel set and for single tests.
+/// Tests many pairs as `triangles_intersect` does, with the same exact answers and a filter vectorised over
+/// pairs; pairs that the filter leaves open are tested one by one. Sets intersect[i] to 1 if pair i shares a
+/// point, else to 0. The counts equal those of single tests: `exact` is the same for every kernel set.
 ///
 /// Unlike the single test it reads one scalar past each corner, which must be readable (playback positions
-/// are padded) and may be anything. `intersect` has a place for each pair. Linear time, no allocation but
-/// that of the exact test.
+/// are padded); its value does not matter. `intersect` has one entry per pair. Linear time; only the exact
+/// test allocates.
 template <class S>
 void triangles_intersect(std::span<const TrianglePair<S>> pairs, std::uint8_t* intersect,
                          TriangleTestStats& stats, KernelSet kernels = active_kernel_set());

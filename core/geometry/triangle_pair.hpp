@@ -2,8 +2,8 @@
 
 namespace kbvh {
 
-/// Two triangles by pointers to their corners' 3 coordinates: corner[0..2] of the one, corner[3..5] of the
-/// other.
+/// Two triangles as pointers to the 3 coordinates of each corner: corner[0..2] of the first triangle,
+/// corner[3..5] of the second.
 template <class S>
 struct TrianglePair {
   const S* corner[6];

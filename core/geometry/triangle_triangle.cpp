@@ -19,7 +19,7 @@
 namespace kbvh {
 namespace {
 
-/// Three corners, always in double: float input converts exactly, and then has 29 bits to spare.
+/// Three corners, always in double: float input converts exactly and leaves 29 bits to spare.
 struct Triangle {
   double corner[3][3];
 };
@@ -31,8 +31,8 @@ Triangle load(const S* p0, const S* p1, const S* p2) {
 
 // ---- Signs ----------------------------------------------------------------------------------------------
 
-/// Two doubles that are computed together: SSE2 where it is (every x86-64), plain code elsewhere, and the
-/// same results in both.
+/// Two doubles that are computed together: SSE2 where available (every x86-64), plain code elsewhere, with
+/// the same results.
 #if defined(__SSE2__)
 struct Lanes {
   __m128d v;
@@ -64,7 +64,7 @@ inline Lanes max(Lanes x, Lanes y) {
 inline Lanes min(Lanes x, Lanes y) {
   return {_mm_min_pd(x.v, y.v)};
 }
-/// Bit i is set where lane i of x is greater.
+/// Returns a mask: bit i is set where lane i of x is greater.
 inline int greater(Lanes x, Lanes y) {
   return _mm_movemask_pd(_mm_cmpgt_pd(x.v, y.v));
 }
@@ -128,21 +128,21 @@ inline Lanes dot(const LanePoint& p, const LanePoint& q) {
   return p.x * q.x + p.y * q.y + p.z * q.z;
 }
 
-/// orient3d(plane of the one triangle, corner i of the other), not yet rounded to a sign: a's plane and b's
+/// orient3d(plane of one triangle, corner i of the other), not yet rounded to a sign: a's plane and b's
 /// corners in lane 0, b's plane and a's corners in lane 1. One bound holds for the errors of a lane's three
-/// values (the operations are those of orient3d_filtered, the permanent is the largest of the three).
+/// values (the operations are those of orient3d_filtered; the permanent is the largest of the three).
 struct SideValues {
   Lanes value[3];
   Lanes bound;
   Lanes minus_bound;
 
-  /// Are all six signs known?
+  /// Returns whether all six signs are known.
   bool decided() const {
     const Lanes smallest = min(min(abs(value[0]), abs(value[1])), abs(value[2]));
     return greater(smallest, bound) == 3;
   }
 
-  /// Is a triangle strictly on one side of the other's plane?
+  /// Returns whether a triangle lies strictly on one side of the other's plane.
   bool separate() const {
     const Lanes low = min(min(value[0], value[1]), value[2]);
     const Lanes high = max(max(value[0], value[1]), value[2]);
@@ -170,7 +170,7 @@ inline SideValues side_values(const S* const (&a)[3], const S* const (&b)[3]) {
 /// Signs of the three corners of one triangle against the plane of the other.
 using Sides = std::array<int, 3>;
 
-/// The signs in one lane (0: of b's corners, 1: of a's).
+/// Returns the signs in one lane (0: of b's corners, 1: of a's).
 inline Sides to_sides(const SideValues& values, int lane) {
   Sides sides{};
   for (int i = 0; i < 3; ++i) {
@@ -196,14 +196,14 @@ void complete_exactly(Sides& sides, const Triangle& plane, const Triangle& other
 
 // ---- Decision -------------------------------------------------------------------------------------------
 
-/// The corner that the other triangle's plane cuts off, and the side on which it lies of the other two.
+/// The corner that the other triangle's plane cuts off from the other two, and its side of that plane.
 struct Apex {
   signed char corner = 0;
   signed char side = 0;
 };
 
-/// Both edges at the apex cross the plane (in at least one point, and not along the edge). With a corner on
-/// each side and one in the plane, the positive one is taken.
+/// Finds the apex. Both edges at the apex cross the plane (in at least one point, and not along the edge).
+/// With a corner on each side and one in the plane, the positive corner is taken.
 constexpr Apex find_apex(const Sides& s) {
   for (int side : {1, -1})
     for (std::size_t i = 0; i < 3; ++i) {
@@ -214,8 +214,8 @@ constexpr Apex find_apex(const Sides& s) {
   return {};
 }
 
-/// The apex for each set of corners on the positive side (bit i: corner i), the others being on the negative
-/// one.
+/// The apex for each set of corners on the positive side (bit i: corner i); the other corners lie on the
+/// negative side.
 constexpr std::array<Apex, 8> strict_apices = [] {
   std::array<Apex, 8> table{};
   for (int i = 0; i < 8; ++i)
@@ -223,14 +223,14 @@ constexpr std::array<Apex, 8> strict_apices = [] {
   return table;
 }();
 
-/// What is left to ask once the sides are known.
+/// The remaining question once the sides are known.
 ///
-/// Where each triangle meets the plane of the other and neither lies in it, both are proper, and each cuts an
-/// interval out of the line common to both planes; its ends are on the edges at the apices p and q. With X on
-/// the edge p-p' and Y on q-q', and the line directed along normal(a) x normal(b),
+/// If each triangle meets the plane of the other and neither lies in it, both are proper, and each cuts an
+/// interval out of the line common to both planes. The ends of an interval lie on the edges at the apices p
+/// and q. With X on the edge p-p' and Y on q-q', and the line directed along normal(a) x normal(b),
 ///   orient3d(p, p', q, q') = det(p' - p, Y - X, q' - q), and its sign is sign(Y - X) side(p) side(q).
-/// On side +1 the edge to the next corner ends the interval of a above, that of b below; on side -1
-/// conversely. So with direction = side(p) side(q) the intervals overlap iff
+/// On side +1 the edge to the next corner ends the interval of a above and the interval of b below; on side
+/// -1 conversely. So with direction = side(p) side(q) the intervals overlap iff
 ///   direction orient3d(p, p_low, q, q_high) >= 0 and direction orient3d(p, p_high, q, q_low) <= 0.
 template <class S>
 struct IntervalEnds {
@@ -260,7 +260,7 @@ inline bool lexicographically_less(const double* p, const double* q) {
   return p[2] < q[2];
 }
 
-/// An axis whose dropping leaves a, b, c a proper triangle, or -1 if they are collinear.
+/// Returns an axis along which a, b, c project to a proper triangle, or -1 if they are collinear.
 int proper_axis(const double* a, const double* b, const double* c) {
   for (int axis = 0; axis < 3; ++axis)
     if (orient2d_filtered(a, b, c, drop_axis(axis)) != undecided_sign) return axis;
@@ -274,14 +274,14 @@ int proper_axis(const double* a, const double* b, const double* c) {
 struct Simplex {
   const double* corner[3];
   int size;
-  int axis;  // for size 3: may be dropped
+  int axis;  // for size 3: the axis of projection
 };
 
 Simplex reduce(const Triangle& t) {
   const double *p = t.corner[0], *q = t.corner[1], *r = t.corner[2];
   const int axis = proper_axis(p, q, r);
   if (axis >= 0) return {{p, q, r}, 3, axis};
-  // Along a line the lexicographical order is the order on the line, or its reverse.
+  // Along a line the lexicographical order is the order on the line or its reverse.
   const double* first = p;
   const double* last = p;
   for (const double* x : {q, r}) {
@@ -291,8 +291,8 @@ Simplex reduce(const Triangle& t) {
   return {{first, last, last}, same_point(first, last) ? 1 : 2, -1};
 }
 
-/// Does a line through an edge of x strictly separate the projections? Edges of a segment have two outer
-/// sides.
+/// Tests whether a line through an edge of x strictly separates the projections. Edges of a segment have two
+/// outer sides.
 bool edge_separates(const Simplex& x, const Simplex& y, Projection projection) {
   const int edges = x.size == 3 ? 3 : x.size - 1;
   for (int i = 0; i < edges; ++i) {
@@ -307,32 +307,34 @@ bool edge_separates(const Simplex& x, const Simplex& y, Projection projection) {
   return false;
 }
 
-/// Two simplices in one plane that projects injectively, not all on one line: apart iff the normal of an edge
-/// of either separates them (the edges of the Minkowski difference have no other directions).
+/// Tests two simplices in one plane that projects injectively and that do not all lie on one line. They are
+/// disjoint iff the normal of an edge of either one separates them (the edges of the Minkowski difference
+/// have no other directions).
 bool coplanar_intersect(const Simplex& x, const Simplex& y, int axis) {
   const Projection projection = drop_axis(axis);
   return !edge_separates(x, y, projection) && !edge_separates(y, x, projection);
 }
 
-/// A proper triangle and a segment or point.
+/// Tests a proper triangle and a segment or point.
 bool triangle_meets_smaller(const Simplex& t, const Simplex& x) {
   const double *a = t.corner[0], *b = t.corner[1], *c = t.corner[2], *p = x.corner[0], *q = x.corner[1];
   const int side_p = orient3d(a, b, c, p);
   const int side_q = x.size == 1 ? side_p : orient3d(a, b, c, q);
   if (side_p == 0 && side_q == 0) return coplanar_intersect(t, x, t.axis);
   if (side_p == side_q) return false;
-  // The line p-q crosses the plane in one point: inside iff it passes all edges on the same side.
+  // The line p-q crosses the plane in one point, which is inside iff the line passes all edges on the same
+  // side.
   const int ab = orient3d(p, q, a, b), bc = orient3d(p, q, b, c), ca = orient3d(p, q, c, a);
   return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
 }
 
-/// Segments or points on one line.
+/// Tests segments or points on one line.
 bool collinear_intersect(const Simplex& x, const Simplex& y) {
   return !lexicographically_less(x.corner[x.size - 1], y.corner[0]) &&
          !lexicographically_less(y.corner[y.size - 1], x.corner[0]);
 }
 
-/// Segments or points, both.
+/// Tests two simplices that are segments or points.
 bool smaller_intersect(const Simplex& x, const Simplex& y) {
   if (x.size < y.size) return smaller_intersect(y, x);
   const double *p = x.corner[0], *q = x.corner[1], *r = y.corner[0], *s = y.corner[1];
@@ -344,7 +346,7 @@ bool smaller_intersect(const Simplex& x, const Simplex& y) {
   return axis < 0 ? collinear_intersect(x, y) : coplanar_intersect(x, y, axis);
 }
 
-/// Triangles that are coplanar, or of which at least one is degenerate.
+/// Tests triangles that are coplanar, or at least one of which is degenerate.
 bool flat_intersect(const Triangle& a, const Triangle& b) {
   const Simplex x = reduce(a), y = reduce(b);
   if (x.size == 3 && y.size == 3) return coplanar_intersect(x, y, x.axis);
@@ -389,8 +391,8 @@ template <class S>
          e.direction * sign(e.p, e.p_high, e.q, e.q_low) <= 0;
 }
 
-/// From complete sides; `exact` says whether they took integers. Both orientations are computed in one go,
-/// with the sign of the second turned so that both have to be positive.
+/// Decides from complete sides; `exact` says whether the sides needed integers. Both orientations are
+/// computed together, with the sign of the second reversed so that both must be positive.
 template <class S>
 inline Outcome finish(const IntervalEnds<S>& e, bool exact) {
   const auto pair = [](const S* x, const S* y) {
@@ -406,18 +408,19 @@ inline Outcome finish(const IntervalEnds<S>& e, bool exact) {
   return outcome(intervals_overlap_exactly(e), true);
 }
 
-/// The filter left a side open: a corner is in or near the plane of the other triangle.
+/// Decides a pair with a side that the filter left open: a corner lies in or near the plane of the other
+/// triangle.
 [[gnu::noinline]] Outcome decide_open(const Triangle& a, Sides sides_a, const Triangle& b, Sides sides_b) {
-  // Meshes that lie on each other, or share corners, come here often; most are decided by comparisons.
+  // Meshes that touch or share corners often reach this point; comparisons decide most of them.
   if (boxes_apart(a, b)) return Outcome::separate;
   if (share_corner(a, b)) return Outcome::intersect;
   complete_exactly(sides_b, a, b);
   if (strictly_one_side(sides_b)) return Outcome::separate_exactly;
-  // All in the plane: coplanar, or a is degenerate and has no plane.
+  // All corners lie in the plane: the triangles are coplanar, or a is degenerate and has no plane.
   if (all_equal(sides_b, 0)) return outcome(flat_intersect(a, b), true);
   complete_exactly(sides_a, b, a);
   if (strictly_one_side(sides_a)) return Outcome::separate_exactly;
-  // a is proper and b not all in its plane, so b is degenerate.
+  // Here a is proper and b does not lie in its plane, so b is degenerate.
   if (all_equal(sides_a, 0)) return outcome(flat_intersect(a, b), true);
   const double* const corners_a[3] = {a.corner[0], a.corner[1], a.corner[2]};
   const double* const corners_b[3] = {b.corner[0], b.corner[1], b.corner[2]};

@@ -14,7 +14,7 @@ std::string short_number(double value) {
   return text;
 }
 
-/// Notes one invalid bound: by how much, and where if it is the first.
+/// Records one invalid bound: its protrusion, and its place if it is the first.
 void add_fault(Audit& result, const Topology& topology, std::uint32_t node, const std::string& where,
                double amount) {
   if (result.first_fault.empty())
@@ -23,7 +23,7 @@ void add_fault(Audit& result, const Topology& topology, std::uint32_t node, cons
   result.protrusion = std::max(result.protrusion, amount);
 }
 
-/// The vertices below every node of a topology, in one list: a node's are contiguous.
+/// The vertices below every node of a topology in one list; those of one node are contiguous.
 template <class S>
 class PointsBelow {
  public:
@@ -57,7 +57,7 @@ class PointsBelow {
       }
     }
   }
-  /// [point][3]; vertices of several leaves are there several times.
+  /// Returns [point][3]; a vertex of several leaves occurs several times.
   std::span<const double> points(std::uint32_t node) const {
     return {points_.data() + std::size_t(3) * begin_[node], std::size_t(3) * count_[node]};
   }
@@ -70,7 +70,7 @@ class PointsBelow {
   std::vector<double> points_;
 };
 
-/// Asks every volume that is not stale about all vertices below its node.
+/// Queries every volume that is not stale about all vertices below its node.
 template <class S>
 void audit_volumes(const AuditView& view, const Primitives& primitives, const S* positions, Audit& result) {
   const PointsBelow<S> below(view.topology, primitives, positions);

@@ -6,44 +6,45 @@
 
 namespace kbvh {
 
-/// What an audit of one body's hierarchy found at one time. Stale nodes (that no query read) are skipped and
-/// counted.
+/// The result of an audit of one body's hierarchy at one time. Stale nodes (that no query read) are skipped
+/// and counted.
 struct Audit {
   std::uint64_t nodes = 0, stale = 0;
   std::uint64_t invalid = 0;    ///< nodes whose bound does not contain a vertex below it
-  std::uint64_t not_tight = 0;  ///< nodes whose bound is not exactly that of the vertices below it
-  /// Furthest that a vertex leaves a bound above it: along one axis for boxes, as a volume measures it
-  /// otherwise (AuditVolumes::protrusion); valid = 0.
+  std::uint64_t not_tight = 0;  ///< nodes whose bound is not exactly the bound of the vertices below it
+  /// The largest distance by which a vertex leaves a bound above it: along one axis for boxes, otherwise as
+  /// measured by the volume (AuditVolumes::protrusion); valid = 0.
   double protrusion = 0;
   double area = 0, tight_area = 0;  ///< summed surface areas, in double
   std::string topology_error;       ///< first broken combinatorial invariant, or empty
   std::string first_fault;          ///< node, place and amount of the first invalid bound, or empty
 
-  /// Summed surface area over tight, minus one (0/0 = 0). The tight bounds of volumes are of their own kind,
-  /// fitted to the vertices at once, so the looseness of kinds whose best fit is not known may be negative.
+  /// Returns the summed surface area over the tight one, minus one (0/0 = 0). The tight bounds of volumes are
+  /// of the same kind, fitted directly to the vertices; the looseness may be negative for kinds whose fit is
+  /// not optimal.
   double looseness() const { return tight_area > 0 ? area / tight_area - 1 : 0; }
   void add(const Audit& other);
 };
 
-/// Audits topology, validity and tightness of one body against its current positions [vertex][3]. Boxes:
-/// O(nodes
-/// + vertices). Volumes (`view.volumes`) are asked about every vertex below every node, inner nodes included:
-/// O(nodes + vertices x depth); one counts as tight if its surface equals that of a volume fitted at once.
-/// `sound` is a topology that was found sound before, so that an equal one is not checked again, or null.
+/// Audits topology, validity and tightness of one body against its current positions [vertex][3]. Cost for
+/// boxes: O(nodes + vertices). Volumes (`view.volumes`) are queried about every vertex below every node,
+/// inner nodes included: O(nodes + vertices x depth). A volume counts as tight if its surface equals that of
+/// a volume fitted directly. `sound` is a topology that passed the check before, so that an equal one is not
+/// checked again, or null.
 template <class S>
 Audit audit(const AuditView& view, const Primitives& primitives, const S* positions,
             const Topology* sound = nullptr);
 
-/// Exact boxes of all nodes, in double; the reference for validity and tightness.
+/// Computes the exact boxes of all nodes, in double: the reference for validity and tightness.
 template <class S>
 std::vector<Box<double>> tight_boxes(const Topology& topology, const Primitives& primitives,
                                      const S* positions);
 
-/// Expected cost of a random query by the surface-area heuristic: sum over inner nodes of area x
-/// traversal_cost plus over leaves of area x primitives, relative to the root's area. 0 for an empty
-/// hierarchy. `areas` has the surface area of each node's bound.
+/// Computes the expected cost of a random query by the surface-area heuristic: the sum over inner nodes of
+/// area x traversal_cost plus the sum over leaves of area x primitives, relative to the root's area. 0 for an
+/// empty hierarchy. `areas` has the surface area of each node's bound.
 double sah_cost(const Topology& topology, std::span<const double> areas, double traversal_cost = 1.0);
-/// The same for boxes.
+/// Computes the same from boxes.
 double sah_cost(const Topology& topology, const std::vector<Box<double>>& boxes, double traversal_cost = 1.0);
 
 }  // namespace kbvh

@@ -86,11 +86,12 @@ std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playb
     const auto report = [&](const Item& x, const Item& y) {
       if (pair.first == pair.second &&
           (x.primitive >= y.primitive || share_vertex(a.primitives[x.primitive], a.primitives[y.primitive])))
-        return;  // each of these pairs is seen twice: of both lists
+        return;  // each of these pairs is found twice: from both lists
       if (overlap(x.box, y.box) && truly_meet(a, x.primitive, positions_a, b, y.primitive, positions_b))
         result.push_back({pair.first, x.primitive, pair.second, y.primitive});
     };
-    // Two sorted lists: whichever starts first looks ahead in the other. Equal starts are seen from a's side.
+    // Two sorted lists: the item that starts first scans ahead in the other list. Equal starts are handled
+    // from a's side.
     std::size_t i = 0, j = 0;
     while (i < items_a.size() && j < items_b.size()) {
       if (items_a[i].box.lower[axis] <= items_b[j].box.lower[axis]) {
@@ -112,7 +113,7 @@ std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playb
 
 namespace {
 constexpr std::uint64_t cache_magic =
-    0x6b62766f72633032ull;  // "kbvorc02": change with the format or the test
+    0x6b62766f72633032ull;  // "kbvorc02": change it with the format or the test
 }
 
 template <class S>
@@ -159,8 +160,8 @@ const std::vector<PrimitivePair>& Oracle<S>::pairs(Playback<S>& playback) {
   return entry->second;
 }
 
-/// The file: magic, number of times, size in bytes; for each time t, number of pairs, pairs; hash of all
-/// before.
+/// File format: magic, number of times, size in bytes; for each time t, number of pairs, pairs; hash of all
+/// preceding bytes.
 template <class S>
 bool Oracle<S>::load() {
   std::ifstream in(file_, std::ios::binary | std::ios::ate);

@@ -8,33 +8,34 @@
 
 namespace kbvh {
 
-/// All intersecting primitive pairs of the scene's body pairs at the playback's current time, sorted, by
-/// testing every pair exactly: no boxes, no sweep, nothing shared with any strategy but the triangle test.
+/// Returns all intersecting primitive pairs of the scene's body pairs at the playback's current time, sorted,
+/// by testing every pair exactly: no boxes, no sweep; it shares only the triangle test with strategies.
 /// O(primitives^2).
 template <class S>
 std::vector<PrimitivePair> brute_force_pairs(const Scene<S>& scene, Playback<S>& playback);
 
-/// The same set by sort-and-sweep along the axis of largest extent and the exact test; itself verified
-/// against `brute_force_pairs`. O(n log n + overlaps on one axis).
+/// Returns the same set by sort-and-sweep along the axis of largest extent and the exact test; itself
+/// verified against `brute_force_pairs`. O(n log n + overlaps on one axis).
 template <class S>
 std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playback);
 
-/// The true pairs at any time of a scene, computed once per (scene, script, scalar, t) and kept; optionally
-/// on disk, so that a later run of the same scene need not compute them again.
+/// The true pairs of a scene at any time, computed once per (scene, script, scalar, t) and kept; optionally
+/// cached on disk for later runs of the same scene.
 template <class S>
 class Oracle {
  public:
-  /// `cache_folder` empty: memory only. A damaged or foreign cache file is ignored and written anew; see
-  /// `problem`. `script` is the hash of the plan script that is replayed, 0: plans are the scene's own.
+  /// An empty `cache_folder` means memory only. A damaged or foreign cache file is ignored and rewritten; see
+  /// `problem`. `script` is the hash of the replayed plan script; 0: the scene's own plans.
   explicit Oracle(const Scene<S>& scene, std::filesystem::path cache_folder = {}, std::uint64_t script = 0);
   ~Oracle();
   std::uint64_t script() const { return script_; }
-  /// Sorted pairs at the playback's current time; the playback must follow the scene's own plans, and the
-  /// script up to that time.
+  /// Returns the sorted pairs at the playback's current time. The playback must follow the scene's own plans,
+  /// and the script up to that time.
   const std::vector<PrimitivePair>& pairs(Playback<S>& playback);
-  /// Writes what is new to the cache, as the destructor does.
+  /// Writes new entries to the cache, as the destructor does.
   void keep();
-  /// What was wrong with the cache, as a sentence, or an empty text: it costs time, never a result.
+  /// Returns a sentence about a defect of the cache, or an empty text. Such a defect costs time but changes
+  /// no result.
   const std::string& problem() const { return problem_; }
 
  private:

@@ -3,9 +3,9 @@
 
 namespace kbvh {
 
-/// Seconds of one frame by phase. `motion` is the driver's, the same for every contestant that wants
-/// positions: evaluating them, and following changes of plans and geometry; the strategy's answers to those
-/// changes are phases of their own.
+/// Seconds of one frame by phase. `motion` is the driver's work, the same for every contestant that needs all
+/// positions: evaluating them, and following changes of plans and geometry. The strategy's responses to these
+/// changes are separate phases.
 struct PhaseTimes {
   double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0, geometry_changes = 0;
   double query() const { return traversal + triangle_tests; }

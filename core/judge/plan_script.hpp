@@ -9,12 +9,11 @@
 
 namespace kbvh {
 
-/// Changes of plans and of geometry to be made at run time, at frames: the same script is replayed to every
-/// contestant.
+/// Changes of plans and of geometry at frames, at run time. The same script is replayed to every contestant.
 template <class S>
 struct PlanScript {
   struct Step {
-    double time;  ///< of a frame; the changes are made after its query
+    double time;  ///< time of a frame; the changes are made after its query
     std::vector<PlanChange<S>> changes{};
     GeometryChange<S> geometry{};  ///< after the plans
   };
@@ -27,7 +26,7 @@ struct PlanScript {
   bool changes_geometry() const {
     return std::any_of(steps.begin(), steps.end(), [](const Step& step) { return !step.geometry.empty(); });
   }
-  /// Changes of single vertices that are made up to and including t.
+  /// Returns the number of changes of single vertices up to and including t.
   std::size_t changes_until(double t) const {
     std::size_t count = 0;
     for (const Step& step : steps)
@@ -36,7 +35,7 @@ struct PlanScript {
   }
 };
 
-/// A 64-bit hash of everything in a script; 0 for an empty one.
+/// Computes a 64-bit hash of everything in a script; 0 for an empty one.
 template <class S>
 std::uint64_t hash(const PlanScript<S>& script) {
   if (script.empty()) return 0;
@@ -74,15 +73,15 @@ std::uint64_t hash(const PlanScript<S>& script) {
   return hasher.value();
 }
 
-/// Walks through a script frame by frame.
+/// Steps through a script frame by frame.
 template <class S>
 class ScriptCursor {
  public:
-  /// At the script's beginning; nullptr is a script without steps.
+  /// Starts at the script's beginning; nullptr is a script without steps.
   explicit ScriptCursor(const PlanScript<S>* script) : script_(script) {}
 
-  /// What is to be done after the query of the frame at t, or nullptr; frames are to come in order. Throws
-  /// std::invalid_argument if a step was passed over, because its time is not a frame's.
+  /// Returns the step to perform after the query of the frame at t, or nullptr; call it for frames in order.
+  /// Throws std::invalid_argument if a step was passed over because its time is not a frame's.
   const typename PlanScript<S>::Step* at(double t) {
     if (script_ == nullptr || next_ == script_->steps.size()) return nullptr;
     const auto& step = script_->steps[next_];

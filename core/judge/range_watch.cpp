@@ -14,13 +14,13 @@ namespace {
 constexpr double forever = std::numeric_limits<double>::infinity();
 constexpr double last_double = std::numeric_limits<double>::max();
 
-/// The last line of a vertex's own plan along an axis.
+/// Returns the last line of a vertex's own plan along an axis.
 template <class S>
 Piece<S> last_line(const FlightPlans<S>& plans, std::uint32_t vertex, int axis) {
   return plans.piece_after(vertex, axis, last_double);
 }
 
-/// A time, rounded down, until which a vertex with a plan of its own stays in the range.
+/// Returns a time, rounded down, until which a vertex with its own plan stays in the range.
 template <class S>
 double stays_until(const FlightPlans<S>& plans, std::uint32_t vertex) {
   double until = forever;
@@ -41,7 +41,7 @@ void check_vertex(const FlightPlans<S>& plans, std::uint32_t body, std::uint32_t
   for (int axis = 0; axis < 3; ++axis) {
     const Piece<S> line = last_line(plans, vertex, axis);
     if (!(line.t0 < t)) continue;
-    // In a wider type: the value may be beyond the range of S, and of double.
+    // Computed in a wider type: the value may be beyond the range of S, and of double.
     const auto x = static_cast<long double>(line.x0) +
                    static_cast<long double>(line.x1) * (static_cast<long double>(t) - line.t0);
     if (std::abs(x) <= static_cast<long double>(admissible_reach<S>)) continue;
@@ -72,7 +72,7 @@ void RangeWatch<S>::changed(const Playback<S>& playback, std::uint32_t body, std
 
 template <class S>
 void RangeWatch<S>::added(const Playback<S>& playback, const GeometryChange<S>& change) {
-  std::vector<std::uint32_t> next(playback.body_count());  // the last ids are the new ones, in their order
+  std::vector<std::uint32_t> next(playback.body_count());  // the last ids are the new ones, in order
   for (std::uint32_t body = 0; body < playback.body_count(); ++body)
     next[body] = playback.plans(body).vertex_count();
   for (const auto& vertex : change.vertices) --next[vertex.body];
@@ -95,7 +95,7 @@ template <class S>
 void check_played(const Scene<S>& scene, const PlanScript<S>& script, std::span<const double> frames) {
   if (frames.empty()) return;
   for (std::size_t f = 0; f < frames.size(); ++f) check_time(frames[f], "frame " + std::to_string(f) + " is");
-  if (script.empty()) return;  // keyframes are in the range, and so is what lies between them
+  if (script.empty()) return;  // keyframes are in the range, and so are all positions between them
   Playback<S> playback(scene);
   std::optional<ChangingScene<S>> changing;
   if (script.changes_geometry()) changing.emplace(scene);

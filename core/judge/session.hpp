@@ -17,18 +17,19 @@
 
 namespace kbvh {
 
-/// How one contestant is to be run.
+/// The configuration of one contestant.
 struct Contestant {
   const StrategyEntry* entry = nullptr;
   std::map<std::string, std::string> params;
   BuilderConfig builder;  ///< ignored by strategies that build their own hierarchy
 };
 
-/// One contestant on one scene: the only driver there is; verification, benchmarks and lessons all use it.
+/// Drives one contestant on one scene. This is the only driver: verification, benchmarks and lessons all use
+/// it.
 template <class S>
 class Session {
  public:
-  /// Builds topologies at the first frame and makes the instance. Throws ConfigError.
+  /// Builds the topologies at the first frame and makes the instance. Throws ConfigError.
   Session(const Scene<S>& scene, const Contestant& contestant, CountingPolicy policy)
       : original_(&scene),
         contestant_(contestant),
@@ -43,9 +44,9 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Starts at time t, with the scene's own plans and geometry again. Where geometry was changed the
-  /// instance is made anew, and references to it are not valid any more. Throws std::invalid_argument, with
-  /// nothing changed, if t is not finite, or not admissible (motion/admissible.hpp).
+  /// Starts at time t, with the scene's original plans and geometry. If the geometry was changed, the
+  /// instance is created anew, and references to the old one become invalid. Throws std::invalid_argument and
+  /// changes nothing if t is not finite or not admissible (motion/admissible.hpp).
   void reset(double t) {
     check_time(t, "cannot start");
     playback_.restore_plans();
@@ -61,13 +62,13 @@ class Session {
     playback_.evaluate_all();
     strategy_->reset(t);
   }
-  /// Keeps an array with a body's positions for the next call that moves to another time (`reset`, `advance`,
-  /// `contacts`), and the frames after that (Playback::hand_in). For contacts the array that was handed in
-  /// before has to hold the positions of before until then.
+  /// Stores an array with a body's positions for the next call that moves to another time (`reset`,
+  /// `advance`, `contacts`), and for the frames after it (Playback::hand_in). For contacts, the array handed
+  /// in before must keep the previous positions until then.
   void hand_in(std::uint32_t body, const S* positions) { handed_in_.push_back({body, positions}); }
-  /// Moves to t, with positions if the strategy wants all of them, and advances. Throws
-  /// std::invalid_argument, with nothing changed, if t is before the present time, not finite or not
-  /// admissible, or a vertex has left the admissible range by then.
+  /// Moves to t, with positions if the strategy needs all of them, and advances the strategy. Throws
+  /// std::invalid_argument and changes nothing if t is before the current time, not finite or not admissible,
+  /// or if a vertex has left the admissible range by then.
   void advance(double t, PhaseTimes& times) {
     if (!(t >= playback_.time()))
       throw std::invalid_argument("cannot advance from t = " + std::to_string(playback_.time()) +
@@ -87,23 +88,23 @@ class Session {
     timed(times.triangle_tests, [&] { strategy_->confirm(playback_.time(), pairs); });
     return status;
   }
-  /// Performs the first event if it is due by time `until` (Strategy::step_event); the motion stays where it
-  /// is until the next `advance`.
+  /// Performs the first event if it is due by time `until` (Strategy::step_event); the motion keeps its time
+  /// until the next `advance`.
   bool step_event(double until, EventDescription<S>& out) { return strategy_->step_event(until, out); }
-  /// Moves to t and appends the pairs of the interval that this takes, for strategies that declare spans.
+  /// Moves to t and appends the pairs of the elapsed interval, for strategies with spans.
   void spans(double t, SpanBuffer& out) {
     const double from = playback_.time();
     watch_.check(playback_, t);
     seek(t);
     strategy_->spans(from, t, out);
   }
-  /// Moves to t and appends the contacts of features on the way, for strategies that declare contacts: every
-  /// vertex moves on a straight line from its present position to that at t. To be called after `reset` and
-  /// then again and again, no further than to `next_knot` at a time, without frames between; plans and
-  /// geometry may change between two calls (edges are numbered anew then, as of the present geometry). The
-  /// narrow phase counts as triangle tests. Throws std::invalid_argument, with nothing changed, unless all
-  /// bodies consist of triangles, and if t is beyond the next knot or not after the present time. Returns the
-  /// pairs of primitives that came to the narrow phase.
+  /// Moves to t and appends the contacts of features on the way, for strategies with contacts: every vertex
+  /// moves on a straight line from its current position to its position at t. Call it after `reset` and then
+  /// repeatedly, each time no further than `next_knot`, without frames in between. Plans and geometry may
+  /// change between two calls (edges are then renumbered for the current geometry). The narrow phase counts
+  /// as triangle tests. Throws std::invalid_argument and changes nothing unless all bodies consist of
+  /// triangles, and if t is beyond the next knot or not after the current time. Returns the number of
+  /// primitive pairs that reached the narrow phase.
   std::size_t contacts(double t, ContactBuffer& out, PhaseTimes& times) {
     if (!info_->can.contacts) throw std::logic_error("'" + info_->id + "' does not declare contacts");
     if (!(t > playback_.time()) || !std::isfinite(t))
@@ -116,20 +117,20 @@ class Session {
     return sweep_->find(
         *strategy_, playback_, t, [this](double to) { seek(to); }, out, times);
   }
-  /// The first time after the present one at which the plan of any vertex has a knot; infinite if none has.
-  /// O(bodies + plans of their own).
+  /// Returns the first time after the current one at which the plan of any vertex has a knot; infinite if
+  /// none has. O(bodies + own plans).
   double next_knot() const {
     double knot = std::numeric_limits<double>::infinity();
     for (std::uint32_t body = 0; body < playback_.body_count(); ++body)
       knot = std::min(knot, playback_.plans(body).lines_end(playback_.time()));
     return knot;
   }
-  /// How contacts were decided; after the first call of `contacts`.
+  /// Returns how contacts were decided; valid after the first call of `contacts`.
   ImpactStats impact_stats() const { return sweep_ ? sweep_->stats() : ImpactStats{}; }
-  /// The swept pairs of the last call of `contacts`, which must have been called.
+  /// Returns the swept pairs of the last call of `contacts`; there must have been one.
   const PairBuffer& swept_pairs() const { return sweep_->pairs(); }
 
-  /// Makes the changes at the current time, all of them or, if one is not valid, none
+  /// Applies the changes at the current time: all of them or, if one is not valid, none
   /// (Playback::change_plans).
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
     timed(times.motion, [&] {
@@ -139,14 +140,14 @@ class Session {
     for (const PlanChange<S>& change : changes) watch_.changed(playback_, change.body, change.vertex);
     timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });
   }
-  /// Inserts and deletes at the current time; the scene given to the constructor stays as it is. Throws
-  /// std::logic_error if the strategy does not declare geometry changes, std::invalid_argument (see
-  /// ChangingScene) with nothing changed.
+  /// Inserts and deletes at the current time; the scene given to the constructor stays unchanged. Throws
+  /// std::logic_error if the strategy does not declare geometry changes, and std::invalid_argument (see
+  /// ChangingScene) without any change.
   void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
     if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
     timed(times.motion, [&] { changing_->apply(change, playback_); });
     geometry_changed_ = true;
-    sweep_.reset();  // its features are those of before
+    sweep_.reset();  // its features are of the old geometry
     watch_.added(playback_, change);
     timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
   }
@@ -154,7 +155,7 @@ class Session {
   Strategy<S>& strategy() { return *strategy_; }
   Playback<S>& playback() { return playback_; }
   const Info& info() const { return *info_; }
-  /// The scene as it is now.
+  /// Returns the current scene.
   const Scene<S>& scene() const { return *scene_; }
 
  private:
@@ -175,7 +176,7 @@ class Session {
   Contestant contestant_;
   CountingPolicy policy_;
   const Info* info_;
-  std::optional<ChangingScene<S>> changing_;  ///< for strategies that can follow
+  std::optional<ChangingScene<S>> changing_;  ///< for strategies that support geometry changes
   const Scene<S>* scene_;
   SceneView<S> view_;
   Playback<S> playback_;

@@ -44,7 +44,7 @@ class FrameChecker {
   FrameChecker(Session<S>& session, Verification& result)
       : session_(session), result_(result), sound_(session.scene().bodies.size()) {}
 
-  /// Takes the answers by value: sorting must not disturb the buffers that strategies keep warm.
+  /// Takes the answers by value: sorting must not disturb the warm buffers of strategies.
   void check_pairs(PairBuffer candidates, PairBuffer confirmed, const PairBuffer& truth) {
     const Info& info = session_.info();
     ++result_.frames;
@@ -70,7 +70,7 @@ class FrameChecker {
     if (!extra.empty()) violate("pair " + text(extra[0]) + " is reported but does not intersect");
   }
 
-  /// `judged`: keep the quality of this frame's boxes, too.
+  /// `judged`: also record the quality of this frame's boxes.
   void check_bounds(bool judged) {
     const Info& info = session_.info();
     Quality quality{.t = session_.playback().time()};
@@ -95,7 +95,7 @@ class FrameChecker {
     if (quality.sah_rebuilt > 0) result_.over_time.push_back(quality);
   }
 
-  /// What was sound need not be any more.
+  /// Topologies that passed the check may have changed.
   void geometry_changed() { std::fill(sound_.begin(), sound_.end(), Topology{}); }
 
  private:
@@ -122,7 +122,7 @@ class FrameChecker {
   }
   Session<S>& session_;
   Verification& result_;
-  std::vector<Topology> sound_;  ///< of each body, as last found sound: most never change
+  std::vector<Topology> sound_;  ///< the last topology of each body that passed the check: most never change
 };
 
 }  // namespace
@@ -135,10 +135,10 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
   PairBuffer pairs;
   PhaseTimes ignored;
   ScriptCursor<S> cursor(script);
-  // The oracle knows one truth for each time, of the scene that it was made for.
+  // The oracle knows one truth per time, for the scene that it was made for.
   const bool known_truth =
       oracle.script() == (script ? hash(*script) : 0) && !(script && script->changes_geometry());
-  // Every so many of the frames that are compared, so that there are no more samples than asked for.
+  // Takes every n-th compared frame, so that there are no more samples than requested.
   const std::uint64_t compared_frames =
       (frames.size() + options.every_nth_frame - 1) / options.every_nth_frame + 1;
   const std::uint64_t judged_every =
@@ -152,7 +152,7 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
     if (!compared) return;
     const PairBuffer candidates = pairs;
     session.strategy().confirm(t, pairs);
-    // Only after the answer may positions be completed for the oracle and the audit.
+    // Positions may be completed for the oracle and the audit only after the answer.
     session.playback().evaluate_all();
     checker.check_pairs(
         candidates, pairs,
@@ -172,7 +172,7 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
     if (step->geometry.empty()) continue;
     session.change_geometry(step->geometry, ignored);
     checker.geometry_changed();
-    query(compared);  // what is valid afterwards is valid at once
+    query(compared);  // bounds must be valid immediately after a change
   }
   return result;
 }

@@ -42,7 +42,7 @@ KernelSet checked(KernelSet set) {
                               "' cannot run on this machine; those that can are " + known);
 }
 
-/// The choice of use_kernel_set, or -1: the environment's.
+/// The choice made by use_kernel_set, or -1: the environment decides.
 std::atomic<int> chosen{-1};
 
 }  // namespace

@@ -1,9 +1,10 @@
 #pragma once
-// Internal: tables of kernels, one for each instruction set (kernel_set.hpp). Kernel files include this and
+// Internal: tables of kernels, one per instruction set (kernel_set.hpp). Kernel files include this header and
 // no standard headers with inline functions.
 
 #if defined(KBVH_X86_KERNELS)
-/// Inside namespace kbvh: declares `table`, of type `const Type`, in the namespaces of all instruction sets.
+/// Declares `table`, of type `const Type`, in the namespaces of all instruction sets; use it inside namespace
+/// kbvh.
 #define KBVH_DECLARE_KERNELS(Type, table) \
   namespace kernels::portable {           \
   extern const Type table;                \
@@ -17,7 +18,7 @@
   namespace kernels::avx512 {             \
   extern const Type table;                \
   }
-/// The table that a KernelSet names.
+/// Selects the table of a KernelSet.
 #define KBVH_SELECT_KERNELS(set, table)                                                 \
   (*kbvh::kernels::choose({&kbvh::kernels::portable::table, &kbvh::kernels::sse::table, \
                            &kbvh::kernels::avx2::table, &kbvh::kernels::avx512::table}, \

@@ -1,11 +1,10 @@
 #pragma once
-// Internal to kernels (core/*/kernels/*.cpp): vectors as wide as the instruction set that the file is
-// compiled for. Everything is in an anonymous namespace and forced inline, so that no two translation units
-// share code. "portable" has vectors of one lane, which are plain numbers: the same source, without any
-// extension.
+// Internal to kernels (core/*/kernels/*.cpp): vectors as wide as the instruction set of the file. Everything
+// is in an anonymous namespace and forced inline, so that no two translation units share code. "portable"
+// uses vectors of one lane, which are plain numbers: the same source without any extension.
 #include <cstddef>
 #include <cstdint>
-// A header that is compiled by itself, for no instruction set, is portable.
+// A header that is compiled by itself, without an instruction set, is portable.
 #if !defined(KBVH_KERNELS_avx512) && !defined(KBVH_KERNELS_avx2) && !defined(KBVH_KERNELS_sse) && \
     !defined(KBVH_KERNELS_portable)
 #define KBVH_KERNELS_portable
@@ -39,7 +38,7 @@ struct VectorOf<S, 1> {
 template <class S, std::size_t n>
 using Vector = typename VectorOf<S, n>::type;
 
-/// Most lanes of a register, or 1.
+/// The largest number of lanes of a register, or 1.
 template <class S>
 constexpr std::size_t native_lanes = kRegisterBytes == 0 ? 1 : kRegisterBytes / sizeof(S);
 
@@ -53,7 +52,8 @@ template <class V, class S>
 [[gnu::always_inline]] inline void store_lanes(S* to, V v) {
   __builtin_memcpy(to, &v, sizeof v);
 }
-/// The smaller of each lane; b where they are equal (both zeros are one number here) or unordered.
+/// Returns the smaller value of each lane; b where they are equal (both zeros count as one number) or
+/// unordered.
 template <class V>
 [[gnu::always_inline]] inline V smaller(V a, V b) {
   return a < b ? a : b;
@@ -63,12 +63,12 @@ template <class V>
   return a > b ? a : b;
 }
 
-/// One bit for each lane of a comparison's result.
+/// Returns one bit per lane of a comparison's result.
 [[gnu::always_inline]] inline unsigned mask_bits(bool lane) {
   return lane ? 1U : 0U;
 }
 #if !defined(KBVH_KERNELS_portable)
-// By size, not by type: compilers differ in what the lanes of a comparison are called.
+// Dispatches by size, not by type: compilers differ in the type of a comparison's lanes.
 template <class V>
 [[gnu::always_inline]] inline unsigned mask_bits(V m) {
   constexpr std::size_t lane = sizeof(m[0]);
@@ -93,8 +93,8 @@ template <class V>
 }
 #endif
 
-/// Copies those of at most 16 numbers whose bits are set, in their order, and returns how many they are. May
-/// write to 16 places.
+/// Copies, in order, those of at most 16 numbers whose bits are set, and returns their count. May write to 16
+/// places.
 template <class T>
 [[gnu::always_inline]] inline unsigned pack_lanes(unsigned bits, const T* from, T* to) {
   static_assert(sizeof(T) == 4);

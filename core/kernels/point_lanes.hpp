@@ -1,5 +1,5 @@
 #pragma once
-// Internal to core/kernels/*.cpp: points of triangles in lanes, one pair of triangles in each.
+// Internal to core/kernels/*.cpp: points of triangles in lanes, one pair of triangles per lane.
 #include "core/kernels/lanes.hpp"
 
 #define KBVH_INLINE [[gnu::always_inline]] inline
@@ -22,7 +22,7 @@ struct WordsOf<double> {
 
 template <class S>
 constexpr std::size_t lanes = native_lanes<S>;
-/// A value for each pair of a register.
+/// One value per pair of a register.
 template <class S>
 using Values = Vector<S, lanes<S>>;
 /// Words of the same width: the bits of values, or a mask.
@@ -42,7 +42,7 @@ template <class S>
 KBVH_INLINE Values<S> absolute(Values<S> x) {
   return __builtin_bit_cast(Values<S>, bits<S>(x) & (~Word<S>(0) >> 1));
 }
-/// All bits set where x > y, else none.
+/// Returns all bits set where x > y, else none.
 template <class S>
 KBVH_INLINE Words<S> greater(Values<S> x, Values<S> y) {
 #if defined(KBVH_KERNELS_portable)
@@ -51,7 +51,7 @@ KBVH_INLINE Words<S> greater(Values<S> x, Values<S> y) {
   return (Words<S>)(x > y);
 #endif
 }
-/// The highest bit of each lane.
+/// Returns the highest bit of each lane.
 template <class S>
 KBVH_INLINE unsigned high_bits(Words<S> mask) {
 #if defined(KBVH_KERNELS_portable)
@@ -98,7 +98,7 @@ KBVH_INLINE Point<S> load_points(const S* const* rows) {
 #define KBVH_FLOATS(operation) _mm_##operation
 #endif
 
-/// Points 0, 4, 8, ..., one in each 128 bits.
+/// Loads points 0, 4, 8, ..., one in each 128 bits.
 KBVH_INLINE Values<float> load_row(const float* const* rows) {
 #if defined(KBVH_KERNELS_avx512)
   return _mm512_insertf32x8(

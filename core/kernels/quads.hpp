@@ -1,12 +1,12 @@
 #pragma once
-// Internal to core/kernels/*.cpp: points as they lie in memory (x, y, z, and whatever follows), and their
+// Internal to core/kernels/*.cpp: points in memory order (x, y, z, and one more number) and their
 // transposition into rows of coordinates. A Pack holds one point in four lanes, or two points in eight.
 #include "core/kernels/lanes.hpp"
 
 namespace kbvh {
 namespace {
 
-/// A point in plain numbers, for instruction sets without a register for it.
+/// A point in plain numbers, for instruction sets without a suitable register.
 template <class S>
 struct PlainPoint {
   S v[3];
@@ -25,17 +25,17 @@ template <class S, std::size_t wanted_points, bool in_registers = (native_lanes<
 struct Points {
   static constexpr std::size_t points = 1;
   using Pack = PlainPoint<S>;
-  /// The point at `a`; a second one, where a pack holds two, at `b`.
+  /// Loads the point at `a` and, if a pack holds two, the point at `b`.
   [[gnu::always_inline]] static Pack load(const S* a, const S* /*b*/) { return {{a[0], a[1], a[2]}}; }
-  /// Writes four packs as rows: rows[axis * stride + i] for the points i < many, each number with its sign
-  /// turned if `turned`.
+  /// Writes four packs as rows: rows[axis * stride + i] for the points i < many, each number negated if
+  /// `turned`.
   template <bool turned>
   [[gnu::always_inline]] static void store_rows(const Pack (&p)[4], S* rows, std::size_t stride,
                                                 std::size_t many) {
     for (std::size_t axis = 0; axis < 3; ++axis)
       for (std::size_t i = 0; i < many; ++i) rows[axis * stride + i] = turned ? -p[i].v[axis] : p[i].v[axis];
   }
-  /// Smallest and largest of a pack's points; may write a fourth number.
+  /// Stores the smallest and largest coordinates of a pack's points; may write a fourth number.
   [[gnu::always_inline]] static void store_smallest(S* to, Pack p) {
     for (int i = 0; i < 3; ++i) to[i] = p.v[i];
   }
@@ -43,7 +43,7 @@ struct Points {
 };
 
 #if defined(KBVH_KERNELS_avx2) || defined(KBVH_KERNELS_avx512)
-// GCC 12 makes a load and a shuffle of __builtin_shufflevector; this is one instruction that reads memory.
+// A single instruction that reads memory; GCC 12 makes a load and a shuffle of __builtin_shufflevector.
 [[gnu::always_inline]] inline Vector<float, 8> joined(Vector<float, 4> a, Vector<float, 4> b) {
   return (Vector<float, 8>)_mm256_insertf128_ps(_mm256_castps128_ps256((__m128)a), (__m128)b, 1);
 }
@@ -54,8 +54,8 @@ struct Points {
 }
 #endif
 
-/// Points in registers; point i < 4 of four packs is their first, point 4 + i their second. `load` reads a
-/// fourth number past each point.
+/// Points in registers; point i < 4 of four packs is their first point, point 4 + i their second. `load`
+/// reads a fourth number past each point.
 template <class S, std::size_t wanted_points>
 struct Points<S, wanted_points, true> {
   static constexpr std::size_t points = native_lanes<S> >= 8 ? wanted_points : 1;
@@ -75,7 +75,7 @@ struct Points<S, wanted_points, true> {
   [[gnu::always_inline]] static void store_rows(const Pack (&p)[4], S* rows, std::size_t stride,
                                                 std::size_t many) {
     Pack x, y, z;
-    // The two patterns are the cheap ones of 4-byte and of 8-byte lanes.
+    // The two patterns are the cheap ones for 4-byte and for 8-byte lanes.
     if constexpr (points == 2 && sizeof(S) == 4) {
       const Pack xy01 = __builtin_shufflevector(p[0], p[1], 0, 8, 1, 9, 4, 12, 5, 13);
       const Pack xy23 = __builtin_shufflevector(p[2], p[3], 0, 8, 1, 9, 4, 12, 5, 13);

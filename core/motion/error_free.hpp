@@ -15,7 +15,7 @@ using DoubleDouble = TwoPart<double>;
 // std::fma is a slow library call. They need -ffp-contract=off and round-to-nearest; they are forced inline
 // because kernels are compiled several times under different flags and must not share an out-of-line copy.
 
-/// hi + lo == a + b exactly, for any a and b whose sum does not overflow.
+/// Computes hi + lo == a + b exactly, for any a and b whose sum does not overflow.
 template <class V>
 [[gnu::always_inline]] inline TwoPart<V> two_sum(V a, V b) {
   const V sum = a + b;
@@ -23,7 +23,7 @@ template <class V>
   return {sum, (a - (sum - rest)) + (b - rest)};
 }
 
-/// hi + lo == a - b exactly, for any a and b whose difference does not overflow.
+/// Computes hi + lo == a - b exactly, for any a and b whose difference does not overflow.
 template <class V>
 [[gnu::always_inline]] inline TwoPart<V> two_diff(V a, V b) {
   const V difference = a - b;
@@ -39,8 +39,9 @@ template <class V>
   return {hi, a - hi};
 }
 
-/// hi + lo == a * b exactly unless the product is so small that lo underflows (safe: 2^-960 <= |a b|, or a b
-/// == 0, and |a|, |b|, |a b| <= 2^960). `halves` are those of b, so that a common factor is split once.
+/// Computes hi + lo == a * b exactly, unless the product is so small that lo underflows (safe: 2^-960 <= |a
+/// b|, or a b == 0, and |a|, |b|, |a b| <= 2^960). `halves` are those of b, so that a common factor is split
+/// only once.
 template <class V>
 [[gnu::always_inline]] inline TwoPart<V> two_product(V a, double b, DoubleDouble halves) {
   const V product = a * b;
@@ -50,12 +51,12 @@ template <class V>
   return {product, lo};
 }
 
-/// hi + lo == a * b exactly; see above for the range.
+/// Computes hi + lo == a * b exactly; see above for the range.
 [[gnu::always_inline]] inline DoubleDouble two_product(double a, double b) {
   return two_product(a, b, split_halves(b));
 }
 
-/// -1, 0 or 1.
+/// Returns -1, 0 or 1.
 [[gnu::always_inline]] inline int sign_of(double value) {
   return (value > 0) - (value < 0);
 }

@@ -8,9 +8,9 @@
 
 namespace kbvh {
 
-/// An exact sum of doubles that grows one term at a time and knows its sign (Shewchuk 1997, grow-expansion
-/// with zero elimination). At most `capacity` terms; each `add` costs the number of non-zero components so
-/// far.
+/// An exact sum of doubles that grows by one term at a time and knows its sign (Shewchuk 1997, grow-expansion
+/// with zero elimination). At most `capacity` terms; each `add` costs the current number of non-zero
+/// components.
 template <int capacity>
 class ExpansionSum {
  public:
@@ -25,7 +25,7 @@ class ExpansionSum {
     if (term != 0) components_[kept++] = term;
     size_ = kept;
   }
-  /// Adds a * b exactly; remembers if the product left the range in which that is possible.
+  /// Adds a * b exactly; records whether the product left the range in which that is possible.
   void add_product(double a, double b) {
     if (a == 0 || b == 0) return;
     const DoubleDouble product = two_product(a, b);
@@ -43,9 +43,9 @@ class ExpansionSum {
     add_product(a.hi, sign * b.lo);
     add_product(a.hi, sign * b.hi);
   }
-  /// False if a product under- or overflowed: the sign means nothing then.
+  /// Returns false if a product under- or overflowed; the sign is then invalid.
   bool in_range() const { return in_range_; }
-  /// The sign of the exact sum: the largest component decides.
+  /// Returns the sign of the exact sum, which is the sign of the largest component.
   int sign() const { return size_ == 0 ? 0 : sign_of(components_[size_ - 1]); }
 
  private:
@@ -54,8 +54,8 @@ class ExpansionSum {
   bool in_range_ = true;
 };
 
-/// An exact dyadic rational mantissa * 2^exponent: closed under +, -, * and without the gcds of a rational
-/// type. Any finite double converts; there is no range to leave. The last stage of every exact decision.
+/// An exact dyadic rational mantissa * 2^exponent: closed under +, -, *, without the gcds of a rational type.
+/// Any finite double converts, and the range is unlimited. It is the last stage of every exact decision.
 class Dyadic {
  public:
   /// Integers of up to 1024 bits stay on the stack.
@@ -65,7 +65,7 @@ class Dyadic {
       boost::multiprecision::et_off>;
 
   Dyadic() = default;
-  /// Exact; value must be finite.
+  /// Converts exactly; value must be finite.
   Dyadic(double value) {  // NOLINT(google-explicit-constructor): formulas read better
     if (value == 0) return;
     int exponent = 0;
@@ -98,8 +98,8 @@ class Dyadic {
   int exponent_ = 0;
 };
 
-/// numerator / denominator (denominator > 0) rounded to S, to nearest even, subnormals and overflow to
-/// infinity included; never -0.
+/// Rounds numerator / denominator (denominator > 0) to S, to nearest even, subnormals and overflow to
+/// infinity included; never returns -0.
 template <class S>
 S round_quotient(const Dyadic& numerator, const Dyadic& denominator) {
   using Integer = Dyadic::Integer;
@@ -121,7 +121,7 @@ S round_quotient(const Dyadic& numerator, const Dyadic& denominator) {
   Integer quotient, remainder;
   divide_qr(top, bottom, quotient, remainder);
   const bool sticky = !remainder.is_zero();
-  // Now round quotient (+ sticky) * 2^quantum to the grid of S.
+  // Rounds quotient (+ sticky) * 2^quantum to the grid of S.
   if (quotient.is_zero()) return S(0);  // below a quarter of the least subnormal
   const int top_bit = static_cast<int>(msb(quotient)) + quantum;
   int grid = top_bit - Limits::digits + 1;
@@ -136,8 +136,8 @@ S round_quotient(const Dyadic& numerator, const Dyadic& denominator) {
   return size == 0 ? S(0) : numerator.sign() < 0 ? -size : size;
 }
 
-/// The sign of a*b - c*d, exactly. Filter in double, then the products' error-free halves, then an expansion,
-/// then Dyadic. 6 flops and a comparison when the filter decides.
+/// Returns the sign of a*b - c*d, exactly: first by a filter in double, then from the products' error-free
+/// halves, then by an expansion, then by Dyadic. The filter takes 6 flops and a comparison.
 inline int sign_of_cross(DoubleDouble a, DoubleDouble b, DoubleDouble c, DoubleDouble d) {
   const double left = a.hi * b.hi, right = c.hi * d.hi;
   const double difference = left - right;
@@ -150,7 +150,8 @@ inline int sign_of_cross(DoubleDouble a, DoubleDouble b, DoubleDouble c, DoubleD
     if (left_zero) return -sign_of(c.hi) * sign_of(d.hi);
     if (right_zero) return sign_of(a.hi) * sign_of(b.hi);
     if (size >= 0x1p-900 && size <= 0x1p900 && std::fabs(left) >= 0x1p-900 && std::fabs(right) >= 0x1p-900) {
-      // hi parts are the products rounded, so by monotony they order the products unless they are equal.
+      // The hi parts are the rounded products, so by monotonicity they order the products unless they are
+      // equal.
       const DoubleDouble p = two_product(a.hi, b.hi), q = two_product(c.hi, d.hi);
       return p.hi != q.hi ? sign_of(p.hi - q.hi) : sign_of(p.lo - q.lo);
     }

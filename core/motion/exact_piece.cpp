@@ -17,7 +17,7 @@ bool same_frame(const Piece<S>& a, const Piece<S>& b) {
   return a.kind == b.kind && a.t0 == b.t0 && (a.kind == PieceKind::ray || a.t1 == b.t1);
 }
 
-/// a - b for two pieces of one frame, exact: g(t) = first + (second - first) s for chords, s = (t - t0) / (t1
+/// a - b for two pieces in one frame, exact: g(t) = first + (second - first) s for chords, s = (t - t0) / (t1
 /// - t0); g(t) = first + second s for rays, s = t - t0.
 struct Difference {
   DoubleDouble first, second;
@@ -33,7 +33,7 @@ DoubleDouble negated(DoubleDouble x) {
   return {-x.hi, -x.lo};
 }
 
-/// The sign of a - b; rounding is monotone, so unequal hi parts decide.
+/// Returns the sign of a - b; rounding is monotone, so unequal hi parts decide.
 int compare(DoubleDouble a, DoubleDouble b) {
   return a.hi != b.hi ? (a.hi > b.hi ? 1 : -1) : (a.lo > b.lo) - (a.lo < b.lo);
 }
@@ -83,8 +83,8 @@ Estimate value_estimate(const Piece<S>& p, double t) {
   return {start + way, (std::fabs(start) + std::fabs(way)) * 0x1p-50 + underflow};
 }
 
-/// Root from pieces in different frames: a Newton step from the later start. An infinite error says that
-/// `time` means nothing.
+/// Estimates the root from pieces in different frames by a Newton step from the later start. An infinite
+/// error marks `time` as invalid.
 template <class S>
 TimeEstimate general_root(const Crossing<S>& c) {
   const double from = c.winner.t0 > c.loser.t0 ? c.winner.t0 : c.loser.t0;
@@ -107,7 +107,8 @@ TimeEstimate root_estimate(const Crossing<S>& c) {
   if (!same_frame(c.winner, c.loser)) return general_root(c);
   const Difference g = difference(c.loser, c.winner);
   const bool chord = c.winner.kind == PieceKind::chord;
-  // hi parts carry a relative error of 2^-53; where the difference of ends cancels, lo parts keep it small.
+  // The hi parts carry a relative error of 2^-53; where the difference of ends cancels, the lo parts keep the
+  // error small.
   double slope = g.second.hi, slope_error = 0;
   if (chord) {
     slope = (g.second.hi - g.first.hi) + (g.second.lo - g.first.lo);
@@ -141,7 +142,7 @@ ExactLine exact_line(const Piece<S>& p) {
   return {x0 * duration - dx * t0, dx, duration};
 }
 
-/// a - b, up to a positive factor.
+/// Computes a - b, up to a positive factor.
 template <class S>
 ExactLine exact_difference(const Piece<S>& a, const Piece<S>& b) {
   const ExactLine p = exact_line(a), q = exact_line(b);
@@ -192,7 +193,7 @@ template <class S>
 TimeEstimate crossing_estimate(const Crossing<S>& crossing) {
   const TimeEstimate quick = root_estimate(crossing);
   if (quick.error < kInfinity) return quick;
-  // Slopes that nearly agree: the double arithmetic above means nothing.
+  // The slopes nearly agree, so the double arithmetic above has no correct digits.
   const ExactRoot root = exact_root(crossing);
   const double time = round_quotient<double>(root.top, root.bottom);
   return {time, std::isinf(time) ? kInfinity : std::fabs(time) * 0x1p-53 + 0x1p-1074};
@@ -200,7 +201,7 @@ TimeEstimate crossing_estimate(const Crossing<S>& crossing) {
 
 template <class S>
 int compare_crossing_to(const Crossing<S>& c, double t) {
-  // The difference loser - winner has at t the sign of its slope times the sign of t - root.
+  // At t the difference loser - winner has the sign of its slope times the sign of t - root.
   const int slope = compare_slopes(c.loser, c.winner);
   if (slope == 0) refuse_parallel(c);
   return -slope * compare_at(c.loser, c.winner, t);
@@ -209,8 +210,8 @@ int compare_crossing_to(const Crossing<S>& c, double t) {
 template <class S>
 int compare_crossings(const Crossing<S>& x, const Crossing<S>& y) {
   if (same_frame(x.winner, x.loser) && same_frame(y.winner, y.loser) && same_frame(x.winner, y.winner)) {
-    // In the frame's own time a root is -first / (second - first) (chord) or -first / second (ray); the
-    // difference of two such has the numerator second_x first_y - first_x second_y either way.
+    // In the frame's own time a root is -first / (second - first) (chord) or -first / second (ray). In both
+    // cases the difference of two roots has the numerator second_x first_y - first_x second_y.
     const Difference f = difference(x.loser, x.winner), g = difference(y.loser, y.winner);
     const int slopes = slope_sign(f, x.winner.kind) * slope_sign(g, x.winner.kind);
     if (slopes == 0) refuse_parallel(slope_sign(f, x.winner.kind) == 0 ? x : y);
@@ -227,8 +228,8 @@ template <class S>
 int compare_at_crossing(const Piece<S>& a, const Piece<S>& b, const Crossing<S>& c) {
   const bool shared = same_frame(a, b);
   if (shared && same_frame(c.winner, c.loser) && same_frame(a, c.winner)) {
-    // a - b at the root is (first_ab second_c - second_ab first_c) over the slope of c, for chords and rays
-    // alike.
+    // At the root a - b equals (first_ab second_c - second_ab first_c) over the slope of c, for chords and
+    // rays.
     const Difference ab = difference(a, b), lw = difference(c.loser, c.winner);
     const int slope = slope_sign(lw, a.kind);
     if (slope == 0) refuse_parallel(c);

@@ -40,7 +40,7 @@ FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> time
     if (positions[i] == S(0)) positions[i] = S(0);  // truth B holds no negative zero
   }
   longest_steps_.assign(times.size(), -1.0);
-  positions.push_back(S(0));  // for readers of four scalars
+  positions.push_back(S(0));  // readers may load four scalars
   keyframes_ = std::make_shared<const Keyframes>(Keyframes{std::move(times), std::move(positions)});
 }
 
@@ -83,7 +83,7 @@ void FlightPlans<S>::evaluate_rays(double t, S* out) const {
 template <class S>
 void FlightPlans<S>::join_rays(OwnPlan& plan) {
   if (plan.times.size() > 1) return;
-  // Changes of one time come together: nearly always the newest group is the right one.
+  // Changes of one time come together: the newest group is nearly always the right one.
   auto rays = std::find_if(rays_.rbegin(), rays_.rend(),
                            [&](const Rays& group) { return group.t0 == plan.times[0]; });
   if (rays == rays_.rend()) {
@@ -306,7 +306,7 @@ template <class S>
 void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* position) {
   check_change(t, change, position);
   OwnPlan plan = own_plan(t, change, change.vertex, position);
-  own_speed_until_ = own_speed_from_;  // to be computed anew
+  own_speed_until_ = own_speed_from_;  // forces recomputation
   if (own_of_vertex_.empty()) own_of_vertex_.assign(vertex_count_, none);
   std::uint32_t& slot = own_of_vertex_[change.vertex];
   if (slot == none) {
@@ -328,7 +328,7 @@ void FlightPlans<S>::check_new_vertex(double t, const PlanChange<S>& plan, const
 template <class S>
 void FlightPlans<S>::add_vertex(double t, const PlanChange<S>& plan, const S* position) {
   check_plan(t, plan, vertex_count_, position);
-  own_speed_until_ = own_speed_from_;  // to be computed anew
+  own_speed_until_ = own_speed_from_;  // forces recomputation
   own_of_vertex_.resize(vertex_count_, none);
   own_of_vertex_.push_back(std::uint32_t(own_.size()));
   own_.push_back(own_plan(t, plan, vertex_count_, position));
@@ -337,13 +337,14 @@ void FlightPlans<S>::add_vertex(double t, const PlanChange<S>& plan, const S* po
 }
 
 namespace {
-/// Above every rounding of the few operations on positive numbers that went before, underflow included.
+/// Returns an upper bound of every rounding of the few preceding operations on positive numbers, underflow
+/// included.
 double rounded_up(double value) {
   return value * (1 + 1e-12) + std::numeric_limits<double>::min();
 }
 }  // namespace
 
-/// The furthest that any vertex moves in a segment, rounded up; 0 only if none moves.
+/// Returns the longest step of any vertex in a segment, rounded up; 0 only if no vertex moves.
 template <class S>
 double FlightPlans<S>::longest_step(std::size_t segment) const {
   double& known = longest_steps_[segment];
@@ -359,12 +360,12 @@ double FlightPlans<S>::longest_step(std::size_t segment) const {
     }
     square = std::max(square, sum);
   }
-  // Squares of small numbers vanish: what that can hide is added.
+  // Squares of small numbers underflow; the added term covers the loss.
   known = largest == 0 ? 0 : rounded_up(std::sqrt(square + 1e-300));
   return known;
 }
 
-/// Of the piece that holds at t.
+/// Returns the speed of the piece that holds at t.
 template <class S>
 double FlightPlans<S>::own_speed(const OwnPlan& plan, double t) const {
   double step[3], seconds = 1;
@@ -415,7 +416,7 @@ double FlightPlans<S>::displacement_bound(double t0, double t1) const {
   if (own_.empty()) return common;
   double own = own_speed_bound(t0);
   if (t1 <= own_speed_until_) return std::max(common, own == 0 ? 0 : rounded_up(own * (t1 - t0)));
-  // Some plan has a knot between: each along its own pieces.
+  // Some plan has a knot in between: follow each plan along its own pieces.
   own = 0;
   for (const OwnPlan& plan : own_) {
     double way = 0;

@@ -13,9 +13,9 @@
 
 namespace kbvh {
 
-/// A vertex's plan of its own, from the moment `flight_plans_changed` gave it: straight lines through
-/// `times`/`positions` (after the starting knot, which is the stored position at the change), then
-/// `velocity` for ever. The common velocity field has no knots.
+/// A vertex's own plan, valid from the time of `flight_plans_changed`: straight lines through
+/// `times`/`positions` (after the starting knot, which is the stored position at the change), then `velocity`
+/// for ever. The common velocity field has no knots.
 template <class S>
 struct PlanChange {
   std::uint32_t body = 0, vertex = 0;
@@ -24,28 +24,29 @@ struct PlanChange {
   S velocity[3] = {0, 0, 0};  ///< units per second, after the last knot
 };
 
-/// Between which vectors, per axis, the steps of a body's vertices over a segment lie.
+/// The range, per axis, of the steps of a body's vertices over a segment.
 template <class S>
 struct Translation {
   std::array<S, 3> lower, upper;
-  bool exact;  ///< one vector: adding it to a position at the begin gives that at the end without rounding
+  bool exact;  ///< all steps are one vector that, added to a position at the begin, gives the position at the
+               ///< end without rounding
 };
 
 /// The flight plans of one body's vertices: exact piecewise-linear functions of the stored numbers (truth A)
-/// over keyframes at arbitrary times, with exceptions for vertices whose plan changed at run time.
-/// Before its first and after its last keyframe a body rests. Positions are A rounded correctly (truth B).
-/// Keyframes are shared between copies; plan changes belong to a copy.
+/// over keyframes at arbitrary times, with exceptions for vertices whose plan changed at run time. Before its
+/// first and after its last keyframe a body rests. Positions are truth A, correctly rounded (truth B). Copies
+/// share the keyframes; plan changes belong to one copy.
 template <class S>
 class FlightPlans {
  public:
   FlightPlans() : FlightPlans(0, {0.0}, {}) {}
-  /// `positions` is [keyframe][vertex][3]. Throws std::invalid_argument naming what is wrong: no keyframe,
-  /// sizes that do not match, times not strictly increasing, values not finite or beyond the admissible
-  /// range.
+  /// Takes `positions` as [keyframe][vertex][3]. Throws std::invalid_argument that names the error: no
+  /// keyframe, sizes that do not match, times that do not strictly increase, values that are not finite or
+  /// beyond the admissible range.
   FlightPlans(std::uint32_t vertex_count, std::vector<double> times, std::vector<S> positions);
-  /// The plans of a body whose positions are handed in frame by frame (Playback::hand_in), so that nothing is
-  /// known of its motion but that it moves. `positions` [vertex][3] are those until the first are handed in.
-  /// Throws std::invalid_argument as the constructor does.
+  /// Makes the plans of a body whose positions are handed in frame by frame (Playback::hand_in): its motion
+  /// is unknown. `positions` [vertex][3] hold until the first hand-in. Throws std::invalid_argument like the
+  /// constructor.
   static FlightPlans handed_in(std::uint32_t vertex_count, std::vector<S> positions) {
     FlightPlans plans(vertex_count, {0.0}, std::move(positions));
     plans.handed_in_ = true;
@@ -53,67 +54,69 @@ class FlightPlans {
   }
   bool is_handed_in() const { return handed_in_; }
 
-  /// All vertices, those added at run time included.
+  /// Returns the number of all vertices, including those added at run time.
   std::uint32_t vertex_count() const { return vertex_count_; }
-  /// Vertices that have keyframes: the first ones. The others have plans of their own.
+  /// Returns the number of vertices with keyframes, which come first. The others have their own plans.
   std::uint32_t keyframed_count() const { return keyframed_count_; }
   std::size_t keyframe_count() const { return keyframes_->times.size(); }
   std::span<const double> keyframe_times() const { return keyframes_->times; }
-  /// Positions of keyframe k, [keyframed vertex][3]; own plans are not in them. One scalar past the end may
-  /// be read.
+  /// Returns the positions of keyframe k, [keyframed vertex][3], without the vertices' own plans. One scalar
+  /// past the end may be read.
   const S* keyframe(std::size_t k) const { return keyframes_->positions.data() + 3 * k * keyframed_count_; }
   bool moving() const { return handed_in_ || keyframe_count() > 1 || !own_.empty(); }
-  /// Do its keyframes end lines? A single one is where the body is at all times.
+  /// Returns whether lines end at keyframes; a body with a single keyframe rests there at all times.
   bool has_knots() const { return keyframed_count_ > 0 && keyframe_count() > 1; }
   bool has_own_plans() const { return !own_.empty(); }
   bool has_own_plan(std::uint32_t vertex) const { return !own_.empty() && own_of_vertex_[vertex] != none; }
 
   /// Writes the position of every vertex at t: out[3 * vertex + axis]. O(vertices).
   void evaluate(double t, S* out) const;
-  /// The same for the listed vertices only, into the same layout.
+  /// Does the same for the listed vertices only, into the same layout.
   void evaluate(double t, std::span<const std::uint32_t> vertices, S* out) const;
 
-  /// Index k of the segment [times[k], times[k+1]) with t in it; 0 before the first, last index past the end.
+  /// Returns the index k of the segment [times[k], times[k+1]) that contains t; 0 before the first, the last
+  /// index past the end.
   std::size_t segment_at(double t) const;
-  /// The linear piece that holds at t and right after it. `t1` is where it ends (infinity: never).
+  /// Returns the linear piece that holds at t and right after it. `t1` is its end (infinity: never).
   Piece<S> piece_after(std::uint32_t vertex, int axis, double t) const;
-  /// The end of that piece, without building it.
+  /// Returns the end of that piece without building it.
   double piece_end(std::uint32_t vertex, double t) const;
 
-  /// From when on, and until when, every vertex is on the lines that it is on at t and right after it;
-  /// infinite where that is for ever. O(own plans).
+  /// Return the time from which and the time until which every vertex stays on the line that it is on at t
+  /// and right after it; infinite if there is no such limit. O(own plans).
   double lines_begin(double t) const;
   double lines_end(double t) const;
-  /// Nothing moves at t, and not before `lines_end(t)`. False if there are plans of their own.
+  /// Returns whether the body rests from t until `lines_end(t)`. False for bodies with vertices' own plans.
   bool at_rest(double t) const;
-  /// How the body moves as a whole over the keyframes' segment that t is in: the steps of all its vertices,
-  /// which differ by no more than the rounding of stored coordinates (4 ulps of the largest). Nothing if they
-  /// differ by more (the first by much more), without a segment, or with plans of its own. O(vertices) the
-  /// first time a segment is asked for, or as many as move alike.
+  /// Returns the common translation of the body over the keyframe segment that contains t: the range of the
+  /// steps of its vertices, which differ by no more than the rounding of stored coordinates (4 ulps of the
+  /// largest). Returns nothing if the steps differ by more, without a segment, or with vertices' own plans.
+  /// O(vertices) at the first call per segment; it stops early at the first vertex that differs by much.
   std::optional<Translation<S>> translation(double t) const;
 
-  /// No vertex is faster than this on the segment that holds at t (units per second, rounded up); own plans
-  /// included. O(vertices) the first time a segment is asked for; O(own plans) after a change, or a knot of
-  /// one.
+  /// Returns an upper bound of every vertex's speed on the segment that holds at t (units per second), own
+  /// plans included. O(vertices) at the first call per segment; O(own plans) after a change or a knot of an
+  /// own plan.
   double speed_bound(double t) const;
-  /// No vertex moves further than this on its way from t0 to t1 (Euclidean, rounded up), whatever segments
-  /// lie between; 0 only if none moves at all. Not for times before the last change. Costs as `speed_bound`.
+  /// Returns an upper bound of every vertex's Euclidean displacement between t0 and t1, over any number of
+  /// segments; 0 only if no vertex moves. Not valid for times before the last change. Costs as much as
+  /// `speed_bound`.
   double displacement_bound(double t0, double t1) const;
 
   /// Throws std::invalid_argument if there is no such vertex.
   void check_vertex(std::uint32_t vertex) const;
-  /// Throws std::invalid_argument, saying what is wrong, if `change` would.
+  /// Throws the std::invalid_argument that `change` would throw.
   void check_change(double t, const PlanChange<S>& change, const S* position) const;
   /// Starts the vertex's new plan at t from its stored position at t (`position`, 3 scalars). Throws
-  /// std::invalid_argument, with nothing changed: on values that are not finite or beyond the admissible
-  /// range (the position, too: a vertex can have flown out of it), knots not after t, or an unknown vertex.
+  /// std::invalid_argument and changes nothing on values that are not finite or beyond the admissible range
+  /// (the position, too: a vertex may have left it), knots not after t, or an unknown vertex.
   void change(double t, const PlanChange<S>& change, const S* position);
-  /// Adds a vertex, with the next free id, that is at `position` (3 scalars) at t and follows the plan from
-  /// there (before t its first piece is defined, and means nothing). `plan.body` and `plan.vertex` are
-  /// ignored. Throws std::invalid_argument like `change`, and on a position that is not admissible. Amortised
-  /// O(knots).
+  /// Adds a vertex with the next free id that is at `position` (3 scalars) at t and follows the plan from
+  /// there. Before t its first piece is defined but meaningless. `plan.body` and `plan.vertex` are ignored.
+  /// Throws std::invalid_argument like `change`, and on an inadmissible position. Amortised O(knots).
   void add_vertex(double t, const PlanChange<S>& plan, const S* position);
-  /// Throws what `add_vertex` would throw for a vertex with that id, and does nothing else.
+  /// Throws the std::invalid_argument that `add_vertex` would throw for a vertex with that id; changes
+  /// nothing.
   static void check_new_vertex(double t, const PlanChange<S>& plan, const S* position, std::uint32_t vertex);
 
   std::size_t bytes() const;
@@ -129,10 +132,10 @@ class FlightPlans {
     std::vector<double> times;  // first knot: the change itself
     std::vector<S> positions;
     S velocity[3];
-    std::uint32_t group = none, place = 0;  ///< in rays_, of plans without a further knot
+    std::uint32_t group = none, place = 0;  ///< index into rays_, for plans without a further knot
   };
-  /// Vertices that fly on for ever from one time on, laid out to be evaluated together: a field of velocities
-  /// that change at run time has thousands of them.
+  /// Vertices that move on rays from one time on, laid out to be evaluated together: a velocity field that
+  /// changes at run time has thousands of them.
   struct Rays {
     double t0;
     std::vector<std::uint32_t> vertices;
@@ -156,9 +159,9 @@ class FlightPlans {
   std::vector<std::uint32_t> own_of_vertex_;
   std::vector<OwnPlan> own_;
   std::vector<Rays> rays_;                     ///< none is empty
-  mutable std::vector<double> longest_steps_;  // by segment; negative until it is asked for
-  mutable std::vector<std::optional<std::optional<Translation<S>>>> translations_;  // likewise
-  mutable double own_speed_ = 0, own_speed_from_ = 0, own_speed_until_ = 0;         // holds in [from, until)
+  mutable std::vector<double> longest_steps_;  // by segment; negative until the first request
+  mutable std::vector<std::optional<std::optional<Translation<S>>>> translations_;  // by segment
+  mutable double own_speed_ = 0, own_speed_from_ = 0, own_speed_until_ = 0;         // valid in [from, until)
 };
 
 extern template class FlightPlans<float>;

@@ -20,7 +20,7 @@ namespace {
 /// Covers the double-double evaluation of round_one: each of about 12 errors is below 2^-104 of |x0| + |dx
 /// ratio|, and underflow of error terms.
 constexpr double kRelativeError = 0x1p-97, kUnderflowError = 0x1p-1040;
-/// Calls for fewer values do without choose_tie_rule: it costs more than the second stage of a few ties.
+/// Calls for fewer values skip choose_tie_rule, which costs more than the second stage of a few ties.
 constexpr std::size_t kChoiceWorthwhile = 48;
 
 template <class S>
@@ -56,8 +56,8 @@ void complete(TimeFraction& f, PieceKind kind) {
   const double second = rest / dh;
   f.ratio = two_sum(first, second);
   f.ratio_exact = f.single && wh == back.hi && back.lo == 0;
-  // Short: 24 bits, so products with floats are exact in double; in a chord 1 - ratio is then exact or not
-  // short.
+  // Short: 24 bits, so products with floats are exact in double; in a chord 1 - ratio is then either exact or
+  // not short.
   f.rest = kind == PieceKind::chord ? 1 - f.ratio.hi : 1.0;
   const bool rest_exact = kind == PieceKind::ray || 1 - f.rest == f.ratio.hi;
   const auto is_short = [](double x) { return x == static_cast<double>(static_cast<float>(x)); };
@@ -67,8 +67,8 @@ void complete(TimeFraction& f, PieceKind kind) {
   f.ratio_halves = split_halves(f.ratio.hi);
 }
 
-/// The largest power of two that `spread` may be where the fraction is p / q + delta, or 0: the conditions
-/// that core/motion/kernels/round.cpp derives.
+/// Returns the largest power of two that `spread` may have where the fraction is p / q + delta, or 0.
+/// core/motion/kernels/round.cpp derives the conditions.
 double largest_spread(double q, double delta) {
   for (double spread = 0x1p12; spread >= 4; spread /= 2) {
     const double reach = 0x1.04p-47 * spread;  // 2.03 * 2^-48
@@ -78,9 +78,9 @@ double largest_spread(double q, double delta) {
   return 0;
 }
 
-/// Chooses how the first stage of a chord of floats treats ties: looks for a fraction p / q so near that only
-/// its ties come near ties. Frames of a clip have one: l frames to a keyframe make q a divisor of l, but for
-/// the rounding of t.
+/// Chooses the treatment of ties in the first stage of a chord of floats: searches for a fraction p / q so
+/// close that only its ties come near ties. Frames of a clip have such a fraction: with l frames per keyframe
+/// q is a divisor of l, up to the rounding of t.
 void choose_tie_rule(TimeFraction& f, std::size_t count) {
   constexpr double largest_q = 1024;
   f.ties = TieRule::undecided;
@@ -94,7 +94,8 @@ void choose_tie_rule(TimeFraction& f, std::size_t count) {
     const double p_next = whole * p + p_before, q_next = whole * q + q_before;
     if (!(q_next <= largest_q)) return;
     p_before = p, q_before = q, p = p_next, q = q_next;
-    if (std::fabs(f.ratio.hi * q - p) < 0x1p-30 * q) break;  // no other has so small a q and is that near
+    if (std::fabs(f.ratio.hi * q - p) < 0x1p-30 * q)
+      break;  // no other fraction with so small a q is this close
     rest = 1 / (rest - whole);
   }
   // delta = (elapsed * q - p * duration) / (q * duration)
@@ -118,14 +119,14 @@ TimeFraction chord_fraction(double t0, double t1, double t) {
   TimeFraction f;
   f.elapsed = two_diff(t, t0);
   f.duration = two_diff(t1, t0);
-  // The unit of time does not matter; a power of two takes everything near 1 exactly (or complete() says no).
+  // The unit of time does not matter; a power of two brings all times near 1 exactly (else complete() fails).
   const int scale = -std::ilogb(f.duration.hi);
   for (double* x : {&f.elapsed.hi, &f.elapsed.lo, &f.duration.hi, &f.duration.lo}) *x = std::ldexp(*x, scale);
   complete(f, PieceKind::chord);
   return f;
 }
 
-/// The fraction for `count` values at once.
+/// Computes the fraction for `count` values at once.
 template <class S>
 TimeFraction chord_fraction(double t0, double t1, double t, std::size_t count) {
   TimeFraction f = chord_fraction(t0, t1, t);
@@ -141,12 +142,12 @@ TimeFraction ray_fraction(double t0, double t) {
   return f;
 }
 
-/// Exact times of a call, for the last stage.
+/// The exact times of a call, for the last stage.
 struct Times {
   double t0, t1, t;
 };
 
-/// The last stage: round the exact quotient.
+/// Performs the last stage: rounds the exact quotient.
 template <PieceKind kind, class S>
 S round_exactly(S x0, S x1, const Times& times) {
   const Dyadic start(static_cast<double>(x0)), end(static_cast<double>(x1));
@@ -156,8 +157,8 @@ S round_exactly(S x0, S x1, const Times& times) {
   return round_quotient<S>(start * duration + (end - start) * elapsed, duration);
 }
 
-/// What the vectorised stages left: one value at a time. Double-double evaluation gives two neighbours, an
-/// exact expansion the side of their midpoint; failing that, big integers.
+/// Rounds one value that the vectorised stages left. Double-double evaluation gives two neighbours, an exact
+/// expansion the side of their midpoint; big integers decide the remaining cases.
 template <PieceKind kind, class S>
 S round_one(S x0, S x1, const TimeFraction& f, const Times& times, RoundingStats& stats) {
   if (x1 == (kind == PieceKind::chord ? x0 : S(0))) return x0 + S(0);
@@ -171,8 +172,8 @@ S round_one(S x0, S x1, const TimeFraction& f, const Times& times, RoundingStats
     const double error = (std::fabs(start) + std::fabs(way.hi)) * kRelativeError + kUnderflowError;
     S lower, upper;
     if constexpr (std::is_same_v<S, float>) {
-      // Rounding hi to float is right unless hi is a midpoint; then, and near cancellation, lo and error
-      // matter. A whole ulp of hi around hi contains hi + lo + error.
+      // Rounding hi to float is correct unless hi is a midpoint; then, and near cancellation, lo and error
+      // matter. An interval of one ulp of hi around hi contains hi + lo + error.
       const double reach = std::fabs(value.hi) * 0x1p-52 + std::fabs(value.lo) + error;
       lower = static_cast<float>(value.hi - reach);
       upper = static_cast<float>(value.hi + reach);
@@ -183,7 +184,7 @@ S round_one(S x0, S x1, const TimeFraction& f, const Times& times, RoundingStats
     if (lower == upper) return lower + S(0);
     if (std::nextafter(lower, upper) == upper && std::fabs(upper) < std::numeric_limits<S>::max() &&
         std::fabs(lower) < std::numeric_limits<S>::max()) {
-      // sign of (x0 - midpoint) * duration + dx * elapsed; midpoint = lower + half_gap
+      // The sign of (x0 - midpoint) * duration + dx * elapsed; midpoint = lower + half_gap.
       const double low = static_cast<double>(lower);
       const double half_gap = 0.5 * (static_cast<double>(upper) - low);
       if (half_gap >= 0x1p-900) {
@@ -204,14 +205,14 @@ S round_one(S x0, S x1, const TimeFraction& f, const Times& times, RoundingStats
   return round_exactly<kind>(x0, x1, times);
 }
 
-/// Zeros from `count` to the end of its group.
+/// Fills with zeros from `count` to the end of its group.
 template <class S>
 void fill_group(S* values, std::size_t count) {
   std::fill(values + count, values + (count + kRoundGroup - 1) / kRoundGroup * kRoundGroup, S(0));
 }
 
-/// Rounds the blocks of one call. What the first stage leaves is gathered over blocks, so that the second
-/// works on whole groups.
+/// Rounds the blocks of one call. Undecided values of the first stage are gathered over blocks, so that the
+/// second stage works on whole groups.
 template <PieceKind kind, class S>
 class BlockRounder {
  public:
@@ -219,7 +220,7 @@ class BlockRounder {
       : fraction_(fraction), times_(times), stats_(stats) {}
 
   /// Rounds `count` values into `result`, which overlaps neither input; all three have room for whole groups.
-  /// What is left is written to place(i) later, by finish at the latest.
+  /// Values left undecided are written to place(i) later, by `finish` at the latest.
   template <class Place>
   void round(const S* x0, const S* second, std::size_t count, S* result, const Place& place) {
     while (pending_ >= kRoundGroup) decide();  // of earlier calls: the caller may copy `result` first
@@ -241,7 +242,7 @@ class BlockRounder {
   }
 
  private:
-  /// Decides the last group of those pending.
+  /// Decides the last pending group.
   void decide() {
     const std::size_t first = (pending_ - 1) / kRoundGroup * kRoundGroup;
     stats_.second_stage += pending_ - first;

@@ -87,7 +87,7 @@ void ChangingScene<S>::check(const GeometryChange<S>& change, const Playback<S>&
     }
   }
   if (removed_vertices.empty()) return;
-  std::vector<Item> freed;  // corners of primitives that go at the same time
+  std::vector<Item> freed;  // corners of primitives removed by the same change
   for (const auto& removed : change.removed_primitives)
     for (std::uint32_t v : scene_.bodies[removed.body].primitives[removed.id])
       freed.emplace_back(removed.body, v);

@@ -7,18 +7,18 @@
 
 namespace kbvh {
 
-/// Vertices and primitives that are inserted and deleted at one time. Ids are stable: what is inserted gets
-/// the next free ids of its body in the order given, and no id is ever used again.
+/// Vertices and primitives that are inserted and deleted at one time. Ids are stable: inserted items get the
+/// next free ids of their body in the given order, and no id is ever reused.
 template <class S>
 struct GeometryChange {
   struct NewVertex {
     std::uint32_t body = 0;
     S position[3] = {0, 0, 0};  ///< at the change
-    PlanChange<S> plan{};       ///< its motion from there; the body and vertex in it are ignored
+    PlanChange<S> plan{};       ///< its motion from the change on; body and vertex in it are ignored
   };
   struct NewPrimitive {
     std::uint32_t body = 0;
-    std::vector<std::uint32_t> vertices;  ///< at least one; vertices of the same change are known already
+    std::vector<std::uint32_t> vertices;  ///< at least one; may name vertices inserted by the same change
   };
   struct Removed {
     std::uint32_t body = 0, id = 0;
@@ -33,8 +33,9 @@ struct GeometryChange {
   }
 };
 
-/// A scene whose geometry changes while it is played: a copy of the connectivity (keyframes are shared) that
-/// grows and is cut. What was removed keeps its id: primitives are marked, vertices rest on their plans.
+/// A scene whose geometry changes at run time: a copy of the connectivity (keyframes are shared) with
+/// insertions and deletions. Removed items keep their ids: primitives are marked, vertices rest on their
+/// plans.
 template <class S>
 class ChangingScene {
  public:
@@ -42,20 +43,21 @@ class ChangingScene {
 
   const Scene<S>& scene() const { return scene_; }
 
-  /// Makes the change in the scene and in the playback, at the playback's time. Throws std::invalid_argument
-  /// naming the first thing that is wrong, with nothing changed: bodies, vertices or primitives that do not
-  /// exist or were removed, primitives without vertices, vertices removed that a primitive uses, anything
-  /// removed twice, numbers that are not finite or not admissible. Amortised O(change), but O(body) the first
-  /// time that vertices of a body are removed.
+  /// Applies the change to the scene and to the playback, at the playback's time. Throws
+  /// std::invalid_argument that names the first error, and changes nothing: bodies, vertices or primitives
+  /// that do not exist or were removed, primitives without vertices, removed vertices that a primitive uses,
+  /// items removed twice, numbers that are not finite or not admissible. Amortised O(change), but O(body) at
+  /// the first removal of vertices of a body.
   void apply(const GeometryChange<S>& change, Playback<S>& playback);
 
-  /// Throws std::invalid_argument if a plan is given to a vertex that was removed.
+  /// Throws std::invalid_argument if a plan is given to a removed vertex.
   void check_plans(std::span<const PlanChange<S>> changes) const;
 
  private:
   struct BodyState {
-    std::vector<std::uint32_t> uses;    ///< living primitive corners at each vertex; made when first needed
-    std::vector<std::uint8_t> removed;  ///< vertices; may be shorter than all of them
+    std::vector<std::uint32_t>
+        uses;  ///< number of living primitive corners at each vertex; computed when first needed
+    std::vector<std::uint8_t> removed;  ///< per vertex; may be shorter than the number of vertices
     bool is_removed(std::uint32_t vertex) const { return vertex < removed.size() && removed[vertex] != 0; }
   };
   void check(const GeometryChange<S>& change, const Playback<S>& playback);
@@ -65,14 +67,14 @@ class ChangingScene {
   std::vector<BodyState> bodies_;
 };
 
-/// What a change means for one body, once the scene shows it.
+/// The effects of a change on one body, after the scene shows it.
 struct BodyChange {
   std::uint32_t body = 0;
   std::uint32_t first_vertex = 0, first_primitive = 0;  ///< ids from here on are new
   std::vector<std::uint32_t> removed_primitives{};
 };
 
-/// One entry for each body that the change touches, ascending.
+/// Returns one entry for each changed body, ascending.
 template <class S>
 std::vector<BodyChange> body_changes(const SceneView<S>& scene, const GeometryChange<S>& change);
 

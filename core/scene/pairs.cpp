@@ -9,7 +9,7 @@ namespace kbvh {
 
 namespace {
 
-/// One body of the pairs at hand, as plain pointers: the loop over them is short.
+/// One body of the current pairs as plain pointers, which keeps the loop over pairs short.
 template <class S>
 struct PairedBody {
   PairedBody(const SceneView<S>& scene, const SampledMotion<S>& motion, std::uint32_t id)
@@ -27,25 +27,25 @@ struct PairedBody {
 
   std::uint32_t body;
   bool polygons;
-  bool current;  ///< nothing has to be fetched
+  bool current;  ///< no position has to be fetched
   const std::uint32_t* offsets;
   const std::uint32_t* vertices;
   const S* positions;
 };
 
-/// Pairs that are tested together: what is known of them stays in the first-level cache. Places fit into
+/// The number of pairs tested together: their data stays in the first-level cache, and their indices fit into
 /// bytes.
 constexpr std::size_t block = 128;
 
-/// Up to `block` candidates: pairs of triangles are collected, others decided one by one.
+/// Up to `block` candidates: pairs of triangles are collected, all others decided one by one.
 template <class S>
 class CandidateBlock {
  public:
   CandidateBlock(const SceneView<S>& scene, const SampledMotion<S>& motion, TriangleTestStats& stats)
       : scene_(&scene), motion_(&motion), stats_(&stats), kernels_(active_kernel_set()) {}
 
-  /// One byte for each of `count` candidates: 1 where the pair intersects, else 0. Overwritten by the next
-  /// call.
+  /// Returns one byte for each of `count` candidates: 1 if the pair intersects, else 0. The next call
+  /// overwrites them.
   const std::uint8_t* intersect(const PrimitivePair* candidates, std::size_t count) {
     size_ = 0;
     for (std::size_t begin = 0, end = 0; begin < count; begin = end) {
@@ -61,7 +61,7 @@ class CandidateBlock {
   }
 
  private:
-  /// How many of the first candidates are of the same two bodies; most often all.
+  /// Returns the number of leading candidates of the same two bodies, most often all of them.
   static std::size_t same_bodies(const PrimitivePair* candidates, std::size_t count) {
     const std::uint32_t body_a = candidates[0].body_a, body_b = candidates[0].body_b;
     std::uint32_t difference = 0;
@@ -104,10 +104,10 @@ class CandidateBlock {
   const SampledMotion<S>* motion_;
   TriangleTestStats* stats_;
   KernelSet kernels_;
-  std::size_t size_ = 0;  // triangles
+  std::size_t size_ = 0;  // number of triangle pairs
   TrianglePair<S> triangles_[block];
-  std::uint8_t places_[block];     // of triangles among the candidates
-  std::uint8_t verdicts_[block];   // of triangles
+  std::uint8_t places_[block];     // indices of triangle pairs among the candidates
+  std::uint8_t verdicts_[block];   // of triangle pairs
   std::uint8_t intersect_[block];  // of candidates
 };
 
@@ -121,7 +121,7 @@ void confirm_pairs(const SceneView<S>& scene, const SampledMotion<S>& motion, Pa
   for (std::size_t first = 0; first < pairs.size(); first += block) {
     const std::size_t count = std::min(block, pairs.size() - first);
     const std::uint8_t* const intersect = candidates.intersect(pairs.data() + first, count);
-    // Without branches; the place of a kept pair is never after the one it comes from.
+    // Branchless; a kept pair never moves to a later index.
     for (std::size_t i = 0; i < count; ++i) {
       pairs[kept] = pairs[first + i];
       kept += intersect[i];

@@ -14,7 +14,7 @@ namespace kbvh {
 struct PrimitivePair {
   std::uint32_t body_a, primitive_a, body_b, primitive_b;
   bool operator==(const PrimitivePair&) const = default;
-  /// By body and primitive of a, then of b.
+  /// Orders by body and primitive of a, then of b.
   auto operator<=>(const PrimitivePair& other) const {
     const auto order = key(body_a, primitive_a) <=> key(other.body_a, other.primitive_a);
     return order != 0 ? order : key(body_b, primitive_b) <=> key(other.body_b, other.primitive_b);
@@ -27,7 +27,7 @@ struct PrimitivePair {
 };
 static_assert(sizeof(PrimitivePair) == 16);
 
-/// Caller-owned answer of a query; strategies append, they never shrink its capacity.
+/// The caller-owned answer of a query; strategies append and never shrink its capacity.
 using PairBuffer = std::vector<PrimitivePair>;
 
 /// A primitive pair and the closed span of time over which it is reported.
@@ -44,8 +44,8 @@ struct Contact {
   double begin, end;  ///< encloses the time of impact
 };
 
-/// Do two polygons (fans of triangles around their first vertex; a segment or point for fewer than three
-/// vertices) share a point? Exact. Each `position(v)` returns 3 scalars.
+/// Tests exactly whether two polygons share a point. A polygon is a fan of triangles around its first vertex;
+/// with fewer than three vertices it is a segment or point. Each `position(v)` returns 3 scalars.
 template <class S, class PositionA, class PositionB>
 bool polygons_intersect(std::span<const std::uint32_t> a, const PositionA& position_a,
                         std::span<const std::uint32_t> b, const PositionB& position_b,
@@ -64,8 +64,7 @@ bool polygons_intersect(std::span<const std::uint32_t> a, const PositionA& posit
 }
 
 /// Keeps the pairs whose primitives intersect at the motion's current time, in their order. Points and
-/// control nets are answered at candidate level: pairs whose boxes overlap stay. Positions are fetched as
-/// needed.
+/// control nets are answered at candidate level: pairs whose boxes overlap stay. Fetches positions as needed.
 template <class S>
 void confirm_pairs(const SceneView<S>& scene, const SampledMotion<S>& motion, PairBuffer& pairs,
                    TriangleTestStats& stats);

@@ -58,7 +58,7 @@ void Playback<S>::hand_in(std::uint32_t body, const S* positions) {
 
 template <class S>
 void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices) {
-  // A static body is evaluated once, for good.
+  // A static body is evaluated only once.
   if (!state.plans.moving() || std::uint64_t(16) * state.fetched > state.plans.vertex_count()) {
     fetch_all(state);
     return;
@@ -70,7 +70,7 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
       stale_.push_back(v);
     }
   if (stale_.empty()) return;
-  // A long list at once may be too many already: one by one, a vertex costs 10 to 40 times as much.
+  // A long list may exceed the limit at once: evaluated singly, a vertex costs 10 to 40 times as much.
   if (stale_.size() > 64 &&
       std::uint64_t(16) * (state.fetched + stale_.size()) > state.plans.vertex_count()) {
     fetch_all(state);

@@ -8,21 +8,22 @@
 namespace kbvh {
 
 /// Plays a scene's motion for one strategy: holds the current time, the current positions (truth B), and the
-/// plans with their run-time changes. The driver owns it; strategies see it through the view that their
-/// declared foresight allows (motion_view.hpp). Positions are evaluated all at once by the driver, or vertex
-/// by vertex on demand; each vertex at most once per frame. No allocation after construction but for plans
-/// that change and added vertices.
+/// plans with their run-time changes. The driver owns it; a strategy sees it through the view of its declared
+/// foresight (motion_view.hpp). The driver evaluates all positions at once, or single vertices are evaluated
+/// on demand; each vertex at most once per frame. After construction only plan changes and added vertices
+/// allocate.
 template <class S>
 class Playback {
  public:
   explicit Playback(const Scene<S>& scene);
 
   double time() const { return time_; }
-  /// Moves to t without evaluating any position. Throws std::invalid_argument if t is not finite.
+  /// Sets the current time to t without evaluating any position. Throws std::invalid_argument if t is not
+  /// finite.
   void seek(double t);
   /// Evaluates every vertex of every moving body at the current time.
   void evaluate_all();
-  /// Evaluates the listed vertices of one body, as far as they are not current.
+  /// Evaluates those of the listed vertices of one body that are not current.
   void fetch(std::uint32_t body, std::span<const std::uint32_t> vertices) {
     BodyState& state = bodies_[body];
     if (state.all_current) return;
@@ -32,28 +33,28 @@ class Playback {
   void fetch_all(std::uint32_t body) {
     if (!bodies_[body].all_current) fetch_all(bodies_[body]);
   }
-  /// Position of one vertex at the current time: 3 scalars.
+  /// Returns the position of one vertex at the current time: 3 scalars.
   const S* position(std::uint32_t body, std::uint32_t vertex) {
     BodyState& state = bodies_[body];
     if (!state.all_current && state.stamp[vertex] != epoch_) fetch_stale(state, {&vertex, 1});
     return state.data() + std::size_t(3) * vertex;
   }
-  /// Positions [vertex][3] of a body, followed by one scalar of padding, so that a fourth lane may be read.
-  /// Only vertices evaluated or fetched for the current time are meaningful.
+  /// Returns the positions [vertex][3] of a body, followed by one scalar of padding, so that a fourth lane
+  /// may be read. Only vertices evaluated or fetched for the current time are valid.
   const S* positions(std::uint32_t body) const { return bodies_[body].data(); }
   bool all_current(std::uint32_t body) const { return bodies_[body].all_current; }
 
-  /// Takes the positions of a body from the caller's array from now on: [vertex][3] and one scalar of
-  /// padding, not copied, to be kept until others are handed in. Only for bodies whose plans are handed in;
-  /// their positions are current at every time. Throws std::invalid_argument for other bodies. O(1).
+  /// Uses the caller's array for the positions of a body from now on: [vertex][3] and one scalar of padding,
+  /// not copied; it must stay unchanged until another array is handed in. Only for bodies made by
+  /// FlightPlans::handed_in; their positions are current at every time. Throws std::invalid_argument for
+  /// other bodies. O(1).
   void hand_in(std::uint32_t body, const S* positions);
 
-  /// Each changed vertex starts its new plan at the current time from its stored position.
-  /// Of several changes of one vertex the last counts. Throws std::invalid_argument, with nothing changed, if
-  /// t is not the current time, a change is not valid, or a body's positions are handed in.
+  /// Starts the new plan of each changed vertex at the current time from its stored position. Of several
+  /// changes of one vertex the last counts. Throws std::invalid_argument and changes nothing if t is not the
+  /// current time, a change is not valid, or a body's positions are handed in.
   void change_plans(double t, std::span<const PlanChange<S>> changes);
-  /// Forgets every change: the plans are the scene's again, and positions are to be evaluated anew after the
-  /// next `seek`.
+  /// Restores the scene's original plans; positions must be evaluated again after the next `seek`.
   void restore_plans();
 
   /// Adds a vertex to a body at the current time; see FlightPlans::add_vertex. Its position is current.
@@ -62,12 +63,12 @@ class Playback {
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return bodies_[body].plans; }
   std::uint32_t body_count() const { return std::uint32_t(bodies_.size()); }
-  /// Positions evaluated on demand so far.
+  /// Returns the number of positions evaluated on demand so far.
   std::uint64_t fetched() const { return fetched_; }
 
  private:
   struct BodyState {
-    FlightPlans<S> plans, scene_plans;  ///< as changed, and as the scene has them
+    FlightPlans<S> plans, scene_plans;  ///< with changes, and as in the scene
     std::vector<S> positions;
     const S* given = nullptr;  ///< the caller's array, if positions were handed in
     std::vector<std::uint32_t> stamp;

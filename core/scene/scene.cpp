@@ -89,7 +89,8 @@ std::vector<double> frame_times(const Scene<S>& scene, std::uint32_t per_keyfram
     for (std::uint32_t j = 0; j < per_keyframe; ++j) {
       if (frames.size() == most) return frames;
       const double t = keyframes[k] + (keyframes[k + 1] - keyframes[k]) * double(j) / double(per_keyframe);
-      // Between keyframes that nearly touch, rounding may reach the next one; it comes as its own frame.
+      // Between keyframes that nearly coincide, rounding may reach the next one; that keyframe is added as a
+      // frame of its own.
       if (t < keyframes[k + 1] && (frames.empty() || frames.back() < t)) frames.push_back(t);
     }
   if (frames.size() < most) frames.push_back(keyframes.back());

@@ -10,19 +10,19 @@
 
 namespace kbvh {
 
-/// What a body's primitives are; decides how a candidate pair is confirmed.
+/// The kind of a body's primitives; decides how a candidate pair is confirmed.
 enum class PrimitiveKind : std::uint8_t {
   polygons,      ///< k >= 1 vertices, tested exactly as a fan of triangles
   points,        ///< 1 vertex each; pairs are answered at candidate level (their boxes)
   control_nets,  ///< k control points; conservative by the convex-hull property; candidate level
 };
 
-/// The kind in words: polygons, points, control_nets.
+/// Returns the kind in words: polygons, points, control_nets.
 const char* name(PrimitiveKind kind);
 
-/// Primitives of one body as CSR lists: primitive p has vertices[offsets[p] .. offsets[p + 1]).
-/// A primitive that was removed at run time (geometry_change.hpp) keeps its id and its list, but no hierarchy
-/// holds it and no answer names it.
+/// Primitives of one body as CSR lists: primitive p has vertices[offsets[p] .. offsets[p + 1]). A primitive
+/// that was removed at run time (geometry_change.hpp) keeps its id and its list, but no hierarchy contains it
+/// and no answer names it.
 struct Primitives {
   PrimitiveKind kind = PrimitiveKind::polygons;
   std::vector<std::uint32_t> offsets{0};
@@ -30,7 +30,7 @@ struct Primitives {
   std::vector<std::uint8_t> removed;  ///< 1 for each removed primitive; empty as long as there is none
   std::uint32_t removed_count = 0;
 
-  /// All ids, those of removed primitives included.
+  /// Returns the number of ids, those of removed primitives included.
   std::uint32_t count() const { return std::uint32_t(offsets.size() - 1); }
   std::uint32_t live_count() const { return count() - removed_count; }
   bool alive(std::uint32_t p) const { return removed.empty() || removed[p] == 0; }
@@ -42,7 +42,7 @@ struct Primitives {
     offsets.push_back(std::uint32_t(vertices.size()));
     if (!removed.empty()) removed.push_back(0);
   }
-  /// Takes a living primitive out of the body; its id is never used again.
+  /// Removes a living primitive from the body; its id is never reused.
   void remove(std::uint32_t p) {
     removed.resize(count(), 0);
     removed[p] = 1;
@@ -58,7 +58,7 @@ struct Body {
   FlightPlans<S> plans;
 };
 
-/// Which bodies are tested against each other; first < second, or both the same: pairs within one body.
+/// Two bodies that are tested against each other, first < second; or one body twice: pairs within the body.
 struct BodyPair {
   std::uint32_t first, second;
 };
@@ -82,7 +82,7 @@ struct Scene {
   }
 };
 
-/// Every unordered pair of different bodies of which at least one moves.
+/// Returns every unordered pair of different bodies with at least one moving body.
 template <class S>
 std::vector<BodyPair> all_pairs(const std::vector<Body<S>>& bodies) {
   std::vector<BodyPair> pairs;
@@ -100,22 +100,23 @@ std::vector<BodyPair> all_pairs(const std::vector<Body<S>>& bodies) {
 template <class S>
 void validate(const Scene<S>& scene);
 
-/// A 64-bit hash of everything that decides results: connectivity, keyframes, scalar, pairs. Not of names.
+/// Computes a 64-bit hash of everything that affects results: connectivity, keyframes, scalar, pairs; not
+/// names.
 template <class S>
 std::uint64_t hash(const Scene<S>& scene);
 
-/// The times of a clip with `per_keyframe` (l >= 1) frames for each segment of the overlaid keyframe times of
-/// all bodies: t = T_i + (T_{i+1} - T_i) * j / l for j = 0..l-1, and the last keyframe. One time if nothing
-/// moves. Only the first `most` of them are made.
+/// Computes the times of a clip with `per_keyframe` (l >= 1) frames per segment of the overlaid keyframe
+/// times of all bodies: t = T_i + (T_{i+1} - T_i) * j / l for j = 0..l-1, and the last keyframe. A scene
+/// without motion has one time. Computes only the first `most` times.
 template <class S>
 std::vector<double> frame_times(const Scene<S>& scene, std::uint32_t per_keyframe,
                                 std::size_t most = std::numeric_limits<std::size_t>::max());
 
-/// The overlaid keyframe times of all bodies, strictly increasing.
+/// Returns the overlaid keyframe times of all bodies, strictly increasing.
 template <class S>
 std::vector<double> overlaid_keyframes(const Scene<S>& scene);
 
-/// Connectivity of a scene without its motion: what every strategy may know, whatever foresight it declares.
+/// The connectivity of a scene without its motion, which every strategy may know.
 template <class S>
 class SceneView {
  public:
@@ -124,7 +125,7 @@ class SceneView {
   const Primitives& primitives(std::uint32_t body) const { return scene_->bodies[body].primitives; }
   std::uint32_t vertex_count(std::uint32_t body) const { return scene_->bodies[body].plans.vertex_count(); }
   std::span<const BodyPair> pairs() const { return scene_->pairs; }
-  /// False for a body that is known to stay where it is unless its plans are changed.
+  /// Returns false for a body that is known to rest unless its plans are changed.
   bool moving(std::uint32_t body) const { return scene_->bodies[body].plans.moving(); }
 
  private:

@@ -8,7 +8,8 @@
 
 namespace kbvh {
 
-/// Do two primitives have a vertex in common? Then they are no pair: they always touch.
+/// Tests whether two primitives have a common vertex. Such primitives always touch and are not reported as a
+/// pair.
 inline bool share_vertex(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
   for (const std::uint32_t v : a)
     for (const std::uint32_t w : b)
@@ -16,14 +17,14 @@ inline bool share_vertex(std::span<const std::uint32_t> a, std::span<const std::
   return false;
 }
 
-/// How pairs of primitives within one body were found.
+/// The origin of pairs of primitives within one body.
 enum class LeavesOf : std::uint8_t {
-  two,  ///< in two leaves: each pair once, in any order
-  one,  ///< in one leaf with itself: each pair twice, and every primitive with itself
+  two,  ///< from two leaves: each pair once, in any order
+  one,  ///< from one leaf with itself: each pair twice, and every primitive with itself
 };
 
-/// Is it a pair within one body? Puts it into canonical order. Pairs of primitives with a common vertex are
-/// none, unless `primitives` is null.
+/// Returns whether two primitives form a pair within one body, and puts the pair into canonical order.
+/// Primitives with a common vertex do not, unless `primitives` is null.
 inline bool keep_self_pair(const Primitives* primitives, LeavesOf leaves, std::uint32_t& a,
                            std::uint32_t& b) {
   if (a >= b) {
@@ -33,8 +34,8 @@ inline bool keep_self_pair(const Primitives* primitives, LeavesOf leaves, std::u
   return primitives == nullptr || !share_vertex((*primitives)[a], (*primitives)[b]);
 }
 
-/// Of pairs within one body, keeps those that are pairs, canonical and once; returns how many these are.
-/// `Pair` has primitive_a and primitive_b.
+/// Keeps the valid pairs among pairs within one body, canonical and once each; returns their number. `Pair`
+/// has primitive_a and primitive_b.
 template <class Pair>
 std::size_t keep_self_pairs(const Primitives* primitives, LeavesOf leaves, Pair* pairs, std::size_t count) {
   std::size_t kept = 0;
@@ -45,7 +46,7 @@ std::size_t keep_self_pairs(const Primitives* primitives, LeavesOf leaves, Pair*
   return kept;
 }
 
-/// Does a scene ask for pairs within a body?
+/// Returns whether a scene asks for pairs within a body.
 inline bool has_self_pairs(std::span<const BodyPair> pairs) {
   return std::any_of(pairs.begin(), pairs.end(),
                      [](const BodyPair& pair) { return pair.first == pair.second; });

@@ -41,8 +41,8 @@ namespace {
 /// A binary node under construction: a range of the permuted primitives, split or not.
 struct BinaryNode {
   std::uint32_t begin, end;
-  std::uint32_t left = 0, right = 0;  // 0: leaf (the root is nobody's child)
-  double weight = 0;                  // what decides which child is opened first when collapsing
+  std::uint32_t left = 0, right = 0;  // 0: leaf (the root is no node's child)
+  double weight = 0;                  // priority for opening a child when collapsing
 };
 
 struct BuildItem {
@@ -86,7 +86,7 @@ class BinaryBuilder {
   const std::vector<BinaryNode>& nodes() const { return nodes_; }
   const std::vector<BuildItem>& items() const { return items_; }
 
-  /// Puts the primitives of [begin, end) with the smallest centroids along the longest axis before `middle`.
+  /// Moves the primitives of [begin, end) with the smallest centroids along the longest axis before `middle`.
   void median_split(std::uint32_t begin, std::uint32_t middle, std::uint32_t end) {
     std::array<double, 3> lower, upper;
     centroid_bounds(begin, end, lower, upper);
@@ -101,7 +101,7 @@ class BinaryBuilder {
   }
 
  private:
-  /// Where to split; `begin` for a leaf.
+  /// Returns the split position; `begin` for a leaf.
   std::uint32_t split(std::uint32_t begin, std::uint32_t end) {
     const std::uint32_t count = end - begin;
     if (config_.method == BuildMethod::sah) return count < 2 ? begin : sah_split(begin, end);
@@ -157,7 +157,7 @@ class BinaryBuilder {
     const double area = surface_area(whole);
     if (count <= config_.leaf_size && area * count <= best_cost + config_.sah_traversal_cost * area)
       return begin;
-    // A stable partition keeps the result independent of the library's choice of swaps.
+    // A stable partition keeps the result independent of the library's order of swaps.
     const auto middle =
         std::stable_partition(items_.begin() + begin, items_.begin() + end,
                               [&](const BuildItem& item) { return bin_of(item, best_axis) <= best_bin; });
@@ -242,7 +242,7 @@ Topology with_root(const BuilderConfig& config) {
   return topology;
 }
 
-/// Makes wide nodes of the binary tree, depth first: what lies below a node lies together.
+/// Collapses the binary tree into wide nodes, depth first: the nodes of a subtree are contiguous.
 Topology collapse(const std::vector<BinaryNode>& binary, const BuilderConfig& config) {
   Topology topology = with_root(config);
   struct Open {
@@ -260,7 +260,7 @@ Topology collapse(const std::vector<BinaryNode>& binary, const BuilderConfig& co
     }
     children = {node.left, node.right};
     while (children.size() < config.width) {
-      // Open the heaviest inner child, the first of equals, in place: leaf order stays left to right.
+      // Opens the heaviest inner child, the first of equals, in place: leaf order stays left to right.
       std::size_t heaviest = children.size();
       for (std::size_t c = 0; c < children.size(); ++c)
         if (binary[children[c]].left != 0 &&
@@ -277,9 +277,9 @@ Topology collapse(const std::vector<BinaryNode>& binary, const BuilderConfig& co
   return topology;
 }
 
-/// The median tree, made wide at once: every leaf but the last holds `leaf_size` primitives, every node above
-/// the leaves but the last has `width` of them, all leaves lie at one depth as long as numbers allow, and
-/// nodes are as full as can be. With width^k full leaves it is perfect.
+/// Builds the median tree directly as a wide tree: every leaf except the last holds `leaf_size` primitives,
+/// every node above the leaves except the last has `width` leaves, all leaves lie at one depth if the numbers
+/// allow it, and nodes are as full as possible. With width^k full leaves the tree is perfect.
 template <class S>
 class MedianTree {
  public:
@@ -295,11 +295,11 @@ class MedianTree {
   }
 
  private:
-  /// Primitives below a full node of leaves.
+  /// Returns the number of primitives below a full node of leaves.
   std::uint32_t block() const { return config_.leaf_size * config_.width; }
   static std::uint32_t units(std::uint32_t count, std::uint32_t unit) { return (count + unit - 1) / unit; }
 
-  /// Recursion is as deep as the tree: at most 32.
+  /// The recursion is as deep as the tree: at most 32.
   void make(Topology& topology, std::uint32_t index, std::uint32_t begin, std::uint32_t end,
             std::uint32_t height) {
     const std::uint32_t count = end - begin;
@@ -324,8 +324,8 @@ class MedianTree {
       make(topology, first + p, bounds[p], bounds[p + 1], height > 0 ? height - 1 : 0);
   }
 
-  /// Sets the inner ones of `parts` + 1 bounds, halving the parts each time; all lie whole units apart but
-  /// the last.
+  /// Sets the inner ones of `parts` + 1 bounds, halving the parts each time; all parts except the last are
+  /// whole units.
   void divide(std::uint32_t* bounds, std::uint32_t parts, std::uint32_t unit) {
     if (parts == 1) return;
     const std::uint32_t left = (parts + 1) / 2, all = units(bounds[parts] - bounds[0], unit);

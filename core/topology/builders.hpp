@@ -6,7 +6,7 @@
 
 namespace kbvh {
 
-/// How a topology is built from primitive boxes at one time.
+/// The method of building a topology from primitive boxes at one time.
 enum class BuildMethod : std::uint8_t {
   median,  ///< exact median along the longest axis of the centroids; full leaves and nodes, one depth,
            ///< perfect when sizes allow
@@ -14,7 +14,7 @@ enum class BuildMethod : std::uint8_t {
   morton,  ///< linear BVH over 63-bit Morton codes of the centroids (Lauterbach et al. 2009)
 };
 const char* name(BuildMethod method);
-/// Throws std::invalid_argument naming the known methods.
+/// Finds a method by its name. Throws std::invalid_argument that lists the known methods.
 BuildMethod build_method(std::string_view name);
 
 struct BuilderConfig {
@@ -25,13 +25,13 @@ struct BuilderConfig {
   double sah_traversal_cost = 1.0;  ///< of one node, in units of one primitive test
 };
 
-/// Boxes of all primitives; empty for removed ones. O(primitives).
+/// Computes the boxes of all primitives; empty for removed ones. O(primitives).
 template <class S>
 std::vector<Box<S>> primitive_boxes(const Primitives& primitives, const S* positions);
 
-/// Builds a topology over the boxes. Deterministic: ties are broken by primitive id. O(n log n).
-/// Nodes come depth first. SAH and Morton trees are binary at first and collapsed, largest child first.
-/// Throws std::invalid_argument on a width or leaf size that is not admissible.
+/// Builds a topology over the boxes. Deterministic: ties are broken by primitive id. O(n log n). Nodes are
+/// stored depth first. SAH and Morton trees are built as binary trees and then collapsed, largest child
+/// first. Throws std::invalid_argument on an inadmissible width or leaf size.
 template <class S>
 Topology build_topology(std::span<const Box<S>> boxes, const BuilderConfig& config);
 

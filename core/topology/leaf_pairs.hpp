@@ -8,8 +8,8 @@
 namespace kbvh {
 
 /// Turns overlapping leaves into candidate pairs: appends the primitive pairs of two leaves whose own boxes
-/// overlap. One such object serves one pair of bodies; it fetches the positions it reads. Within one body,
-/// each two leaves are to be given once, and a leaf of several primitives with itself, too.
+/// overlap. One object serves one pair of bodies and fetches the positions that it reads. Within one body,
+/// the caller passes each two leaves once, and also each leaf of several primitives with itself.
 template <class S, class Count>
 class LeafPairs {
  public:

@@ -4,8 +4,8 @@
 
 namespace kbvh {
 
-/// A scene whose vertices and primitives are stored in the order in which a hierarchy's leaves meet them, so
-/// that updates read memory in order. Ids change: the maps lead back.
+/// A scene whose vertices and primitives are stored in the order of a hierarchy's leaves, so that updates
+/// read memory in order. Ids change: the maps give the old ids.
 template <class S>
 struct RenumberedScene {
   Scene<S> scene;
@@ -15,7 +15,7 @@ struct RenumberedScene {
 
 /// Renumbers every body along the leaves of the topology that `config` builds at the first frame. Geometry
 /// and motion stay the same; corners of a primitive keep their order. O(n log n), and a copy of all
-/// keyframes. Plans changed at run time are not carried over: renumber before a session starts.
+/// keyframes. Plan changes at run time are not carried over: renumber before a session starts.
 template <class S>
 RenumberedScene<S> renumber_in_leaf_order(const Scene<S>& scene, const BuilderConfig& config);
 

@@ -10,7 +10,7 @@
 namespace kbvh {
 
 namespace {
-/// The first id of the pair of siblings that a node belongs to; the root has none.
+/// Returns the first id of the sibling pair of a node; the root has none.
 std::uint32_t pair_of(const Topology& topology, std::uint32_t node) {
   return topology.nodes[topology.parents[node]].first();
 }
@@ -55,7 +55,8 @@ void SubtreeSwap::swap(Topology& topology, std::uint32_t first, std::uint32_t se
     set_depths_below(topology, first);
     set_depths_below(topology, second);
   }
-  // What lay at the second place has larger ids than that below it; at the first place larger ids still.
+  // The former subtree of the second place has larger ids than that place; at the first place the ids are
+  // larger still.
   const TopologyNode lower = topology.nodes[second];
   if (!lower.is_leaf() && lower.first() < second) order(topology, second);
 
@@ -108,9 +109,9 @@ std::uint32_t SubtreeSwap::moved_to(std::uint32_t node) const {
   return move == nullptr ? node : move->to + (node - move->from);
 }
 
-/// Gives a node a smaller id than its children; all other parents precede theirs. Pairs of siblings above the
-/// node and pairs below it that lie between the two in the wrong order share out their ids anew: first those
-/// above, then those below, both in the order that they had.
+/// Gives a node a smaller id than its children; all other parents precede theirs. Sibling pairs above the
+/// node and pairs below it that lie in the wrong order redistribute their ids: first the pairs above, then
+/// the pairs below, each in their previous order.
 void SubtreeSwap::order(Topology& topology, std::uint32_t parent) {
   const std::uint32_t upper = pair_of(topology, parent), lower = topology.nodes[parent].first();
   KBVH_ASSERT(lower < upper);
@@ -132,7 +133,7 @@ void SubtreeSwap::order(Topology& topology, std::uint32_t parent) {
   std::sort(below_.begin(), below_.end());
   for (const std::uint32_t pair : below_) moves_.push_back({pair, 0, topology.parents[pair], 0, {}});
 
-  // Ids in ascending order, to those above first.
+  // Assigns ids in ascending order, to the pairs above first.
   open_.clear();
   for (const Move& move : moves_) open_.push_back(move.from);
   std::sort(open_.begin(), open_.end());
@@ -150,7 +151,7 @@ void SubtreeSwap::order(Topology& topology, std::uint32_t parent) {
       topology.parents[move.to + k] = moved_to(move.parent);
       topology.depths[move.to + k] = move.depth;
     }
-  // Children that stay learn of their parents' new ids, and parents of their children's.
+  // Updates the parents' ids in children that stay, and the children's ids in parents.
   for (const Move& move : moves_)
     for (std::uint32_t k = 0; k < 2; ++k) {
       const TopologyNode content = move.nodes[k];

@@ -6,31 +6,30 @@
 
 namespace kbvh {
 
-/// Exchanges two subtrees of a binary topology in place; with a child and a grandchild of one node it is a
-/// tree rotation (Kopta et al. 2012). All that `check_topology` checks is kept: parents precede their
-/// children, and `parents` and `depths` are right, so a reverse sweep over the nodes is still bottom-up.
+/// Exchanges two subtrees of a binary topology in place. With a child and a grandchild of one node this is a
+/// tree rotation (Kopta et al. 2012). All invariants of `check_topology` are preserved: parents precede their
+/// children, and `parents` and `depths` are correct, so a reverse sweep over the nodes is still bottom-up.
 ///
-/// The work is in proportion to what changes: O(1) for the two nodes; their subtrees where they move to
-/// another depth; and those nodes that would precede their parents otherwise, which exchange ids among
-/// themselves (the pairs of siblings between the two places that are above the one or below the other, Pearce
-/// & Kelly 2007). Entries of leaves stay where they are, so leaves are not in the order of their entries any
-/// more, and `perfect` is taken back, since positions of children are not implicit any more; `compacted`
-/// restores both.
+/// The work is proportional to the change: O(1) for the two nodes; their subtrees if their depth changes; and
+/// the nodes that would otherwise precede their parents, which exchange ids among themselves (the sibling
+/// pairs between the two places that are above one of them or below the other, Pearce & Kelly 2007). Entries
+/// of leaves stay in place, so leaves are no longer in the order of their entries. `perfect` is cleared,
+/// because positions of children are no longer implicit. `compacted` restores both.
 ///
-/// The object only holds memory that is used again: once warm, a swap allocates nothing.
+/// The object only holds reusable memory: once warm, a swap allocates nothing.
 class SubtreeSwap {
  public:
-  /// Exchanges the subtrees at two nodes. Throws std::invalid_argument, with nothing changed, if the topology
-  /// is wider than 2, an id is out of range, or one node is the other or above it.
+  /// Exchanges the subtrees at two nodes. Throws std::invalid_argument and changes nothing if the topology is
+  /// wider than 2, an id is out of range, or one node equals the other or is above it.
   ///
-  /// `edit` is cleared before. `moved` then tells under which ids contents lie now, each id once: what lay at
-  /// `from` before the call lies at `to` after it, all at once, and no id becomes free. `changed` has the
-  /// nodes that got another child: the parents of the two places, after the call. Bounds change there and
-  /// above.
+  /// Clears `edit` first. `moved` then lists the new ids of moved contents, each id once: the contents of
+  /// `from` before the call are at `to` after it, all moves simultaneous, and no id becomes free. `changed`
+  /// lists the nodes with another child: the parents of the two places, after the call. Bounds change at
+  /// these nodes and above.
   void swap(Topology& topology, std::uint32_t first, std::uint32_t second, TopologyEdit& edit);
 
-  /// Rotates: the child of a node changes places with a child of its sibling. Throws std::invalid_argument,
-  /// with nothing changed, if the second is not a child of the first's sibling.
+  /// Rotates: exchanges a child of a node with a child of its sibling. Throws std::invalid_argument and
+  /// changes nothing if the second is not a child of the first's sibling.
   void rotate(Topology& topology, std::uint32_t child, std::uint32_t grandchild, TopologyEdit& edit);
 
   std::size_t bytes() const {
@@ -38,7 +37,7 @@ class SubtreeSwap {
   }
 
  private:
-  /// Two siblings on their way to other ids.
+  /// Two siblings that move to other ids.
   struct Move {
     std::uint32_t from, to, parent;
     std::uint8_t depth;

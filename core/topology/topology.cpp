@@ -25,7 +25,7 @@ LeafVertices unique_leaf_vertices(const Topology& topology, const Primitives& pr
 }
 
 namespace {
-/// `ids`: how many primitive ids there are; `count`: how many of them are `alive`.
+/// `ids`: number of primitive ids; `count`: number of `alive` ones.
 template <class Alive>
 std::string check(const Topology& topology, std::uint32_t ids, std::uint32_t count, const Alive& alive) {
   const std::size_t n = topology.nodes.size();

@@ -7,13 +7,13 @@
 
 namespace kbvh {
 
-/// A node of a topology: one packed word, no bounds. Children of an inner node, and primitives of a leaf, are
-/// contiguous.
+/// A node of a topology: one packed word without bounds. The children of an inner node, and the primitives of
+/// a leaf, are contiguous.
 class TopologyNode {
  public:
-  /// Children are nodes [first, first + count).
+  /// Makes an inner node with the children [first, first + count).
   static TopologyNode inner(std::uint32_t first, std::uint32_t count) { return {first, count}; }
-  /// Primitives are entries [first, first + count) of the topology's `primitives`.
+  /// Makes a leaf with the entries [first, first + count) of the topology's `primitives`.
   static TopologyNode leaf(std::uint32_t first, std::uint32_t count) { return {first, count | leaf_bit}; }
   TopologyNode() = default;
 
@@ -33,8 +33,8 @@ static_assert(sizeof(TopologyNode) == 8);
 /// The combinatorial part of a hierarchy over one body. Node 0 is the root; parents come before their
 /// children, so a reverse sweep over `nodes` is bottom-up. A body without primitives has no nodes.
 struct Topology {
-  std::uint32_t width = 2;      ///< most children of a node: 2, 4 or 8
-  std::uint32_t leaf_size = 1;  ///< most primitives of a leaf: 1..16
+  std::uint32_t width = 2;      ///< maximum number of children of a node: 2, 4 or 8
+  std::uint32_t leaf_size = 1;  ///< maximum number of primitives of a leaf: 1..16
   std::vector<TopologyNode> nodes;
   std::vector<std::uint32_t> parents;     ///< of each node; the root is its own parent
   std::vector<std::uint8_t> depths;       ///< of each node, saturated at 255; the root has 0
@@ -64,9 +64,9 @@ LeafVertices unique_leaf_vertices(const Topology& topology, const Primitives& pr
 
 /// Checks the combinatorial invariants against the primitive count: every node but the root has exactly one
 /// parent, every primitive lies in exactly one leaf, counts respect width and leaf size, parents precede
-/// children, `parents`, `depths` and `perfect` are right. Returns an empty text, or the first violation.
+/// children, `parents`, `depths` and `perfect` are correct. Returns an empty text, or the first violation.
 std::string check_topology(const Topology& topology, std::uint32_t primitive_count);
-/// The same where exactly the living primitives must be in leaves.
+/// Checks the same, with exactly the living primitives in leaves.
 std::string check_topology(const Topology& topology, const Primitives& primitives);
 
 }  // namespace kbvh

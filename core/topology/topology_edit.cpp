@@ -49,7 +49,7 @@ std::uint32_t TopologyEditor::new_entries(Topology& topology) {
 }
 
 void TopologyEditor::free_entries(const Topology& topology, std::uint32_t first) {
-  // The room of a leaf as built is what it had then, which nobody has written down.
+  // Built leaves have no recorded capacity, so their entries are not recycled.
   if (first >= packed_entries_ || topology.leaf_size == 1) free_entries_.push_back(first);
 }
 
@@ -87,7 +87,7 @@ std::uint32_t TopologyEditor::insert(Topology& topology, std::uint32_t leaf, std
   KBVH_ASSERT(content.is_leaf());
   if (content.count() < topology.leaf_size) {
     std::uint32_t first = content.first();
-    if (first < packed_entries_) {  // no room behind it
+    if (first < packed_entries_) {  // no free entries behind it
       first = new_entries(topology);
       for (std::uint32_t i = 0; i < content.count(); ++i)
         topology.primitives[first + i] = topology.primitives[content.first() + i];
@@ -130,7 +130,7 @@ void TopologyEditor::remove(Topology& topology, std::uint32_t primitive, Topolog
   free_entries(topology, content.first());
   --leaf_count_;
   edit.vacated.push_back(leaf);
-  if (leaf == 0) {  // nothing is left
+  if (leaf == 0) {  // the tree is empty
     topology.nodes.clear();
     topology.parents.clear();
     topology.depths.clear();
@@ -343,7 +343,7 @@ Topology edited_topology(Topology topology, std::vector<Box<S>> boxes, const Bod
     boxes.resize(topology.size());
     for (const auto& [node, box] : moved) boxes[node] = box;
   };
-  // Boxes above what is removed stay as large as they were: they only guide insertions.
+  // Boxes above removed primitives keep their size: they only guide insertions.
   for (const std::uint32_t p : change.removed_primitives) {
     editor.remove(topology, p, edit);
     carry_boxes();
@@ -362,7 +362,7 @@ Topology edited_topology(Topology topology, std::vector<Box<S>> boxes, const Bod
     for (std::uint32_t top; (top = editor.unbalanced_above(topology, p)) != TopologyEditor::none;) {
       editor.rebalance(topology, top, edit, [&](std::uint32_t n) { return to_double(boxes[n]); });
       carry_boxes();
-      // Parents were placed before their children: inner boxes come from behind.
+      // Parents were placed before their children, so inner boxes are computed in reverse.
       for (std::size_t i = edit.fresh.size(); i-- > 0;) {
         const TopologyNode node = topology.nodes[edit.fresh[i]];
         if (node.is_leaf()) continue;

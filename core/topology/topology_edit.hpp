@@ -10,15 +10,15 @@
 
 namespace kbvh {
 
-/// What one edit did to the nodes of a topology. First `moved` and `vacated` hold, then `fresh` and
+/// The effects of one edit on the nodes of a topology. Apply `moved` and `vacated` first, then `fresh` and
 /// `changed`.
 struct TopologyEdit {
   struct Move {
     std::uint32_t from, to;
   };
-  std::vector<Move> moved;             ///< these contents lie under other ids now; all at once
-  std::vector<std::uint32_t> vacated;  ///< ids that meant something before, and not the same any more
-  std::vector<std::uint32_t> fresh;    ///< ids that mean something new
+  std::vector<Move> moved;             ///< contents that lie under other ids now; all simultaneous
+  std::vector<std::uint32_t> vacated;  ///< ids that lost their previous meaning
+  std::vector<std::uint32_t> fresh;    ///< ids with new contents
   std::vector<std::uint32_t> changed;  ///< ids that stay, with other children or primitives
 
   void clear() {
@@ -29,38 +29,39 @@ struct TopologyEdit {
   }
 };
 
-/// Inserts primitives into a topology and removes them, by local edits: a leaf that is full becomes the
-/// parent of itself and a new leaf; when a leaf of two siblings has lost its last primitive, its sibling
-/// takes the place of their parent. O(width + leaf size) per edit, after O(nodes) to begin with.
+/// Inserts primitives into a topology and removes them, by local edits. A full leaf becomes the parent of
+/// itself and a new leaf. When one of two sibling leaves has lost its last primitive, its sibling replaces
+/// their parent. O(width + leaf size) per edit, after O(nodes) for the construction.
 ///
-/// An edited topology is no longer laid out as a built one (`compacted` makes one that is): ids and entries
-/// may mean nothing, parents may have larger ids than their children, and `depths` only grow from parent to
-/// child (saturated), which is all that the order of events asks of them. Freed pairs of nodes are used
-/// again, so a binary topology never has more than twice as many nodes as it had leaves at once; of nodes
-/// with more children, and of fuller leaves, what they had at the start is not.
+/// An edited topology no longer has the layout of a built one (`compacted` restores it): ids and entries may
+/// be unused, parents may have larger ids than their children, and `depths` are only known to grow from
+/// parent to child (saturated), which suffices for the order of events. Freed pairs of nodes are recycled, so
+/// a binary topology never has more than twice as many nodes as it had leaves at one time. For wider nodes
+/// and fuller leaves, the initial nodes and entries are not recycled.
 class TopologyEditor {
  public:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
-  /// For this topology, whose primitives have ids below `primitive_ids`.
+  /// Makes an editor of this topology, whose primitives have ids below `primitive_ids`.
   TopologyEditor(const Topology& topology, std::uint32_t primitive_ids);
 
-  /// The leaf that holds a primitive.
+  /// Returns the leaf that holds a primitive.
   std::uint32_t leaf_of(std::uint32_t primitive) const { return leaf_of_[primitive]; }
   std::uint32_t leaf_count() const { return leaf_count_; }
 
-  /// Adds a primitive at a leaf (any number if the topology is empty), which is split if it is full. Returns
-  /// the leaf that holds the primitive; what happened to the nodes is in `edit`, which is cleared before.
+  /// Adds a primitive at a leaf (any number if the topology is empty) and splits the leaf if it is full.
+  /// Returns the leaf that holds the primitive. `edit` is cleared first and then lists the changes to the
+  /// nodes.
   std::uint32_t insert(Topology& topology, std::uint32_t leaf, std::uint32_t primitive, TopologyEdit& edit);
-  /// Takes a primitive out of its leaf.
+  /// Removes a primitive from its leaf.
   void remove(Topology& topology, std::uint32_t primitive, TopologyEdit& edit);
 
-  /// The lowest node above a primitive that is so unbalanced that one child has more than 1/sqrt(2) of its
-  /// leaves; `none` unless the primitive's leaf lies deeper than 2 log2(leaves), when there must be one
-  /// (Galperin & Rivest 1993). To be asked again after `rebalance`: removals may have left several. O(depth),
-  /// and O(leaves below the result) if there is one.
+  /// Returns the lowest node above a primitive that is unbalanced: one child has more than 1/sqrt(2) of its
+  /// leaves. Returns `none` unless the primitive's leaf lies deeper than 2 log2(leaves), where such a node
+  /// must exist (Galperin & Rivest 1993). Call it again after `rebalance`: removals may have left several
+  /// such nodes. O(depth), and O(leaves below the result) if there is one.
   std::uint32_t unbalanced_above(const Topology& topology, std::uint32_t primitive) const;
-  /// Lays out everything below an inner node anew as a balanced binary subtree over its leaves, by medians of
+  /// Replaces everything below an inner node by a balanced binary subtree over its leaves, by medians of
   /// their boxes' centres. `box_of(leaf)` returns a Box<double>. O(leaves log leaves).
   template <class BoxOf>
   void rebalance(Topology& topology, std::uint32_t node, TopologyEdit& edit, BoxOf&& box_of) {
@@ -73,7 +74,7 @@ class TopologyEditor {
     rebuild(topology, node, leaves, edit);
   }
 
-  /// Takes note that someone else has moved a leaf's content to this node.
+  /// Records that another function moved a leaf's content to this node.
   void placed(const Topology& topology, std::uint32_t leaf);
 
   std::size_t bytes() const {
@@ -94,15 +95,16 @@ class TopologyEditor {
   void rebuild(Topology& topology, std::uint32_t node, std::span<PlacedLeaf> leaves, TopologyEdit& edit);
   void place(Topology& topology, std::uint32_t node, std::span<PlacedLeaf> leaves, TopologyEdit& edit);
 
-  std::vector<std::uint32_t> leaf_of_;  ///< by primitive; none for those that are in no leaf
+  std::vector<std::uint32_t> leaf_of_;  ///< by primitive; `none` for those in no leaf
   std::uint32_t leaf_count_ = 0;
   std::uint32_t packed_entries_;             ///< entries as built; blocks of `leaf_size` follow
   std::vector<std::uint32_t> free_pairs_;    ///< first ids of pairs of nodes
   std::vector<std::uint32_t> free_entries_;  ///< first entries of blocks
 };
 
-/// The leaf to insert a box at: from the root, always the child whose surface area grows least; of equal ones
-/// the smaller. `box_of(node)` returns the node's Box<S>. `none` for an empty topology. O(depth x width).
+/// Returns the leaf to insert a box at: starts from the root and always takes the child whose surface area
+/// grows least; of equal ones the smaller. `box_of(node)` returns the node's Box<S>. `none` for an empty
+/// topology. O(depth x width).
 template <class S, class BoxOf>
 std::uint32_t leaf_for(const Topology& topology, const Box<S>& box, BoxOf&& box_of) {
   if (topology.empty()) return TopologyEditor::none;
@@ -126,16 +128,16 @@ std::uint32_t leaf_for(const Topology& topology, const Box<S>& box, BoxOf&& box_
   return node;
 }
 
-/// Whether `Topology::perfect` is to be said of a topology that is laid out as a built one. O(nodes).
+/// Returns the correct value of `Topology::perfect` for a topology in built layout. O(nodes).
 bool is_perfect(const Topology& topology);
 
-/// The same hierarchy laid out as a builder does it: depth first, siblings in a row, no holes, exact depths.
-/// order[i] is the id that node i had.
+/// Returns the same hierarchy in built layout: depth first, siblings in a row, no holes, exact depths.
+/// order[i] is the previous id of node i.
 Topology compacted(const Topology& topology, std::vector<std::uint32_t>& order);
 
-/// A built topology after a change of one body's geometry, edited locally and compacted: for hierarchies that
-/// are laid out anew in any case. `boxes` are those of its nodes, and positions those of all vertices, at the
-/// time of the change. O(nodes).
+/// Returns a built topology after a change of one body's geometry, edited locally and compacted: for
+/// hierarchies that are laid out again in any case. `boxes` are those of its nodes, `positions` those of all
+/// vertices, at the time of the change. O(nodes).
 template <class S>
 Topology edited_topology(Topology topology, std::vector<Box<S>> boxes, const BodyChange& change,
                          const Primitives& primitives, const S* positions);

@@ -9,33 +9,33 @@
 
 namespace kbvh {
 
-/// How much work a query may do; counted, so that a budget means the same on every machine.
+/// The work limit of a query; counted, so that a budget has the same meaning on every machine.
 struct Budget {
   std::uint64_t box_tests = std::numeric_limits<std::uint64_t>::max();
 };
 
-/// What a query left undone; 0 and complete unless a budget ran out.
+/// The unfinished work of a query; 0 and complete unless a budget ran out.
 struct QueryStatus {
-  std::uint64_t pending = 0;  ///< node pairs (or other units of work) not looked at
+  std::uint64_t pending = 0;  ///< node pairs (or other units of work) not visited
   bool complete() const { return pending == 0; }
 };
 
-/// Two nodes still to be compared.
+/// Two nodes that remain to be compared.
 struct NodePair {
   std::uint32_t first, second;
 };
 
-/// The simultaneous traversal of two hierarchies (Z&W Algorithm 2): visits every pair of leaves whose bounds,
-/// and whose ancestors' bounds on both sides, overlap, and calls on_leaves(leaf of a, leaf of b) once for
-/// each. A bounds view tells how a hierarchy's bounds are read:
+/// Traverses two hierarchies simultaneously (Z&W Algorithm 2): visits every pair of leaves whose bounds, and
+/// whose ancestors' bounds on both sides, overlap, and calls on_leaves(leaf of a, leaf of b) once for each. A
+/// bounds view gives access to a hierarchy's bounds:
 ///   void ensure(std::uint32_t node)         makes the node's bound valid at the query's time
 ///   B operator()(std::uint32_t node)        its bound, read only after `ensure`
 /// B is a Box<S> or any other type for which argument-dependent lookup finds `bool overlap(bound of a, bound
 /// of b)`: every BoundingVolume (core/geometry/volumes) has one. An overlap may be false only where no point
-/// is in both. Views of the two bodies may differ. (Stored boxes have a query of their own:
-/// wide_hierarchy.hpp.) Both inner: descend both; one leaf: descend the other. The stack grows as needed and
-/// is the caller's, so that no work is dropped and a frame allocates nothing. Of a body with itself, each two
-/// leaves are visited in both orders. `Count` is a counting policy.
+/// is in both. The views of the two bodies may differ. (Stored boxes have their own query:
+/// wide_hierarchy.hpp.) Two inner nodes: descend both; one leaf: descend the other. The caller owns the
+/// stack, which grows as needed, so that no work is dropped and a frame allocates nothing. For a body with
+/// itself, each two leaves are visited in both orders. `Count` is a counting policy.
 template <class ViewA, class ViewB, class Count, class OnLeaves>
 QueryStatus traverse(const Topology& a, ViewA&& bounds_a, const Topology& b, ViewB&& bounds_b,
                      std::vector<NodePair>& stack, Count& count, const Budget& budget, OnLeaves&& on_leaves) {

@@ -9,40 +9,40 @@
 
 namespace kbvh {
 
-/// One body whose boxes were made at a frame, "then", and what is known of its motion since: for each axis an
-/// interval that holds the displacement of every vertex. All is rounded such that it errs to the safe side,
-/// for positions up to `admissible_magnitude`. Sides are lower x, y, z, upper x, y, z.
+/// One body whose boxes were made at an earlier frame, "then", and the known motion since: per axis an
+/// interval that contains the displacement of every vertex. All roundings err to the safe side, for positions
+/// up to `admissible_magnitude`. Sides are lower x, y, z, upper x, y, z.
 template <class S>
 struct DriftBody {
-  /// What is looked at at a frame.
+  /// The part of a body that a frame reads.
   enum class Watch : std::uint8_t {
-    nothing,  ///< it rests
-    box,      ///< it is too far from all others: its own box
-    drift,    ///< how far its vertices moved since its boxes were made
+    nothing,  ///< nothing: the body rests
+    box,      ///< only its own box: the body is far from all others
+    drift,    ///< the drift of its vertices since its boxes were made
   };
   static constexpr double eps = std::numeric_limits<S>::epsilon();
 
-  AlignedArray<S> before;                      ///< positions then, of those whose drift is read
-  double low[3] = {}, high[3] = {};            ///< no vertex moved by less, or more, since then
-  double rate_low[3] = {}, rate_high[3] = {};  ///< the same in one frame, as was seen last
-  Box<double> box, box_then;                   ///< hold every vertex now, and then
-  S margin[6] = {};                            ///< by which its boxes are larger than the vertices were then
-  double slack = 0;                            ///< more than all roundings of a comparison of boxes
-  double moved = 0, rounding = 0;              ///< the bound on steps: the way of any vertex since then
-  double leaf_size = 0;                        ///< mean side of a leaf's box
+  AlignedArray<S> before;                      ///< positions then, of bodies whose drift is read
+  double low[3] = {}, high[3] = {};            ///< bounds of every vertex's displacement since then
+  double rate_low[3] = {}, rate_high[3] = {};  ///< the same for one frame, as last observed
+  Box<double> box, box_then;                   ///< contain every vertex now, and then
+  S margin[6] = {};                            ///< margin by which its boxes exceed the vertices then
+  double slack = 0;                            ///< upper bound of all roundings in a comparison of boxes
+  double moved = 0, rounding = 0;  ///< by the bound on steps: displacement of any vertex since then
+  double leaf_size = 0;            ///< mean side of a leaf's box
   Watch watch = Watch::nothing;
   bool near = false;     ///< to another body: it takes part in searches
-  bool changed = false;  ///< plans of its own: it is no body at rest any more
-  bool widened = false;  ///< boxes hold the margin already (bodies at rest)
-  bool read = false;     ///< all its vertices, in this frame, for their drift
-  bool remade = false;   ///< its boxes, in this frame
+  bool changed = false;  ///< vertices have their own plans: the body no longer counts as resting
+  bool widened = false;  ///< boxes already contain the margin (bodies at rest)
+  bool read = false;     ///< all its vertices were read in this frame, for their drift
+  bool remade = false;   ///< its boxes were made in this frame
 
   static double below(double value) {
     return std::nextafter(value, -std::numeric_limits<double>::infinity());
   }
   static double above(double value) { return std::nextafter(value, std::numeric_limits<double>::infinity()); }
 
-  /// Then is now.
+  /// Makes the current time "then".
   void stand() {
     std::fill_n(low, 3, 0.0);
     std::fill_n(high, 3, 0.0);
@@ -50,8 +50,8 @@ struct DriftBody {
     rounding = above(largest_coordinate() * eps / 2) + double(std::numeric_limits<S>::denorm_min());
   }
 
-  /// `interval` [8] holds, as lower x, y, z, unused, upper ..., the computed displacements of all vertices in
-  /// so many frames.
+  /// Takes the computed displacements of all vertices over `frames` frames; `interval` [8] holds lower x, y,
+  /// z, unused, upper ...
   void drifted_by(const S* interval, int frames) {
     for (int axis = 0; axis < 3; ++axis) {
       const double lower = double(interval[axis]), upper = double(interval[axis + 4]);
@@ -62,7 +62,7 @@ struct DriftBody {
     }
     put_box();
   }
-  /// In this frame no vertex went further by its plan.
+  /// Takes a bound on every vertex's displacement in this frame, by its plan.
   void moved_by_at_most(double way) {
     moved = above(moved + way);
     // Both positions are the plan's, rounded.
@@ -75,13 +75,13 @@ struct DriftBody {
     }
     put_box();
   }
-  /// Its plans change now: the way so far stays bounded, and from the stored position on, rounding starts
-  /// over.
+  /// Registers a change of plans: the displacement so far stays bounded; from the stored position on,
+  /// rounding errors start anew.
   void plans_changed() {
-    // Enlarged, for so is what a change of a body far from here has been rounded by.
+    // Inflate: the stored position's rounding error grows with the distance moved.
     moved = above(above(moved + rounding) + eps * moved);
   }
-  /// In this frame its box has moved, from what it was to `box`.
+  /// Takes the motion of the body's box in this frame, from `last` to `box`.
   void box_moved_from(const Box<double>& last) {
     for (int axis = 0; axis < 3; ++axis) {
       const double lower = box.lower[axis] - last.lower[axis], upper = box.upper[axis] - last.upper[axis];
@@ -90,7 +90,7 @@ struct DriftBody {
     }
   }
 
-  /// A box of then, larger by what the vertices have moved since.
+  /// Returns a box of then, inflated by the displacements since then.
   Box<double> moved_on(Box<double> then) const {
     for (int axis = 0; axis < 3; ++axis) {
       then.lower[axis] = below(then.lower[axis] + low[axis]);
@@ -99,7 +99,7 @@ struct DriftBody {
     return then;
   }
 
-  /// Margins that hold for so many frames of the present motion; positive also for none.
+  /// Sets margins that suffice for `frames` frames of the current motion; positive even without motion.
   void set_margin(double frames) {
     slack = 8 * eps * largest_coordinate();
     const double least = std::max(2 * slack, 4 * double(std::numeric_limits<S>::min()));
@@ -108,7 +108,7 @@ struct DriftBody {
       margin[axis + 3] = S(least + frames * std::max(0.0, rate_high[axis]));
     }
   }
-  /// Holds the body while it keeps to its margins.
+  /// Returns a box that contains the body as long as it keeps to its margins.
   Box<double> swept() const {
     Box<double> all = box;
     for (int axis = 0; axis < 3; ++axis) {
@@ -128,17 +128,17 @@ struct DriftBody {
   void put_box() { box = moved_on(box_then); }
 };
 
-/// By how much side k of the gap between two bodies (near_pairs.hpp) may have closed since then.
+/// Returns an upper bound on the closing of side k of the gap between two bodies (near_pairs.hpp) since then.
 template <class S>
 double closing(const DriftBody<S>& a, const DriftBody<S>& b, std::size_t k) {
   return k < 3 ? a.high[k] - b.low[k] : b.high[k - 3] - a.low[k - 3];
 }
-/// By how much it may close: what both margins add up to.
+/// Returns the admissible closing: the sum of both margins.
 template <class S>
 S reach(const DriftBody<S>& a, const DriftBody<S>& b, std::size_t k) {
   return k < 3 ? a.margin[k + 3] + b.margin[k] : b.margin[k] + a.margin[k - 3];
 }
-/// Which fraction of the reach has been used, quotients rounded up; at most 1.
+/// Returns the used fraction of the reach, quotients rounded up; at most 1.
 template <class S>
 double used_reach(const DriftBody<S>& a, const DriftBody<S>& b) {
   double most = 0;
@@ -146,7 +146,7 @@ double used_reach(const DriftBody<S>& a, const DriftBody<S>& b) {
     most = std::max(most, closing(a, b, k) / double(reach(a, b, k)) * (1 + 0x1p-16));
   return std::min(most, 1.0);
 }
-/// Has no side closed by more than its reach?
+/// Tests whether no side has closed by more than its reach.
 template <class S>
 bool keeps_to_reach(const DriftBody<S>& a, const DriftBody<S>& b) {
   for (std::size_t k = 0; k < 6; ++k)

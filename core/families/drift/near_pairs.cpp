@@ -5,10 +5,10 @@
 namespace kbvh {
 
 namespace {
-/// Leaf pairs that are collected before they are turned into pairs of primitives: few enough to stay in the
-/// cache.
+/// The number of leaf pairs that are collected before they are turned into pairs of primitives: few enough to
+/// stay in the cache.
 constexpr std::size_t leaf_pair_room = 2048;
-/// Room for pairs of primitives that is made at least.
+/// The smallest allocation for pairs of primitives.
 constexpr std::size_t chunk_room = 2048;
 }  // namespace
 

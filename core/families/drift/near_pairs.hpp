@@ -9,11 +9,11 @@
 
 namespace kbvh {
 
-/// Rows of the leaves of one body that a search came to; all pairs that the body is in share them.
+/// Rows of the leaves of one body that a search visited; all pairs with this body share them.
 template <class S>
 class NearLeafRows {
  public:
-  /// The positions are others now: nothing is taken over.
+  /// Invalidates all rows, because the positions changed.
   void positions_changed() {
     if (++stamp_ != 0) return;
     std::fill(stamps_.begin(), stamps_.end(), 0);
@@ -29,7 +29,7 @@ class NearLeafRows {
   std::uint32_t stamp_ = 1;
 };
 
-/// Buffers of searches and reads, which need them one at a time.
+/// Buffers of searches and reads; one search or read at a time may use them.
 template <class S>
 struct NearWork {
   std::vector<WidePair> stack;
@@ -42,42 +42,43 @@ struct NearWork {
   }
 };
 
-/// One side of a search for near pairs. The boxes of the hierarchy are larger than those of `positions` by
-/// the margin (lower sides x, y, z, upper sides), with all its roundings at most 4 ulps of the largest
+/// One side of a search for near pairs. The boxes of the hierarchy exceed the boxes of `positions` by the
+/// margin (lower sides x, y, z, upper sides); all roundings together make them at most 4 ulps of the largest
 /// coordinate too small.
 template <class S>
 struct NearSide {
   WideHierarchy<S>* hierarchy;
   const S* positions;  ///< [vertex][3], one scalar past the end readable
   const S* margin;
-  NearLeafRows<S>* rows;  ///< of these positions, as far as there are any
+  NearLeafRows<S>* rows;  ///< rows of these positions, as far as they exist
 };
 
 /// The pairs of primitives of two bodies whose boxes can meet while the bodies close in on each other by no
-/// more than a reach, in the order in which they can: what moves little has the candidates of many frames in
-/// one list, and each frame takes as much of its beginning as the bodies have moved (lists of neighbours,
+/// more than a reach, in order of the closing at which they first can meet. For slow motion one list contains
+/// the candidates of many frames, and each frame reads a prefix in proportion to the motion (neighbour lists,
 /// Verlet 1967, for boxes).
 ///
-/// Closing is by side: what the gap between a and b may have lost if b lies above a along x, y, z (0 to 2),
-/// or below it (3 to 5).
+/// Closing is measured by side: the possible loss of the gap between a and b if b lies above a along x, y, z
+/// (0 to 2), or below it (3 to 5).
 template <class S>
 class NearPairs {
  public:
-  /// Searches anew. The reach is what both margins add up to, by side: positive. Adds the box tests made to
-  /// `tests`. Allocates only where there are more pairs than ever before. Hierarchies need one width and leaf
-  /// size. Not for empty hierarchies.
+  /// Searches anew. The reach per side is the sum of both margins and must be positive. Adds the box tests
+  /// made to `tests`. Allocates only if there are more pairs than ever before. Both hierarchies need one
+  /// width and leaf size and must not be empty.
   void build(const NearSide<S>& a, const NearSide<S>& b, std::uint32_t body_a, std::uint32_t body_b,
              const S (&reach)[6], NearWork<S>& work, std::uint64_t& tests);
   void clear();
 
-  /// Appends the pairs whose boxes can have met when no side has closed by more than this fraction of its
+  /// Appends the pairs whose boxes can have met if no side has closed by more than this fraction of its
   /// reach; 0 to 1, rounding of the quotient included.
   void read(double fraction, PairBuffer& out) const;
-  /// The same, less those whose boxes do not overlap at the present positions. Returns how many it looked at.
+  /// Appends those of these pairs whose boxes overlap at the current positions. Returns the number of
+  /// examined pairs.
   std::size_t read_meeting(double fraction, const PrimitivesNow<S>& a, const PrimitivesNow<S>& b,
                            NearWork<S>& work, PairBuffer& out) const;
   std::size_t count() const { return pairs_.size(); }
-  /// How many of them overlapped when they were found.
+  /// Returns the number of pairs that overlapped at the search.
   std::size_t overlapping() const { return bucket_end_[0]; }
 
   std::size_t bytes() const;

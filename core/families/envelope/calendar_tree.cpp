@@ -68,8 +68,8 @@ void CalendarTree<S>::choose_end(double t) {
   scale_ = buckets / (end_ - begin_);
 }
 
-/// Each of the few operations is off by at most 2^-53 of the sum of the magnitudes; 32 times as much is
-/// allowed.
+/// Each of the few operations is off by at most 2^-53 of the sum of the magnitudes; the bound allows 32 times
+/// as much.
 template <class S>
 void CalendarTree<S>::read_line(std::uint32_t vertex) {
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
@@ -132,8 +132,8 @@ int CalendarTree<S>::ahead(std::uint32_t x, std::uint32_t y, bool lower, double 
   return lower ? -sign : sign;
 }
 
-/// When `other` can first be ahead of the winner: a lower bound, `never` if not before the end of the
-/// segment, or the present if it is already.
+/// Returns the time at which `other` can first be ahead of the winner: a lower bound; `never` if not before
+/// the end of the segment; the current time if it is already ahead.
 template <class S>
 double CalendarTree<S>::failure(const Candidate& winner, const Candidate& other, bool lower) {
   const double gap = winner.now - other.now, left = winner.end - other.end, error = 2.01 * error_;
@@ -151,7 +151,7 @@ double CalendarTree<S>::failure(const Candidate& winner, const Candidate& other,
   return std::isfinite(estimate.error) ? estimate.time - estimate.error : now_;
 }
 
-/// Who realises a side now, and until when for certain.
+/// Determines the current realiser of a side, and a time until which it certainly stays the realiser.
 template <class S>
 void CalendarTree<S>::determine(const WideArrays<S>& h, WideRealisers& realisers, std::uint32_t slot) {
   const auto [index, row, lane] = place_of(slot);
@@ -181,7 +181,7 @@ void CalendarTree<S>::determine(const WideArrays<S>& h, WideRealisers& realisers
   }
   counts_.reads += count;
   ++counts_.sides;
-  // Those that may be just as far out: of several that are, the one that ends furthest out.
+  // Vertices that may be equally far out: among them the one that ends furthest out wins.
   reached -= 4.02 * error_;
   if (!(second < reached))
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -222,7 +222,7 @@ void CalendarTree<S>::unschedule(std::uint32_t slot) {
 template <class S>
 void CalendarTree<S>::schedule(std::uint32_t slot, double time) {
   unschedule(slot);
-  if (time >= end_) return;  // everything starts over then
+  if (time >= end_) return;  // the whole body restarts then
   Entry& entry = entries_[slot];
   entry.time = time;
   entry.bucket = std::max(bucket_of(time), bucket_);
@@ -238,7 +238,7 @@ void CalendarTree<S>::make_due(std::uint32_t slot) {
   levels_[depth_[place_of(slot).node]].push_back(slot);
 }
 
-/// Asks for what `determine` reads of some sides: nearly all of it comes from far away.
+/// Prefetches the data that `determine` reads for some sides: most of it is not in the cache.
 template <class S>
 void CalendarTree<S>::fetch_ahead(const WideArrays<S>& h, const WideRealisers& realisers,
                                   std::span<const std::uint32_t> slots) const {
@@ -265,12 +265,12 @@ void CalendarTree<S>::fetch_ahead(const WideArrays<S>& h, const WideRealisers& r
     });
 }
 
-/// Determines all sides in `levels_` anew, deepest first, and those above that follow from them.
+/// Determines all sides in `levels_` again, deepest first, and the sides above that depend on them.
 template <class S>
 void CalendarTree<S>::process(const WideArrays<S>& h, WideRealisers& realisers) {
   for (std::size_t depth = levels_.size(); depth-- > 0;) {
     std::size_t fetched = 0;
-    for (std::size_t i = 0; i < levels_[depth].size(); ++i) {  // depths saturate: it may grow
+    for (std::size_t i = 0; i < levels_[depth].size(); ++i) {  // depths saturate: the list may grow
       if (i == fetched) {
         fetched = std::min(levels_[depth].size(), i + together);
         fetch_ahead(h, realisers, {levels_[depth].data() + i, fetched - i});
@@ -285,7 +285,7 @@ void CalendarTree<S>::process(const WideArrays<S>& h, WideRealisers& realisers) 
         continue;
       }
       counts_.changes += realisers[slot] != before ? 1 : 0;
-      // The side of the same kind, of this node's box.
+      // The same side of this node's own box.
       if (node != 0) make_due(above_[node] + row * width_);
     }
     levels_[depth].clear();
@@ -350,7 +350,7 @@ void CalendarTree<S>::plans_changed(WideHierarchy<S>& hierarchy, WideRealisers& 
       for (std::uint32_t k = first_leaf_[v]; k < first_leaf_[v + 1]; ++k) visit(v, leaves_[k]);
     }
   };
-  // What is read comes from far away: first it is asked for.
+  // Prefetches first: the data read is not in the cache.
   each_leaf([&](std::uint32_t, std::uint32_t leaf) {
     for (std::uint32_t row = 0; row < 6; ++row) {
       __builtin_prefetch(&realisers[leaf + row * width_]);

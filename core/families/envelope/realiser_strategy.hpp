@@ -13,10 +13,10 @@
 
 namespace kbvh {
 
-/// What strategies share that keep the realisers of a wide hierarchy's boxes, and no boxes: a query makes the
-/// boxes of a node from six coordinates per child when it first comes there, into the rows that stored boxes
-/// lie in, so that it runs on the same kernels as that of a refit. Nodes that the last queries came to are
-/// made in one go beforehand: call by call, a coordinate costs several times as much.
+/// The shared part of strategies that keep the realisers of a wide hierarchy's boxes instead of the boxes. A
+/// query computes the boxes of a node at its first visit, from six coordinates per child, into the rows of
+/// stored boxes, so that it runs on the kernels of a refit's query. Nodes that the last queries visited are
+/// computed together beforehand: one call per node costs several times as much per coordinate.
 template <class S, class Count>
 class RealiserStrategy : public CountedStrategy<S, Count> {
  public:
@@ -73,7 +73,7 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
     for (std::uint32_t node = size; node-- > 0;) {
       const bool root = hierarchy.wide_parent(node) == WideHierarchy<S>::no_node;
       if (body.stale[root ? 0 : hierarchy.wide_parent(node)] == 0)
-        view.boxes[node] = to_double(hierarchy.box(node));  // what a query read
+        view.boxes[node] = to_double(hierarchy.box(node));  // the boxes that a query read
       else if (root)
         for (std::uint32_t child = 0; child < view.topology.nodes[0].count(); ++child)
           view.boxes[0].extend(view.boxes[view.topology.nodes[0].first() + child]);
@@ -95,21 +95,22 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
   struct Body {
     WideHierarchy<S> hierarchy;
     WideRealisers realisers;
-    std::vector<std::uint8_t> stale;     ///< by wide node: its rows are not those of the present
-    std::vector<std::uint32_t> visited;  ///< nodes whose rows were made for queries since it was emptied
-    std::uint32_t frames = 0;            ///< since then
+    std::vector<std::uint8_t> stale;  ///< by wide node: its rows are not current
+    std::vector<std::uint32_t>
+        visited;               ///< nodes whose rows were computed for queries since the list was emptied
+    std::uint32_t frames = 0;  ///< since then
     const S* line_ends[2] = {nullptr, nullptr};  ///< stored positions between which vertices move, or null
     double line_times[2] = {0, 0};
   };
 
-  /// Positions are others now: nothing of what was made holds.
+  /// Invalidates all rows, because the positions changed.
   void new_frame(std::uint32_t index) {
     Body& body = bodies_[index];
     body.hierarchy.positions_changed();
     std::fill(body.stale.begin(), body.stale.end(), std::uint8_t(1));
     ++body.frames;
   }
-  /// All rows have been made by a refit of all positions.
+  /// Marks all rows as current, after a refit of all positions.
   void refit(std::uint32_t index) {
     Body& body = bodies_[index];
     body.hierarchy.positions_changed();
@@ -124,7 +125,7 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
   std::vector<Body> bodies_;
 
  private:
-  static constexpr std::uint32_t visits_kept = 16;  ///< frames; then they are learnt anew
+  static constexpr std::uint32_t visits_kept = 16;  ///< frames; then the visited nodes are collected anew
   static constexpr std::size_t made_together = 16;  ///< nodes
 
   void make_visited(std::uint32_t index) {
@@ -135,7 +136,7 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
       body.frames = 0;
     }
     if (body.visited.empty()) {
-      if (body.stale[0] != 0) make_wanted(index, 0);  // a query begins with the box of the root
+      if (body.stale[0] != 0) make_wanted(index, 0);  // a query starts with the box of the root
       return;
     }
     if (body.stale[body.visited[0]] != 0) make(index, body.visited);

@@ -11,16 +11,16 @@ namespace kbvh {
 
 namespace {
 
-/// Nodes that are checked before their active sides are looked at: few enough to stay in the cache. Fewer
-/// cost several percent more.
+/// The number of nodes that are checked before their active sides are processed: few enough to stay in the
+/// cache. Smaller blocks cost several percent more.
 constexpr std::uint32_t largest_block = 128, smallest_block = 4;
-/// Stores of a bucket, on average.
+/// The mean number of stores per bucket.
 constexpr std::size_t bucket_stores = 32;
-/// A computed fraction of the segment at which two lines meet is off by less: two differences, their sum, and
-/// the quotient are each off by a relative 2^-53, and it is at most 1.
+/// The error bound of a computed fraction of the segment at which two lines meet: two differences, their sum,
+/// and the quotient are each off by a relative 2^-53, and the fraction is at most 1.
 constexpr double fraction_error = 0x1p-50;
 constexpr double key_steps = 0x1p32;
-/// Of the work on a segment that is made in slices: the part for its nodes. The rest sorts stores.
+/// The share of the nodes in the work on a segment that is made in slices. The rest sorts stores.
 constexpr double nodes_part = 15.0 / 16;
 
 }  // namespace
@@ -122,8 +122,8 @@ void SegmentEnvelope<S>::step(WideHierarchy<S>& hierarchy, const WideRealisers& 
   if (nodes_left_ == 0 && part > 0) fill_buckets(part < 1 ? std::size_t(part * double(steps)) : steps);
 }
 
-/// The rows of the next block at the end of the present segment, of which the stores were made in this very
-/// order: block by block, and for one side in that of time.
+/// Computes the rows of the next block at the end of the current segment, whose stores were made in the same
+/// order: block by block, and for one side in order of time.
 template <class S>
 void SegmentEnvelope<S>::carry_over(const WideRealisers& realisers, WideRealisers& at_end) {
   const std::size_t scalars = lane_scalars(width_), begin = next_block();
@@ -145,7 +145,7 @@ std::uint32_t SegmentEnvelope<S>::next_block() const {
   return nodes_left_ > block_ ? nodes_left_ - block_ : 0;
 }
 
-/// Nodes after those of this block have been made.
+/// Makes one block; nodes after this block are done.
 template <class S>
 void SegmentEnvelope<S>::make_block(WideHierarchy<S>& hierarchy, const WideRealisers& realisers) {
   const std::uint32_t begin = next_block(), end = nodes_left_;
@@ -159,8 +159,8 @@ void SegmentEnvelope<S>::make_block(WideHierarchy<S>& hierarchy, const WideReali
   nodes_left_ = begin;
 }
 
-/// The active sides that are boxes of leaves, of a range of nodes. First the lines of all of them are looked
-/// up, then they are walked: so one waits for memory while others are computed.
+/// Processes the active sides that are boxes of leaves, for a range of nodes. It first looks up all their
+/// lines and then walks them: the cache misses of some overlap with the computation of others.
 template <class S>
 void SegmentEnvelope<S>::walk_leaves(WideHierarchy<S>& hierarchy, const WideRealisers& realisers,
                                      std::uint32_t begin, std::uint32_t end) {
@@ -184,8 +184,7 @@ void SegmentEnvelope<S>::walk_leaves(WideHierarchy<S>& hierarchy, const WideReal
       const S sign = row < 3 ? S(-1) : S(1);
       const std::uint32_t realiser = realisers[slot];
       const S reached = sign * p1[realiser];
-      // Which lines end further out nobody can predict: no branch. Lists are filled up with their last
-      // vertex.
+      // Branchless: which lines end further out is unpredictable. Lists are filled up with their last vertex.
       std::uint32_t count = 0, last = realiser;
       for (std::uint32_t i = 0; i < node.length; ++i) {
         const std::uint32_t place = list[i * width_] + axis;
@@ -211,7 +210,7 @@ void SegmentEnvelope<S>::walk_leaves(WideHierarchy<S>& hierarchy, const WideReal
   }
 }
 
-/// The active sides of one node that are boxes of nodes, of which the envelopes are there.
+/// Processes the active sides of one node that are boxes of nodes whose envelopes are complete.
 template <class S>
 void SegmentEnvelope<S>::walk_above(WideHierarchy<S>& hierarchy, const WideRealisers& realisers,
                                     std::uint32_t index) {
@@ -256,15 +255,16 @@ typename SegmentEnvelope<S>::Line* SegmentEnvelope<S>::room_for(std::size_t line
   return lines_.data();
 }
 
-/// The fraction of the segment at which `later`, which is not ahead at first and is in the end, meets `now`.
+/// Returns the fraction of the segment at which `later`, which is not ahead at the begin but at the end,
+/// meets `now`.
 template <class S>
 double SegmentEnvelope<S>::meeting(const Line& now, const Line& later) {
   const double behind = double(now.begin) - double(later.begin);
   return behind / (behind + (double(later.end) - double(now.end)));
 }
 
-/// From the line that is ahead at the begin to the one that is ahead at the end; `lines` are those that end
-/// further out than it.
+/// Walks from the line that is ahead at the begin to the line that is ahead at the end; `lines` are those
+/// that end further out than the first.
 template <class S>
 void SegmentEnvelope<S>::walk(std::uint32_t slot, Line now, Line* lines, std::size_t count) {
   std::vector<Store>& made = segments_[making_].made;
@@ -296,7 +296,7 @@ void SegmentEnvelope<S>::walk(std::uint32_t slot, Line now, Line* lines, std::si
   }
 }
 
-/// Of the lines the one that takes over first, where times are too close to tell.
+/// Returns the line that takes over first, where times are too close for double arithmetic.
 template <class S>
 std::size_t SegmentEnvelope<S>::first_exactly(const Line& now, const Line* lines, std::size_t count) {
   std::size_t first = 0;
@@ -315,7 +315,8 @@ std::size_t SegmentEnvelope<S>::first_exactly(const Line& now, const Line* lines
   return first;
 }
 
-/// Does x overtake the winner before y does? Of two that do at one instant the one that stays ahead counts.
+/// Returns whether x overtakes the winner before y does. If both do at one instant, the line that stays ahead
+/// counts.
 template <class S>
 bool SegmentEnvelope<S>::comes_first(const Line& x, const Line& y, const Line& winner) const {
   if (x.begin == y.begin && x.begin == winner.begin) return x.end > y.end;
@@ -325,9 +326,9 @@ bool SegmentEnvelope<S>::comes_first(const Line& x, const Line& y, const Line& w
   return order != 0 ? order < 0 : x.end > y.end;
 }
 
-/// A counting sort by time: a bucket's stores keep the order in which they were made, which is that of time
-/// for the stores of one side. Goes on to a number of steps, of which each store takes one to be counted and
-/// one to be put in place.
+/// Performs a counting sort by time: a bucket's stores keep their order of creation, which for one side is
+/// the order of time. Continues up to a number of steps; each store takes one step to be counted and one to
+/// be placed.
 template <class S>
 void SegmentEnvelope<S>::fill_buckets(std::size_t steps) {
   Segment& segment = segments_[making_];
@@ -375,15 +376,16 @@ void SegmentEnvelope<S>::advance(double t, WideRealisers& realisers) {
   std::size_t& next = segment.next;
   if (next == stores.size()) return;
   const std::size_t from = next;
-  if (t >= segment.t1) {  // in any order that keeps those of one side in turn
+  if (t >= segment.t1) {  // in any order that preserves the order of each side
     for (; next < stores.size(); ++next) realisers[stores[next].slot] = stores[next].realiser;
     counts_.stores += next - from;
     return;
   }
-  // Steps of the key; the division is off by less than a thousandth of one, and so are the keys.
+  // Steps of the key; the division is off by less than a thousandth of a step, and so are the keys.
   const auto now = std::int64_t((t - segment.t0) / (segment.t1 - segment.t0) * key_steps);
-  const std::int64_t past = now - 1, future = now + 2;  // keys below, and from there on, are surely so
-  // Whole buckets come in the order in which they were made; the last one needs that of time.
+  const std::int64_t past = now - 1, future = now + 2;  // keys below `past` are certainly past, keys from
+                                                        // `future` on certainly in the future
+  // Whole buckets are applied in order of creation; the last one needs the order of time.
   const auto whole = std::size_t(std::max<std::int64_t>(past, 0) >> segment.bucket_shift);
   for (; next < bucket[whole]; ++next) realisers[stores[next].slot] = stores[next].realiser;
   const std::size_t last =
@@ -393,7 +395,7 @@ void SegmentEnvelope<S>::advance(double t, WideRealisers& realisers) {
     std::sort(start, stores.begin() + bucket[last], [this, p1 = segment.p1](const Store& a, const Store& b) {
       if (a.key != b.key) return a.key < b.key;
       if (a.slot != b.slot) return a.slot < b.slot;
-      // Of one side's realisers a later one ends further out.
+      // Among the realisers of one side the later one ends further out.
       return is_lower(a.slot) ? p1[a.realiser] > p1[b.realiser] : p1[a.realiser] < p1[b.realiser];
     });
     segment.ordered = bucket[last];
@@ -402,7 +404,7 @@ void SegmentEnvelope<S>::advance(double t, WideRealisers& realisers) {
     realisers[stores[next].slot] = stores[next].realiser;
     ++next;
   }
-  // A handful, of this very instant; they are looked at again by the next frame.
+  // A handful of stores of this very instant; the next frame examines them again.
   for (std::size_t i = next; i < bucket[last] && stores[i].key < future; ++i)
     if (is_due(stores[i], realisers[stores[i].slot], t)) realisers[stores[i].slot] = stores[i].realiser;
   counts_.stores += next - from;

@@ -1,4 +1,4 @@
-// Chooses the table of this room's kernels.
+// Selects the table of this room's kernels.
 #include "core/families/limits/kernels/limits.hpp"
 #include "core/kernels/kernel_set.hpp"
 

@@ -8,25 +8,25 @@
 
 namespace kbvh {
 
-/// Boxes of bodies at ends of a clip's segments, kept to be used again when it plays again. What came first
-/// stays: where not all finds room, a clip that loops would otherwise push out each box before it is wanted.
+/// Keeps the boxes of bodies at segment ends of a clip for later plays. Older entries stay: if memory is
+/// short, a looping clip would otherwise evict each box before its reuse.
 template <class S>
 class BoundsCache {
  public:
   struct Boxes {
     AlignedArray<S> child_bounds, node_bounds;  ///< as in WideArrays
-    bool complete = false;                      ///< to be said by whoever fills them in
+    bool complete = false;                      ///< set by the caller after filling in the boxes
   };
 
   BoundsCache(std::size_t bodies, std::size_t most_bytes) : kept_(bodies), most_bytes_(most_bytes) {}
   bool is_used() const { return most_bytes_ > 0; }
 
-  /// Those of a body at t; null if there are none.
+  /// Returns the boxes of a body at t; null if there are none.
   const Boxes* find(std::size_t body, double t) const {
     const auto found = kept_[body].find(t);
     return found == kept_[body].end() || !found->second.complete ? nullptr : &found->second;
   }
-  /// Room for those of a body at t that are not complete yet; null if there is no more.
+  /// Reserves boxes of a body at t, not yet complete; null if memory is short.
   Boxes* add(std::size_t body, double t, std::size_t child_bounds, std::size_t node_bounds) {
     if (const auto begun = kept_[body].find(t); begun != kept_[body].end()) return &begun->second;
     const std::size_t more = (child_bounds + node_bounds) * sizeof(S);

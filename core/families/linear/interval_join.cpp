@@ -7,10 +7,10 @@
 namespace kbvh {
 
 namespace {
-/// Room for pairs of primitives that is made at least.
+/// The smallest allocation for pairs of primitives.
 constexpr std::size_t chunk_room = 2048;
 
-/// Of pairs in columns, keeps those that are pairs within a body, from one on.
+/// Keeps the valid pairs within a body among pairs in columns, from a given index on.
 void keep_self_columns(const Primitives* neighbours, LeavesOf leaves, JoinColumns& pairs, std::size_t from) {
   std::size_t kept = from;
   for (std::size_t i = from; i < pairs.found; ++i) {
@@ -70,7 +70,7 @@ void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>&
   begin_bodies();
 }
 
-/// Sets out to join the next pair of bodies.
+/// Starts to join the next pair of bodies.
 template <class S>
 void IntervalJoin<S>::begin_bodies() {
   const BodyPair bodies = bodies_[found_.size()];
@@ -88,7 +88,7 @@ void IntervalJoin<S>::begin_bodies() {
   leaf_pairs_.resize(std::max(leaf_pairs_.size(), 2 * leaf_pairs_room_));
   traversal_ = {stack_.data(),    0, stack_.size(),     leaf_pairs_.data(), 0,
                 leaf_pairs_room_, 1, Budget{}.box_tests};
-  // A root that is a leaf lies in a node's only lane, so that the roots are compared with each other there.
+  // A root that is a leaf lies in a node's only lane, so the roots are compared there.
   traversal_.stack[traversal_.depth++] = {0, 0};
   leaf_join_ = {width,
                 a.hierarchy().arrays(),
@@ -242,7 +242,7 @@ template <class S>
 void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
   if (!reading_) start_reading();
   const std::uint32_t bucket = FractionBuckets::of(fraction);
-  // What begins: all of earlier buckets, some of the present one.
+  // Beginning pairs: all of earlier buckets, some of the current one.
   std::size_t kept = 0;
   const auto begin_or_wait = [&](std::uint32_t index) {
     const JoinedPair& pair = sorted_[index];
@@ -256,7 +256,7 @@ void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
   for (std::size_t i = 0; i < before; ++i) begin_or_wait(waiting_[i]);
   for (; next_ < bucket_end_[bucket]; ++next_) begin_or_wait(next_);
   waiting_.resize(kept);
-  // What ends: the lists of earlier buckets as a whole.
+  // Ending pairs: the lists of earlier buckets as a whole.
   for (; present_ < bucket; ++present_) {
     for (std::uint32_t index = ending_[present_]; index != none; index = next_ending_[index]) end_pair(index);
     ending_[present_] = none;

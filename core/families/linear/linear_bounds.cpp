@@ -25,8 +25,8 @@ Box<S> swept(const BodySegmentBounds<S>& side) {
   return box;
 }
 
-/// Does the body stay near the admissible range until this end? Beyond it differences of boxes could
-/// overflow.
+/// Tests whether the body stays near the admissible range until this end. Beyond it differences of boxes
+/// could overflow.
 template <class S>
 bool admissible_root(const EndpointBounds<S>& end) {
   const auto near = [](S x) { return std::abs(x) <= 2 * admissible_reach<S>; };
@@ -70,7 +70,7 @@ void LinearBounds<S>::choose_segment(Segment& segment, const SegmentMotion<S>& m
   segment.endless = interval.endless;
 }
 
-/// Sets out to make the boxes of one end, which has its slot: returns what is left to do.
+/// Starts to make the boxes of one end, which has its slot; returns the remaining work.
 template <class S>
 auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t index,
                                 std::uint32_t end, double t) -> Refit {
@@ -90,8 +90,7 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   at.made = ++body.made;
   if (body.hierarchy.empty()) return {};
   at.excess = 0;
-  // Over the whole of a segment of its own a body may be moved, as long as its boxes become no larger than
-  // by their margin.
+  // Over an uncut segment a body's boxes may be translated, as long as their excess stays within the margin.
   const bool whole =
       end == 1 && segment.begin == motion.lines_begin(index) && segment.end == motion.lines_end(index);
   const auto step = whole ? motion.translation(index) : std::optional<Translation<S>>{};
@@ -113,7 +112,7 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   }
   Refit refit{child_bounds.data(), node_bounds.data(), at.positions, std::uint32_t(nodes), nullptr};
   const bool remembers = memory_.is_used() && motion.as_in_the_scene(index);
-  // A body at rest is at a keyframe, whenever it is looked at.
+  // A body at rest is at a keyframe at any time.
   const double knot = !side.at_rest                              ? t
                       : std::isfinite(motion.lines_begin(index)) ? motion.lines_begin(index)
                                                                  : motion.lines_end(index);
@@ -237,8 +236,8 @@ void LinearBounds<S>::enter() {
   }
 }
 
-/// Gives a body's ends over a segment their slots, and makes what is at its begin. Returns whether the other
-/// end is to be made. `before` is the segment before.
+/// Assigns slots to a body's ends over a segment, and makes the boxes at its begin. Returns whether the other
+/// end remains to be made. `before` is the preceding segment.
 template <class S>
 bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion,
                                  std::uint32_t body, double t, Before what) {
@@ -254,7 +253,7 @@ bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const 
     while (std::find(used.begin(), used.end(), slot) != used.end()) ++slot;
     return slot;
   };
-  // Where it was, and not at rest behind the clip after it was before it.
+  // The body rests at the same place; a rest after the clip does not continue the rest before it.
   if (old.current && old.at_rest && side.at_rest &&
       old.at[1].positions == motion.positions_on_lines(body, t, bodies_[body].room[old.at[1].slot])) {
     side.at[0] = side.at[1] = old.at[1];
@@ -288,7 +287,7 @@ void LinearBounds<S>::next_segment() {
   choose_segment(segment, motion_, t);
   for (std::uint32_t body = 0; body < body_count(); ++body) {
     if (!begin_side(segment, before, motion_, body, t, Before::ends)) continue;
-    // A line without end may leave the admissible range: then less of it.
+    // A line without end may leave the admissible range: shorten the segment.
     while (!make_end(segment, motion_, body, 1, segment.end) && segment.end > segment.begin) {
       segment.end = segment.begin + (segment.end - segment.begin) / 2;
       for (std::uint32_t other = 0; other < body; ++other)
@@ -312,7 +311,7 @@ bool LinearBounds<S>::start_ahead(const SegmentMotion<S>& motion) {
   forget_ahead();
   const Segment& before = segments_[present_];
   Segment& segment = segments_[1 - present_];
-  // How a segment is to be cut is seen when it is there.
+  // The cuts of such a segment are decided only when it begins.
   if (whole_ || cuts_.max_looseness > 0 || motion.time() != before.end) return false;
   bool ends = false;
   for (std::uint32_t body = 0; body < body_count(); ++body)
@@ -339,7 +338,7 @@ bool LinearBounds<S>::step_ahead(std::uint64_t nodes) {
       const std::uint32_t body = ahead_.body++;
       if (begin_side(segment, before, *ahead_.motion, body, before.end, Before::stays))
         ahead_.refit = begin_end(segment, *ahead_.motion, body, 1, segment.end);
-      // What is done at once costs a part of a refit.
+      // Work done at once counts as a part of a refit.
       if (ahead_.refit.left == 0) done += hierarchy(body).node_count() / 4;
     } else if (ahead_.finished) {
       return true;
@@ -349,7 +348,7 @@ bool LinearBounds<S>::step_ahead(std::uint64_t nodes) {
         return side.hierarchy().empty() || admissible_root(side.at[1]);
       };
       if (!std::all_of(segment.sides.begin(), segment.sides.end(), is_admissible)) {
-        forget_ahead();  // less of it is to be taken, as `next_segment` does
+        forget_ahead();  // the segment must be shortened, as in `next_segment`
         return false;
       }
       finish(segment, *ahead_.motion);
@@ -366,7 +365,7 @@ std::uint64_t LinearBounds<S>::nodes_of_segment() const {
   return nodes;
 }
 
-/// Cuts the segment that has just begun into twice as many pieces until the present one is tight enough.
+/// Cuts the segment that has just begun into twice as many pieces until the current one is tight enough.
 template <class S>
 void LinearBounds<S>::cut_while_loose(double t) {
   Segment& segment = segments_[present_];
@@ -375,7 +374,7 @@ void LinearBounds<S>::cut_while_loose(double t) {
     segment.pieces *= 2;
     const double begin = segment.begin, end = segment.end;
     choose_segment(segment, motion_, t);
-    if (segment.begin == begin && segment.end == end) return;  // as short as doubles can be
+    if (segment.begin == begin && segment.end == end) return;  // as short as doubles allow
     for (std::uint32_t body = 0; body < body_count(); ++body) {
       if (segment.sides[body].at_rest) continue;
       if (segment.begin != begin) make_end(segment, motion_, body, 0, segment.begin);
@@ -413,8 +412,9 @@ double LinearBounds<S>::looseness_in_the_middle() {
   return tight > 0 ? linear / tight - 1 : 0;
 }
 
-/// Margins, and which bodies meet another's box over the segment. Those that come near again get all their
-/// boxes; those that are apart get one from the next segment on, and keep those they have until then.
+/// Sets the margins, and finds the bodies whose box meets another body's box over the segment. Bodies that
+/// come near again get all their boxes. Bodies that are apart get only one box from the next segment on, and
+/// keep their boxes until then.
 template <class S>
 void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
   for (BodySegmentBounds<S>& side : segment.sides) make_margin(side);
@@ -435,7 +435,7 @@ void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
   for (std::uint32_t body = 0; body < body_count(); ++body) {
     BodySegmentBounds<S>& side = segment.sides[body];
     if (near_[body] == 0) {
-      // What rests has its boxes already; a root that is a leaf lies where those of others do.
+      // A resting body already has its boxes; a root that is a leaf lies in the lanes of a node.
       side.apart = side.apart || (!side.at_rest && side.hierarchy().topology().size() > 1);
     } else if (side.apart) {
       side.apart = false;

@@ -9,28 +9,28 @@
 
 namespace kbvh {
 
-/// Boxes of one body at one end of a segment, and the positions that they are of.
+/// Boxes of one body at one end of a segment, with their positions.
 template <class S>
 struct EndpointBounds {
   const S *child_bounds = nullptr, *node_bounds = nullptr;  ///< as in WideArrays
   const S* positions = nullptr;                             ///< [vertex][3]
-  std::uint32_t slot = 0;  ///< place in LinearBody::rows of what is made from positions
-  std::uint32_t made = 0;  ///< one number for one set of positions
-  S excess = 0;            ///< at most so much larger is a box than a tight one, on each side
+  std::uint32_t slot = 0;  ///< index into LinearBody::rows of the data made from the positions
+  std::uint32_t made = 0;  ///< a number that identifies the positions
+  S excess = 0;            ///< upper bound on a box's excess over the tight box, per side
 };
 
-/// A body with linear bounds: its topology, and room for three ends, those of the present segment and the
-/// one after it.
+/// A body with linear bounds: its topology, and memory for three ends, those of the current segment and of
+/// the next one.
 template <class S>
 struct LinearBody {
   static constexpr std::uint32_t slots = 3;
-  WideHierarchy<S> hierarchy;  ///< its boxes are free to be used
+  WideHierarchy<S> hierarchy;  ///< its boxes are free for temporary use
   AlignedArray<S> child_bounds[slots], node_bounds[slots];
-  std::vector<S> room[slots];  ///< for positions that are nowhere else
-  /// Rows of the leaves that a join came to, and which positions they are of.
+  std::vector<S> room[slots];  ///< for positions that are not stored elsewhere
+  /// Rows of the leaves that a join visited, with stamps of their positions.
   AlignedArray<S> rows[slots];
   std::vector<std::uint32_t> stamps[slots];
-  std::uint32_t made = 0;  ///< ends so far
+  std::uint32_t made = 0;  ///< number of ends made so far
 
   WideLinearLeaves<S> leaves(const EndpointBounds<S>& first, const EndpointBounds<S>& last) {
     const std::size_t count = hierarchy.leaf_count();
@@ -61,9 +61,9 @@ struct BodySegmentBounds {
   LinearBody<S>* body = nullptr;
   EndpointBounds<S> at[2];  ///< the same at both ends for a body at rest
   bool at_rest = false, current = false;
-  /// It meets no other body's box over this segment: of its boxes nobody reads any but the root's.
+  /// The body meets no other body's box over this segment; only its root's box is read.
   bool apart = false;
-  S margin = 0;  ///< by which every box is larger
+  S margin = 0;  ///< margin by which every box is inflated
 
   WideHierarchy<S>& hierarchy() const { return body->hierarchy; }
   WideEnds<S> ends() const {
@@ -73,7 +73,7 @@ struct BodySegmentBounds {
   Box<S> box_at(std::uint32_t end, std::uint32_t node) const {
     return hierarchy().box_in(at[end].child_bounds, at[end].node_bounds, node);
   }
-  /// What is between the ends at a fraction of the segment, without the margin.
+  /// Interpolates a box between the ends at a fraction of the segment, without the margin.
   Box<double> box_between(std::uint32_t node, double fraction) const {
     const Box<S> first = box_at(0, node), last = box_at(1, node);
     Box<double> box;
@@ -86,15 +86,16 @@ struct BodySegmentBounds {
   }
 };
 
-/// All bodies of a scene over a segment in which every vertex keeps to one line.
+/// All bodies of a scene over a segment in which every vertex stays on one line.
 template <class S>
 struct LinearSegment {
   double begin = 0, end = 0;  ///< the end may be infinite if nothing moves
   std::vector<BodySegmentBounds<S>> sides;
-  /// Indices of the scene's pairs of bodies that meet within the segment, ascending; all where these are few.
+  /// Indices of the scene's pairs of bodies that meet within the segment, ascending; all pairs if there are
+  /// few.
   std::vector<std::uint32_t> near_pairs;
 
-  /// Where in the segment a time lies, from 0 to 1.
+  /// Returns the position of a time in the segment, from 0 to 1.
   S fraction(double t) const {
     if (!(end > begin) || end == std::numeric_limits<double>::infinity()) return 0;
     return std::clamp(S((t - begin) / (end - begin)), S(0), S(1));

@@ -1,4 +1,4 @@
-// Chooses the tables of this room's kernels.
+// Selects the tables of this room's kernels.
 #include "core/families/linear/kernels/span_tests.hpp"
 #include "core/kernels/kernel_set.hpp"
 

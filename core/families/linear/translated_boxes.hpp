@@ -8,7 +8,7 @@
 
 namespace kbvh {
 
-/// Of the root's box.
+/// Returns the largest coordinate of the root's box.
 template <class S>
 S largest_coordinate(const EndpointBounds<S>& end) {
   S largest = 0;
@@ -17,11 +17,11 @@ S largest_coordinate(const EndpointBounds<S>& end) {
   return largest;
 }
 
-/// Boxes at the end of a segment over which a body moves as a whole, from those at its begin: all of them, or
-/// only the root's. They hold what those at the begin held, and are larger than tight ones by rounding only.
+/// Boxes at the end of a segment over which a body translates, from those at its begin: all of them, or only
+/// the root's. They contain the same vertices and exceed tight boxes by rounding only.
 template <class S>
 struct TranslatedBoxes {
-  S lower[3], upper[3];  ///< what is added
+  S lower[3], upper[3];  ///< the added vectors
   S excess;              ///< of the result
 
   TranslatedBoxes(const EndpointBounds<S>& from, const Translation<S>& step) : excess(from.excess) {

@@ -5,11 +5,12 @@
 namespace kbvh {
 
 namespace {
-/// More than all rounding of fractions in float.
+/// An upper bound of all rounding of fractions in float.
 constexpr float fraction_slack = 0x1p-21F;
 }  // namespace
 
-/// All pairs wait for their begin; ahead of time those that overlap then are asked about otherwise.
+/// Enters all pairs into the lists by their begin; pairs that overlap at the begin are attempted ahead, if
+/// requested.
 template <class S>
 void TriangleSpanFilter<S>::begin(const IntervalJoin<S>& join, When when) {
   intersecting_.clear();
@@ -68,7 +69,7 @@ void TriangleSpanFilter<S>::collect_due(const IntervalJoin<S>& join, float fract
     while (pair != none) {
       const std::uint32_t next = next_[pair];
       if (time_[pair] > fraction)
-        wait(pair, time_[pair]);  // later in the present bucket
+        wait(pair, time_[pair]);  // later in the current bucket
       else if (pairs[pair].end >= fraction)
         due_.push_back(pair);
       pair = next;
@@ -92,7 +93,7 @@ void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const Scene
   BodyPair bodies = join.bodies_of(due_[0]);
   const BodySegmentBounds<S>*a = nullptr, *b = nullptr;
   const std::uint32_t *corners_a = nullptr, *corners_b = nullptr;
-  S margin = 0;  // the largest: a larger one leaves more open, and decides nothing wrongly
+  S margin = 0;  // the largest margin: a larger one leaves more pairs open, but makes no wrong verdict
   const auto take_bodies = [&](const BodyPair& next) {
     bodies = next;
     a = &segment.sides[bodies.first];
@@ -119,12 +120,13 @@ void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const Scene
         span.corner[end][c + 3] = b->at[end].positions + vb;
       }
     }
-    // Lines go on beyond the span: a little more of it holds the frame's time, which the fraction is not.
+    // Lines extend beyond the span; a slightly longer span contains the frame's time, which the fraction
+    // approximates.
     span.begin = fraction - fraction_slack;
     span.end = fraction + share * (pair.end - fraction) + fraction_slack;
   }
-  // A body's margin is 8 ulps of its largest coordinate. Positions of frames differ from the plans, and so do
-  // the ends that are read here, by half an ulp each; interpolation in S adds two and a half at each of two
+  // A body's margin is 8 ulps of its largest coordinate. Positions of frames differ from the plans by half an
+  // ulp each, and so do the ends read here. Interpolation in S adds two and a half ulps at each of two
   // corners, their difference another one, products some more.
   span_test_kernels<S>(a->hierarchy().kernels())
       .decide(tries_.data(), tries_.size(), {.gap = 2 * margin, .component = margin}, verdicts_.data());
@@ -143,7 +145,7 @@ void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const Scene
   due_.resize(left);
 }
 
-/// Of what is due first the rest of its span, then a quarter of that.
+/// When a proof expires, retries the remaining span, then its first quarter.
 template <class S>
 void TriangleSpanFilter<S>::attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene,
                                         const IntervalJoin<S>& join, float fraction) {
@@ -160,7 +162,7 @@ std::size_t TriangleSpanFilter<S>::read(const LinearSegment<S>& segment, const S
   last_ = fraction;
   collect_due(join, fraction);
   const auto pairs = join.pairs();
-  // Not worth a span: no frame comes after this one.
+  // No frame follows within the span, so a proof would gain nothing.
   std::size_t worth = 0;
   for (const std::uint32_t pair : due_)
     if (pairs[pair].end >= fraction + step_)

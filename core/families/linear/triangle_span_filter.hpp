@@ -8,30 +8,31 @@
 
 namespace kbvh {
 
-/// Triangle tests of the pairs of an interval join, answered for spans of time where that can be proved. When
-/// a pair begins, or what was proved of it ends, the rest of its span is asked about, then a quarter of that.
-/// What is apart is not looked at again before its span is over, what intersects is only read out, and the
-/// rest is a candidate at each frame for as long as a quarter would have lasted.
+/// Decides the triangle tests of an interval join for spans of time where a proof exists. When a pair begins,
+/// or when a proof expires, it retries the remaining span, then its first quarter. A pair proved apart is not
+/// examined again before its span ends; a pair proved intersecting is only reported; any other pair is a
+/// candidate at each frame for the length of that quarter.
 ///
-/// All bodies of the join must consist of triangles only, the corners of primitive p at 3 p, 3 p + 1 and 3 p
-/// + 2 of `Primitives::vertices` (`all_triangles`).
+/// All bodies of the join must consist of triangles only, with the corners of primitive p at 3 p, 3 p + 1 and
+/// 3 p + 2 of `Primitives::vertices` (`all_triangles`).
 template <class S>
 class TriangleSpanFilter {
  public:
-  /// The join is that of a new segment.
+  /// Starts with the join of a new segment.
   void start(const IntervalJoin<S>& join);
-  /// The same ahead of time: `step` asks about so many more of the pairs that overlap at the begin of the
-  /// segment. Returns whether there are no more of them; only then it may be read.
+  /// Starts ahead of time: `step` attempts the given number of pairs that overlap at the begin of the
+  /// segment. It returns true when none are left; only then may the filter be read.
   void start_ahead(const IntervalJoin<S>& join);
   bool step(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
             std::size_t pairs);
 
-  /// Appends the pairs that intersect at a fraction of the segment for certain, and after them those that
-  /// may; returns how many these are. Fractions never decrease within a segment.
+  /// Appends the pairs that certainly intersect at a fraction of the segment, and after them the pairs that
+  /// may intersect; returns the number of the latter. Fractions must not decrease within a segment.
   std::size_t read(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                    float fraction, PairBuffer& out);
 
-  /// Since they were cleared: attempts to decide a pair for a span, and pairs that frames read as decided.
+  /// Return the attempts to decide a pair for a span, and the pairs that frames reported as decided, since
+  /// these counts were cleared.
   std::uint64_t attempts() const { return attempts_; }
   std::uint64_t decided() const { return decided_; }
   void clear_counts() { attempts_ = decided_ = 0; }
@@ -39,7 +40,7 @@ class TriangleSpanFilter {
 
  private:
   static constexpr std::uint32_t none = ~std::uint32_t(0);
-  /// A pair by its place in the join, and until when it stays where it is.
+  /// A pair by its index in the join, and the time until which its state holds.
   struct Item {
     std::uint32_t pair;
     float until;
@@ -53,9 +54,9 @@ class TriangleSpanFilter {
   void attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                    float fraction);
 
-  std::size_t asked_ = 0;  ///< pairs, ahead of time
+  std::size_t asked_ = 0;  ///< pairs attempted ahead of time
   std::vector<Item> intersecting_, open_;
-  /// Pairs that wait for their time: lists by bucket of it.
+  /// Pairs in lists by the bucket of their next time.
   std::vector<std::uint32_t> next_;
   std::vector<float> time_;
   std::uint32_t head_[FractionBuckets::count] = {}, bucket_ = 0;
@@ -66,7 +67,7 @@ class TriangleSpanFilter {
   std::uint64_t attempts_ = 0, decided_ = 0;
 };
 
-/// Whether TriangleSpanFilter can take the primitives. O(primitives).
+/// Returns whether TriangleSpanFilter accepts the primitives. O(primitives).
 bool all_triangles(const Primitives& primitives);
 
 extern template class TriangleSpanFilter<float>;

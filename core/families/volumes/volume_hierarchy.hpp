@@ -14,14 +14,14 @@
 
 namespace kbvh {
 
-/// What the volume of a leaf has to contain of each primitive.
+/// The part of each primitive that the volume of a leaf must contain.
 enum class Cover : std::uint8_t {
-  vertices,  ///< its vertices, and so their convex hull
-  boxes,     ///< its axis-aligned box: where pairs are answered at candidate level, by boxes
+  vertices,  ///< its vertices, and therefore their convex hull
+  boxes,     ///< its axis-aligned box, for pairs that are answered at candidate level by boxes
 };
 
-/// The hierarchy of one body with a bounding volume of any kind stored for each node, on a topology of any
-/// width that may be rotated while it is used.
+/// The hierarchy of one body that stores a bounding volume of any kind per node. The topology may have any
+/// width and may be rotated at run time.
 template <BoundingVolume V>
 class VolumeHierarchy {
  public:
@@ -46,8 +46,8 @@ class VolumeHierarchy {
     corners_.resize(cover_ == Cover::boxes ? std::size_t(topology_.leaf_size) * corners_each * 3 : 0);
   }
 
-  /// Makes all volumes from positions [vertex][3], readable up to one scalar past the end: leaves from what
-  /// they have to contain, parents from their children. O(nodes + leaf vertices).
+  /// Computes all volumes from positions [vertex][3], readable up to one scalar past the end: leaves from
+  /// their geometry, parents from their children. O(nodes + leaf vertices).
   void refit(const S* positions) {
     for (std::uint32_t node = topology_.size(); node-- > 0;)
       if (topology_.nodes[node].is_leaf())
@@ -56,21 +56,22 @@ class VolumeHierarchy {
         enclose_children(node);
   }
 
-  /// Exchanges two subtrees (SubtreeSwap::swap) and makes the volumes of the two parents and of all nodes
-  /// above them anew; all volumes must be current. O(what the exchange changes + depth). The first call since
-  /// the topology was assigned copies it.
+  /// Exchanges two subtrees (SubtreeSwap::swap) and recomputes the volumes of the two parents and of all
+  /// nodes above them; all volumes must be current. O(changed nodes + depth). The first call after `assign`
+  /// copies the topology.
   void swap(std::uint32_t first, std::uint32_t second) {
     keep_start();
     swap_.swap(topology_, first, second, edit_);
     follow_edit();
   }
-  /// The same for a tree rotation (SubtreeSwap::rotate).
+  /// Does the same for a tree rotation (SubtreeSwap::rotate).
   void rotate(std::uint32_t child, std::uint32_t grandchild) {
     keep_start();
     swap_.rotate(topology_, child, grandchild, edit_);
     follow_edit();
   }
-  /// Takes back all exchanges: the topology is the one last assigned. Volumes are to be refitted.
+  /// Undoes all exchanges: restores the topology of the last `assign`. The volumes must be refitted
+  /// afterwards.
   void restore() {
     if (start_) topology_ = *start_;
   }
@@ -79,13 +80,13 @@ class VolumeHierarchy {
   bool empty() const { return topology_.empty(); }
   const V& volume(std::uint32_t node) const { return volumes_[node]; }
   void set_volume(std::uint32_t node, const V& volume) { volumes_[node] = volume; }
-  /// The vertices of a leaf, each once, ascending.
+  /// Returns the vertices of a leaf, each once, ascending.
   std::span<const std::uint32_t> vertices(std::uint32_t leaf) const {
     const Range range = leaf_vertices_[topology_.nodes[leaf].first()];
     return {vertices_.data() + range.begin, vertices_.data() + range.end};
   }
   std::size_t leaf_vertex_count() const { return vertices_.size(); }
-  /// A copy of all volumes, for audits.
+  /// Returns a copy of all volumes, for audits.
   std::vector<V> volumes() const { return volumes_; }
 
   std::size_t bytes() const {
@@ -126,7 +127,7 @@ class VolumeHierarchy {
     carried_.clear();
     for (const auto& move : edit_.moved) carried_.push_back(volumes_[move.from]);
     for (std::size_t i = 0; i < carried_.size(); ++i) volumes_[edit_.moved[i].to] = carried_[i];
-    // From the larger id up, then from the smaller: the larger may lie below the smaller.
+    // Walks up from the larger id first, because the larger may lie below the smaller.
     std::sort(edit_.changed.begin(), edit_.changed.end(), std::greater<>());
     for (std::uint32_t node : edit_.changed)
       for (;; node = topology_.parents[node]) {
@@ -141,7 +142,7 @@ class VolumeHierarchy {
   Cover cover_;
   std::vector<V> volumes_;  ///< one per node
   std::vector<Range>
-      leaf_vertices_;  ///< of the leaf whose first entry this is: leaves change their nodes' ids
+      leaf_vertices_;  ///< indexed by the leaf's first entry, because exchanges change the ids of leaves
   std::vector<std::uint32_t> vertices_;
   std::vector<S> corners_;
   SubtreeSwap swap_;
@@ -150,14 +151,14 @@ class VolumeHierarchy {
 };
 
 namespace detail {
-/// For a class with a member of that name.
+/// Uses the member of that name if the class has one.
 template <BoundingVolume V>
 double protrusion_of(const V& volume, const double* point) {
   return protrusion(volume, point);
 }
 }  // namespace detail
 
-/// The volumes of a hierarchy as an audit asks for them.
+/// The volumes of a hierarchy in the form that audits query.
 template <BoundingVolume V>
 class AuditedVolumes final : public AuditVolumes {
  public:

@@ -10,12 +10,12 @@
 
 namespace kbvh {
 
-/// A plain strategy over bounding volumes of any kind: every volume of a moving body is made anew at each
-/// frame, leaves first, and the one traversal (core/topology/traversal.hpp) compares them. `Volumes` are the
-/// kinds that an instance can be made with. Nothing is specialised for speed: the wide hierarchies of boxes
-/// are for that.
+/// A simple strategy over bounding volumes of any kind: it recomputes every volume of a moving body at each
+/// frame, leaves first, and compares volumes by the template traversal (core/topology/traversal.hpp).
+/// `Volumes` are the kinds of which an instance uses one. Nothing is specialised for speed; the wide
+/// hierarchies of boxes are the fast special case.
 ///
-/// Within one body the traversal meets each two leaves in both orders; one is dropped.
+/// Within one body the traversal meets each two leaves in both orders; one order is dropped.
 template <class S, class Count, BoundingVolume... Volumes>
 class VolumeStrategy : public CountedStrategy<S, Count>,
                        public TakesPlanChanges<S>,
@@ -27,7 +27,7 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
  public:
   static constexpr Foresight foresight = Foresight::none;
 
-  /// `kind` is the index among Volumes of the kind to use.
+  /// `kind` is the index of the used kind among Volumes.
   VolumeStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                  std::size_t kind)
       : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
@@ -40,8 +40,8 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
     });
   }
 
-  /// Starts over with the topologies of the start, or of the last change of geometry: what exchanged subtrees
-  /// since then is taken back.
+  /// Restarts with the initial topologies, or those of the last change of geometry: undoes all later
+  /// exchanges of subtrees.
   void reset_to(double /*t*/) override {
     plans_changed_ = false;
     near_bodies_.start_over();
@@ -89,15 +89,14 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
     return status;
   }
 
-  /// Positions are all it reads: no body is at rest for certain any more.
+  /// The strategy reads only positions; afterwards no body is certain to rest.
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     plans_changed_ = true;
   }
 
-  /// Edits the topologies locally, guided by boxes, and lays them out anew: O(nodes) for each body that
-  /// changes.
+  /// Edits the topologies locally, guided by boxes, and lays them out again: O(nodes) for each changed body.
   void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
-    plans_changed_ = true;  // new vertices have plans of their own
+    plans_changed_ = true;  // new vertices have their own plans
     on_bodies([&](auto& bodies) {
       for (const BodyChange& own : body_changes(this->scene_, change)) {
         auto& body = bodies[own.body];
@@ -125,7 +124,7 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
   }
 
  protected:
-  /// Calls work(bodies) with the hierarchies of all bodies, of the kind in use.
+  /// Calls work(bodies) with the hierarchies of all bodies, of the used kind.
   template <class Work>
   decltype(auto) on_bodies(Work&& work) {
     return std::visit(std::forward<Work>(work), bodies_);
@@ -136,7 +135,7 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
   }
 
  private:
-  /// A bounds view of volumes that are there.
+  /// A bounds view of stored volumes.
   template <class V>
   struct Stored {
     void ensure(std::uint32_t /*node*/) const {}
@@ -148,7 +147,7 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
     return {hierarchy};
   }
 
-  /// Boxes for the bodies of a pair that is answered by boxes; but a point is its box.
+  /// Returns `boxes` for the bodies of pairs that are answered by boxes; a point equals its box.
   static std::vector<Cover> covers(const SceneView<S>& scene) {
     const auto kind = [&](std::uint32_t body) { return scene.primitives(body).kind; };
     std::vector<Cover> covers(scene.body_count(), Cover::vertices);

@@ -6,7 +6,7 @@
 
 namespace kbvh {
 
-/// Puts pairs of two different leaves before those of a leaf with itself; returns how many they are.
+/// Moves pairs of two different leaves before pairs of a leaf with itself; returns the number of the former.
 inline std::size_t different_leaves_first(LeafSlot* pairs, std::size_t count) {
   std::size_t different = 0;
   for (std::size_t i = 0; i < count; ++i) {

@@ -8,10 +8,11 @@
 namespace kbvh {
 
 namespace {
-/// Below this a loop over all pairs, which compares roots, costs less than a search.
+/// Below this number a loop over all pairs, which compares roots, costs less than a search.
 constexpr std::size_t few_pairs = 256;
 constexpr std::uint32_t pairs_per_body = 4;
-/// The tree is built anew when a search makes so many times the tests that it made when the tree was new.
+/// The tree is rebuilt when a search makes this many times the tests of the first search after the last
+/// build.
 constexpr double worn_out = 2;
 
 bool by_bodies(const BodyPair& a, const BodyPair& b) {
@@ -54,7 +55,7 @@ NearBodies::NearBodies(std::span<const BodyPair> pairs, std::uint32_t body_count
     primitives_.add(std::vector<std::uint32_t>{2 * body, 2 * body + 1});
 }
 
-/// An empty box becomes a point of the body before it: such a body is in no pair that counts.
+/// An empty box becomes a point of the preceding body: pairs with such a body never count.
 void NearBodies::put(std::uint32_t body, const Box<double>& box) {
   double* const corners = corners_.data() + std::size_t(6) * body;
   empty_[body] = box.empty() ? 1 : 0;
@@ -96,7 +97,7 @@ void NearBodies::search(std::uint64_t& tests) {
   if (!order_.empty()) std::sort(near_.begin(), near_.end());
 }
 
-/// Every pair of the scene between two bodies, of which the first has the smaller number.
+/// Appends every pair of the scene between two bodies, the first of which has the smaller number.
 void NearBodies::append_pairs(std::uint32_t first, std::uint32_t second) {
   const auto index = [&](std::uint32_t place) { return order_.empty() ? place : order_[place]; };
   std::uint32_t low = begin_[first], high = begin_[first + 1];

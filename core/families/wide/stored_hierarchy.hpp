@@ -10,15 +10,15 @@
 
 namespace kbvh {
 
-/// Box of a leaf from its unique vertices; 4 lanes, of which the last is padding.
+/// Computes the box of a leaf from its unique vertices; 4 lanes, the last of which is padding.
 template <class S>
 inline Box<S> leaf_box(std::span<const std::uint32_t> vertices, const S* positions) {
   return LaneBox<S>::of(vertices, positions).box();
 }
 
-/// Everything that strategies with stored boxes share, the query included: `update(body)` is all that a
-/// derived class must say. Bodies that cannot move are brought up to date at `reset` only. Most strategies
-/// derive from StoredHierarchyStrategy, which takes changes of plans, too.
+/// The shared part of strategies with stored boxes, including the query: a derived class only implements
+/// `update(body)`. Bodies that cannot move are updated at `reset` only. Most strategies derive from
+/// StoredHierarchyStrategy, which also accepts changes of plans.
 template <class S, class Count>
 class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
  public:
@@ -83,11 +83,11 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
  protected:
   /// Brings one moving body's bounds to the current time.
   virtual void update(std::uint32_t body) = 0;
-  /// Edits the topologies locally and lays the hierarchies out anew: O(nodes) for each body that changes.
-  /// What a strategy that declares geometry changes does when they come, unless it builds anew.
+  /// Edits the topologies locally and lays the hierarchies out again: O(nodes) for each changed body. For
+  /// strategies that declare geometry changes and do not rebuild.
   void edit_geometry(const GeometryChange<S>& change) {
-    plans_changed_ = true;  // new vertices have plans of their own
-    swept_.reset();         // on the topologies of before
+    plans_changed_ = true;  // new vertices have their own plans
+    swept_.reset();         // it uses the old topologies
     for (const BodyChange& own : body_changes(this->scene_, change)) {
       WideHierarchy<S>& hierarchy = hierarchies_[own.body];
       const Primitives& primitives = this->scene_.primitives(own.body);
@@ -100,10 +100,10 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
       update(own.body);
     }
   }
-  /// Called when a body's hierarchy has another topology than before, for what is kept beside it.
+  /// Called when the topology of a body's hierarchy has changed, to update dependent data.
   virtual void topology_changed(std::uint32_t /*body*/) {}
-  /// The broad phase of contacts by one refit to both ends of the motion, on the topologies as they are at
-  /// its first call: what a strategy that declares contacts can do in `swept_pairs`.
+  /// Implements the broad phase of contacts by one refit to both ends of the motion, on the topologies at its
+  /// first call: for strategies that declare contacts, in `swept_pairs`.
   void sweep(std::span<const S* const> before, PairBuffer& out) {
     if (!swept_)
       swept_.emplace(
@@ -119,7 +119,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
     swept_->pairs(query_, out, tests);
     this->count_.add(Counter::box_tests, tests);
   }
-  /// Calls work(pair) for each pair of the scene's bodies whose boxes overlap, or for all where these are
+  /// Calls work(pair) for each pair of the scene's bodies whose boxes overlap, or for all pairs if there are
   /// few.
   template <class Work>
   void for_near_bodies(std::uint64_t& tests, Work&& work) {
@@ -134,7 +134,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
   NearBodies near_bodies_;
   WideQuery<S> query_;
   bool plans_changed_ = false;
-  std::optional<SweptHierarchies<S>> swept_;  ///< made when contacts are first asked for
+  std::optional<SweptHierarchies<S>> swept_;  ///< made at the first request for contacts
 };
 
 /// The same for plans that change, too.
@@ -144,7 +144,7 @@ class StoredHierarchyStrategy : public FixedPlansHierarchyStrategy<S, Count>, pu
   using FixedPlansHierarchyStrategy<S, Count>::FixedPlansHierarchyStrategy;
 
  protected:
-  /// Positions are all it reads: nothing to do but to remember that no body is at rest for certain.
+  /// The strategy reads only positions; it only records that no body is certain to rest.
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     this->plans_changed_ = true;
   }

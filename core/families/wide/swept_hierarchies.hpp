@@ -8,13 +8,13 @@
 
 namespace kbvh {
 
-/// Boxes that hold everything at both ends of a motion, and so, if it is linear, all the way: hierarchies
-/// over primitives with every vertex twice, where it was and where it is, refitted bottom-up. Boxes are not
-/// rounded.
+/// Boxes that contain everything at both ends of a motion and therefore, if the motion is linear, throughout:
+/// hierarchies over primitives with every vertex twice, at its old and its new position, refitted bottom-up.
+/// Boxes are not rounded.
 template <class S>
 class SweptHierarchies {
  public:
-  /// On the topologies of other hierarchies of the scene's bodies: hierarchy_of(body).
+  /// Uses the topologies of other hierarchies of the scene's bodies: hierarchy_of(body).
   template <class HierarchyOf>
   SweptHierarchies(const SceneView<S>& scene, const HierarchyOf& hierarchy_of)
       : scene_(scene),
@@ -40,7 +40,7 @@ class SweptHierarchies {
     }
   }
 
-  /// Refits to a motion from `before` (positions of each body) to where the motion view stands now.
+  /// Refits to a motion from `before` (positions of each body) to the current positions of the motion view.
   void refit(std::span<const S* const> before, const SampledMotion<S>& motion) {
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
       const std::size_t size = std::size_t(3) * scene_.vertex_count(body);
@@ -51,7 +51,7 @@ class SweptHierarchies {
     }
   }
 
-  /// Appends the pairs of primitives whose boxes overlap; within a body those that share a vertex, too.
+  /// Appends the pairs of primitives whose boxes overlap; within a body also those that share a vertex.
   void pairs(WideQuery<S>& query, PairBuffer& out, std::uint64_t& tests) {
     const auto box_of = [&](std::uint32_t body) {
       return hierarchies_[body].empty() ? Box<double>{} : to_double(hierarchies_[body].box(0));

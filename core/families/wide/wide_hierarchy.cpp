@@ -11,8 +11,8 @@ namespace kbvh {
 
 namespace {
 
-/// Leaf pairs that are collected before they are turned into pairs of primitives: few enough to stay in the
-/// cache.
+/// The number of leaf pairs that are collected before they are turned into pairs of primitives: few enough to
+/// stay in the cache.
 constexpr std::size_t leaf_pair_room = 2048;
 constexpr std::size_t chunk_room = 2048;
 
@@ -80,7 +80,8 @@ template <class S>
 void WideHierarchy<S>::find_subtrees() {
   subtrees_.clear();
   above_subtrees_.clear();
-  // Descendants lie together if nodes are numbered depth first, siblings in one row; others are not divided.
+  // Descendants are contiguous if nodes are numbered depth first with siblings in one row; other topologies
+  // are not divided.
   std::vector<std::uint32_t> size(nodes_.size(), 1);
   for (std::uint32_t n = node_count(); n-- > 0;) {
     const WideNode& node = nodes_[n];
@@ -332,7 +333,7 @@ typename WideQuery<S>::Wanted WideQuery<S>::step(const LazySide& a, const LazySi
     lazy_.found = 0;
     grow(lazy_);
   }
-  // What was found last before a wait, when nothing was left to do after it.
+  // Processes the pairs found just before a pause, if no other work followed.
   if (lazy_.found != 0)
     leaves_to_pairs(*a.hierarchy, a.body, *b.hierarchy, b.body, scene, motion, lazy_.found, out, tests);
   lazy_.found = 0;
@@ -343,8 +344,7 @@ typename WideQuery<S>::Wanted WideQuery<S>::step(const LazySide& a, const LazySi
 template <class S>
 void WideQuery<S>::fetch_leaves(WideHierarchy<S>& h, std::uint32_t body, std::size_t side, std::size_t count,
                                 const SceneView<S>& scene, const SampledMotion<S>& motion) {
-  // Positions that are not there yet, all at once: calls with a few vertices each cost more than the
-  // vertices.
+  // Fetches missing positions all at once: calls with a few vertices each cost more than the vertices.
   if (h.padded_leaf_size() == 1 || motion.all_current(body)) return;
   to_fetch_.clear();
   for (std::size_t i = 0; i < count; ++i) {

@@ -1,4 +1,4 @@
-// Chooses the tables of this room's kernels.
+// Selects the tables of this room's kernels.
 #include "core/families/wide/kernels/bounds.hpp"
 #include "core/families/wide/kernels/wide_inflate.hpp"
 #include "core/families/wide/kernels/wide_linear.hpp"

@@ -3,17 +3,17 @@
 #include "core/geometry/filter_bounds.hpp"
 #include "core/kernels/point_lanes.hpp"
 
-// The first two stages of core/geometry/triangle_triangle.cpp, one pair in each lane. Stage 1 finds the six
-// signs of the corners against the planes; most pairs end there. The others are compacted, their corners
-// reordered by the signs, and stage 2 finds whether the intervals on the common line overlap.
+// The first two stages of core/geometry/triangle_triangle.cpp, one pair per lane. Stage 1 computes the six
+// signs of the corners against the planes and decides most pairs. The remaining pairs are compacted and their
+// corners reordered by the signs. Stage 2 tests whether the intervals on the common line overlap.
 
 namespace kbvh {
 namespace {
 
 // ---- Filtered determinants --------------------------------------------------------------------------------
 
-/// A cross product and, for each of its components, the sum of the absolute products (and what float's
-/// underflow needs).
+/// A cross product and, for each of its components, the sum of the absolute products (plus the underflow term
+/// for float).
 template <class S>
 struct Cross {
   Point<S> value, magnitude;
@@ -44,8 +44,8 @@ KBVH_INLINE Values<S> error_bound(Values<S> permanent) {
 
 // ---- Stage 1 ----------------------------------------------------------------------------------------------
 
-/// Of three corners against a plane: which are on the negative side (highest bits), whether that is certain
-/// for all three (all bits), and whether they are on different sides (highest bits).
+/// Three corners against a plane: which lie on the negative side (highest bits), whether that is certain for
+/// all three (all bits), and whether they lie on different sides (highest bits).
 template <class S>
 struct Sides {
   Words<S> negative[3];
@@ -53,8 +53,8 @@ struct Sides {
   Words<S> differ;
 };
 
-/// orient3d of a plane, given by two edges from one of its points, and three corners, given relative to that
-/// point. One bound holds for the three errors: the permanent is the largest of the three.
+/// Computes orient3d of a plane, given by two edges from one of its points, and three corners, given relative
+/// to that point. One bound holds for all three errors: the permanent is the largest of the three.
 template <class S>
 KBVH_INLINE Sides<S> sides(const Point<S>& edge, const Point<S>& other_edge, const Point<S>& d0,
                            const Point<S>& d1, const Point<S>& d2) {
@@ -67,8 +67,8 @@ KBVH_INLINE Sides<S> sides(const Point<S>& edge, const Point<S>& other_edge, con
   return {{s0, s1, s2}, greater<S>(least, bound), (s0 ^ s1) | (s0 ^ s2)};
 }
 
-/// What stage 1 finds of the pairs of a register, one bit each; and where all signs are certain, those of the
-/// corners: bit i for corner i of the pair on the negative side of the other triangle's plane.
+/// The results of stage 1 for the pairs of a register, one bit per pair; and where all signs are certain, the
+/// signs of the corners: bit i for corner i of the pair on the negative side of the other triangle's plane.
 template <class S>
 struct Classes {
   Words<S> signs;
@@ -95,12 +95,12 @@ KBVH_INLINE Classes<S> classify(const TrianglePair<S>* pairs) {
 
 // ---- Stage 2 ----------------------------------------------------------------------------------------------
 
-/// Corners of a pair as stage 2 wants them (see interval_ends in triangle_triangle.cpp).
+/// The corners of a pair in the order that stage 2 expects (see interval_ends in triangle_triangle.cpp).
 struct Order {
   std::uint8_t p, p_low, p_high, q, q_low, q_high;
 };
 
-/// The corner that is alone on its side of the plane, and the next two in cyclic order.
+/// The corner that lies alone on its side of the plane, and the next two in cyclic order.
 struct Apex {
   std::uint8_t corner, next, last;
   bool negative;
@@ -114,8 +114,8 @@ constexpr Apex apex(unsigned negatives) {
 
 /// With direction = side(p) side(q), the intervals overlap iff direction orient3d(p, p_low, q, q_high) >= 0
 /// and direction orient3d(p, p_high, q, q_low) <= 0. On side +1 the edge to the next corner ends the interval
-/// of a above, that of b below; on side -1 conversely. Where direction is -1, low and high are exchanged once
-/// more, which turns both conditions.
+/// of a above and the interval of b below; on side -1 conversely. Where direction is -1, low and high are
+/// exchanged once more, which reverses both conditions.
 struct Orders {
   Order order[64];
 };
@@ -136,7 +136,7 @@ constexpr Orders make_orders() {
 }
 constexpr Orders all_orders = make_orders();
 
-/// orient3d(p, end, q, last) and its error bound; q is given relative to p.
+/// Computes orient3d(p, end, q, last) and its error bound; q is given relative to p.
 template <class S>
 struct Orientation {
   Values<S> value, bound;
@@ -149,7 +149,7 @@ KBVH_INLINE Orientation<S> orientation(const Point<S>& p, const Point<S>& end, c
   return {dot(normal.value, d), error_bound<S>(dot(normal.magnitude, absolute(d)))};
 }
 
-/// The pairs of a register whose intervals certainly overlap, and those whose certainly do not.
+/// The pairs of a register whose intervals certainly overlap, and those whose intervals certainly do not.
 struct Overlap {
   unsigned intersect, separate;
 };
@@ -164,10 +164,10 @@ KBVH_INLINE Overlap overlap(const S* const (&rows)[6][lanes<S>]) {
 
 // ---- Both -------------------------------------------------------------------------------------------------
 
-/// Pairs that pass through both stages together; their indices fit into bytes.
+/// The number of pairs that pass through both stages together; their indices fit into bytes.
 constexpr std::size_t block = 128;
 
-/// The places of the set bits of 4, and how many there are.
+/// The positions of the set bits of 4 bits, and their number.
 struct Selections {
   std::uint8_t places[16][4];
   std::uint8_t size[16];
@@ -181,12 +181,12 @@ constexpr Selections make_selections() {
 }
 constexpr Selections selections = make_selections();
 
-/// Indices of pairs; room for a register and four more than can be selected.
+/// Indices of pairs; room for a register plus four more than can be selected.
 struct Selected {
   std::uint8_t index[block + 20];
   std::size_t size = 0;
 
-  /// Appends first + i for each set bit i of `mask`, without branches, which could not be predicted.
+  /// Appends first + i for each set bit i of `mask`, without branches, which would be mispredicted.
   template <std::size_t bit_count>
   KBVH_INLINE void append(std::size_t first, unsigned mask) {
     for (std::size_t at = 0; at < bit_count; at += 4) {
@@ -227,7 +227,7 @@ std::size_t filter_block(const TrianglePair<S>* pairs, std::size_t count, Filter
     stage1(rest, at, (1U << (count - at)) - 1);
   }
 
-  // The last register is filled up with its last pair.
+  // Fills the last register up with its last pair.
   for (std::size_t k = 0; survivors.size > 0 && k < width; ++k)
     survivors.index[survivors.size + k] = survivors.index[survivors.size - 1];
   for (std::size_t first = 0; first < survivors.size; first += width) {

@@ -8,18 +8,18 @@
 
 namespace kbvh {
 
-/// What the filter says of a pair.
+/// The verdict of the filter on a pair.
 enum class FilteredVerdict : std::uint8_t {
   separate = 0,   ///< certainly
   intersect = 1,  ///< certainly
-  open = 2,       ///< exact arithmetic has to decide
+  open = 2,       ///< left to exact arithmetic
 };
 
-/// Writes one verdict for each of `count` pairs and returns how many are open. Reads one scalar past each
-/// corner.
+/// Writes one verdict per pair for `count` pairs and returns the number of open pairs. Reads one scalar past
+/// each corner.
 ///
-/// Double pairs are filtered by the operations of triangles_intersect; float pairs in float, by a coarser
-/// bound: what is left open may still be decided by the filter in double.
+/// Double pairs are filtered by the operations of triangles_intersect. Float pairs are filtered in float,
+/// with a coarser bound: the filter in double may still decide open pairs.
 struct TriangleKernels {
   std::size_t (*filter_float)(const TrianglePair<float>* pairs, std::size_t count, FilteredVerdict* verdicts);
   std::size_t (*filter_double)(const TrianglePair<double>* pairs, std::size_t count,

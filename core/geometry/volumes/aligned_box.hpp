@@ -5,8 +5,8 @@
 
 #include "core/geometry/volumes/bounding_volume.hpp"
 
-// Box<S> as a bounding volume. Nothing is rounded but areas and distances: the box of points has their least
-// and largest coordinates, so a box of boxes is the box of all points below, and a refit from below is tight.
+// Box<S> as a bounding volume. Only areas and distances are rounded: the box of points has their least and
+// largest coordinates, so a box of boxes is the box of all points below, and a bottom-up refit is tight.
 
 namespace kbvh {
 
@@ -23,7 +23,7 @@ void enclose(Box<S>& box, std::span<const Box<S>> children) {
   box = all;
 }
 
-/// The furthest along one axis; a difference of doubles is 0 only if they are equal.
+/// Returns the largest protrusion along one axis; a difference of doubles is 0 only if they are equal.
 template <class S>
 double protrusion(const Box<S>& box, const double* point) {
   if (box.empty()) return std::numeric_limits<double>::infinity();

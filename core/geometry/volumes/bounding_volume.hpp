@@ -9,7 +9,7 @@
 
 namespace kbvh {
 
-/// Points as rows of an array of positions [point][3]: all of them, or those that a list names.
+/// Selects rows of an array of positions [point][3]: all of them, or those in a list.
 template <class S>
 class PointSet {
  public:
@@ -27,7 +27,7 @@ class PointSet {
   std::size_t size_;
 };
 
-/// The scalar of a volume's numbers: its member type Scalar, or that of a Box.
+/// The scalar of a volume's numbers: its member type Scalar, or the scalar of a Box.
 template <class V>
 struct VolumeScalarOf {
   using type = typename V::Scalar;
@@ -39,12 +39,12 @@ struct VolumeScalarOf<Box<S>> {
 template <class V>
 using VolumeScalar = typename VolumeScalarOf<V>::type;
 
-/// A bounding volume: a closed convex set of points of space that a hierarchy keeps around what lies below a
-/// node. Models: Box<S> (aligned_box.hpp), Dop<S, K> (dop.hpp), Sphere<S> (sphere.hpp), Obb<S> (obb.hpp),
-/// each in float and double.
+/// A bounding volume: a closed convex set of points that a hierarchy keeps around the geometry below a node.
+/// Models: Box<S> (aligned_box.hpp), Dop<S, K> (dop.hpp), Sphere<S> (sphere.hpp), Obb<S> (obb.hpp), each in
+/// float and double.
 ///
-/// A model is a plain value whose numbers are taken as exact: they say which real points are in the set. All
-/// operations are conservative under rounding with regard to that set:
+/// A model is a plain value whose numbers are taken as exact: they define which real points are in the set.
+/// All operations are conservative under rounding with regard to that set:
 ///   V{}                     the empty volume: contains nothing, overlaps nothing
 ///   fit(v, points)          v becomes a volume that contains every point of a set, exactly
 ///   enclose(v, children)    v becomes a volume that contains every volume of a list, exactly
@@ -54,7 +54,7 @@ using VolumeScalar = typename VolumeScalarOf<V>::type;
 ///                           exactly; otherwise a positive distance, correct to rounding; infinite if empty
 ///   enclosing_box(v)        a Box<double> that contains the volume
 /// Each model states which of its operations round outwards, and by how much. Numbers must be admissible
-/// (`admissible_magnitude`). A volume occupies sizeof(V) bytes and nothing else.
+/// (`admissible_magnitude`). A volume occupies sizeof(V) bytes and owns no other memory.
 template <class V>
 concept BoundingVolume = std::is_trivially_copyable_v<V> && std::default_initializable<V> &&
     requires(V& v, const V& a, const V& b, PointSet<VolumeScalar<V>> points, std::span<const V> children,

@@ -13,9 +13,9 @@ namespace kbvh {
 /// A direction of slabs; each component is -1, 0 or 1.
 using SlabDirection = std::array<int, 3>;
 
-/// The directions of a k-DOP with K sides, so K / 2 of them, after Klosowski et al. 1998: the axes, and for
-/// 14 the diagonals of the unit cube (its corners are cut off), for 18 those of its faces (its edges are cut
-/// off), for 26 both.
+/// The K / 2 directions of a k-DOP with K sides, after Klosowski et al. 1998: the axes; for 14 sides also the
+/// diagonals of the unit cube (they cut off its corners); for 18 sides instead the diagonals of its faces
+/// (they cut off its edges); for 26 sides both.
 template <int K>
 constexpr std::array<SlabDirection, std::size_t(K / 2)> slab_directions() {
   static_assert(K == 14 || K == 18 || K == 26, "k-DOPs have 14, 18 or 26 sides");
@@ -32,10 +32,10 @@ constexpr std::array<SlabDirection, std::size_t(K / 2)> slab_directions() {
 /// A discrete oriented polytope with K sides (Klosowski, Held, Mitchell, Sowizral and Zikan 1998): the points
 /// p with lower[i] <= n_i . p <= upper[i] for fixed directions n_i that are not normalised. K scalars.
 ///
-/// Rounding: n . p is summed exactly and rounded outwards to S, to the next number that is not inside; sides
-/// along the axes are exact. All else is minima and maxima: a k-DOP of k-DOPs is the k-DOP of all points
-/// below, so a refit from below is tight. `overlap` compares slab by slab (K / 2 of the directions that could
-/// separate two polytopes), so it errs to true for some that are apart.
+/// Rounding: n . p is summed exactly and rounded outwards to the nearest S that does not cut the point off;
+/// sides along the axes are exact. All other operations are minima and maxima: a k-DOP of k-DOPs is the k-DOP
+/// of all points below, so a bottom-up refit is tight. `overlap` compares slab by slab (K / 2 of the
+/// directions that could separate two polytopes), so it errs to true for some disjoint polytopes.
 template <class S, int K>
 struct Dop {
   using Scalar = S;
@@ -51,7 +51,7 @@ struct Dop {
   bool empty() const { return !(lower[0] <= upper[0]); }
   bool operator==(const Dop&) const = default;
 
-  /// n . p, exactly.
+  /// Computes n . p exactly.
   template <class T>
   static outward::Rounded along(std::size_t slab, const T* p) {
     const SlabDirection& n = directions[slab];
@@ -65,7 +65,7 @@ void fit(Dop<S, K>& dop, PointSet<S> points) {
   for (std::size_t i = 0; i < points.size(); ++i)
     for (std::size_t slab = 0; slab < fitted.slabs; ++slab) {
       const outward::Rounded at = Dop<S, K>::along(slab, points[i]);
-      // Rounding is monotone: what is inside by the nearest double stays inside.
+      // Rounding is monotone: a point that is inside by the nearest double stays inside.
       if (at.nearest <= double(fitted.lower[slab]))
         fitted.lower[slab] = std::min(fitted.lower[slab], outward::down<S>(at));
       if (at.nearest >= double(fitted.upper[slab]))
@@ -93,7 +93,8 @@ bool overlap(const Dop<S, K>& a, const Dop<S, K>& b) {
   return !apart;
 }
 
-/// The surface area of the polytope itself: each side's polygon is clipped by all other slabs. O(K^2).
+/// Computes the surface area of the polytope itself: each side's polygon is clipped by all other slabs.
+/// O(K^2).
 template <class S, int K>
 double surface_area(const Dop<S, K>& dop) {
   if (dop.empty()) return 0;
@@ -106,7 +107,7 @@ double surface_area(const Dop<S, K>& dop) {
   return slab_area(slabs);
 }
 
-/// The largest distance from a slab's planes.
+/// Returns the largest distance to a slab's planes.
 template <class S, int K>
 double protrusion(const Dop<S, K>& dop, const double* point) {
   if (dop.empty()) return std::numeric_limits<double>::infinity();
@@ -123,7 +124,7 @@ double protrusion(const Dop<S, K>& dop, const double* point) {
   return furthest;
 }
 
-/// The slabs along the axes.
+/// Returns the box given by the slabs along the axes.
 template <class S, int K>
 Box<double> enclosing_box(const Dop<S, K>& dop) {
   Box<double> box;

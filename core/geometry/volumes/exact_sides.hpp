@@ -2,12 +2,13 @@
 
 namespace kbvh {
 
-/// The exact sign of |p - centre| - radius: 1 outside, 0 on the sphere, -1 inside. Filtered; what the filter
-/// leaves is decided in rational arithmetic (microseconds). Points are 3 doubles; the radius is not negative.
+/// Returns the exact sign of |p - centre| - radius: 1 outside, 0 on the sphere, -1 inside. A filter decides
+/// most cases, rational arithmetic (microseconds) the others. Points are 3 doubles; the radius is not
+/// negative.
 int side_of_sphere(const double* centre, double radius, const double* p);
 
-/// The exact sign of |axis . (p - centre)| - half: 1 outside the slab, 0 on one of its planes, -1 inside.
-/// Filtered in the same way.
+/// Returns the exact sign of |axis . (p - centre)| - half: 1 outside the slab, 0 on one of its planes, -1
+/// inside. Filtered in the same way.
 int side_of_slab(const double* axis, const double* centre, double half, const double* p);
 
 }  // namespace kbvh

@@ -14,15 +14,15 @@ namespace kbvh {
 /// An oriented box (Gottschalk, Lin and Manocha 1996): the points p with |axis_i . (p - centre)| <= half_i.
 /// Empty if half[0] is negative. 15 scalars.
 ///
-/// The axes are unit vectors at right angles, rounded to S, and the set is defined by the rounded axes: so a
-/// point can be decided exactly, and the box is a parallelepiped by an angle of some units in the last place.
+/// The axes are orthonormal vectors rounded to S, and the rounded axes define the set. A point can therefore
+/// be decided exactly, and the box is a parallelepiped whose angles are off by some units in the last place.
 ///
 /// Rounding: half_i is measured around the rounded centre along the rounded axes, in double with a bound on
-/// its error (16 units of double of the sum of absolute products), and then rounded up to S. Where an extent
-/// of the box is asked for (`enclose`, `overlap`, `enclosing_box`) the halves are first enlarged by as much
-/// as the axes deviate from right angles (`obb_reach`). `overlap` tests 15 axes in double with bounds on all
-/// errors and errs to true within these. A box of boxes is larger than the box of the points below: a refit
-/// from below is conservative, not tight.
+/// its error (16 units of double of the sum of absolute products), and then rounded up to S. Operations that
+/// need an extent of the box (`enclose`, `overlap`, `enclosing_box`) first enlarge the halves by the axes'
+/// deviation from right angles (`obb_reach`). `overlap` tests 15 axes in double with bounds on all errors and
+/// errs to true within these bounds. A box of boxes is larger than the box of the points below: a bottom-up
+/// refit is conservative, not tight.
 template <class S>
 struct Obb {
   using Scalar = S;
@@ -34,13 +34,13 @@ struct Obb {
   bool operator==(const Obb&) const = default;
 };
 
-/// The same box in double, exactly, with the halves that its extent needs: the box lies within centre + sum
-/// of u_i axis_i, |u_i| <= reach_i.
+/// The same box in double, exactly, with halves that cover its extent: the box lies within centre + sum of
+/// u_i axis_i, |u_i| <= reach_i.
 struct ObbReach {
   double centre[3], axis[3][3], reach[3];
 };
-/// O(1). If the axes deviate from right angles by E = A A^T - I, then u = s - E u for s_i = axis_i . (p -
-/// centre), so |u_i| <= half_i + 1.1 sum_j |E_ij| half_j for the small E of rounded axes.
+/// Computes the reach. O(1). If the axes deviate from right angles by E = A A^T - I, then u = s - E u for s_i
+/// = axis_i . (p - centre), so |u_i| <= half_i + 1.1 sum_j |E_ij| half_j for the small E of rounded axes.
 template <class S>
 ObbReach obb_reach(const Obb<S>& box) {
   ObbReach result;
@@ -61,7 +61,7 @@ ObbReach obb_reach(const Obb<S>& box) {
 }
 
 namespace detail {
-/// At least the largest |axis . (p - from)| over the points p of a box.
+/// Returns an upper bound of |axis . (p - from)| over the points p of a box.
 inline double furthest_along(const double* axis, const double* from, const ObbReach& box) {
   double way[3];
   outward::difference(box.centre, from, way);
@@ -85,7 +85,7 @@ void set_frame(Obb<S>& box, const ObbFrame& frame) {
 }
 }  // namespace detail
 
-/// The best of a few frames by surface area: those of Larsson and Källberg 2011 (DiTO-14: triangles and
+/// Fits the best of a few frames by surface area: those of Larsson and Källberg 2011 (DiTO-14: triangles and
 /// tetrahedra of points that are extreme along seven directions), and the coordinate axes. O(points).
 template <class S>
 void fit(Obb<S>& box, PointSet<S> points) {
@@ -121,8 +121,8 @@ void fit(Obb<S>& box, PointSet<S> points) {
   }
 }
 
-/// The best by surface area among the children's own frames, that of their corners as for points, and the
-/// coordinate axes; its extent is measured on the boxes, not on their corners. O(children^2).
+/// Takes the best frame by surface area among the children's frames, the frame of their corners as for
+/// points, and the coordinate axes. The extent is measured on the boxes, not on their corners. O(children^2).
 template <class S>
 void enclose(Obb<S>& box, std::span<const Obb<S>> children) {
   ObbFrames frames;
@@ -180,7 +180,7 @@ void enclose(Obb<S>& box, std::span<const Obb<S>> children) {
 }
 
 namespace detail {
-/// Does a direction keep two boxes apart, for certain? Any direction may be asked, of whatever length: it is
+/// Tests whether a direction certainly separates two boxes. Any direction of any length is allowed; it is
 /// taken as exact.
 inline bool apart_along(const double* direction, const double* way, const ObbReach& a, const ObbReach& b) {
   const outward::Bounded gap = outward::dot(direction, way);
@@ -216,7 +216,7 @@ bool overlap(const Obb<S>& a, const Obb<S>& b) {
   return true;
 }
 
-/// Of a box with right angles.
+/// Computes the surface area as if the axes were at right angles.
 template <class S>
 double surface_area(const Obb<S>& box) {
   if (box.empty()) return 0;
@@ -224,7 +224,7 @@ double surface_area(const Obb<S>& box) {
   return 8 * (x * y + y * z + z * x);
 }
 
-/// The furthest along one axis of the box.
+/// Returns the largest protrusion along one axis of the box.
 template <class S>
 double protrusion(const Obb<S>& box, const double* point) {
   if (box.empty()) return std::numeric_limits<double>::infinity();

@@ -20,7 +20,7 @@ void subtract(const double* a, const double* b, double* result) {
 double largest(const double* v) {
   return std::fmax(std::fabs(v[0]), std::fmax(std::fabs(v[1]), std::fabs(v[2])));
 }
-/// Makes a unit vector; false for the zero vector. Scaled first, so that squares do not vanish.
+/// Normalises a vector; returns false for the zero vector. Scales first, so that squares do not underflow.
 bool normalise(double* v) {
   const double scale = largest(v);
   if (!(scale > 0)) return false;
@@ -29,7 +29,7 @@ bool normalise(double* v) {
   for (int d = 0; d < 3; ++d) v[d] /= length;
   return true;
 }
-/// Any unit vector at a right angle to a unit vector.
+/// Computes any unit vector at a right angle to a unit vector.
 void any_normal(const double* unit, double* result) {
   int least = 0;
   for (int d = 1; d < 3; ++d)
@@ -72,7 +72,7 @@ void ObbFrames::consider(const double* edge, const double* normal, double& least
   double axis[3][3];
   std::copy_n(edge, 3, axis[0]);
   if (!normalise(axis[0])) return;
-  // The normal of a thin triangle is not at a right angle to its edges: twice is enough.
+  // The normal of a thin triangle is not at a right angle to its edges; two orthogonalisations suffice.
   std::copy_n(normal, 3, axis[1]);
   for (int round = 0; round < 2; ++round) {
     const double along = dot(axis[0], axis[1]);
@@ -121,7 +121,7 @@ void ObbFrames::choose() {
     a = least_[i].point;
     b = most_[i].point;
   }
-  if (a == nullptr) return;  // one point: any axes will do
+  if (a == nullptr) return;  // one point: any axes suffice
   subtract(b, a, edge);
   normalise(edge);
   const double* c = nullptr;

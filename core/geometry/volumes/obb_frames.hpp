@@ -5,7 +5,7 @@
 
 namespace kbvh {
 
-/// Axes at right angles, up to rounding in double, and the middle of what is measured along them.
+/// Axes at right angles, up to rounding in double, and the middle of the extents along them.
 struct ObbFrame {
   double axis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   double centre[3] = {0, 0, 0};
@@ -14,11 +14,12 @@ struct ObbFrame {
 
 /// Chooses the frame of an oriented box by the points that are extreme along seven directions (Larsson and
 /// Källberg 2011, "Fast computation of tight-fitting oriented bounding boxes", DiTO-14): a large triangle of
-/// them, and the two tetrahedra on it; the edges and normals of these seven triangles give 21 frames,
-/// compared on the extreme points alone. Nothing here has to be exact: whoever takes a frame measures anew.
+/// these points and the two tetrahedra on it. The edges and normals of these seven triangles give 21 frames,
+/// compared on the extreme points alone. Exactness is not needed here: users of a frame measure the extents
+/// again.
 class ObbFrames {
  public:
-  /// What a set of points takes up along an axis.
+  /// The extent of a set of points along an axis.
   struct Interval {
     double lower = std::numeric_limits<double>::infinity(), upper = -std::numeric_limits<double>::infinity();
     void add(double x) {
@@ -27,14 +28,14 @@ class ObbFrames {
     }
   };
 
-  /// Looks at a point: 3 numbers.
+  /// Updates the extreme points with a point of 3 numbers.
   void add_extreme(const double* point);
   bool empty() const { return count_ == 0; }
-  /// Chooses among the 21 frames; to be called once, after the last point. O(1).
+  /// Chooses among the 21 frames; call it once, after the last point. O(1).
   void choose();
 
-  /// The better of the chosen frame and the coordinate axes by surface area. measure(axis, from) returns the
-  /// Interval of axis . (p - from) over all that the box has to hold.
+  /// Returns the better of the chosen frame and the coordinate axes by surface area. measure(axis, from)
+  /// returns the Interval of axis . (p - from) over the whole set.
   template <class Measure>
   ObbFrame best(const Measure& measure) const {
     ObbFrame frame;
@@ -42,7 +43,7 @@ class ObbFrames {
     improve(frame, chosen_, measure);
     return frame;
   }
-  /// Takes other axes if they give less surface; of equal surfaces the one with the shorter sides.
+  /// Takes other axes if their surface is smaller, or equal with shorter sides.
   template <class Measure>
   void improve(ObbFrame& best, const double (&axis)[3][3], const Measure& measure) const {
     ObbFrame other;

@@ -16,17 +16,17 @@ double scalar_product(const double* a, const double* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// A convex polygon that half-spaces cut; each adds at most one corner.
+/// A convex polygon that is clipped by half-spaces; each clip adds at most one corner.
 class Polygon {
  public:
-  /// The square around a point of a plane, with sides of twice the reach.
+  /// Makes the square around a point of a plane, with half-width `reach`.
   Polygon(const Point& centre, const Point& u, const Point& v, double reach) {
     for (const auto& [along_u, along_v] : {std::pair{-1.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {-1.0, 1.0}}) {
       Point& corner = corners_[count_++];
       for (int d = 0; d < 3; ++d) corner.x[d] = centre.x[d] + reach * (along_u * u.x[d] + along_v * v.x[d]);
     }
   }
-  /// Keeps what has normal . p <= offset.
+  /// Clips the polygon to normal . p <= offset.
   void clip(const double* normal, double offset) {
     Point kept[capacity];
     int kept_count = 0;
@@ -64,7 +64,7 @@ class Polygon {
   int count_ = 0;
 };
 
-/// Two unit vectors that span the plane of a normal.
+/// Computes two unit vectors that span the plane of a normal.
 void span_plane(const double* normal, Point& u, Point& v) {
   const double length = std::sqrt(scalar_product(normal, normal));
   int least = 0;
@@ -83,7 +83,7 @@ void span_plane(const double* normal, Point& u, Point& v) {
 
 double slab_area(std::span<const Slab> slabs) {
   KBVH_ASSERT(slabs.size() >= 3 && slabs.size() <= 32);
-  // Relative to the middle of the box of the first three.
+  // Coordinates are relative to the middle of the box of the first three slabs.
   double middle[3], reach = 0;
   for (int d = 0; d < 3; ++d) {
     middle[d] = 0.5 * slabs[std::size_t(d)].lower + 0.5 * slabs[std::size_t(d)].upper;

@@ -10,10 +10,11 @@ namespace kbvh {
 
 /// A ball: the points at most `radius` from the centre; empty if the radius is negative. 4 scalars.
 ///
-/// Rounding: any centre will do, so only radii are rounded: a distance is computed in double, at most 32
-/// units of double above the exact one, and then rounded up to S. `overlap` errs to true for balls that are
-/// less than 32 units of double apart (of their distance), and where squares underflow in double. A ball of
-/// balls is larger than the ball of the points below: a refit from below is conservative, not tight.
+/// Rounding: the centre may be any point, so only radii are rounded. A distance is computed in double, at
+/// most 32 units of double above the exact one, and then rounded up to S. `overlap` errs to true for balls
+/// that are less than 32 units of double apart (relative to their distance), and where squares underflow in
+/// double. A ball of balls is larger than the ball of the points below: a bottom-up refit is conservative,
+/// not tight.
 template <class S>
 struct Sphere {
   using Scalar = S;
@@ -24,9 +25,9 @@ struct Sphere {
   bool operator==(const Sphere&) const = default;
 };
 
-/// A ball that grows until it holds all points (Ritter 1990): begins with two points that are far apart,
-/// moves towards each point outside; the radius is then measured anew around the last centre. At most some 20
-/// % larger than the smallest ball in practice. O(points).
+/// Grows a ball until it contains all points (Ritter 1990): it starts with two distant points and moves
+/// towards each point outside. The radius is then measured again around the last centre. In practice at most
+/// about 20 % larger than the smallest ball. O(points).
 template <class S>
 void fit(Sphere<S>& sphere, PointSet<S> points) {
   sphere = Sphere<S>{};
@@ -65,8 +66,8 @@ void fit(Sphere<S>& sphere, PointSet<S> points) {
   }
 }
 
-/// The smallest ball around two balls, then around that and the next, and so on; the radius is measured anew
-/// around the last centre. The smallest for two, up to rounding.
+/// Computes the smallest ball around two balls, then around the result and the next ball, and so on. The
+/// radius is measured again around the last centre. The result is the smallest ball for two, up to rounding.
 template <class S>
 void enclose(Sphere<S>& sphere, std::span<const Sphere<S>> children) {
   double centre[3] = {0, 0, 0}, radius = -1, way[3];
@@ -104,8 +105,8 @@ bool overlap(const Sphere<S>& a, const Sphere<S>& b) {
   outward::difference(b.centre, a.centre, way);
   const double distance = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
   const double reach = double(a.radius) + double(b.radius);
-  // Squares: 5 roundings of the distance, 3 of the reach, and these; less than `least` lost by underflow
-  // each.
+  // Squares: 5 roundings of the distance, 3 of the reach, and the squarings themselves; each loses less than
+  // `least` by underflow.
   return !(distance * (1 - 16 * outward::unit_roundoff) >
            reach * reach * (1 + 16 * outward::unit_roundoff) + 16 * outward::least);
 }
@@ -116,7 +117,7 @@ double surface_area(const Sphere<S>& sphere) {
   return sphere.empty() ? 0 : 4 * pi * double(sphere.radius) * double(sphere.radius);
 }
 
-/// The distance from the surface.
+/// Returns the distance from the surface.
 template <class S>
 double protrusion(const Sphere<S>& sphere, const double* point) {
   if (sphere.empty()) return std::numeric_limits<double>::infinity();

@@ -1,6 +1,6 @@
-// Correct rounding of flight plans, block by block (round_positions.hpp says what is computed). Written in
-// the vector extensions of GCC and clang: GCC 12 vectorises the equivalent loops only in part. "portable" has
-// two double lanes and no intrinsics, which compilers take apart where the machine has no vectors.
+// Correct rounding of flight plans, block by block (defined in round_positions.hpp). Written in the vector
+// extensions of GCC and clang: GCC 12 vectorises the equivalent loops only in part. "portable" has two double
+// lanes and no intrinsics; compilers split the lanes on machines without vectors.
 #include "core/motion/kernels/round.hpp"
 
 #include "core/kernels/lanes.hpp"
@@ -24,8 +24,8 @@ using Unsigned = Vector<std::uint32_t, kLanes>;
 using AllFloats = Vector<float, 2 * kLanes>;
 using AllInts = Vector<std::int32_t, 2 * kLanes>;
 
-// What follows holds for every set: with FMA a product and a sum round once, without it twice. Bounds assume
-// twice.
+// The following holds for every set: a product and a sum round once with FMA, twice without. The bounds
+// assume two roundings.
 
 [[gnu::always_inline]] inline Doubles product_plus(Doubles a, Doubles b, Doubles c) {
 #if defined(KBVH_KERNELS_avx512)
@@ -37,7 +37,7 @@ using AllInts = Vector<std::int32_t, 2 * kLanes>;
 #endif
 }
 
-/// As kbvh::two_product.
+/// Like kbvh::two_product.
 [[gnu::always_inline]] inline TwoPart<Doubles> product(Doubles a, double b, DoubleDouble halves) {
 #if defined(KBVH_KERNELS_avx2) || defined(KBVH_KERNELS_avx512)
   static_cast<void>(halves);
@@ -77,7 +77,7 @@ using AllInts = Vector<std::int32_t, 2 * kLanes>;
 [[gnu::always_inline]] inline Floats narrowed(Doubles x) {
   return __builtin_convertvector(x, Floats);
 }
-/// Two halves, rounded to one register of floats.
+/// Rounds two halves to one register of floats.
 [[gnu::always_inline]] inline AllFloats narrowed(Doubles low, Doubles high) {
 #if defined(KBVH_KERNELS_avx512)
   // GCC 12 warns of its own undefined values in the intrinsics.
@@ -236,10 +236,10 @@ template <TieRule ties>
 // ---- Rays of floats, and what chords leave ----
 
 /// Relative half width of the float filter: rounding of dx, ratio, product and sum, 2^-53 each, on |x0| + |dx
-/// ratio|; half as much again pays for the rounding of the filter itself.
+/// ratio|; a margin of another half covers the rounding of the filter itself.
 constexpr double kFloatFilter = 0x1.8p-51;
 
-/// The float filter's candidates: the value lies between them or on one of them.
+/// The float filter's candidates: the exact value lies between them or equals one of them.
 struct Candidates {
   Floats lower, upper;
 };
@@ -252,15 +252,15 @@ template <PieceKind kind>
   return {narrowed(value - error), narrowed(value + error)};
 }
 
-/// The same with short factors, so that a float times either is a double: if the sum is one too, both
-/// candidates are the correctly rounded value, ties included.
+/// The same with short factors, for which a float times either factor is a double: if the sum is a double
+/// too, both candidates are the correctly rounded value, ties included.
 [[gnu::always_inline]] inline Candidates candidates(Doubles start, Doubles end, double ratio, double rest) {
   const TwoPart<Doubles> value = two_sum(start * rest, end * ratio);
   const Doubles error = value.lo != 0.0 ? absolute(value.hi) * 0x1p-51 : Doubles{};
   return {narrowed(value.hi - error), narrowed(value.hi + error)};
 }
 
-/// Which candidates the first stage of rays computes.
+/// The candidates that the first stage of rays computes.
 enum class RatioLength : std::uint8_t { any, short_ratio };
 
 template <RatioLength length_of_ratio>
@@ -294,9 +294,9 @@ template <RatioLength length_of_ratio>
   return bits < 0 ? -size : size;
 }
 
-/// Second stage for float: decides undecided values by the exact sign of value - midpoint, that is, of
-/// dx * elapsed - (midpoint - x0) * duration, from error-free products. hard[i] is not 0 where that does not
-/// apply: the candidates are not neighbours, or a difference is no double.
+/// Second stage for float: decides undecided values by the exact sign of value - midpoint, which is the sign
+/// of dx * elapsed - (midpoint - x0) * duration, from error-free products. Sets hard[i] to a nonzero value
+/// where that does not apply: the candidates are not neighbours, or a difference is no double.
 template <PieceKind kind>
 [[gnu::always_inline]] inline void second_stage(const float* x0, const float* second,
                                                 const TimeFraction& fraction, float* __restrict out,
@@ -310,7 +310,8 @@ template <PieceKind kind>
     const TwoPart<Doubles> dm = two_diff(midpoint, start);
     const TwoPart<Doubles> p = product(dx.hi, fraction.elapsed.hi, fraction.elapsed_halves);
     const TwoPart<Doubles> q = product(dm.hi, fraction.duration.hi, fraction.duration_halves);
-    // The hi parts are the products rounded, so by monotony they order the products unless they are equal.
+    // The hi parts are the rounded products, so by monotonicity they order the products unless they are
+    // equal.
     const Doubles high = p.hi - q.hi;
     const Doubles side = high != 0.0 ? high : p.lo - q.lo;
     const Ints below = __builtin_convertvector(side < 0.0, Ints);
@@ -321,7 +322,7 @@ template <PieceKind kind>
     const Ints inexact =
         __builtin_convertvector((dx.lo != 0.0) | (dm.lo != 0.0) | (absolute(midpoint) >= 0x1p127), Ints);
     const Ints left = inexact | (Ints)(ordinal(upper_bits) - ordinal(lower_bits) != 1U);
-    // Equal candidates decide without the second stage: first stages may list more than has to be.
+    // Equal candidates need no second stage: first stages may list more values than necessary.
     const Ints open = left & (Ints)(lower != upper);
     for (std::size_t k = 0; k < kLanes; ++k) hard[at + k] = static_cast<std::uint8_t>(open[k] & 1);
   }
@@ -357,16 +358,17 @@ template <PieceKind kind>
       const Doubles error = (absolute(start) + absolute(way.hi)) * kDoubleFilter + kUnderflowFilter;
       const Doubles lower = value.hi + (value.lo - error), upper = value.hi + (value.lo + error);
       store_lanes(out + at, value.hi + 0.0);
-      open |= bits_of((Longs)((lower != upper) & (dx.hi != 0.0))) << (k * kLanes);  // what rests is exact
+      open |= bits_of((Longs)((lower != upper) & (dx.hi != 0.0)))
+              << (k * kLanes);  // resting coordinates are exact
     }
     if (open != 0) length = append_set(open, i, list, length);
   }
   return length;
 }
 
-/// Second stage for double when the ratio is exact (1/2, 1/4, ...), where ties abound: the whole evaluation
-/// is exact if no transform leaves a remainder, and then the last addition rounds correctly. hard[i] is not 0
-/// elsewhere.
+/// Second stage for double when the ratio is exact (1/2, 1/4, ...), where ties are frequent: the whole
+/// evaluation is exact if no transform leaves a remainder, and then the last addition rounds correctly. Sets
+/// hard[i] to a nonzero value elsewhere.
 template <PieceKind kind>
 [[gnu::always_inline]] inline void second_stage(const double* x0, const double* second,
                                                 const TimeFraction& fraction, double* __restrict out,

@@ -12,7 +12,7 @@ constexpr std::size_t lanes_of = [] {
   return fit * sizeof(S) < 16 ? std::size_t(1) : fit;  // there are no shorter registers
 }();
 
-/// What rows of the other body are compared with: upper bounds, and lower ones with their sign turned.
+/// A box to compare rows of the other body with: upper bounds, and negated lower bounds.
 template <class S>
 struct Bounds {
   S bound[6];
@@ -22,7 +22,7 @@ template <class S>
   return {{box.upper[0], box.upper[1], box.upper[2], -box.lower[0], -box.lower[1], -box.lower[2]}};
 }
 
-/// Bit i: lane i of the rows, larger by the margin, overlaps the box.
+/// Returns a mask. Bit i: lane i of the rows, inflated by the margin, overlaps the box.
 template <class S, std::size_t width>
 [[gnu::always_inline]] inline unsigned widened(const S* rows, const Bounds<S>& box, const S* margin) {
   constexpr std::size_t lanes = lanes_of<S, width>;
@@ -38,7 +38,8 @@ template <class S, std::size_t width>
   return bits;
 }
 
-/// Bit i: the gaps between lane i and the box are within reach on all sides; writes the largest share of it.
+/// Returns a mask. Bit i: the gaps between lane i and the box are within reach on all sides. Writes the
+/// largest used share of the reach.
 template <class S, std::size_t width>
 [[gnu::always_inline]] inline unsigned within_reach(const S* rows, const Bounds<S>& box,
                                                     const S* inverse_reach, S* ratios) {
@@ -82,7 +83,7 @@ void near(LeafNear<S>& shared) {
     const std::uint32_t begin_a = lists_a.first_entry[leaf_a], begin_b = lists_b.first_entry[leaf_b];
     const std::uint32_t count_a = lists_a.first_entry[leaf_a + 1] - begin_a;
     const std::uint32_t count_b = lists_b.first_entry[leaf_b + 1] - begin_b;
-    // The leaf's box of b is larger by the margin of b, the rows of a are not.
+    // The leaf box of b is inflated by the margin of b, the rows of a are not.
     const Bounds<S> box_b = bounds_of(
         lane_box(state.b.child_bounds + slot_b.node() * std::size_t(6) * width, width, slot_b.lane()));
     unsigned first = widened<S, padded>(rows_a, box_b, state.leaves_a.margin);
@@ -114,7 +115,7 @@ void widen(WideArrays<S> h, std::uint32_t node_count, const S* margin) {
   }
 }
 
-/// Three registers of coordinates, x, y, z, x, y, z, ... as they lie in memory, at a time.
+/// Processes three registers of coordinates, x, y, z, x, y, z, ... in memory order, at a time.
 template <class S>
 void drift(const S* now, const S* before, std::size_t vertices, S* interval) {
   constexpr std::size_t lanes = native_lanes<S>;
@@ -160,7 +161,7 @@ void drift(const S* now, const S* before, std::size_t vertices, S* interval) {
     }
 }
 
-/// Bit i is 0 only if coordinate i of a is larger.
+/// Returns a mask. Bit i is 0 only if coordinate i of a is larger.
 template <class S>
 [[gnu::always_inline]] inline unsigned not_larger(PlainPoint<S> a, PlainPoint<S> b) {
   return (a.v[0] <= b.v[0] ? 1u : 0u) | (a.v[1] <= b.v[1] ? 2u : 0u) | (a.v[2] <= b.v[2] ? 4u : 0u);

@@ -7,28 +7,27 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// Two primitives that are near each other: how much of the reach it takes until their boxes can meet. Not
-/// positive if they overlap already.
+/// Two near primitives, with the share of the reach at which their boxes can first meet. Not positive if they
+/// overlap already.
 struct NearPair {
   std::uint32_t primitive_a, primitive_b;
   float ratio;
 };
 
-/// A leaf pair's side: as `WideLeaves`, with room of its own for rows, in leaves of any size.
+/// One side of leaf pairs: like `WideLeaves`, with its own memory for rows, in leaves of any size.
 template <class S>
 struct NearLeaves {
   WideLeafLists lists;
   S* rows;                ///< [leaf][6][padded leaf size, at least 4]
-  std::uint32_t* stamps;  ///< [leaf]: the rows are those of these positions
+  std::uint32_t* stamps;  ///< [leaf]: stamp of the positions of its rows
   std::uint32_t stamp;
   const S* positions;
-  S margin[6];  ///< by how much the rows of the hierarchy are larger than the vertices: lower sides, upper
-                ///< ones
+  S margin[6];  ///< margin by which the hierarchy's rows exceed the vertices: lower sides, upper ones
 };
 
-/// Turns pairs of leaves into pairs of primitives whose boxes may meet while they close in on each other by
-/// no more than the reach. Sides 0 to 2: b lies on the upper side of a along x, y, z; 3 to 5: on the lower
-/// one.
+/// Turns pairs of leaves into pairs of primitives whose boxes may meet while the two bodies close in on each
+/// other by no more than the reach. Sides 0 to 2: b lies on the upper side of a along x, y, z; 3 to 5: on the
+/// lower side.
 template <class S>
 struct LeafNear {
   WideArrays<S> a, b;
@@ -41,7 +40,7 @@ struct LeafNear {
   std::uint64_t tests;
 };
 
-/// One body's primitives as they are now: CSR lists, and positions [vertex][3], one number past the end
+/// The current primitives of one body: CSR lists, and positions [vertex][3], one number past the end
 /// readable.
 template <class S>
 struct PrimitivesNow {
@@ -51,18 +50,19 @@ struct PrimitivesNow {
 
 template <class S>
 struct NearKernels {
-  /// Goes on until all pairs of leaves are done or the next might not find room (`leaf_pair_step`).
+  /// Continues until all pairs of leaves are done or the next one might exceed the free space
+  /// (`leaf_pair_step`).
   using Near = void (*)(LeafNear<S>& state);
-  /// Makes all boxes of a hierarchy larger by the margin: lower sides x, y, z, upper sides x, y, z.
+  /// Inflates all boxes of a hierarchy by the margin: lower sides x, y, z, upper sides x, y, z.
   using Widen = void (*)(WideArrays<S> hierarchy, std::uint32_t node_count, const S* margin);
   Near near_padded[3][3];  ///< [log2(width) - 1][padded leaf size 4, 8, 16]
   Widen widen_width[3];    ///< [log2(width) - 1]
-  /// The least and the largest of now - before over `vertices` points [vertex][3], each rounded to nearest:
-  /// lower x, y, z, any, upper x, y, z, any.
+  /// Computes the least and the largest of now - before over `vertices` points [vertex][3], each rounded to
+  /// nearest: lower x, y, z, unused, upper x, y, z, unused.
   void (*drift)(const S* now, const S* before, std::size_t vertices, S* interval);
 
-  /// Keeps the pairs whose primitives' boxes overlap now, in their order; `out` has room for all of them.
-  /// Returns how many.
+  /// Keeps the pairs whose primitives' boxes overlap now, in their order, and returns their number; `out` has
+  /// space for all pairs.
   std::size_t (*meeting)(const FoundPair* pairs, std::size_t count, PrimitivesNow<S> a, PrimitivesNow<S> b,
                          FoundPair* out);
 
@@ -75,7 +75,7 @@ struct NearKernels {
 KBVH_DECLARE_KERNELS(NearKernels<float>, near_float)
 KBVH_DECLARE_KERNELS(NearKernels<double>, near_double)
 
-/// Those of one instruction set.
+/// Returns the kernels of one instruction set.
 template <class S>
 const NearKernels<S>& near_kernels(KernelSet set);
 template <>

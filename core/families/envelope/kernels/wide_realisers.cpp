@@ -5,7 +5,7 @@
 namespace kbvh {
 namespace {
 
-/// values[i] = positions[places[i]], a few at a time: loads wait for nothing but each other.
+/// Computes values[i] = positions[places[i]], a few at a time, so that the loads are independent.
 template <class S>
 [[gnu::always_inline]] inline void collect_some(const std::uint32_t* places, const S* positions,
                                                 std::size_t count, S* values) {
@@ -17,7 +17,8 @@ void collect(const std::uint32_t* places, const S* positions, std::size_t count,
   collect_some(places, positions, count, values);
 }
 
-/// The most lanes of a register that divide `many`; there are no registers shorter than 16 bytes.
+/// Returns the largest number of lanes of a register that divides `many`; there are no registers shorter than
+/// 16 bytes.
 template <class S>
 constexpr std::size_t lanes_for(std::size_t many) {
   std::size_t lanes = native_lanes<S>;
@@ -25,8 +26,8 @@ constexpr std::size_t lanes_for(std::size_t many) {
   return lanes;
 }
 
-/// The coordinates at `lanes` places. Not by way of memory where that can be helped: a load of several
-/// numbers waits until all of them have been stored.
+/// Gathers the coordinates at `lanes` places, without a detour through memory where possible: a load of
+/// several numbers waits until all of them have been stored.
 template <class S, std::size_t lanes>
 [[gnu::always_inline]] inline Vector<S, lanes> gathered(const std::uint32_t* places, const S* positions) {
 #if defined(KBVH_KERNELS_avx2) || defined(KBVH_KERNELS_avx512)
@@ -48,7 +49,7 @@ template <class S, std::size_t lanes>
   }
 }
 
-/// Bit i: the realiser's coordinate is not the bound, which lies in the rows as it is stored there.
+/// Returns a mask. Bit i: the realiser's coordinate differs from the bound in the rows.
 template <class S, std::uint32_t width>
 [[gnu::always_inline]] inline std::uint64_t lost_sides(const std::uint32_t* realisers, const S* positions,
                                                        const S* rows) {
@@ -60,7 +61,7 @@ template <class S, std::uint32_t width>
     V value = gathered<S, lanes>(realisers + i, positions);
     if (i >= 3 * width) value = -value;
     const V bound = load_lanes<V>(rows + i);
-    // A bound is stored so that less is further out. Empty lanes are infinite: nothing is larger.
+    // Bounds are stored so that smaller is further out. Empty lanes are infinite: nothing is larger.
     if constexpr (lanes == 1)
       bits |= std::uint64_t(value > bound) << i;
     else

@@ -7,16 +7,17 @@ namespace kbvh {
 enum class KernelSet : std::uint8_t;
 
 /// Kernels on the vertices that realise the boxes of a wide hierarchy. `realisers` is [node][6][width] like
-/// `WideArrays::lanes`: where the coordinate stands in an array of positions, 3 * vertex + axis; anything
-/// that is readable for empty lanes.
+/// `WideArrays::child_bounds`: the index of the coordinate in an array of positions, 3 * vertex + axis; any
+/// readable index for empty lanes.
 template <class S>
 struct WideRealiserKernels {
-  /// Makes the boxes of the nodes [begin, end) at `positions`, the last first, into `hierarchy.node_bounds`;
-  /// its `lanes` are neither read nor written. `lost[node]`: bit row * width + lane is set where the realiser
-  /// does not realise the side there. Children that are nodes must be current or lie in the range, too.
+  /// Computes the boxes of the nodes [begin, end) at `positions`, the last first, into
+  /// `hierarchy.node_bounds`; its `child_bounds` are neither read nor written. `lost[node]`: bit row * width
+  /// + lane is set where the realiser does not realise the side there. Children that are nodes must be
+  /// current or lie in the range, too.
   using Check = void (*)(WideArrays<S> hierarchy, const std::uint32_t* realisers, const S* positions,
                          std::uint64_t* lost, std::uint32_t begin, std::uint32_t end);
-  /// values[i] = positions[places[i]].
+  /// Computes values[i] = positions[places[i]].
   using Collect = void (*)(const std::uint32_t* places, const S* positions, std::size_t count, S* values);
   /// Writes a node's rows and own box from the coordinates of its realisers, [6][width].
   using Place = void (*)(WideArrays<S> hierarchy, const S* values, std::uint32_t node);
@@ -31,7 +32,7 @@ struct WideRealiserKernels {
 KBVH_DECLARE_KERNELS(WideRealiserKernels<float>, wide_realisers_float)
 KBVH_DECLARE_KERNELS(WideRealiserKernels<double>, wide_realisers_double)
 
-/// Those of one instruction set.
+/// Returns the kernels of one instruction set.
 template <class S>
 const WideRealiserKernels<S>& wide_realiser_kernels(KernelSet set);
 template <>

@@ -7,7 +7,7 @@ namespace {
 
 // ---- One direction ----------------------------------------------------------------------------------------
 
-/// Smallest normal number: what products that vanish can hide.
+/// The smallest normal number: bounds the loss by underflow of products.
 template <class S>
 constexpr S tiny = sizeof(S) == sizeof(float) ? S(0x1p-126) : S(0x1p-1022);
 
@@ -16,14 +16,14 @@ KBVH_INLINE Point<S> cross_product(const Point<S>& p, const Point<S>& q) {
   return {p.y * q.z - p.z * q.y, p.z * q.x - p.x * q.z, p.x * q.y - p.y * q.x};
 }
 
-/// The corners of a register of pairs at one end of their spans, relative to the first corner: that of the
-/// first triangle is the origin.
+/// The corners of a register of pairs at one end of their spans, relative to the first corner of the first
+/// triangle, which is the origin.
 template <class S>
 struct Corners {
   Point<S> a1, a2, b0, b1, b2;
 };
 
-/// How far one triangle lies before the other along a direction, in either order.
+/// The gap from one triangle to the other along a direction, in both orders.
 template <class S>
 struct Gap {
   Values<S> a_first, b_first;
@@ -38,7 +38,7 @@ KBVH_INLINE Gap<S> gap(const Corners<S>& at, const Point<S>& direction) {
   return {least_b - most_a, least_a - most_b};
 }
 
-/// All bits set where the direction keeps the triangles apart at both ends, in the same order.
+/// Returns all bits set where the direction separates the triangles at both ends, in the same order.
 template <class S>
 KBVH_INLINE Words<S> apart(const Corners<S>& first, const Corners<S>& last, const Point<S>& direction,
                            S margin) {
@@ -60,7 +60,8 @@ KBVH_INLINE Point<S> sum(const Point<S>& p, const Point<S>& q) {
 
 // ---- Signs throughout a span -----------------------------------------------------------------------------
 
-/// A vector that is linear over the span, and the larger sum of its absolute components at the ends.
+/// A vector that is linear over the span, and the larger of the sums of its absolute components at the two
+/// ends.
 template <class S>
 struct Linear {
   Point<S> first, last;
@@ -79,7 +80,7 @@ KBVH_INLINE Linear<S> difference(const Point<S>& p0, const Point<S>& p1, const P
   return d;
 }
 
-/// u x v: its Bernstein coefficients, the middle one twice.
+/// u x v: its Bernstein coefficients, the middle one doubled.
 template <class S>
 struct Normal {
   Point<S> first, twice_middle, last;
@@ -90,14 +91,14 @@ KBVH_INLINE Normal<S> normal_of(const Linear<S>& u, const Linear<S>& v) {
           sum(cross_product(u.first, v.last), cross_product(u.last, v.first)), cross_product(u.last, v.last)};
 }
 
-/// All bits set where a determinant is certainly positive, or negative, throughout.
+/// Has all bits set where a determinant is certainly positive, or negative, throughout.
 template <class S>
 struct Sign {
   Words<S> positive, negative;
 };
-/// Of (u x v) w. With components off by o at most, a determinant of vectors whose absolute components add up
-/// to U, V, W changes by no more than o (UV + UW + VW) + 3 o^2 (U + V + W) + 6 o^3; its own rounding is far
-/// below 64 roundings of UVW.
+/// Returns the sign of (u x v) w. If components are off by at most o, a determinant of vectors whose absolute
+/// components add up to U, V, W changes by no more than o (UV + UW + VW) + 3 o^2 (U + V + W) + 6 o^3; its own
+/// rounding is far below 64 roundings of UVW.
 template <class S>
 KBVH_INLINE Sign<S> sign_of(const Linear<S>& u, const Linear<S>& v, const Normal<S>& n, const Linear<S>& w,
                             S o) {
@@ -120,7 +121,8 @@ KBVH_INLINE Words<S> alike(const Sign<S>& a, const Sign<S>& b, const Sign<S>& c)
   return (a.positive & b.positive & c.positive) | (a.negative & b.negative & c.negative);
 }
 
-/// All bits set where some edge of one triangle certainly passes through the other one throughout.
+/// Returns all bits set where some edge of one triangle certainly passes through the other triangle
+/// throughout.
 template <class S>
 [[gnu::noinline]] Words<S> intersecting(const Corners<S>& first, const Corners<S>& last, S o) {
   const Point<S> zero{};
@@ -128,7 +130,7 @@ template <class S>
   const Point<S>* const a1[3] = {&zero, &last.a1, &last.a2};
   const Point<S>* const b0[3] = {&first.b0, &first.b1, &first.b2};
   const Point<S>* const b1[3] = {&last.b0, &last.b1, &last.b2};
-  // On which side of the plane of b the corners of a are, and conversely.
+  // The side of the plane of b on which each corner of a lies, and conversely.
   Sign<S> side_a[3], side_b[3];
   {
     const Linear<S> u = difference(*b0[1], *b1[1], *b0[0], *b1[0]),
@@ -143,7 +145,7 @@ template <class S>
     for (std::size_t k = 0; k < 3; ++k)
       side_b[k] = sign_of(u, v, n, difference(*b0[k], *b1[k], zero, zero), o);
   }
-  // How edge i of a passes edge k of b; the same sign whichever is asked about the other.
+  // The turn of edge i of a around edge k of b; the same sign in both orders.
   Sign<S> turn[3][3];
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t j = (i + 1) % 3;
@@ -164,7 +166,7 @@ template <class S>
 
 // ---- Both -------------------------------------------------------------------------------------------------
 
-/// Bits of the pairs of one register that are certain.
+/// The decided pairs of one register, as bits.
 struct Certain {
   unsigned apart, intersect;
 };
@@ -199,7 +201,7 @@ template <class S>
       *points[1][c - 1] = at_end - origin[1];
     }
   }
-  // Twice the corners at the middle; only directions come from them.
+  // Twice the corners at the middle; only directions are derived from them.
   const Point<S> a1 = sum(first.a1, last.a1), a2 = sum(first.a2, last.a2);
   const Point<S> b0 = sum(first.b0, last.b0), b1 = sum(first.b1, last.b1), b2 = sum(first.b2, last.b2);
   const Point<S> edges_a[3] = {a1, a2 - a1, a2}, edges_b[3] = {b1 - b0, b2 - b1, b2 - b0};

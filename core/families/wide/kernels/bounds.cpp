@@ -5,8 +5,8 @@
 namespace kbvh {
 namespace {
 
-/// Smallest and largest of three registers of coordinates, x, y, z, x, y, z, ... as they lie in memory: a
-/// register's worth of vertices at a time, with nothing gathered.
+/// Smallest and largest of three registers of coordinates, x, y, z, x, y, z, ... in memory order: as many
+/// vertices at a time as a register has lanes, without gathers.
 template <class S>
 struct Stride {
   static constexpr std::size_t lanes = native_lanes<S>;
@@ -33,7 +33,7 @@ void of_runs(const VertexRun* runs, std::size_t count, const S* positions, S* bo
     all.lower[j] = typename Long::V{} + infinity;
     all.upper[j] = -all.lower[j];
   }
-  // Runs too short for a stride go point by point.
+  // Runs that are too short for a stride are processed point by point.
   auto lower = P::load(positions + std::size_t(3) * runs[0].first, positions), upper = lower;
   for (std::size_t r = 0; r < count; ++r) {
     const S* at = positions + std::size_t(3) * runs[r].first;

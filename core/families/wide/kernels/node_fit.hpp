@@ -7,8 +7,8 @@
 namespace kbvh {
 namespace {
 
-/// Boxes of the `width` children of a node, from one point each (lower and upper corners, 8 numbers from one
-/// child to the next) or from a list of vertices, into the node's rows and its own box.
+/// Computes the boxes of the `width` children of a node, from one point each (lower and upper corners, 8
+/// numbers from one child to the next) or from a list of vertices, into the node's rows and its own box.
 template <class S, std::uint32_t width>
 struct NodeFit {
   using P = Points<S, width == 8 ? 2 : 1>;
@@ -35,11 +35,11 @@ struct NodeFit {
     P::template store_rows<true>(upper, rows + 3 * width + first, width, per_pass);
   }
 
-  /// The pack j of the lanes from `first` on, in one row of the lists.
+  /// Returns pack j of the lanes from `first` on, in one row of the lists.
   [[gnu::always_inline]] static Pack listed(const std::uint32_t* row, std::uint32_t first, std::uint32_t j,
                                             const S* positions) {
     if constexpr (P::points == 2) {
-      std::uint64_t two;  // one load for two numbers: loads are what limits this loop
+      std::uint64_t two;  // one load for two numbers: loads limit this loop
       __builtin_memcpy(&two, row + 2 * j, sizeof two);
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
       return P::load(positions + std::uint32_t(two), positions + (two >> 32));
@@ -69,7 +69,7 @@ struct NodeFit {
     }
   }
 
-  /// boxes[lane]: a child's box, 8 numbers.
+  /// Takes the child boxes boxes[lane], 8 numbers each.
   [[gnu::always_inline]] inline void from_boxes(const S* const (&boxes)[width], S* rows) {
     for (std::uint32_t first = 0; first < width; first += per_pass) {
       Pack lower[4], upper[4];
@@ -95,7 +95,7 @@ template <class S>
 constexpr S empty_box[8] = {infinity<S>,  infinity<S>,  infinity<S>,  infinity<S>,
                             -infinity<S>, -infinity<S>, -infinity<S>, -infinity<S>};
 
-/// Few leaves beside nodes (SAH trees; the last nodes of a level): one box at a time.
+/// Few leaves next to nodes (SAH trees; the last nodes of a level): one box at a time.
 template <class S, std::uint32_t width>
 [[gnu::noinline]] void fit_single(const WideArrays<S>& h, const WideNode& node, const S* positions, S* rows,
                                   S* own) {
@@ -125,7 +125,7 @@ template <class S, std::uint32_t width>
   fit.store_own(own);
 }
 
-/// Many leaves, whose lists fill all lanes: what belongs to nodes, or to nobody, is put right afterwards.
+/// Many leaves, whose lists fill all lanes: afterwards the lanes of nodes and the empty lanes are corrected.
 template <class S, std::uint32_t width>
 [[gnu::noinline]] void put_right(const WideArrays<S>& h, const WideNode& node, S* rows, S* own) {
   for (std::uint32_t lane = node.leaf_count; lane < width; ++lane) {
@@ -141,7 +141,7 @@ template <class S, std::uint32_t width>
   }
 }
 
-/// A node whose children are all leaves.
+/// Fits a node whose children are all leaves.
 template <class S, std::uint32_t width>
 [[gnu::always_inline]] inline void fit_leaves(const WideArrays<S>& h, const WideNode& node,
                                               const S* positions, S* rows, S* own) {
@@ -151,7 +151,7 @@ template <class S, std::uint32_t width>
   if (node.leaf_count != width) put_right<S, width>(h, node, rows, own);
 }
 
-/// Any other; the own boxes of children that are nodes must be current.
+/// Fits any other node; the own boxes of children that are nodes must be current.
 template <class S, std::uint32_t width>
 [[gnu::always_inline]] inline void fit_above(const WideArrays<S>& h, const WideNode& node, const S* positions,
                                              S* rows, S* own) {

@@ -5,15 +5,15 @@
 namespace kbvh {
 namespace {
 
-/// How far vertices lie inside the sides of stored boxes: the least and the most.
+/// The smallest and the largest distance of vertices from the sides of stored boxes, inwards.
 template <class S>
 struct Room {
   S least, most;
 };
 
 /// Rows are lower and -upper, so that "inside" is "not smaller" in all six. Lanes that are empty in both
-/// (infinity
-/// - infinity) do not count: a comparison with NaN is false, and `smaller` then keeps its second argument.
+/// (infinity - infinity) do not count: a comparison with NaN is false, and `smaller` then keeps its second
+/// argument.
 template <class S, std::uint32_t width>
 [[gnu::always_inline]] inline Room<S> room_of(const S* stored, const S* fresh) {
   constexpr std::size_t fit = native_lanes<S> < width ? native_lanes<S> : width;
@@ -35,7 +35,7 @@ template <class S, std::uint32_t width>
   }
 }
 
-/// The box of an inflated node, compared and stored: was it another one?
+/// Compares and stores the box of an inflated node; returns whether it changed.
 template <class S>
 [[gnu::always_inline]] inline bool replace_own(S* own, const S* fresh) {
   bool changed = false;
@@ -61,7 +61,7 @@ void check_margins(MarginCheck<S>& shared) {
       inflated[axis + 4] = box[axis + 4] + state.margin;
     }
   };
-  // As in the refit: nodes of leaves only in ascending order, those above children first.
+  // As in the refit: nodes with leaves only in ascending order, the others children first.
   for (std::uint32_t i = 0; i < state.node_count; ++i) {
     const WideNode& node = h.nodes[i];
     if (node.leaf_count != node.count) continue;
@@ -102,7 +102,7 @@ void check_margins(MarginCheck<S>& shared) {
       fit.from_boxes(boxes, rows);
       fit.store_own(inflated);
     } else {
-      // Leaves beside nodes: the lanes of the leaves are looked at, the others taken from the children.
+      // Leaves next to nodes: leaf lanes are checked, the others are copied from the children.
       NodeFit<S, width> fit;
       fit.from_lists(h.vertices + node.list, node.length, state.positions, fresh);
       fit.store_own(box);
@@ -118,7 +118,7 @@ void check_margins(MarginCheck<S>& shared) {
       if (found.least >= state.keep_from && found.most <= state.keep_to) {
         room = smaller(found.least, room);
         if (!changed) continue;
-        // The leaves stay as they are: the node's box is made from the rows as stored.
+        // The leaves stay unchanged: the node's box is computed from the stored rows.
       } else {
         for (std::size_t k = 0; k < row_scalars; ++k) stored[k] = leaves_only[k] - state.margin;
         room = smaller(room_of<S, width>(stored, leaves_only).least, room);
@@ -141,7 +141,7 @@ void check_margins(MarginCheck<S>& shared) {
     state.remade[i] = replace_own(own, inflated) ? 1 : 0;
     if (changed) inner_boxes += std::uint32_t(node.count - node.leaf_count);
   }
-  if (state.node_count > 1 && state.remade[0] != 0) ++inner_boxes;  // the root's box is in nobody's row
+  if (state.node_count > 1 && state.remade[0] != 0) ++inner_boxes;  // no row contains the root's box
   shared.room = room;
   shared.room_before = room_before;
   shared.leaf_boxes = leaf_boxes;

@@ -5,13 +5,13 @@
 namespace kbvh {
 
 /// One wide node: up to `width` children whose boxes lie side by side. Lanes [0, leaf_count) are leaves,
-/// lanes [leaf_count, count) are nodes, the rest are empty. Children of either kind are numbered
-/// consecutively, so the first number says all. 16 bytes.
+/// lanes [leaf_count, count) are nodes, the rest are empty. Children of each kind have consecutive numbers,
+/// so the first number suffices. 16 bytes.
 struct WideNode {
   std::uint32_t first_child = 0;  ///< wide node of lane `leaf_count`
   std::uint32_t first_leaf = 0;   ///< leaf of lane 0, counted over the whole hierarchy
   std::uint32_t list = 0;         ///< start of its leaves' vertices in `WideArrays::vertices`
-  std::uint16_t length = 0;       ///< vertices per lane there: the lists of one node are padded to one length
+  std::uint16_t length = 0;  ///< vertices per lane there: the lists of one node are padded to equal length
   std::uint8_t leaf_count = 0;
   std::uint8_t count = 0;
 };
@@ -41,20 +41,20 @@ struct LeafSlot {
   [[gnu::always_inline]] std::uint32_t lane() const { return word % 8; }
 };
 
-/// What one step of a traversal compares: two nodes, a node and a leaf (bit 31 set: 8 * node + lane), or two
-/// leaves.
+/// The two items of one step of a traversal: two nodes, a node and a leaf (bit 31 set: 8 * node + lane), or
+/// two leaves.
 struct WidePair {
   std::uint32_t first, second;
   static constexpr std::uint32_t leaf_bit = std::uint32_t(1) << 31;
 };
 
-/// Where a lane's vertex stands in a row of a list: lanes that share a register of two points are neighbours,
-/// so that one load gets both.
+/// Returns the place of a lane's vertex in a row of a list: lanes that share a register of two points are
+/// neighbours, so that one load fetches both.
 [[gnu::always_inline]] constexpr std::uint32_t list_place(std::uint32_t lane, std::uint32_t width) {
   return width < 8 ? lane : lane < 4 ? 2 * lane : 2 * lane - 7;
 }
 
-/// Scalars per node in WideArrays::child_bounds.
+/// Returns the scalars per node in WideArrays::child_bounds.
 [[gnu::always_inline]] constexpr std::size_t lane_scalars(std::uint32_t width) {
   return std::size_t(6) * width;
 }

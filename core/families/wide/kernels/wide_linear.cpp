@@ -15,8 +15,8 @@ void make(const WideMoment<S>& moment, std::uint32_t node) {
   const S* first = moment.ends.child_bounds[0] + node * scalars;
   const S* last = moment.ends.child_bounds[1] + node * scalars;
   S* rows = moment.hierarchy.child_bounds + node * scalars;
-  // Upper bounds are stored with their sign turned: less is larger for every row. Empty lanes become NaN,
-  // which overlaps nothing either.
+  // Upper bounds are stored negated: smaller is further out in every row. Empty lanes become NaN, which
+  // overlaps nothing either.
   for (std::size_t i = 0; i < scalars; ++i) rows[i] = first[i] + s * (last[i] - first[i]) - margin;
   const S* own_first = moment.ends.node_bounds[0] + std::size_t(8) * node;
   const S* own_last = moment.ends.node_bounds[1] + std::size_t(8) * node;
@@ -25,7 +25,7 @@ void make(const WideMoment<S>& moment, std::uint32_t node) {
     own[i] = own_first[i] + s * (own_last[i] - own_first[i]) + (i < 4 ? -margin : margin);
 }
 
-/// Stored boxes that are made on the first visit.
+/// Stored boxes that are computed at the first visit.
 template <class S, std::uint32_t width>
 struct MomentView : StoredView<S, width> {
   const WideMoment<S>&a, &b;
@@ -50,8 +50,8 @@ void at(WideMoment<S> a, WideMoment<S> b, WideTraversal& state) {
 
 // ---- A whole segment --------------------------------------------------------------------------------------
 
-/// A box at both ends, as what the rows of the other side are compared with: upper bounds, and lower ones
-/// with their sign turned, both larger by the margin.
+/// A box at both ends, in the form to compare rows of the other side with: upper bounds and negated lower
+/// bounds, both inflated by the margin.
 template <class S>
 struct Reach {
   S bound[2][6];
@@ -69,13 +69,14 @@ template <class S>
   return reach;
 }
 
-/// Gaps of a register of boxes to one box at both ends: positive where a side keeps them apart.
+/// Gaps of a register of boxes to one box at both ends: positive where a side separates them.
 template <class S, class V>
 struct Gaps {
   V first[6], last[6];
 };
 
-/// From when to when no side keeps them apart, of lanes in which every side closes at one end at least.
+/// Computes the interval in which no side separates them, for lanes in which every side closes at one end at
+/// least.
 template <class S, class V>
 [[gnu::always_inline]] inline void together(const Gaps<S, V>& gaps, V& begin, V& end) {
   begin = V{} + S(0);
@@ -89,10 +90,10 @@ template <class S, class V>
   }
 }
 
-/// More than all rounding of a fraction, of `together` and of frames alike.
+/// An upper bound of all rounding of a fraction, in `together` and in frames alike.
 constexpr float fraction_slack = 0x1p-20f;
 
-/// Bits of the lanes that no side keeps apart at the begin, or none at the end.
+/// Returns the bits of the lanes that no side separates at the begin, or none at the end.
 template <class S, class V>
 [[gnu::always_inline]] inline unsigned together_at_an_end(const Gaps<S, V>& gaps) {
   V first = gaps.first[0], last = gaps.last[0];
@@ -110,7 +111,7 @@ constexpr std::size_t register_lanes = [] {
   return fit * sizeof(S) < 16 ? std::size_t(1) : fit;  // there are no shorter registers
 }();
 
-/// Bit i: lane i of the rows overlaps the box at some time.
+/// Returns a mask. Bit i: lane i of the rows overlaps the box at some time.
 template <class S, std::size_t width>
 [[gnu::always_inline]] inline unsigned meeting(const S* first, const S* last, const Reach<S>& reach) {
   constexpr std::size_t lanes = register_lanes<S, width>;
@@ -184,11 +185,11 @@ void join(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends
   traverse_pairs(a, b, view, state);
 }
 
-/// Pairs of leaves whose rows are made before they are compared.
+/// The number of leaf pairs whose rows are computed before they are compared.
 constexpr std::size_t rows_ahead = 32;
 
-/// Makes the rows of leaves where they are not there already: several at a time, so that their memory comes
-/// while others are made.
+/// Computes missing rows of leaves, several at a time, so that their memory accesses overlap with
+/// computation.
 template <class S, std::size_t padded>
 class RowMaker {
  public:
@@ -238,7 +239,7 @@ struct LeafRows {
   std::uint32_t count;
 };
 
-/// What primitives of a leaf are compared with, as `Reach`.
+/// The data to compare primitives of a leaf with, like `Reach`.
 template <class S, std::size_t padded>
 struct LeafReach {
   alignas(64) S bound[2][6][padded];  ///< by end, side and primitive
@@ -254,7 +255,8 @@ struct LeafReach {
   }
 };
 
-/// Lanes of a leaf that may overlap primitive i of another at some time, and those that do from begin to end.
+/// Lanes of a leaf that may overlap primitive i of another leaf at some time, and those that do so from begin
+/// to end.
 struct LaneBits {
   unsigned hit, throughout;
 };
@@ -280,8 +282,8 @@ template <class S, std::size_t padded>
   return bits;
 }
 
-/// Pairs that overlap in a part of the segment perhaps, a register of them at a time: divisions cost more
-/// than all the rest, so that no lane of one is to be idle.
+/// Pairs that may overlap in a part of the segment, a register of them at a time: the divisions cost more
+/// than all other work, so no lane of a division should be idle.
 template <class S>
 struct PartlyBatch {
   static constexpr std::uint32_t room = 16;
@@ -289,7 +291,7 @@ struct PartlyBatch {
   alignas(64) std::uint32_t primitive_a[room] = {}, primitive_b[room] = {};
   std::uint32_t count = 0;
 
-  /// Appends those that do overlap, and from when to when, rounded outwards.
+  /// Appends the pairs that do overlap, with the begin and end of the overlap, rounded outwards.
   [[gnu::noinline]] void flush(JoinColumns& to) {
     constexpr std::size_t lanes = register_lanes<S, room>;
     using V = Vector<S, lanes>;
@@ -322,8 +324,8 @@ struct PartlyBatch {
   }
 };
 
-/// Pairs of the primitives of two leaves, of which those of `outer` with a bit are looked at. Branches that
-/// depend on what overlaps cost as much as the comparisons: there are none but the ends of loops.
+/// Processes the pairs of the primitives of two leaves; only primitives of `outer` with a bit are visited.
+/// Branches on the overlap would cost as much as the comparisons, so only the ends of loops branch.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline void leaf_pairs(const LeafRows<S>& outer, unsigned bits,
                                               const LeafRows<S>& inner, S margin, bool swapped,
@@ -360,8 +362,8 @@ template <class S, std::size_t padded>
   }
 }
 
-// The width is not known to the compiler: it is only where boxes of leaves lie, and each copy of this is
-// large.
+// The width is not a template parameter: it only determines the place of leaf boxes, and each copy of this
+// function is large.
 template <class S, std::size_t padded>
 void leaf_join(WideLeafJoin<S>& shared) {
   WideLeafJoin<S> state = shared;

@@ -8,7 +8,7 @@ namespace kbvh {
 enum class KernelSet : std::uint8_t;
 
 /// Boxes of a wide hierarchy that are linear in time over a segment: child and node bounds as in
-/// `WideArrays`, at its begin and at its end. At every fraction between, a box is what lies between, larger
+/// `WideArrays`, at its begin and at its end. A box at a fraction in between is the interpolation, inflated
 /// by the margin on every side.
 template <class S>
 struct WideEnds {
@@ -17,43 +17,42 @@ struct WideEnds {
   S margin;
 };
 
-/// Boxes at one fraction of the segment, made from the ends when the traversal first comes to a node.
+/// Boxes at one fraction of the segment, computed from the ends when the traversal first visits a node.
 template <class S>
 struct WideMoment {
   WideArrays<S> hierarchy;  ///< child_bounds and node_bounds are written
   WideEnds<S> ends;
-  std::uint8_t* stale;  ///< [node]: not 0 until its boxes are made
+  std::uint8_t* stale;  ///< [node]: not 0 until its boxes are computed
   S fraction;
 };
 
-/// Two primitives whose boxes overlap at some time of a segment, and from which fraction of it to which.
-/// Closed; rounded outwards.
+/// Two primitives whose boxes overlap at some time of a segment, with the fractions at which the overlap
+/// begins and ends. Closed; rounded outwards.
 struct JoinedPair {
   std::uint32_t primitive_a, primitive_b;
   float begin, end;
 };
 static_assert(sizeof(JoinedPair) == 16);
 
-/// Leaves for a join: as `WideLeaves`, with rows at both ends of the segment.
+/// Leaves for a join: like `WideLeaves`, with rows at both ends of the segment.
 template <class S>
 struct WideLinearLeaves {
   WideLeafLists lists;
   /// By end; both the same for a body at rest.
   S* rows[2];                ///< [leaf][6][padded leaf size]
-  std::uint32_t* stamps[2];  ///< [leaf]: which positions the rows are of
-  std::uint32_t stamp[2];    ///< of these positions
+  std::uint32_t* stamps[2];  ///< [leaf]: stamp of the positions of its rows
+  std::uint32_t stamp[2];    ///< stamp of these positions
   const S* positions[2];
 };
 
-/// Pairs of primitives in columns, and where they go. `begin` and `end` are null for pairs that overlap
-/// throughout.
+/// Output columns for pairs of primitives. `begin` and `end` are null for pairs that overlap throughout.
 struct JoinColumns {
   std::uint32_t *primitive_a, *primitive_b;
   float *begin, *end;
   std::size_t found, room;
 
-  /// A pair of leaves finds room: what it can give, what waits in a register and that register, since
-  /// registers are written whole.
+  /// Returns whether there is space for a pair of leaves: its possible pairs, the pairs waiting in a
+  /// register, and one register, since registers are written whole.
   bool has_room() const { return found + leaf_pair_step + 32 <= room; }
 };
 
@@ -66,27 +65,28 @@ struct WideLeafJoin {
   WideLinearLeaves<S> leaves_a, leaves_b;
   const LeafSlot* pairs;  ///< first, second, ...
   std::size_t next, count;
-  JoinColumns throughout;  ///< overlap from the begin of the segment to its end
+  JoinColumns throughout;  ///< pairs that overlap from the begin of the segment to its end
   JoinColumns partly;      ///< the others
   std::uint64_t tests;
 };
 
 template <class S>
 struct WideLinearKernels {
-  /// As WideOverlapKernels::Traverse, with the boxes of one moment.
+  /// Like WideOverlapKernels::Traverse, with the boxes of one moment.
   using At = void (*)(WideMoment<S> a, WideMoment<S> b, WideTraversal& state);
   /// The same for boxes that overlap at any time of the segment.
   using Join = void (*)(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b,
                         WideTraversal& state);
-  /// Goes on until all pairs of leaves are done or the next might not find room (`JoinColumns::has_room`).
+  /// Continues until all pairs of leaves are done or the next one might exceed the free space
+  /// (`JoinColumns::has_room`).
   using LeafJoin = void (*)(WideLeafJoin<S>& state);
-  /// Boxes of one node at a fraction.
+  /// Computes the boxes of one node at a fraction.
   using Make = void (*)(const WideMoment<S>& moment, std::uint32_t node);
   At at_width[3];                ///< [log2(width) - 1]
   Join join_width[3];            ///< [log2(width) - 1]
   LeafJoin leaf_join_padded[3];  ///< [padded leaf size 4, 8, 16]
   Make make_width[3];            ///< [log2(width) - 1]
-  Join self_width[3];            ///< [log2(width) - 1]; of a hierarchy with itself
+  Join self_width[3];            ///< [log2(width) - 1]; a hierarchy with itself
 
   static constexpr std::size_t index(std::uint32_t width) { return width == 2 ? 0 : width == 4 ? 1 : 2; }
   At at(std::uint32_t width) const { return at_width[index(width)]; }
@@ -98,7 +98,7 @@ struct WideLinearKernels {
 KBVH_DECLARE_KERNELS(WideLinearKernels<float>, wide_linear_float)
 KBVH_DECLARE_KERNELS(WideLinearKernels<double>, wide_linear_double)
 
-/// Those of one instruction set.
+/// Returns the kernels of one instruction set.
 template <class S>
 const WideLinearKernels<S>& wide_linear_kernels(KernelSet set);
 template <>

@@ -6,7 +6,7 @@
 namespace kbvh {
 namespace {
 
-/// Stored boxes some of which are made when they are first needed: the traversal is left for it.
+/// Stored boxes, some of which are computed at their first use: the traversal pauses for this.
 template <class S, std::uint32_t width>
 struct LazyView : StoredView<S, width> {
   using StoredView<S, width>::StoredView;
@@ -15,7 +15,7 @@ struct LazyView : StoredView<S, width> {
   }
 };
 
-/// Of a hierarchy with itself.
+/// A hierarchy with itself.
 template <class S, std::uint32_t width>
 struct SelfView : StoredView<S, width> {
   using StoredView<S, width>::StoredView;
@@ -28,7 +28,7 @@ void traverse(WideArrays<S> a, WideArrays<S> b, WideTraversal& state) {
   traverse_pairs(a, b, view, state);
 }
 
-/// Makes the rows of a leaf, unless they are those of the present positions.
+/// Computes the rows of a leaf unless they are current.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline const S* leaf_rows(const WideLeaves<S>& leaves, std::uint32_t leaf) {
   S* rows = leaves.rows + std::size_t(leaf) * 6 * padded;

@@ -8,18 +8,18 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// A simultaneous traversal that can be left and resumed: whoever calls provides room.
+/// A simultaneous traversal that can pause and resume; the caller provides memory.
 struct WideTraversal {
   WidePair* stack;
   std::size_t depth, stack_room;
   LeafSlot* out;                ///< pairs of overlapping leaves: first, second, first, second, ...
   std::size_t found, out_room;  ///< in pairs
   std::uint64_t tests, test_limit;
-  /// Per node of either hierarchy, for the lazy traversal: not 0 if its children's boxes have to be made
+  /// Per node of each hierarchy, for the lazy traversal: not 0 if its children's boxes must be computed
   /// first.
   const std::uint8_t *stale_a = nullptr, *stale_b = nullptr;
 
-  /// The pair on top waits for boxes of the first, or of the second hierarchy.
+  /// Return whether the pair on top waits for boxes of the first, or of the second hierarchy.
   [[gnu::always_inline]] bool first_is_stale() const {
     return (stack[depth - 1].first & WidePair::leaf_bit) == 0 && stale_a[stack[depth - 1].first] != 0;
   }
@@ -27,7 +27,7 @@ struct WideTraversal {
     return (stack[depth - 1].second & WidePair::leaf_bit) == 0 && stale_b[stack[depth - 1].second] != 0;
   }
 };
-/// One step may push, and find, so many pairs.
+/// The largest number of pairs that one step may push, and find.
 inline constexpr std::size_t max_pairs_per_step = 64;
 
 /// The primitives of a hierarchy's leaves.
@@ -38,13 +38,13 @@ struct WideLeafLists {
   const std::uint32_t* primitives;    ///< [entry]
 };
 
-/// And their boxes, made when a query first asks for them.
+/// The primitive boxes of leaves, computed when a query first needs them.
 template <class S>
 struct WideLeaves {
   WideLeafLists lists;
   S* rows;                ///< [leaf][6][padded leaf size]: rows like those of a node
-  std::uint32_t* stamps;  ///< [leaf]: the rows are those of this refit
-  std::uint32_t stamp;    ///< of the present positions
+  std::uint32_t* stamps;  ///< [leaf]: number of the refit of its rows
+  std::uint32_t stamp;    ///< of the current positions
   const S* positions;
 };
 
@@ -65,23 +65,24 @@ struct WideLeafPairs {
   std::size_t found, out_room;
   std::uint64_t tests;
 };
-/// One pair of leaves may yield so many pairs of primitives.
+/// The largest number of primitive pairs from one pair of leaves.
 inline constexpr std::size_t leaf_pair_step = 256;
 
-/// Boxes of both bodies are compared with closed bounds, many at a time.
+/// Compares boxes of both bodies as closed sets, many at a time.
 template <class S>
 struct WideOverlapKernels {
-  /// Goes on until the stack is empty, the limit of tests is reached, or a step might not find room.
+  /// Continues until the stack is empty, the limit of tests is reached, or a step might exceed the free
+  /// space.
   using Traverse = void (*)(WideArrays<S> a, WideArrays<S> b, WideTraversal& state);
-  /// Goes on until all pairs of leaves are done or the next might not find room. For leaves of up to 4, 8
-  /// or 16.
+  /// Continues until all pairs of leaves are done or the next one might exceed the free space. For leaves of
+  /// up to 4, 8 or 16.
   using LeafPairs = void (*)(WideLeafPairs<S>& state);
   Traverse width2, width4, width8;
   /// [log2(width) - 1][padded leaf size 4, 8, 16]
   LeafPairs leaf_pairs[3][3];
-  /// As `traverse`, but leaves off, too, when the pair on top of the stack waits for boxes.
+  /// Like `traverse`, but also pauses when the pair on top of the stack waits for boxes.
   Traverse lazy2, lazy4, lazy8;
-  /// As `traverse`, of a hierarchy with itself: two different leaves once, and each leaf with itself.
+  /// Like `traverse`, for a hierarchy with itself: two different leaves once, and each leaf with itself.
   Traverse self_width[3];
   Traverse self(std::uint32_t width) const { return self_width[width == 2 ? 0 : width == 4 ? 1 : 2]; }
   Traverse lazy(std::uint32_t width) const { return width == 2 ? lazy2 : width == 4 ? lazy4 : lazy8; }
@@ -93,7 +94,7 @@ struct WideOverlapKernels {
 KBVH_DECLARE_KERNELS(WideOverlapKernels<float>, wide_overlap_float)
 KBVH_DECLARE_KERNELS(WideOverlapKernels<double>, wide_overlap_double)
 
-/// The table of a kernel set.
+/// Returns the kernels of one instruction set.
 template <class S>
 const WideOverlapKernels<S>& wide_overlap_kernels(KernelSet set);
 template <>

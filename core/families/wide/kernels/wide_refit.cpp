@@ -7,8 +7,8 @@ namespace {
 
 template <class S, std::uint32_t width>
 void refit(WideArrays<S> h, const S* positions, std::uint32_t begin, std::uint32_t end) {
-  // Nodes that have leaves only depend on nothing: they come in the order in which memory is fetched best,
-  // which is ascending (1.1 to 1.25 times faster on Zen 3). Those above follow, children first.
+  // Nodes with leaves only do not depend on other nodes. They are processed in ascending order, which suits
+  // the prefetcher (1.1 to 1.25 times faster on Zen 3). The others follow, children first.
   for (std::uint32_t i = begin; i < end; ++i) {
     const WideNode& node = h.nodes[i];
     if (node.leaf_count != node.count) continue;

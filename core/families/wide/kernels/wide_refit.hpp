@@ -20,7 +20,7 @@ struct WideRefitKernels {
 KBVH_DECLARE_KERNELS(WideRefitKernels<float>, wide_refit_float)
 KBVH_DECLARE_KERNELS(WideRefitKernels<double>, wide_refit_double)
 
-/// The table of a kernel set.
+/// Returns the kernels of one instruction set.
 template <class S>
 const WideRefitKernels<S>& wide_refit_kernels(KernelSet set);
 template <>

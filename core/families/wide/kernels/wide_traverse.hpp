@@ -1,6 +1,6 @@
 #pragma once
 // Internal to core/kernels/*.cpp: the simultaneous traversal of two wide hierarchies, for any view of their
-// boxes: stored, made as they are visited, or linear in time.
+// boxes: stored, computed at the visit, or linear in time.
 #include "core/families/wide/kernels/wide_overlap.hpp"
 #include "core/kernels/quads.hpp"
 
@@ -27,7 +27,7 @@ template <class S>
   return {{own[0], own[1], own[2]}, {own[4], own[5], own[6]}};
 }
 
-/// Bit i: lane i of the rows overlaps the box. Empty lanes overlap nothing.
+/// Returns a mask. Bit i: lane i of the rows overlaps the box. Empty lanes overlap nothing.
 template <class S, std::size_t width>
 [[gnu::always_inline]] inline unsigned overlapping(const S* rows, const SixSides<S>& box) {
   constexpr std::size_t fit = native_lanes<S> < width ? native_lanes<S> : width;
@@ -52,14 +52,15 @@ template <class S, std::size_t width>
   return std::uint32_t(__builtin_ctz(bits));
 }
 
-/// Child `lane` as a traversal names it.
+/// Returns the traversal's name of child `lane`.
 [[gnu::always_inline]] inline std::uint32_t child(const WideNode& node, std::uint32_t index,
                                                   std::uint32_t lane) {
   return lane < node.leaf_count ? WidePair::leaf_bit | LeafSlot::of(index, lane)
                                 : node.first_child + lane - node.leaf_count;
 }
 
-/// Two leaves go to the output, everything else to the stack; without a branch, for nobody can predict it.
+/// Writes a pair of two leaves to the output, any other pair to the stack; branchless, because the branch
+/// would be unpredictable.
 [[gnu::always_inline]] inline void emit(WideTraversal& state, std::uint32_t first, std::uint32_t second) {
   const bool leaves = (first & second & WidePair::leaf_bit) != 0;
   state.stack[state.depth] = {first, second};
@@ -70,8 +71,8 @@ template <class S, std::size_t width>
 }
 
 /// Compares the children of all pairs on the stack until it is empty, the limit of tests is reached, a step
-/// might not find room, or the view waits for boxes. A view has
-///   bool waits(const WideTraversal&)       the pair on top has boxes that are not there
+/// might exceed the free space, or the view waits for boxes. A view has
+///   bool waits(const WideTraversal&)       the pair on top lacks boxes
 ///   void enter(std::uint32_t a, std::uint32_t b)   their children will be read; a leaf has bit 31 set
 ///   Box own_b(node), lane_a(node, lane), lane_b(node, lane)
 ///   unsigned meeting_a(node, Box), meeting_b(node, Box)   bit i: lane i of the node meets the box
@@ -94,7 +95,7 @@ template <class S, class View>
       for (; first != 0; first &= first - 1) {
         const std::uint32_t i = lowest(first), child_a = child(node_a, pair.first, i);
         unsigned second = view.meeting_b(pair.second, view.lane_a(pair.first, i));
-        // Below a node with itself, the other half mirrors this one.
+        // For a node with itself, the other half mirrors this one.
         if (View::within_one && pair.first == pair.second) second &= ~0U << i;
         for (; second != 0; second &= second - 1)
           emit(state, child_a, child(node_b, pair.second, lowest(second)));
@@ -116,7 +117,7 @@ template <class S, class View>
   shared = state;
 }
 
-/// Boxes as they lie in the rows.
+/// Boxes stored in the rows.
 template <class S, std::uint32_t width>
 struct StoredView {
   static constexpr bool within_one = false;
