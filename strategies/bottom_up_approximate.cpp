@@ -1,6 +1,6 @@
-// Bottom-up refit as it is often written: positions interpolated in the scalar's own arithmetic, and boxes
-// kept in fewer digits. Shows what correctly rounded positions and boxes rounded outwards buy (Z&W 2006, s.2,
-// takes both for granted).
+// Bottom-up refit in a common simplified form: positions interpolated in the scalar's own arithmetic, and
+// boxes stored with fewer digits. It shows the benefit of correctly rounded positions and of boxes rounded
+// outwards (Z&W 2006, s.2, takes both for granted).
 
 #include <cmath>
 
@@ -10,7 +10,8 @@
 namespace kbvh {
 namespace {
 
-/// The nearest number of so many binary digits, or the next one below. The range of exponents is double's.
+/// Returns the nearest number of `digits` binary digits, or the next one below. The range of exponents is
+/// double's.
 double with_digits(double x, int digits, bool down) {
   if (x == 0 || !std::isfinite(x)) return x;
   int exponent = 0;
@@ -42,7 +43,7 @@ class BottomUpApproximate final : public FixedPlansHierarchyStrategy<S, Count> {
   }
 
  private:
-  /// Binary digits of a box's sides; 0: those of the scalar.
+  /// Returns the binary digits of a box's sides; 0: those of the scalar.
   static int digits_of(const std::string& word) {
     const int digits = word == "float" ? 24 : word == "bfloat16" ? 8 : 0;
     return digits < std::numeric_limits<S>::digits ? digits : 0;
@@ -62,7 +63,7 @@ class BottomUpApproximate final : public FixedPlansHierarchyStrategy<S, Count> {
     }
   }
 
-  /// x0 + u (x1 - x0) in the scalar's arithmetic.
+  /// Computes x0 + u (x1 - x0) in the scalar's arithmetic.
   const S* plain_positions(std::uint32_t body) {
     const double t = this->time(), begin = motion_.lines_begin(body), end = motion_.lines_end(body);
     if (!std::isfinite(begin) || !std::isfinite(end) || t <= begin) return this->sampled_.positions(body);
