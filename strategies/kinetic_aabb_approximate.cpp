@@ -1,6 +1,5 @@
-// The kinetic AABB tree as one would write it without exact arithmetic: times of events are floats or
-// doubles, and a certificate's failure is where two lines meet. Shows what the exact decisions of
-// kinetic_aabb buy.
+// The kinetic AABB tree without exact arithmetic: event times are floats or doubles, and a certificate fails
+// where two lines cross. It shows the benefit of the exact decisions of kinetic_aabb.
 
 #include "core/contract/registry.hpp"
 #include "core/families/events/kinetic_aabb_strategy.hpp"
