@@ -36,7 +36,7 @@ in, the peers' own continuous tests of the same two features, which answer in fl
 with the folder of a study for DIR, that study's report has it, too.
 Exit codes: 0 all verdicts are right, 1 one is wrong, 2 wrong use or input, 3 anything else.)";
 
-/// What one test said of the queries of one file, and how fast.
+/// The verdicts and the speed of one test on the queries of one file.
 struct Row {
   std::uint64_t positives = 0, missed = 0, extra = 0, filtered = 0;
   double seconds = 0;
@@ -58,7 +58,7 @@ std::vector<Peer> peers() {
   return found;
 }
 
-/// Decides all queries once and compares with the truth; `test` says whether one touches.
+/// Decides all queries once and compares with the truth; `test` returns whether one touches.
 template <class Test>
 void judge(const ImpactQueries& queries, Row& row, const Test& test) {
   for (const ImpactQuery& query : queries.queries) {
@@ -70,8 +70,8 @@ void judge(const ImpactQueries& queries, Row& row, const Test& test) {
   }
 }
 
-/// Decides all queries again and again, until that has taken `seconds`. Doubles the passes between two looks
-/// at the clock, because a look costs more than a query.
+/// Decides all queries repeatedly until that has taken `seconds`. Doubles the number of passes between two
+/// reads of the clock, because a read costs more than a query.
 template <class Test>
 void time_passes(const ImpactQueries& queries, Row& row, double seconds, const Test& test) {
   std::vector<std::uint8_t> said(queries.queries.size());
@@ -88,7 +88,7 @@ void time_passes(const ImpactQueries& queries, Row& row, double seconds, const T
   row.seconds += here;
 }
 
-/// The exact test and the peers, by turns, each for `seconds` in all.
+/// Times the exact test and the peers alternately, each for `seconds` in total.
 std::vector<Row> measure(const ImpactQueries& queries, const std::vector<Peer>& others, double seconds) {
   std::vector<Row> rows(1 + others.size());
   ImpactStats stats, ignored;
@@ -177,7 +177,7 @@ int run(const Arguments& arguments) {
       totals[i].missed += rows[i].missed;
       totals[i].extra += rows[i].extra;
       totals[i].filtered += rows[i].filtered;
-      // Seconds for one pass over everything.
+      // Seconds for one pass over all files.
       if (rows[i].passes > 0) totals[i].seconds += rows[i].seconds / double(rows[i].passes);
       totals[i].passes = 1;
     }

@@ -40,7 +40,7 @@ int report(const std::string& out, const std::string& title) {
   return code == wrong_use ? wrong_use : internal_error;
 }
 
-/// Prints what is read, until its end.
+/// Prints everything that can be read from a descriptor.
 void pass_on(int descriptor) {
   char bytes[4096];
   for (;;) {
@@ -57,7 +57,7 @@ int run_and_wait(std::vector<std::string> words) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
-  // What the program prints comes through here, so that a full disk is told of in one way.
+  // The program's output passes through here, so that a full disk is reported in one way.
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), "pipe");
   posix_spawn_file_actions_t actions;

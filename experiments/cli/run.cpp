@@ -32,7 +32,7 @@ constexpr const char* bench_examples = R"(Examples:
 One iteration is a whole clip, timed by phases; repetitions are randomly interleaved and all kept, in
 DIR/benchmark.json and DIR/results.jsonl. Whoever breaks its guarantee is refused a time.)";
 
-/// Parameters as the plan holds them: "key=a,b" becomes {"key": ["a", "b"]}.
+/// Converts parameters to the form of a plan: "key=a,b" becomes {"key": ["a", "b"]}.
 json params_of(const std::vector<std::string>& assignments) {
   json params = json::object();
   for (const std::string& text : assignments) {
@@ -46,7 +46,7 @@ json params_of(const std::vector<std::string>& assignments) {
   return params;
 }
 
-/// --clip is for every glTF body that does not name a clip of its own.
+/// Applies --clip to every glTF body without a clip of its own.
 void choose_clip(json& scene, const std::string& clip) {
   bool used = false;
   for (json& body : scene["bodies"]) {

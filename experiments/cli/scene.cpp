@@ -31,7 +31,8 @@ struct SceneOptions {
   bool as_json = false;
 };
 
-/// All bodies as one mesh at one keyframe: bodies at rest, and past their end, as they are last.
+/// Merges all bodies into one mesh at one keyframe: bodies at rest, and bodies past their end, in their last
+/// positions.
 io::AnimatedMesh snapshot(const std::vector<io::AnimatedMesh>& bodies, std::size_t frame) {
   io::AnimatedMesh all;
   all.keyframe_times = {0.0};
@@ -54,7 +55,7 @@ bool is_obj(const SceneOptions& options) {
   return std::filesystem::path(options.out).extension() == ".obj";
 }
 
-/// Complains about a --frame that no file would show.
+/// Rejects a --frame that no file would show.
 void check_frame(const LoadedScene& scene, const SceneOptions& options) {
   if (options.frame == 0) return;
   if (!is_obj(options)) throw io::InputError("--frame: goes with --out FILE.obj, which shows one keyframe");

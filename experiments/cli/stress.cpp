@@ -87,10 +87,10 @@ int run_repro(const StressArguments& arguments, bool others) {
   return failed ? guarantee_broken : success;
 }
 
-/// What a run leaves in its folder, written while it runs: what was found is there whenever it ends.
+/// The files of a run in its folder, written during the run, so that an interrupted run keeps its findings.
 class StressFiles {
  public:
-  /// Writes nothing if there is no folder. Throws io::InputError if it cannot be written.
+  /// Writes nothing without a folder. Throws io::InputError if the folder cannot be written.
   StressFiles(std::filesystem::path folder, const stress::StressOptions& options)
       : folder_(std::move(folder)), options_(options) {
     if (folder_.empty()) return;
@@ -98,7 +98,7 @@ class StressFiles {
     if (file_->earlier().is_null()) write_table({});
   }
 
-  /// Failures at once, the table every other second. Problems are kept for `finish`: the run goes on.
+  /// Writes failures at once, the table every other second. Errors are kept for `finish`: the run continues.
   void keep(stress::StressReport& report) {
     if (folder_.empty()) return;
     try {
@@ -113,7 +113,7 @@ class StressFiles {
     }
   }
 
-  /// Throws io::InputError if anything could not be written.
+  /// Throws io::InputError if any file could not be written.
   void finish(const stress::StressReport& report) {
     if (folder_.empty()) return;
     if (!problem_.empty()) throw io::InputError(problem_);
@@ -122,7 +122,7 @@ class StressFiles {
   }
 
  private:
-  /// Leaves the table of an earlier run with the same options until this one has come as far.
+  /// Keeps the table of an earlier run with the same options until this run has progressed as far.
   void write_table(const stress::StressReport& report) {
     if (const nlohmann::json& earlier = file_->earlier();
         !earlier.is_null() && earlier.value("played", nlohmann::json(0)) > nlohmann::json(report.played))
@@ -130,7 +130,7 @@ class StressFiles {
     file_->write(to_json(report, options_));
   }
 
-  /// Writes a failure that is new, or was made smaller since; false if there was nothing to do.
+  /// Writes a failure that is new or was shrunk further; returns false if there was nothing to write.
   bool keep(stress::StressFailure& failure, std::size_t i) {
     std::string text = stress::to_text(failure.repro);
     if (i < texts_.size() && texts_[i] == text) return false;
@@ -144,7 +144,7 @@ class StressFiles {
     return true;
   }
 
-  /// A name that nothing else has: a failure of another run stays, the same one is not kept twice.
+  /// Returns an unused name: a failure of another run stays, and the same failure is not written twice.
   std::string name_for(const stress::Repro& repro, const std::string& text, const std::string& own) const {
     const std::string base = "repro-" + repro.scene.family + "-" + repro.strategy + "-" + repro.scalar;
     std::error_code error;
@@ -161,7 +161,7 @@ class StressFiles {
   std::filesystem::path folder_;
   const stress::StressOptions& options_;
   std::optional<ResultFile> file_;
-  std::vector<std::string> texts_;  ///< of each failure, as written
+  std::vector<std::string> texts_;  ///< text of each failure as written
   std::chrono::steady_clock::time_point written_{};
   std::string problem_;
 };
