@@ -3,7 +3,7 @@
 
 namespace kbvh::experiments {
 
-/// One line on standard error that says what long work is doing; silent unless that is a terminal.
+/// A progress line on standard error; silent unless standard error is a terminal.
 class Progress {
  public:
   Progress();
@@ -12,7 +12,7 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
   /// Replaces the line.
   void show(const std::string& line);
-  /// Removes the line, before anything else is printed.
+  /// Removes the line; call it before any other output.
   void clear();
 
  private:
