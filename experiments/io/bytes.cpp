@@ -138,7 +138,7 @@ void write_file_atomically(const fs::path& file, std::string_view bytes) {
     }
     done += static_cast<std::size_t>(n);
   }
-  // Without fsync a crash can leave the new name without content: what the rename is to prevent.
+  // Without fsync a crash can leave the new name without content, which the rename must prevent.
   const int synced = fsync(descriptor) == 0 ? 0 : errno;
   const int closed = close(descriptor) == 0 ? 0 : errno;
   if (synced != 0 || closed != 0) give_up(synced != 0 ? synced : closed);
