@@ -17,7 +17,7 @@ using nlohmann::json;
 
 namespace {
 
-/// Google Benchmark writes NaN and Infinity (the variation of what is always zero), which JSON does not have.
+/// Google Benchmark writes NaN and Infinity (the variation of constant zeros), which JSON does not have.
 std::string without_nan(std::string text) {
   for (const std::string token : {": NaN", ": -NaN", ": Infinity", ": -Infinity"})
     for (std::size_t at = 0; (at = text.find(token, at)) != std::string::npos;)
