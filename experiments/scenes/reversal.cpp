@@ -17,11 +17,11 @@ std::vector<double> frames_of(const ReversalRule& rule) {
 
 namespace {
 
-/// What is known of one body while its vertices turn round.
+/// The state of one body while its vertices reverse.
 template <class S>
 struct TurningBody {
   std::vector<S> outward;             ///< velocities [vertex][3]
-  std::vector<std::uint8_t> inwards;  ///< has the vertex been reversed?
+  std::vector<std::uint8_t> inwards;  ///< whether the vertex has been reversed
   std::vector<std::uint8_t> touched;  ///< by a colliding primitive in this frame
 };
 
@@ -101,7 +101,7 @@ PlanScript<S> record_reversals(const Scene<S>& scene, const ReversalRule& rule,
 
 namespace {
 
-constexpr std::string_view magic = "KBVHSCR1";  // change with the layout, the rule or the test of the oracle
+constexpr std::string_view magic = "KBVHSCR1";  // change it with the layout, the rule or the oracle's test
 
 template <class S>
 std::string bytes_of(const PlanScript<S>& script) {
@@ -120,7 +120,7 @@ std::string bytes_of(const PlanScript<S>& script) {
   return out;
 }
 
-/// Throws io::InputError if the file is not what bytes_of wrote.
+/// Throws io::InputError if the file was not written by bytes_of.
 template <class S>
 PlanScript<S> read_script(const std::filesystem::path& file) {
   const std::string bytes = io::read_file(file);

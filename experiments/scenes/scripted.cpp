@@ -75,7 +75,7 @@ ScriptSpec::Step read_step(const json& value, const std::string& place) {
   return step;
 }
 
-/// The text of a script's file; throws io::InputError that begins with `place` if it cannot be read.
+/// Returns the text of a script's file; throws io::InputError that begins with `place` if it cannot be read.
 std::string text_of(const std::filesystem::path& file, const std::string& place) {
   try {
     return io::read_file(file);
