@@ -18,7 +18,7 @@ using boost::multiprecision::cpp_int;
 namespace {
 
 std::optional<Contact::Kind> kind_named(const std::string& name) {
-  // A word of the name, not letters within one: sheets and knees are no edges.
+  // Matches a whole word of the name, not letters within one: sheets and knees are no edges.
   const auto has = [&](const std::string& word) {
     const auto letter = [&](std::size_t at) {
       return at < name.size() && std::isalpha(static_cast<unsigned char>(name[at])) != 0;
@@ -43,10 +43,10 @@ bool is_integer(const std::string& text) {
                      [](char c) { return c >= '0' && c <= '9'; });
 }
 
-/// A quotient that is a double, exactly; nothing if it is none.
+/// Returns a quotient that is exactly a double; nothing otherwise.
 std::optional<double> exact_quotient(const std::string& top, const std::string& bottom) {
   if (!is_integer(top) || !is_integer(bottom)) return {};
-  // A number that begins with a zero would be read as an octal one.
+  // A number that begins with a zero would be read as octal.
   const auto decimal = [](const std::string& text) {
     const bool negative = text.starts_with('-');
     const std::size_t first = std::min(text.find_first_not_of('0', negative ? 1 : 0), text.size() - 1);
@@ -78,7 +78,7 @@ std::vector<fs::path> files_in(const fs::path& folder, const std::string& extens
   return files;
 }
 
-/// The file of a kind, by the part of its name before `suffix`.
+/// Returns the file of a kind, by the part of its name before `suffix`.
 fs::path file_of_kind(const fs::path& folder, const std::string& ending) {
   for (const fs::path& file : files_in(folder, ".json"))
     if (file.filename().string().ends_with(ending)) return file;
@@ -209,8 +209,8 @@ ImpactQuery FramePair::query(const Listed& pair) const {
 
 namespace {
 
-/// As `find_impact_queries`; `above` are the folders that `path` is in, so that a link to one of them ends
-/// nothing.
+/// Like `find_impact_queries`; `above` are the folders that contain `path`, so that a link to one of them
+/// does not recurse.
 std::vector<ImpactQueries> find_below(const fs::path& path, std::vector<fs::path>& above) {
   std::vector<ImpactQueries> found;
   std::error_code problem;
@@ -225,7 +225,7 @@ std::vector<ImpactQueries> find_below(const fs::path& path, std::vector<fs::path
         if (listed.kind == kind) found.back().queries.push_back(pair.query(listed));
     }
   } else if (fs::is_directory(status)) {
-    std::error_code error;  // of a link that leads nowhere, which is no folder
+    std::error_code error;  // of a dangling link, which is not a folder
     std::vector<fs::path> inside;
     for (const auto& entry : fs::directory_iterator(path))
       if (entry.is_directory(error) || entry.path().extension() == ".csv") inside.push_back(entry.path());

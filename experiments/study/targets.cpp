@@ -84,7 +84,7 @@ Target read_target(const json& value, const std::string& place) {
   return target;
 }
 
-/// Does the study measure in this scalar and l?
+/// Returns whether the study measures in this scalar and l.
 bool measures(const Study& study, const Target& target) {
   return has(study.scalars, target.scalar) && has(study.per_keyframe, target.per_keyframe);
 }
