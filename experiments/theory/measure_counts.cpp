@@ -22,7 +22,7 @@ struct CountNotices {
 using Forest = KineticForest<float, AvlQueue<float>, Counting, CountNotices>;
 using Tree = Forest::Tree;
 
-/// A sum and a maximum of differences of a counter that only grows.
+/// The sum and the maximum of the increments of a growing counter.
 class Difference {
  public:
   void start(std::uint64_t value) { last_ = value; }
@@ -83,7 +83,7 @@ std::uint64_t most_events_of_a_node(const Forest& forest, std::uint32_t bodies) 
   return most;
 }
 
-/// Leaves by vertex, from connectivity alone.
+/// Returns the leaves of each vertex, from connectivity alone.
 std::vector<std::vector<std::uint32_t>> leaves_of_vertices(const Topology& topology,
                                                            const Primitives& primitives,
                                                            std::uint32_t vertices) {
@@ -98,7 +98,8 @@ std::vector<std::vector<std::uint32_t>> leaves_of_vertices(const Topology& topol
   return leaves;
 }
 
-/// Changes one plan after the other at the first keyframe: 200 vertices by chance and the one of most leaves.
+/// Changes one plan after the other at the first keyframe: 200 random vertices and the one with the most
+/// leaves.
 void measure_updates(const Scene<float>& scene, const Topologies& topologies, CountRun& run) {
   const SceneView<float> view(scene);
   Playback<float> playback(scene);
@@ -123,7 +124,8 @@ void measure_updates(const Scene<float>& scene, const Topologies& topologies, Co
     for (int i = 0; i < 200; ++i) chosen.push_back(std::uint32_t(noise.bits(index++) % leaves.size()));
     for (const std::uint32_t v : chosen) {
       if (leaves[v].empty()) continue;
-      // All that an update may look at, from the tree alone: the candidates of every node above the vertex.
+      // The largest set that an update may visit, from the tree alone: the candidates of every node above the
+      // vertex.
       std::vector<std::uint32_t> above;
       for (std::uint32_t node : leaves[v])
         for (;; node = topology.parents[node]) {
