@@ -353,12 +353,12 @@ KBVH_STRATEGY(bullet_bvh) {
   info.parameters.push_back({"query",
                              "trees",
                              {"trees", "primitives"},
-                             "descend both trees, or ask Bullet for each primitive of the smaller body",
+                             "descend both trees, or query Bullet once per primitive of the smaller body",
                              0});
   info.parameters.push_back({"scale",
                              "fit",
                              {"fit", "none"},
-                             "scale the scene so that Bullet's margin of 1.0 is small, or leave it",
+                             "scale the scene so that Bullet's margin of 1.0 is small, or use it unscaled",
                              0});
   return {make_entry<bullet::BulletBvh, Scalars::float_only>(std::move(info))};
 }

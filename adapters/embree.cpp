@@ -432,13 +432,12 @@ KBVH_STRATEGY(embree) {
   info.positions = PositionUse::all;
   info.topology.own = true;
   info.own_scalar = "float";
-  info.parameters = {
-      {"geometry",
-       "user",
-       {"user", "triangles"},
-       "what the update refits: user geometry, which the query collides; or triangle geometry, "
-       "Embree's fastest refit, which cannot be collided: the query then refits user geometry "
-       "first, and its time is not to be quoted"}};
+  info.parameters = {{"geometry",
+                      "user",
+                      {"user", "triangles"},
+                      "geometry that the update refits: user geometry, which the query collides; or triangle "
+                      "geometry, Embree's fastest refit, which Embree cannot collide: the query then refits "
+                      "user geometry first, and its time must not be quoted"}};
   std::vector<StrategyEntry> entries;
   entries.push_back(make_entry<EmbreeRefit, Scalars::float_only>(std::move(info)));
   return entries;

@@ -400,11 +400,10 @@ KBVH_STRATEGY(auto) {
       .tightness = Tightness::conservative,
       .positions = PositionUse::varying,
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {{"gain",
-            "1.1",
-            {},
-            "another strategy is taken if it is predicted to be so many times faster than the one in use",
-            1}},
+      .parameters = {{"gain",
+                      "1.1",
+                      {},
+                      "predicted speed-up from which on another strategy replaces the active one",
+                      1}},
   })};
 }

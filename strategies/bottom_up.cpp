@@ -112,16 +112,15 @@ KBVH_STRATEGY(bottom_up) {
       .baseline = true,
       .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {{"kernels", "auto", kernel_words(),
-            "instruction set of refit and query; auto: the widest of this machine"},
-           {"threads",
-            "1",
-            {},
-            "threads of the refit (TBB), at most those of this machine; times with more than one are "
-            "reported apart",
-            1,
-            most_threads(),
-            Numbers::whole}},
+      .parameters = {{"kernels", "auto", kernel_words(),
+                      "instruction set of refit and query; auto: the widest that this machine supports"},
+                     {"threads",
+                      "1",
+                      {},
+                      "threads of the refit (TBB), at most those of this machine; times with more than one "
+                      "thread are reported separately",
+                      1,
+                      most_threads(),
+                      Numbers::whole}},
   })};
 }

@@ -97,16 +97,18 @@ KBVH_STRATEGY(bottom_up_approximate) {
       .tightness = Tightness::none,
       .guarantee = Guarantee::approximate,
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {{"positions",
-            "plain",
-            {"plain", "rounded"},
-            "boxes hold positions interpolated in the scalar's arithmetic, or correctly rounded "
-            "ones, which every query is about"},
-           {"boxes",
-            "scene",
-            {"scene", "float", "bfloat16"},
-            "binary digits of boxes: the scalar's, 24 or 8"},
-           {"rounding", "nearest", {"nearest", "outward"}, "of boxes with fewer digits than positions"}},
+      .parameters = {{"positions",
+                      "plain",
+                      {"plain", "rounded"},
+                      "positions in the boxes: interpolated in the scalar's arithmetic, or correctly rounded "
+                      "as in all queries"},
+                     {"boxes",
+                      "scene",
+                      {"scene", "float", "bfloat16"},
+                      "binary digits of the boxes: the scalar's, 24 or 8"},
+                     {"rounding",
+                      "nearest",
+                      {"nearest", "outward"},
+                      "rounding of boxes with fewer digits than positions"}},
   })};
 }

@@ -44,7 +44,7 @@ KBVH_STRATEGY(bottom_up_budget) {
       .parameters = {{"box_tests",
                       "1000",
                       {},
-                      "box tests that the query of a frame may take",
+                      "maximum number of box tests in the query of a frame",
                       1,
                       1e15,
                       Numbers::whole}},

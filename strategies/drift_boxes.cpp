@@ -470,19 +470,20 @@ class DriftBoxesBounded final : public DriftStrategy<S, Count, SteppedMotion<S>>
 };
 
 Info drift_info() {
-  return {
-      .family = "lazy",
-      .citation = "kbvh; lists of neighbours after Verlet 1967",
-      .tightness = Tightness::conservative,
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = {{"lists",
-                      "tuned",
-                      {"tuned", "never"},
-                      "one search for as many frames as counts of work say, or one at every frame"},
-                     {"candidates",
-                      "boxes",
-                      {"boxes", "listed"},
-                      "listed pairs whose boxes overlap at the frame, as of any query; or all that may"}}};
+  return {.family = "lazy",
+          .citation = "kbvh; lists of neighbours after Verlet 1967",
+          .tightness = Tightness::conservative,
+          .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+          .parameters = {
+              {"lists",
+               "tuned",
+               {"tuned", "never"},
+               "one search for several frames, chosen by a cost model of counts, or one search per frame"},
+              {"candidates",
+               "boxes",
+               {"boxes", "listed"},
+               "candidates: listed pairs whose boxes overlap at the frame, as in other queries; or all "
+               "listed pairs that may overlap"}}};
 }
 
 }  // namespace

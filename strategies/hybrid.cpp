@@ -285,15 +285,14 @@ KBVH_STRATEGY(hybrid) {
       .baseline = true,
       .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {{"levels",
-            "auto",
-            {"auto", "0", "1", "2", "3", "4", "6", "8", "12", "16"},
-            "levels refitted at every frame, counted from the root; auto: half of them"},
-           {"below",
-            "subtree",
-            {"subtree", "top_down"},
-            "what a query entering a subtree below them makes: all of it, bottom-up, or one node at a "
-            "time, from all vertices below"}},
+      .parameters = {{"levels",
+                      "auto",
+                      {"auto", "0", "1", "2", "3", "4", "6", "8", "12", "16"},
+                      "levels refitted at every frame, counted from the root; auto: half of all levels"},
+                     {"below",
+                      "subtree",
+                      {"subtree", "top_down"},
+                      "work of a query that enters a subtree below them: refit it all, bottom-up, or one "
+                      "node at a time, from all vertices below"}},
   })};
 }

@@ -292,18 +292,17 @@ KBVH_STRATEGY(inflated_lazy) {
       .positions = PositionUse::fetched,
       .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = {{"margin_is",
-                      "tuned",
-                      {"tuned", "absolute", "relative"},
-                      "what `margin` means: nothing, for it follows from the motion and the last query's "
-                      "work; units of the "
-                      "scene; or a fraction of the mean side of the leaves' boxes at the reset"},
-                     {"margin", "0.1", {}, "by how much leaf boxes are inflated on every side"},
-                     {"bound",
-                      "step",
-                      {"step", "scan"},
-                      "how it knows whether a margin is used up: from the caller's bound on the motion, "
-                      "which skips frames, "
-                      "or by reading every vertex"}},
+      .parameters =
+          {{"margin_is",
+            "tuned",
+            {"tuned", "absolute", "relative"},
+            "unit of `margin`: unused, because the margin follows from the motion and the last query's work; "
+            "units of the scene; or a fraction of the mean side of the leaves' boxes at the reset"},
+           {"margin", "0.1", {}, "inflation of leaf boxes on every side"},
+           {"bound",
+            "step",
+            {"step", "scan"},
+            "test whether a margin is used up: by the caller's bound on the motion, which skips frames, or "
+            "by reading every vertex"}},
   })};
 }

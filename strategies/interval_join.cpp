@@ -145,7 +145,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   void find_swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) override {
     if (plans_changed_) return sweep_both_ends(before, out);
     if (!(bounds_.begin() <= t0 && t1 <= bounds_.end()))
-      throw std::invalid_argument("contacts are asked for across a knot of a plan");
+      throw std::invalid_argument("contacts were requested across a knot of a plan");
     for (std::size_t i = 0; i < sweeps_.size(); ++i) {
       sweeps_[i].join(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i));
       this->count_.add(Counter::box_tests, sweeps_[i].tests());
@@ -332,7 +332,7 @@ std::vector<Parameter> join_parameters() {
   list.push_back({"triangle_tests",
                   "spans",
                   {"spans", "frames"},
-                  "decide pairs of triangles for spans of time where that can be proved, or at every frame"});
+                  "decide pairs of triangles for spans of time where a proof exists, or at every frame"});
   return list;
 }
 
@@ -355,5 +355,5 @@ KBVH_STRATEGY(interval_join) {
     };
   };
   return {make_entry<AtOnce>(info("interval_join", "interval join")),
-          make_entry<MadeAhead>(info("interval_join_ahead", "interval join, made ahead"))};
+          make_entry<MadeAhead>(info("interval_join_ahead", "interval join, computed ahead"))};
 }

@@ -45,11 +45,11 @@ KBVH_STRATEGY(kinetic_aabb_approximate) {
       .parameters = {{"event_times",
                       "double",
                       {"double", "float"},
-                      "in what times of events are computed and compared (kinetic_aabb: exactly)"},
+                      "arithmetic of event times and their comparisons (kinetic_aabb: exact)"},
                      {"formula",
                       "textbook",
                       {"textbook", "end_point_rule"},
-                      "a failure is where two lines meet, or where the end of the segment says (as in "
-                      "kinetic_aabb)"}},
+                      "failure test: by the crossing of two lines, or by the values at the end of the "
+                      "segment (as in kinetic_aabb)"}},
   })};
 }

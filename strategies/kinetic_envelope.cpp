@@ -254,6 +254,6 @@ KBVH_STRATEGY(kinetic_envelope) {
   return {
       make_entry<KineticEnvelope>(info_of("kinetic_envelope", "kinetic AABB tree, envelopes")),
       make_entry<KineticEnvelopeAhead>(
-          info_of("kinetic_envelope_ahead", "kinetic AABB tree, envelopes made ahead")),
+          info_of("kinetic_envelope_ahead", "kinetic AABB tree, envelopes computed ahead")),
   };
 }

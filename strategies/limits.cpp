@@ -105,7 +105,7 @@ Info limit(const char* id, const char* title) {
   info.id = id;
   info.title = title;
   info.family = "limit";
-  info.citation = "kbvh: a bound for others, not a contestant";
+  info.citation = "kbvh; a limit for comparison, not a contestant";
   info.tightness = Tightness::none;
   info.guarantee = Guarantee::approximate;
   return info;

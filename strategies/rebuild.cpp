@@ -64,6 +64,6 @@ KBVH_STRATEGY(rebuild) {
       .citation = "van den Bergen 1997 (as the alternative to refitting)",
       .declares = {.restructures = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = {{"method", "median", {"median", "sah", "morton"}, "how the new topology is built"}},
+      .parameters = {{"method", "median", {"median", "sah", "morton"}, "builder of the new topology"}},
   })};
 }

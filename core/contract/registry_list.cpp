@@ -13,7 +13,7 @@ const std::vector<StrategyEntry>& registry() {
     for (std::size_t i = 0; i < list.size(); ++i)
       for (std::size_t j = i + 1; j < list.size(); ++j)
         if (list[i].info.id == list[j].info.id)
-          throw std::logic_error("two strategies are registered as '" + list[i].info.id + "'");
+          throw std::logic_error("two strategies are registered with the id '" + list[i].info.id + "'");
     return list;
   }();
   return entries;

@@ -30,11 +30,11 @@ constexpr const char* ccd_examples = R"(Examples:
   kbvh ccd
   kbvh ccd queries/unit-tests frames/cloth-ball --out results/ccd
 Decides queries of continuous collision detection (a vertex and a face, or two edges, in linear motion) exactly, and
-compares with the verdicts that come with them: files of 8 rows a query in exact rationals, folders of such files, and
-pairs of frames with lists of pairs, as in the NYU CCD benchmark (Wang et al. 2021). Beside it, where they are built
-in, the peers' own continuous tests of the same two features, which answer in floating point. DIR/ccd.json has the table;
-with the folder of a study for DIR, that study's report has it, too.
-Exit codes: 0 all verdicts are right, 1 one is wrong, 2 wrong use or input, 3 anything else.)";
+compares with the given verdicts. Input: files with 8 rows per query in exact rationals, folders of such files, and
+pairs of frames with lists of pairs, as in the NYU CCD benchmark (Wang et al. 2021). The table also has the peers' own
+continuous tests of the same two features, in floating point, if they are built in. DIR/ccd.json has the table; if DIR
+is the folder of a study, the study's report includes it.
+Exit codes: 0 all verdicts are right, 1 one is wrong, 2 wrong use or input, 3 other error.)";
 
 /// The verdicts and the speed of one test on the queries of one file.
 struct Row {
@@ -186,7 +186,7 @@ int run(const Arguments& arguments) {
   add_line("all", queries, totals);
   print(columns(table));
   if (others.empty()) print("No peer with a continuous test of its own is built in (FCL 0.7 has one).\n");
-  if (unknown > 0) print(counted(unknown, "query") + " without a verdict to compare with.\n");
+  if (unknown > 0) print(counted(unknown, "query") + " without a given verdict.\n");
   if (result)
     result->write({{"commit", commit()},
                    {"dirty", dirty()},
@@ -194,7 +194,7 @@ int run(const Arguments& arguments) {
                    {"options", options},
                    {"files", records}});
   if (wrong == 0) return success;
-  say(counted(wrong, "verdict") + " that should have been the other");
+  say(counted(wrong, "verdict") + " that are wrong");
   return guarantee_broken;
 }
 
@@ -205,7 +205,7 @@ void add_ccd(CLI::App& program, Action& action) {
   command->footer(ccd_examples);
   auto a = std::make_shared<Arguments>();
   add_texts(*command, "paths", a->paths, "files, folders, frame pairs (the data folder's ccd)");
-  add_number(*command, "--seconds", a->seconds, 0, 3600, "of each test on each file, at least (0.05)");
+  add_number(*command, "--seconds", a->seconds, 0, 3600, "minimum time of each test on each file (0.05)");
   add_text(*command, "--out", a->out, "folder for ccd.json (none: the table only)");
   command->callback([&action, a] { action = [a] { return run(*a); }; });
 }

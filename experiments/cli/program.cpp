@@ -137,7 +137,7 @@ int run_program(int argc, const char* const* argv) {
   } catch (const ConfigError& problem) {
     return wrong(problem.what());
   } catch (const std::bad_alloc&) {
-    say("out of memory: what was asked for does not fit into this machine, or into a limit (ulimit -v)");
+    say("out of memory: the request exceeds this machine's memory, or a limit (ulimit -v)");
     return internal_error;
   } catch (const std::exception& problem) {
     say(std::string("internal error: ") + one_line(problem.what()));

@@ -24,8 +24,9 @@ namespace {
 
 constexpr const char* report_examples = R"(Example:
   kbvh report --out results
-writes results/report.html, self-contained, its figures and results/claims.json, from results/results.jsonl and what lies
-beside it: targets.json (bench), theory.json, stress.json, ccd.json. Commands that make those take the same --out.)";
+writes results/report.html, self-contained, its figures and results/claims.json, from results/results.jsonl and the
+files next to it: targets.json (bench), theory.json, stress.json, ccd.json. The commands that write those take the
+same --out.)";
 
 int report(const std::string& out, const std::string& title) {
   const std::filesystem::path results = std::filesystem::path(out) / "results.jsonl";
@@ -77,11 +78,11 @@ int run_and_wait(std::vector<std::string> words) {
 }
 
 void add_report(CLI::App& program, Action& action) {
-  CLI::App* command = program.add_subcommand("report", "tables and figures of a result folder");
+  CLI::App* command = program.add_subcommand("report", "write tables and figures of a result folder");
   command->footer(report_examples);
   auto out = std::make_shared<std::string>(), title = std::make_shared<std::string>();
   add_text(*command, "--out", *out, "folder with results.jsonl")->required();
-  add_text(*command, "--title", *title, "of the report");
+  add_text(*command, "--title", *title, "title of the report");
   command->callback([&action, out, title] { action = [out, title] { return report(*out, *title); }; });
 }
 

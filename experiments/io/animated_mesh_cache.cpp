@@ -145,7 +145,7 @@ std::vector<AnimatedMesh> load_cache(const std::filesystem::path& file) {
   if (version != cache_version || reserved != 0) {
     fail(file, "header",
          "version is " + std::to_string(version) + ", only " + std::to_string(cache_version) +
-             " is known; delete the file to have it made anew");
+             " is known; delete the file to recreate it");
   }
   const auto size = load_little_endian<std::uint64_t>(&bytes[16]);
   if (size != bytes.size() - header_bytes) {

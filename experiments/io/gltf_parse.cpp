@@ -166,7 +166,7 @@ class Parser {
       const bool harmless = name == "KHR_mesh_quantization" || name.starts_with("KHR_materials_") ||
                             name.starts_with("KHR_texture_") || name.starts_with("EXT_texture_") ||
                             name.starts_with("KHR_lights_") || name.starts_with("KHR_xmp");
-      if (!harmless) v.reject("the extension " + printable(name) + " is required, and is not read here");
+      if (!harmless) v.reject("the extension " + printable(name) + " is required, but not supported");
     }
   }
 
@@ -281,7 +281,7 @@ class Parser {
     const std::optional<Value> extensions = v.find("extensions");
     if (extensions && extensions->find("KHR_draco_mesh_compression") && primitive.position &&
         !document_.accessors[*primitive.position].view) {
-      v.reject("its geometry is compressed (KHR_draco_mesh_compression), which is not read here");
+      v.reject("its geometry is compressed (KHR_draco_mesh_compression), which is not supported");
     }
     return primitive;
   }

@@ -87,7 +87,7 @@ ResultStore::ResultStore(const std::filesystem::path& folder)
   prepare_folder(folder);
   std::error_code error;
   if (std::filesystem::exists(file_, error) && !std::filesystem::is_regular_file(file_, error))
-    throw io::InputError(file_.string() + ": is not a file that results can be added to");
+    throw io::InputError(file_.string() + ": is not a file to which results can be appended");
   if (const int descriptor = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC); descriptor >= 0)
     ::close(descriptor);
   else if (errno != ENOENT)

@@ -132,9 +132,8 @@ std::string results_table(const std::vector<json>& records) {
   for (const std::string kind : {"points", "control_nets"})
     if (std::any_of(bodies.begin(), bodies.end(),
                     [&](const json& body) { return body.value("kind", std::string()) == kind; }))
-      text +=
-          fmt::format("  pairs with {} are candidates: boxes that overlap, which says nothing of contact\n",
-                      kind == "points" ? "points" : "control nets");
+      text += fmt::format("  pairs with {} are candidates: overlapping boxes, without a test of contact\n",
+                          kind == "points" ? "points" : "control nets");
   for (const char* column : {"x refit", "with motion", "missed", "extra", "protrusion", "looseness"})
     head.push_back(column);
   std::vector<std::vector<std::string>> rows{head};
@@ -168,8 +167,7 @@ std::string results_table(const std::vector<json>& records) {
   text += columns(rows) + refusals + choices + counted_by;
   std::set<std::string> runs;
   for (const json& record : records) runs.insert(record.value("run", std::string()));
-  if (runs.size() > 1)
-    text += "  (not all of one run: the machine may not have been the same all the time)\n";
+  if (runs.size() > 1) text += "  (from several runs: the machine may have differed)\n";
   return text;
 }
 

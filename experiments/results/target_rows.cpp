@@ -302,7 +302,7 @@ std::string targets_table(const json& rows) {
   }
   std::string text = "Targets: how many times slower the other is, on the scenes that count\n";
   text += columns(summary) + reasons;
-  if (several_runs) text += "  (not all of one run: the machine may not have been the same all the time)\n";
+  if (several_runs) text += "  (from several runs: the machine may have differed)\n";
   return text + "\nAll scenes (* counts)\n" + details;
 }
 
@@ -316,8 +316,8 @@ void write_targets(const std::filesystem::path& folder, const json& rows) {
     for (const json& row : *before)
       if (!row.is_object() || !plans.contains(row.value("plan", ""))) all.push_back(row);
   } else if (before) {
-    say("warning: " + file.string() + " is no list of targets: it is now " + set_aside(file) +
-        ", and a new one is begun");
+    say("warning: " + file.string() + " is not a list of targets: it is now " + set_aside(file) +
+        ", and a new file is started");
   }
   for (const json& row : rows) all.push_back(row);
   io::write_file_atomically(file, all.dump(1, ' ', false, json::error_handler_t::replace) + "\n");

@@ -44,17 +44,17 @@ class Runner {
     std::error_code error;
     for (const char* name : {"benchmark.json", "targets.json"})
       if (const auto file = out / name; std::filesystem::is_directory(file, error))
-        throw io::InputError(file.string() + ": is a folder where a file is to be written");
+        throw io::InputError(file.string() + ": is a folder, but a file must be written there");
     if (store_->unreadable_lines() > 0)
       say("note: " + (out / "results.jsonl").string() + " has " + std::to_string(store_->unreadable_lines()) +
-          " unreadable lines (of a run that was stopped?); they are left as they are");
+          " unreadable lines (of an interrupted run?); they stay unchanged");
   }
 
   void study(const Study& study, const std::vector<ContestantSpec>& contestants) {
     for (const SceneSpec& spec : study.scenes) {
       if (spec.optional) {
         if (const std::string missing = missing_file(spec); !missing.empty()) {
-          note("note: the scene '" + spec.name + "' is left out, there is no " + missing);
+          note("note: the scene '" + spec.name + "' is skipped: there is no " + missing);
           continue;
         }
       }
@@ -119,9 +119,8 @@ class Runner {
   void warn_of_no_pairs(const Scene<S>& scene) {
     if (!scene.pairs.empty()) return;
     note("warning: " + scene.name +
-         " has one body, so there are no pairs of bodies, and nothing is found or compared; pairs within it "
-         "are "
-         "asked for by --self (in a plan: \"self\": true)");
+         " has one body, so there are no pairs of bodies, and nothing is found or compared; --self (in a "
+         "plan: \"self\": true) asks for pairs within it");
   }
 
   template <class S>
@@ -138,7 +137,7 @@ class Runner {
     std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
     if (has_own_frames(loaded)) {
       if (per_keyframe != std::vector<std::uint32_t>{1})
-        note("note: " + scene.name + " says itself when its frames are: l does not apply and counts as 1");
+        note("note: " + scene.name + " defines its own frame times: l does not apply and counts as 1");
       per_keyframe = {1};
     }
     for (const std::uint32_t l : per_keyframe) {
@@ -173,14 +172,14 @@ class Runner {
                      const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script) {
     if (script.changes_geometry()) {
       note("note: " + scene.name +
-           " is left out: contacts between keyframes know nothing of changes of geometry");
+           " is skipped: contacts between keyframes do not support changes of geometry");
       return;
     }
     std::vector<double> knots = script.empty() ? overlaid_keyframes(scene)
                                                : contact_times(frames_of(scene, loaded, script, 1), script);
     if (study.frames_limit > 0 && knots.size() > study.frames_limit + 1) knots.resize(study.frames_limit + 1);
     if (knots.size() < 2) {
-      note("note: " + scene.name + " is left out: nothing moves, so there are no contacts between keyframes");
+      note("note: " + scene.name + " is skipped: nothing moves, so there are no contacts between keyframes");
       return;
     }
     progress_.show(scene.name + ": finding the true contacts");

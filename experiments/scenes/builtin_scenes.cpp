@@ -29,7 +29,7 @@ Meshes simulated(const Config& config, Simulate simulate, const std::string& wha
     try {
       return io::load_cache(file);
     } catch (const io::InputError& problem) {
-      say(std::string("warning: ") + problem.what() + "; the scene is simulated anew");
+      say(std::string("warning: ") + problem.what() + "; the scene is simulated again");
     }
   }
   const auto report = [&](double fraction) {
@@ -41,7 +41,7 @@ Meshes simulated(const Config& config, Simulate simulate, const std::string& wha
     try {
       io::save_cache(meshes, file);
     } catch (const io::InputError& problem) {
-      say(std::string("warning: the simulated scene is not kept: ") + problem.what());
+      say(std::string("warning: the simulated scene is not cached: ") + problem.what());
     }
   }
   return meshes;
@@ -146,11 +146,11 @@ const std::vector<BuiltinScene>& builtin_scenes() {
       {"waving_sheet", "a sheet in crossing waves cuts a sphere at rest", &waving_sheet},
       {"expanding_sphere", "a growing sphere reaches a sphere at rest", &expanding_sphere},
       {"reversing_spheres",
-       "two spheres expand and vertices turn round where triangles meet, at 60 frames per second; keyframes: "
-       "frames",
+       "two spheres expand, and vertices of colliding triangles reverse, at 60 frames per second; keyframes: "
+       "number of frames",
        &reversing_spheres, &reversing_rule},
-      {"passing_spheres", "two spheres fly through each other, without deforming", &passing_spheres},
-      {"turning_box", "a box turns inside a sphere at rest", &turning_box},
+      {"passing_spheres", "two rigid spheres pass through each other", &passing_spheres},
+      {"turning_box", "a box rotates inside a sphere at rest", &turning_box},
       {"random_soups", "two clouds of separate drifting triangles in the same cube", &random_soups},
   };
   return list;

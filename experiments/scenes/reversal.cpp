@@ -134,7 +134,7 @@ PlanScript<S> read_script(const std::filesystem::path& file) {
     at += sizeof value;
   };
   room(1, magic.size());
-  if (!bytes.starts_with(magic)) io::fail(file, "", "is no recorded script of this version");
+  if (!bytes.starts_with(magic)) io::fail(file, "", "is not a recorded script of this version");
   at = magic.size();
   std::uint64_t expected = 0, steps = 0, changes = 0;
   take(expected);
@@ -181,14 +181,14 @@ PlanScript<S> recorded_reversals(const Scene<S>& scene, const ReversalRule& rule
     try {
       return read_script<S>(file);
     } catch (const io::InputError& problem) {
-      say(std::string("warning: ") + problem.what() + "; the script is recorded anew");
+      say(std::string("warning: ") + problem.what() + "; the script is recorded again");
     }
   }
   PlanScript<S> script = record_reversals(scene, rule, progress);
   try {
     io::write_file_atomically(file, bytes_of(script));
   } catch (const io::InputError& problem) {
-    say(std::string("warning: the recorded script is not kept: ") + problem.what());
+    say(std::string("warning: the recorded script is not cached: ") + problem.what());
   }
   return script;
 }

@@ -110,7 +110,7 @@ ScriptSpec read_script_spec(const json& value, const std::string& place,
     script.steps.push_back(read_step(steps[i], place + ": steps[" + std::to_string(i) + "]"));
     if (i > 0 && !(script.steps[i - 1].time < script.steps[i].time))
       throw io::InputError(script.steps[i].place + ": time " + io::text_of(script.steps[i].time) +
-                           " does not follow that of the step before, " +
+                           " is not later than that of the preceding step, " +
                            io::text_of(script.steps[i - 1].time));
   }
   return script;

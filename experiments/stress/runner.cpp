@@ -327,7 +327,7 @@ StressReport run_stress(const StressOptions& options, const std::function<void(c
           if (keep) keep(report);
           if (options.shrink) {
             CaseResult last = results[c];
-            told("shrinking what fails " + specs[c].label + " in " + family.name);
+            told("shrinking a failure of " + specs[c].label + " in " + family.name);
             RunLimits limits = options.limits;
             limits.silent = true;
             const auto fails = [&](const StressScene& candidate) {

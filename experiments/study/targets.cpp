@@ -122,7 +122,7 @@ void check_target_scenes(const Plan& plan) {
       if (meanings.empty())
         fail("no study has a scene of the name '" + scene + "' " + conditions(target) +
              (known.empty() ? "; there are none with a name" : "; there are " + joined(known)));
-      if (meanings.size() > 1) fail("'" + scene + "' is the name of several scenes, which counts?");
+      if (meanings.size() > 1) fail("'" + scene + "' is the name of several scenes");
     }
   }
 }

@@ -99,7 +99,8 @@ Recording<S> record_events(const Scene<S>& scene, const PlanScript<S>& script, c
   recording.topologies = build_topologies(view, playback, play.builder);
   const std::unique_ptr<Strategy<S>> strategy = make(view, playback, recording.topologies);
   EventSource<S>* const source = strategy->events();
-  if (source == nullptr) throw std::logic_error("what is to be recorded event by event has no events");
+  if (source == nullptr)
+    throw std::logic_error("a strategy without events cannot be recorded event by event");
   strategy->reset(first);
   std::vector<BoundNotice<S>> told;
   source->watch_bounds(&told);
@@ -299,7 +300,7 @@ std::string check_change(const Epoch<S>& epoch, std::uint32_t body, const Case& 
                              std::to_string(notice.node) + " side " + std::to_string(notice.side);
     std::uint32_t& realiser = state[6 * std::size_t(notice.node) + notice.side];
     if (notice.at_event || notice.begin != epoch.begin) return name + ": not at the change's own time";
-    if (realiser != notice.old_vertex) return name + ": passes on what it does not have";
+    if (realiser != notice.old_vertex) return name + ": passes on a bound that it does not have";
     const int order = now.motion.compare(std::size_t(0), int(notice.side / 2), notice.new_vertex, realiser);
     if ((notice.side % 2 == 1 ? order : -order) <= 0) return name + ": gains nothing";
     realiser = notice.new_vertex;
