@@ -346,7 +346,9 @@ KBVH_STRATEGY(interval_join) {
         .id = id,
         .title = title,
         .family = "linear",
-        .citation = "kbvh",
+        .citation =
+            "kbvh; joins of boxes linear in time as in Saltenis et al. 2000, Tao & Papadias 2002 and Zhang "
+            "et al. 2008 (core/adr/0010)",
         .tightness = Tightness::conservative,
         .positions = PositionUse::fetched,
         .declares = {.continuous = true},
