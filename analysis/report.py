@@ -42,7 +42,7 @@ TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 @dataclass
 class Section:
-    """All about one scene."""
+    """The part of the report on one scene."""
 
     title: str
     anchor: str
@@ -60,7 +60,7 @@ class Section:
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
-    """The command; returns its exit code: 0, or 2 for results that cannot be used."""
+    """Runs the command; returns its exit code: 0, or 2 for unusable results."""
     parser = argparse.ArgumentParser(
         prog="report.py",
         description="Turns RESULTS_DIR/results.jsonl into RESULTS_DIR/report.html and RESULTS_DIR/figures/.",
@@ -100,7 +100,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
 
 
 def plain_groups(study: Study) -> list[tuple[str, tables.Group]]:
-    """Groups with the name of their scene."""
+    """Returns groups with the name of their scene."""
     scenes = [rows["scene_name"].iloc[0] for rows in study.groups()]
     return list(zip(scenes, tables.groups(study, tables.Ratios(study))))
 
@@ -156,7 +156,7 @@ def write(
 
 
 def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:
-    """How many claims have which verdict."""
+    """Counts the claims by verdict."""
     verdicts = (paper_claims.HOLDS, paper_claims.CONDITION, paper_claims.FAILS, paper_claims.OPEN)
     return [(verdict, sum(row.verdict == verdict for row in claims.rows)) for verdict in verdicts]
 
@@ -164,7 +164,7 @@ def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:
 def _claim_links(
     claims: paper_claims.Claims, study: Study, groups: list[tables.Group], drawn: set[str]
 ) -> dict[str, list[tuple[str, str]]]:
-    """For each claim the fragments of the figures (of those that are there) and tables that show it, with their texts."""
+    """Returns, for each claim, the fragments of its existing figures and tables, with their texts."""
     names = {rows["group"].iloc[0]: (rows["scene"].iloc[0], group) for rows, group in zip(study.groups(), groups)}
     links: dict[str, list[tuple[str, str]]] = {}
     for row in claims.rows:
@@ -182,7 +182,7 @@ def _claim_links(
 
 
 def _theory(folder: Path, which: str) -> list[Picture]:
-    """What theory.json shows, if it is there."""
+    """Returns the figures of theory.json, if it exists."""
     file = folder / "theory.json"
     if which == "none" or not file.exists():
         return []
@@ -197,14 +197,14 @@ def _theory(folder: Path, which: str) -> list[Picture]:
 def _paper(
     study: Study, claims: paper_claims.Claims, all_looks: dict[str, Look], folder: Path, which: str
 ) -> list[tuple[paper_figures.PaperFigure, Optional[Picture], list[str]]]:
-    """The paper's own figures; without any of its panels, or if none are wanted, just what is missing."""
+    """Returns the paper's own figures; without any of their panels, or if none are wanted, only the missing data."""
     if which == "none":
         return []
     return paper_figures.drawn(Table(study, "float"), claims.baselines, all_looks, folder)
 
 
 def render(**values: object) -> str:
-    """The page as a text; everything that comes from results is escaped."""
+    """Renders the page as a text; all content from results is escaped."""
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -258,7 +258,7 @@ def _sections(
 
 
 def headline(timed: pd.DataFrame) -> str:
-    """The group that figures of one group show: the largest, in float if there is one, at the middle l."""
+    """Returns the group for single-group figures: the largest, in float if available, at the middle l."""
     rows = timed[timed["primitives"] == timed["primitives"].max()]
     if (rows["scalar"] == "float").any():
         rows = rows[rows["scalar"] == "float"]
@@ -274,7 +274,7 @@ def _place(row: pd.Series) -> str:
 def _group_pictures(
     group: pd.DataFrame, timed: pd.DataFrame, all_looks: dict[str, Look], folder: Path, slug: str
 ) -> list[Picture]:
-    """Cost split, time against error, counters and latency of one group."""
+    """Draws cost split, time against error, counters and latency of one group."""
     first = group.iloc[0]
     place = _place(first)
     sizes = ratios.fastest_configurations(
@@ -349,7 +349,9 @@ def _left_out(rows: pd.DataFrame) -> str:
 def _trends(
     timed: pd.DataFrame, head: str, all_looks: dict[str, Look], folder: Path, slug: str
 ) -> tuple[list[Picture], list[tuple[str, ...]]]:
-    """Lines over l and over n: at the size with most l and at the l with most sizes, or else those of the headline group."""
+    """Draws lines over l and over n: at the size with most l and at the l with most sizes, or else those of the headline
+    group.
+    """
     first = timed[timed["group"] == head].iloc[0]
     same = timed[(timed["scalar"] == first["scalar"]) & (timed["machine"] == first["machine"])]
     same = same.drop_duplicates(["contestant", "primitives", "l"], keep="last")
@@ -381,7 +383,9 @@ def _trends(
 
 
 def _most(rows: pd.DataFrame, column: str, counted: str, usual: float) -> float:
-    """The value of a column at which most values of another were measured: the usual one if it has as many, else the largest."""
+    """Returns the value of a column at which most values of another were measured: the usual one if it has as many, else the
+    largest.
+    """
     numbers = rows.groupby(column)[counted].nunique()
     best = numbers[numbers == numbers.max()].index
     return usual if usual in best else float(best.max())
@@ -393,7 +397,7 @@ def _values(column: pd.Series, shorten: Optional[int] = None) -> str:
 
 
 def _machine(study: Study) -> list[tuple[str, str]]:
-    """What the study ran on, as pairs of a name and a value."""
+    """Describes the machine of the study, as pairs of a name and a value."""
     runs = study.runs
     memory = _values(runs["memory_gb"])
     return [
@@ -407,7 +411,7 @@ def _machine(study: Study) -> list[tuple[str, str]]:
 
 
 def _made(study: Study) -> list[tuple[str, str]]:
-    """How the study was made."""
+    """Describes how the study was made."""
     runs, timed = study.runs, study.timed
     when = sorted(value for value in runs["when"].unique() if value)
     dirty = runs[runs["dirty"]]
@@ -430,7 +434,7 @@ def _made(study: Study) -> list[tuple[str, str]]:
 
 
 def _strategies(study: Study) -> list[dict[str, object]]:
-    """What each contestant is, once."""
+    """Describes each contestant, once."""
     unique = study.runs.drop_duplicates("contestant").sort_values(["family", "label"])
     result = []
     for row in unique.itertuples():

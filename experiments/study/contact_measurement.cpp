@@ -105,7 +105,7 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
       const auto begin = std::chrono::steady_clock::now();
       entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
       measured.build_seconds = seconds_since(begin);
-      // Warm: buffers grow, and hierarchies for sweeps are made when they are first asked for.
+      // Warm-up: buffers grow, and hierarchies for sweeps are created at their first use.
       PhaseTimes ignored;
       ScriptCursor<S> cursor(script_);
       entrant.session->reset(knots_[0]);

@@ -84,7 +84,7 @@ Target read_target(const json& value, const std::string& place) {
   return target;
 }
 
-/// Does the study measure in this scalar and l?
+/// Returns whether the study measures in this scalar and l.
 bool measures(const Study& study, const Target& target) {
   return has(study.scalars, target.scalar) && has(study.per_keyframe, target.per_keyframe);
 }
@@ -122,7 +122,7 @@ void check_target_scenes(const Plan& plan) {
       if (meanings.empty())
         fail("no study has a scene of the name '" + scene + "' " + conditions(target) +
              (known.empty() ? "; there are none with a name" : "; there are " + joined(known)));
-      if (meanings.size() > 1) fail("'" + scene + "' is the name of several scenes, which counts?");
+      if (meanings.size() > 1) fail("'" + scene + "' is the name of several scenes");
     }
   }
 }

@@ -96,7 +96,7 @@ std::uint64_t most_events_of_a_node(const EventSource<float>& source, std::uint3
   return most;
 }
 
-/// Leaves by vertex, from connectivity alone.
+/// Returns the leaves of each vertex, from connectivity alone.
 std::vector<std::vector<std::uint32_t>> leaves_of_vertices(const Topology& topology,
                                                            const Primitives& primitives,
                                                            std::uint32_t vertices) {
@@ -111,7 +111,8 @@ std::vector<std::vector<std::uint32_t>> leaves_of_vertices(const Topology& topol
   return leaves;
 }
 
-/// Changes one plan after the other at the first keyframe: 200 vertices by chance and the one of most leaves.
+/// Changes one plan after the other at the first keyframe: 200 random vertices and the one with the most
+/// leaves.
 void measure_updates(const Scene<float>& scene, const Topologies& topologies, CountRun& run) {
   const SceneView<float> view(scene);
   Playback<float> playback(scene);
@@ -134,7 +135,8 @@ void measure_updates(const Scene<float>& scene, const Topologies& topologies, Co
     for (int i = 0; i < 200; ++i) chosen.push_back(std::uint32_t(noise.bits(index++) % leaves.size()));
     for (const std::uint32_t v : chosen) {
       if (leaves[v].empty()) continue;
-      // All that an update may look at, from the tree alone: the candidates of every node above the vertex.
+      // The largest set that an update may visit, from the tree alone: the candidates of every node above the
+      // vertex.
       std::vector<std::uint32_t> above;
       for (std::uint32_t node : leaves[v])
         for (;; node = topology.parents[node]) {

@@ -303,7 +303,7 @@ TEST_F(Binary, OptionalScenesMayBeAbsent) {
       {"builtin": "waving_sheet", "triangles": 50, "keyframes": 2}]})");
   const Outcome run = kbvh("run --plan plan.json");
   EXPECT_EQ(run.code, 0) << run.err;
-  EXPECT_NE(run.err.find("'away' is left out"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("'away' is skipped"), std::string::npos) << run.err;
 }
 
 TEST_F(Binary, BrokenGuaranteesAreRefusedATime) {
