@@ -8,9 +8,10 @@
 namespace kbvh::experiments {
 
 /// Returns the times between which contacts are found where plans change: the frames, and in between every
-/// possible knot of a changed plan.
+/// keyframe of a body and every possible knot of a changed plan.
 template <class S>
-std::vector<double> contact_times(std::vector<double> frames, const PlanScript<S>& script);
+std::vector<double> contact_times(const Scene<S>& scene, std::vector<double> frames,
+                                  const PlanScript<S>& script);
 
 /// Like Measurement, for the contacts of features while vertices move from one time of `knots` to the next.
 template <class S>
