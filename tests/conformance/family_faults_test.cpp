@@ -23,7 +23,7 @@ enum class Fault : std::uint8_t {
   late_begin,       // pairs are reported a twentieth of the segment after they begin
   early_end,        // and a twentieth before they end
   overdue_verdict,  // what was proved of a pair at the segment's begin is reported throughout
-  half_closing,     // bodies are taken to close in by half of what they can
+  small_closing,    // bodies are taken to close in by a tenth of what they can
   stale_rows,       // a search reads the leaves of the search before
   ends_only,        // a sweep looks at where the motion ends
 };
@@ -168,7 +168,7 @@ class Near : public StoredHierarchyStrategy<S, Count> {
   void advance_to(double t) override {
     for (std::uint32_t body = 0; body < rows_.size(); ++body) {
       const double way = motion_.displacement_bound(body, this->previous_time(), t);
-      moved_[body] += fault == Fault::half_closing ? way / 2 : way;
+      moved_[body] += fault == Fault::small_closing ? way / 10 : way;
     }
     if (*std::max_element(moved_.begin(), moved_.end()) > 0.999 * double(margin)) search();
   }
@@ -318,8 +318,8 @@ TEST(FamilyFaults, PlansForgottenByTheJoin) {
 TEST(FamilyFaults, SoundNearPairsPass) {
   expect_sound<Near>({"soups", "sheets", "four_bodies_own_keyframes"});
 }
-TEST(FamilyFaults, ClosingTakenForHalf) {
-  expect_caught<Near, Fault::half_closing>("soups", "not among the candidates");
+TEST(FamilyFaults, ClosingTakenForLess) {
+  expect_caught<Near, Fault::small_closing>("soups", "not among the candidates");
 }
 TEST(FamilyFaults, RowsOfTheSearchBefore) {
   expect_caught<Near, Fault::stale_rows>("soups", "not among the candidates");
