@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 import text
-from load import COUNTERS, Study
+from load import READ_COUNTERS, Study
 
 NOISY = 0.1  #: spread of repetitions from which a run is called noisy
 
@@ -134,7 +134,7 @@ def _hidden(runs: pd.DataFrame) -> tuple[str, str]:
 def _absent(study: Study) -> tuple[str, str]:
     timed = study.timed
     words = []
-    counted = timed[[f"{name}_per_frame" for name in COUNTERS]].notna().any(axis=1)
+    counted = timed[[f"{name}_per_frame" for name in READ_COUNTERS]].notna().any(axis=1)
     if len(timed) and not counted.all():
         words.append(f"{text.plural(int((~counted).sum()), 'run')} of {len(timed)} recorded no counters.")
     if len(timed) and not timed["baseline"].any():

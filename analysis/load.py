@@ -22,13 +22,8 @@ import scene_names
 SCHEMA = 1
 FILE_NAME = "results.jsonl"
 PHASES = ("motion", "update", "traversal", "triangle_tests", "plan_changes")
-COUNTERS = (
-    "nodes_visited", "values_written", "vertex_reads", "positions_fetched", "certificates_made",
-    "certificates_failed", "certificates_discarded", "internal_events", "overlap_events",
-    "fathers_apart_events", "leaves_apart_events", "bound_change_events", "list_peak", "queue_operations", "queue_steps",
-    "queue_peak", "box_tests", "triangle_tests", "triangle_tests_exact", "span_tests", "span_verdicts",
-    "bodies_skipped", "nodes_skipped", "bodies_translated", "bodies_remembered",
-)  # fmt: skip
+#: Counters that tables and figures read. Others become columns, too, if the results have them.
+READ_COUNTERS = ("certificates_failed", "values_written", "positions_fetched")
 #: Counters that are a level, not a sum over the clip.
 LEVELS = ("queue_peak", "list_peak")
 GUARANTEES = ("exact", "candidate_superset", "approximate")
@@ -267,7 +262,8 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         row["verified_frames" if name == "frames" else name] = record.number(f"verified.{name}", math.nan)
     if not row["audited"]:  # a hierarchy that cannot be seen has no measured boxes, whatever was recorded
         row["protrusion"] = row["looseness"] = math.nan
-    for name in COUNTERS:
+    counters = record.get("counters", {})
+    for name in dict.fromkeys((*READ_COUNTERS, *(counters if isinstance(counters, dict) else ()))):
         total = record.number(f"counters.{name}", math.nan)
         row[f"{name}_per_frame"] = total if name in LEVELS or not row["frames"] > 0 else total / row["frames"]
     row["contestant"] = _identity(row["id"], params, builder)

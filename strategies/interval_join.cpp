@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/linear_bounds.hpp"
@@ -37,7 +38,7 @@ struct WorkAhead {
   std::size_t join = 0;  ///< the next one
   bool begun = false;    ///< work on that join has begun
   bool joins_begun = false;
-  double since = 0;  ///< time at which the work began
+  Pacer pacer;
   double done = 0;
 };
 
@@ -229,7 +230,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
       joined_ = true;
     }
     ahead_ = {};
-    ahead_.since = this->time();
+    ahead_.pacer = {this->time(), bounds_.end()};
     if constexpr (works_ahead)
       if (bounds_.start_ahead(motion_.from(bounds_.end()))) ahead_.stage = Stage::bounds;
   }
@@ -244,10 +245,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
   /// Returns the share of the work ahead that must be done by now: all of it at the last frame before the
   /// next segment, if the step between the last two frames repeats.
-  double share_due() const {
-    const double next_frame = this->time() + (this->time() - before_);
-    return (next_frame - ahead_.since) / (bounds_.end() - ahead_.since);
-  }
+  double share_due() const { return ahead_.pacer.share_due(this->time(), this->time() - before_); }
   /// Estimates the work as if the next segment resembled the current one, or, if that one has little work,
   /// many others.
   double all_work() const {

@@ -3,6 +3,7 @@
 // stores, sorted by time, that frames apply (core/families/envelope/segment_envelope.hpp). If the whole clip
 // is known, the frames of a segment can share the pass for the next one.
 
+#include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/envelope/realiser_strategy.hpp"
 #include "core/families/envelope/segment_envelope.hpp"
@@ -108,8 +109,8 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     double end = 0;          ///< of the segment
     std::vector<S> room[2];  ///< for positions at its ends that are not stored
     Next next = Next::nothing;
-    double next_since = 0;  ///< time at which the next segment's envelope was begun
-    WideRealisers at_end;   ///< at the end of the current segment, as far as the next envelope is computed
+    Pacer pacer;           ///< of the next segment's envelope
+    WideRealisers at_end;  ///< at the end of the current segment, as far as the next envelope is computed
   };
 
   /// Tests for equal steps to the last bit: then no vertex overtakes another.
@@ -191,7 +192,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
       return;
     }
     state.next = Next::envelope;
-    state.next_since = this->time();
+    state.pacer = {this->time(), state.end};
     const double next_end = later.lines_end(index);
     // The ends are keyframes, which need no extra memory.
     state.envelope.start_next(this->bodies_[index].hierarchy,
@@ -202,9 +203,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
   /// steps.
   void work_ahead(std::uint32_t index, double step) {
     const State& state = states_[index];
-    if (state.next == Next::envelope)
-      make_next(index,
-                std::min(1.0, (this->time() + step - state.next_since) / (state.end - state.next_since)));
+    if (state.next == Next::envelope) make_next(index, state.pacer.share_due(this->time(), step));
   }
   void make_next(std::uint32_t index, double share) {
     State& state = states_[index];

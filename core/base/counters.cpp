@@ -1,68 +1,28 @@
 #include "core/base/counters.hpp"
 
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
 namespace kbvh {
 
+namespace {
+struct CounterText {
+  const char *name, *meaning;
+};
+constexpr CounterText texts[] = {
+#define KBVH_COUNTER(name, meaning) {#name, meaning},
+    KBVH_COUNTERS(KBVH_COUNTER)
+#undef KBVH_COUNTER
+};
+static_assert(std::size(texts) == std::size_t(Counter::count));
+}  // namespace
+
 const char* name(Counter counter) {
-  switch (counter) {
-    case Counter::nodes_visited:
-      return "nodes_visited";
-    case Counter::values_written:
-      return "values_written";
-    case Counter::vertex_reads:
-      return "vertex_reads";
-    case Counter::positions_fetched:
-      return "positions_fetched";
-    case Counter::certificates_made:
-      return "certificates_made";
-    case Counter::certificates_failed:
-      return "certificates_failed";
-    case Counter::certificates_discarded:
-      return "certificates_discarded";
-    case Counter::internal_events:
-      return "internal_events";
-    case Counter::overlap_events:
-      return "overlap_events";
-    case Counter::fathers_apart_events:
-      return "fathers_apart_events";
-    case Counter::leaves_apart_events:
-      return "leaves_apart_events";
-    case Counter::bound_change_events:
-      return "bound_change_events";
-    case Counter::list_peak:
-      return "list_peak";
-    case Counter::queue_operations:
-      return "queue_operations";
-    case Counter::queue_steps:
-      return "queue_steps";
-    case Counter::queue_peak:
-      return "queue_peak";
-    case Counter::box_tests:
-      return "box_tests";
-    case Counter::triangle_tests:
-      return "triangle_tests";
-    case Counter::triangle_tests_exact:
-      return "triangle_tests_exact";
-    case Counter::span_tests:
-      return "span_tests";
-    case Counter::span_verdicts:
-      return "span_verdicts";
-    case Counter::bodies_skipped:
-      return "bodies_skipped";
-    case Counter::nodes_skipped:
-      return "nodes_skipped";
-    case Counter::bodies_translated:
-      return "bodies_translated";
-    case Counter::bodies_remembered:
-      return "bodies_remembered";
-    case Counter::bytes:
-      return "bytes";
-    case Counter::count:
-      break;
-  }
-  return "?";
+  return counter < Counter::count ? texts[std::size_t(counter)].name : "?";
+}
+const char* meaning(Counter counter) {
+  return counter < Counter::count ? texts[std::size_t(counter)].meaning : "?";
 }
 
 void Counters::add(std::string_view own, std::uint64_t n) {

@@ -8,40 +8,47 @@
 
 namespace kbvh {
 
-/// The shared counters of strategies. One table serves all strategies, so that reports and theory checks can
-/// loop over it.
+/// Every counter that any strategy may use: X(name in code and in result files, what it counts).
+#define KBVH_COUNTERS(X)                                                                             \
+  X(nodes_visited, "nodes whose bounds an update visited")                                           \
+  X(values_written, "bound values stored (6 per AABB written; 1 per realiser changed)")              \
+  X(vertex_reads, "vertex positions read by updates")                                                \
+  X(positions_fetched, "positions that a lazy strategy had evaluated on demand")                     \
+  X(certificates_made, "certificates computed, with or without a failure inside the clip")           \
+  X(certificates_failed, "events processed")                                                         \
+  X(certificates_discarded, "scheduled failures removed before they happened")                       \
+  X(internal_events, "events that changed no bound")                                                 \
+  X(overlap_events, "boxes of a separation list that began to overlap")                              \
+  X(fathers_apart_events, "inner pairs above a separation list whose boxes ceased to overlap")       \
+  X(leaves_apart_events, "overlapping pairs of leaves that ceased to overlap")                       \
+  X(bound_change_events, "changes of a box that occurs in a separation list")                        \
+  X(list_peak, "largest number of pairs in the separation list (a maximum, not a sum)")              \
+  X(queue_operations, "insert, erase, pop and re-key on the event queue")                            \
+  X(queue_steps, "comparisons made by the queue")                                                    \
+  X(queue_peak, "largest number of events scheduled at once (a maximum, not a sum)")                 \
+  X(box_tests, "box-box overlap tests of the query, primitive pre-tests included")                   \
+  X(triangle_tests, "exact triangle tests")                                                          \
+  X(triangle_tests_exact, "exact triangle tests that the filter left to exact arithmetic")           \
+  X(span_tests, "attempts to decide a pair of triangles for a span of time")                         \
+  X(span_verdicts, "pairs that a frame reported as intersecting by the verdict of an earlier frame") \
+  X(bodies_skipped, "bodies for which a frame read at most one box")                                 \
+  X(nodes_skipped, "nodes that an update skipped because no query of the frame could read them")     \
+  X(bodies_translated, "bodies whose boxes were translated for a whole segment instead of refitted") \
+  X(bodies_remembered, "bodies whose boxes were reused from an earlier play of the clip")            \
+  X(bytes, "memory held by the strategy's own structures, in bytes (a level, not a sum)")
+
+/// What a strategy counts; reports and theory checks loop over it.
 enum class Counter : std::uint8_t {
-  nodes_visited,           ///< nodes whose bounds an update visited
-  values_written,          ///< bound values stored (6 per AABB written; 1 per realiser changed)
-  vertex_reads,            ///< vertex positions read by updates
-  positions_fetched,       ///< positions that a lazy strategy had evaluated on demand
-  certificates_made,       ///< certificates computed, with or without a failure inside the clip
-  certificates_failed,     ///< events processed
-  certificates_discarded,  ///< scheduled failures removed before they happened
-  internal_events,         ///< events that changed no bound
-  overlap_events,          ///< boxes of a separation list that began to overlap
-  fathers_apart_events,    ///< inner pairs above a separation list whose boxes ceased to overlap
-  leaves_apart_events,     ///< overlapping pairs of leaves that ceased to overlap
-  bound_change_events,     ///< changes of a box that occurs in a separation list
-  list_peak,               ///< largest number of pairs in the separation list (a maximum, not a sum)
-  queue_operations,        ///< insert, erase, pop and re-key on the event queue
-  queue_steps,             ///< comparisons made by the queue
-  queue_peak,              ///< largest number of events scheduled at once (a maximum, not a sum)
-  box_tests,               ///< box-box overlap tests of the query, primitive pre-tests included
-  triangle_tests,          ///< exact triangle tests
-  triangle_tests_exact,    ///< exact triangle tests that the filter left to exact arithmetic
-  span_tests,              ///< attempts to decide a pair of triangles for a span of time
-  span_verdicts,           ///< pairs that a frame reported as intersecting by the verdict of an earlier frame
-  bodies_skipped,          ///< bodies for which a frame read at most one box
-  nodes_skipped,           ///< nodes that an update skipped because no query of the frame could read them
-  bodies_translated,       ///< bodies whose boxes were translated for a whole segment instead of refitted
-  bodies_remembered,       ///< bodies whose boxes were reused from an earlier play of the clip
-  bytes,                   ///< memory held by the strategy's own structures, in bytes (a level, not a sum)
-  count
+#define KBVH_COUNTER(name, meaning) name,
+  KBVH_COUNTERS(KBVH_COUNTER)
+#undef KBVH_COUNTER
+      count
 };
 
 /// Returns the name of a counter in result files.
 const char* name(Counter counter);
+/// Returns what a counter counts, in a line.
+const char* meaning(Counter counter);
 
 /// The counter table of one strategy instance; cleared by `reset`.
 struct Counters {

@@ -26,9 +26,13 @@ function(kbvh_write_manifest file)
 
 @declarations@
 namespace kbvh {
-std::vector<StrategyEntry> manifest_entries() {
+static std::vector<StrategyEntry> manifest_entries() {
   std::vector<StrategyEntry> entries;
-@calls@  return entries;
+@calls@  return with_unique_ids(std::move(entries));
+}
+const std::vector<StrategyEntry>& registry() {
+  static const std::vector<StrategyEntry> entries = manifest_entries();
+  return entries;
 }
 }  // namespace kbvh
 ")

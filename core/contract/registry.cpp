@@ -1,10 +1,28 @@
 #include "core/contract/registry.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
+
+std::vector<StrategyEntry> with_unique_ids(std::vector<StrategyEntry> entries) {
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    for (std::size_t j = i + 1; j < entries.size(); ++j)
+      if (entries[i].info.id == entries[j].info.id)
+        throw std::logic_error("two strategies are registered as '" + entries[i].info.id + "'");
+  return entries;
+}
+
+const StrategyEntry& find_strategy(const std::vector<StrategyEntry>& entries, std::string_view id) {
+  std::string known;
+  for (const StrategyEntry& entry : entries) {
+    if (entry.info.id == id) return entry;
+    known += (known.empty() ? "" : ", ") + entry.info.id;
+  }
+  throw ConfigError("there is no strategy '" + std::string(id) + "'; known are " + known);
+}
 
 BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> method,
                                std::optional<std::uint32_t> width, std::optional<std::uint32_t> leaf_size) {

@@ -90,11 +90,18 @@ StrategyEntry make_entry(Info info) {
 ///   KBVH_STRATEGY(NAME) { return {make_entry<MyStrategy>({.id = ...})}; }
 #define KBVH_STRATEGY(name) std::vector<kbvh::StrategyEntry> kbvh_strategy_##name()
 
-/// Returns all contestants linked into this program, in manifest order.
+/// Returns all contestants linked into this program, in manifest order. Defined by the manifest, a source
+/// that the build generates from the list of strategies: a program that links no manifest has no registry.
 const std::vector<StrategyEntry>& registry();
 
+/// Returns the entries; throws std::logic_error if two of them have one id. For manifests.
+std::vector<StrategyEntry> with_unique_ids(std::vector<StrategyEntry> entries);
+
 /// Finds a contestant. Throws ConfigError that lists the known ids.
-const StrategyEntry& find_strategy(std::string_view id);
+const StrategyEntry& find_strategy(const std::vector<StrategyEntry>& entries, std::string_view id);
+inline const StrategyEntry& find_strategy(std::string_view id) {
+  return find_strategy(registry(), id);
+}
 
 /// Returns the strategy's preferred builder configuration with the given overrides. Throws ConfigError if the
 /// strategy does not support them.

@@ -1,6 +1,5 @@
 #pragma once
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -10,10 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/continuous/contacts.hpp"
 #include "core/contract/registry.hpp"
-#include "core/judge/oracle.hpp"
-#include "core/judge/plan_script.hpp"
+#include "core/judge/contact_sweep.hpp"
+#include "core/judge/phase_times.hpp"
 #include "core/judge/range_watch.hpp"
 #include "core/scene/self_pairs.hpp"
 
@@ -24,15 +22,6 @@ struct Contestant {
   const StrategyEntry* entry = nullptr;
   std::map<std::string, std::string> params;
   BuilderConfig builder;  ///< ignored by strategies that build their own hierarchy
-};
-
-/// Seconds of one frame by phase. `motion` is the driver's work, the same for every contestant that needs all
-/// positions: evaluating them, and following changes of plans and geometry. The strategy's responses to these
-/// changes are separate phases.
-struct PhaseTimes {
-  double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0, geometry_changes = 0;
-  double query() const { return traversal + triangle_tests; }
-  double total() const { return update + traversal + triangle_tests + plan_changes + geometry_changes; }
 };
 
 /// Drives one contestant on one scene. This is the only driver: verification, benchmarks and lessons all use
@@ -65,7 +54,7 @@ class Session {
       changing_.emplace(*original_);
       playback_.seek(overlaid_keyframes(*original_).front());
       make_strategy();
-      finder_.reset();
+      sweep_.reset();
       geometry_changed_ = false;
     }
     watch_.start(playback_);
@@ -124,20 +113,9 @@ class Session {
     if (const double knot = next_knot(); t > knot)
       throw std::invalid_argument("contacts to t = " + std::to_string(t) + " across the knot of a plan at " +
                                   std::to_string(knot));
-    if (!finder_) finder_.emplace(*scene_);
-    playback_.evaluate_all();
-    finder_->start(playback_);
-    const double from = playback_.time();
-    timed(times.update, [&] { strategy_->start_sweep(from); });
-    seek(t);
-    timed(times.motion, [&] { playback_.evaluate_all(); });
-    before_.clear();
-    for (std::uint32_t body = 0; body < playback_.body_count(); ++body)
-      before_.push_back(finder_->before(body));
-    swept_.clear();
-    timed(times.traversal, [&] { strategy_->swept_pairs(from, t, before_, swept_); });
-    timed(times.triangle_tests, [&] { finder_->find(playback_, swept_, out); });
-    return swept_.size();
+    if (!sweep_) sweep_.emplace(*scene_);
+    return sweep_->find(
+        *strategy_, playback_, t, [this](double to) { seek(to); }, out, times);
   }
   /// Returns the first time after the current one at which the plan of any vertex has a knot; infinite if
   /// none has. O(bodies + own plans).
@@ -148,9 +126,9 @@ class Session {
     return knot;
   }
   /// Returns how contacts were decided; valid after the first call of `contacts`.
-  ImpactStats impact_stats() const { return finder_ ? finder_->stats() : ImpactStats{}; }
-  /// Returns the pairs of the last call of `contacts`.
-  const PairBuffer& swept_pairs() const { return swept_; }
+  ImpactStats impact_stats() const { return sweep_ ? sweep_->stats() : ImpactStats{}; }
+  /// Returns the swept pairs of the last call of `contacts`; there must have been one.
+  const PairBuffer& swept_pairs() const { return sweep_->pairs(); }
 
   /// Applies the changes at the current time: all of them or, if one is not valid, none
   /// (Playback::change_plans).
@@ -169,16 +147,9 @@ class Session {
     if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
     timed(times.motion, [&] { changing_->apply(change, playback_); });
     geometry_changed_ = true;
-    finder_.reset();  // its features are of the old geometry
+    sweep_.reset();  // its features are of the old geometry
     watch_.added(playback_, change);
     timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
-  }
-
-  /// Applies a script's changes at the current time; nullptr: none.
-  void follow(const typename PlanScript<S>::Step* step, PhaseTimes& times) {
-    if (step == nullptr) return;
-    if (!step->changes.empty()) change_plans(step->changes, times);
-    if (!step->geometry.empty()) change_geometry(step->geometry, times);
   }
 
   Strategy<S>& strategy() { return *strategy_; }
@@ -201,12 +172,6 @@ class Session {
     for (const auto& [body, positions] : handed_in_) playback_.hand_in(body, positions);
     handed_in_.clear();
   }
-  template <class Work>
-  static void timed(double& seconds, Work&& work) {
-    const auto begin = std::chrono::steady_clock::now();
-    work();
-    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  }
   const Scene<S>* original_;
   Contestant contestant_;
   CountingPolicy policy_;
@@ -219,9 +184,7 @@ class Session {
   std::unique_ptr<Strategy<S>> strategy_;
   bool geometry_changed_ = false;
   std::vector<std::pair<std::uint32_t, const S*>> handed_in_;
-  std::optional<ContactFinder<S>> finder_;
-  std::vector<const S*> before_;
-  PairBuffer swept_;
+  std::optional<ContactSweep<S>> sweep_;  ///< made by the first call of `contacts`
 };
 
 }  // namespace kbvh

@@ -1,5 +1,7 @@
 #pragma once
 #include "core/judge/audit.hpp"
+#include "core/judge/oracle.hpp"
+#include "core/judge/plan_script.hpp"
 #include "core/judge/session.hpp"
 
 namespace kbvh {

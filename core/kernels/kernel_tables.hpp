@@ -31,6 +31,18 @@
 #define KBVH_SELECT_KERNELS(set, table) (static_cast<void>(set), kbvh::kernels::portable::table)
 #endif
 
+/// Inside namespace kbvh: defines `function<S>(KernelSet)` for both scalars, which returns `table_float` or
+/// `table_double`.
+#define KBVH_DEFINE_KERNEL_CHOICE(Type, function, table) \
+  template <>                                            \
+  const Type<float>& function(KernelSet set) {           \
+    return KBVH_SELECT_KERNELS(set, table##_float);      \
+  }                                                      \
+  template <>                                            \
+  const Type<double>& function(KernelSet set) {          \
+    return KBVH_SELECT_KERNELS(set, table##_double);     \
+  }
+
 namespace kbvh::kernels {
 template <class Table>
 inline const Table* choose(const Table* const (&tables)[4], int set) {

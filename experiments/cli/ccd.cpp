@@ -74,18 +74,18 @@ void judge(const ImpactQueries& queries, Row& row, const Test& test) {
 /// reads of the clock, because a read costs more than a query.
 template <class Test>
 void time_passes(const ImpactQueries& queries, Row& row, double seconds, const Test& test) {
-  std::vector<std::uint8_t> said(queries.queries.size());
-  if (said.empty()) return;
+  if (queries.queries.empty()) return;
+  std::uint64_t touching = 0;
   double here = 0;
   for (std::uint64_t passes = 1; passes == 1 || here < seconds; passes *= 2) {
     const auto begin = std::chrono::steady_clock::now();
     for (std::uint64_t k = 0; k < passes; ++k)
-      for (std::size_t i = 0; i < said.size(); ++i)
-        said[i] = test(queries.queries[i].kind, queries.queries[i].moving()) ? 1 : 0;
+      for (const auto& query : queries.queries) touching += test(query.kind, query.moving()) ? 1 : 0;
     here += seconds_since(begin);
     row.passes += passes;
   }
   row.seconds += here;
+  asm volatile("" : : "r"(touching));  // the verdicts count as used
 }
 
 /// Times the exact test and the peers alternately, each for `seconds` in total.

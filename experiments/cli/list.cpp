@@ -94,13 +94,15 @@ json strategy_json(const Info& info) {
 }
 
 void print_json() {
-  json strategies = json::array(), scenes = json::array(), shapes = json::array();
+  json strategies = json::array(), scenes = json::array(), shapes = json::array(), counters = json::array();
   for (const StrategyEntry& entry : registry()) strategies.push_back(strategy_json(entry.info));
   for (const BuiltinScene& scene : builtin_scenes())
     scenes.push_back({{"name", scene.name}, {"meaning", scene.meaning}});
   for (const ShapeKind& shape : shape_kinds())
     shapes.push_back({{"name", shape.name}, {"meaning", shape.meaning}});
-  const json all{{"strategies", strategies}, {"scenes", scenes}, {"shapes", shapes}};
+  for (std::size_t c = 0; c < std::size_t(Counter::count); ++c)
+    counters.push_back({{"name", name(Counter(c))}, {"meaning", meaning(Counter(c))}});
+  const json all{{"strategies", strategies}, {"scenes", scenes}, {"shapes", shapes}, {"counters", counters}};
   print(all.dump(2) + "\n");
 }
 

@@ -1,6 +1,8 @@
 #include "experiments/cli/program.hpp"
 
 #include <algorithm>
+#include <cstdlib>
+#include <exception>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -85,6 +87,25 @@ int finished(int code) {
   return code == success ? internal_error : code;
 }
 
+/// Says during which work a library called std::terminate, and ends the program. Embree does so when there is
+/// no memory for one of its threads.
+[[noreturn]] void say_terminated() {
+  std::string why = "terminated by a library, without an exception";
+  if (const std::exception_ptr thrown = std::current_exception()) {
+    try {
+      std::rethrow_exception(thrown);
+    } catch (const std::exception& problem) {
+      why = "terminated by an exception: " + one_line(problem.what());
+    } catch (...) {
+      why = "terminated by an exception of an unknown type";
+    }
+  }
+  const std::string& work = Progress::activity();
+  say("internal error: " + why + (work.empty() ? "" : ", during " + work) +
+      "; out of memory, perhaps (ulimit -v). What this scene has measured is lost, other results are kept");
+  std::_Exit(internal_error);
+}
+
 int wrong(const std::string& what) {
   say(one_line(what));
   return finished(wrong_use);
@@ -94,6 +115,7 @@ int wrong(const std::string& what) {
 
 int run_program(int argc, const char* const* argv) {
   prepare_output();
+  std::set_terminate(&say_terminated);
   Action action;
   CLI::App program("kbvh compares ways to keep bounding volume hierarchies valid while meshes deform.",
                    "kbvh");

@@ -6,9 +6,14 @@
 
 namespace kbvh::experiments {
 
+namespace {
+std::string current_activity;
+}
+
 Progress::Progress() : terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 void Progress::show(const std::string& line) {
+  current_activity = line;
   if (!terminal_) return;
   shown_ = true;
   std::fprintf(stderr, "\r\x1b[K%.110s", line.c_str());
@@ -16,10 +21,15 @@ void Progress::show(const std::string& line) {
 }
 
 void Progress::clear() {
+  current_activity.clear();
   if (!shown_) return;
   shown_ = false;
   std::fputs("\r\x1b[K", stderr);
   std::fflush(stderr);
+}
+
+const std::string& Progress::activity() {
+  return current_activity;
 }
 
 void say(const std::string& text) {

@@ -3,7 +3,7 @@
 
 namespace kbvh::experiments {
 
-/// A progress line on standard error; silent unless standard error is a terminal.
+/// A progress line on standard error; silent unless standard error is a terminal. There is one at a time.
 class Progress {
  public:
   Progress();
@@ -14,6 +14,8 @@ class Progress {
   void show(const std::string& line);
   /// Removes the line; call it before any other output.
   void clear();
+  /// The text that was shown last and is not cleared, on any standard error; empty if there is none.
+  static const std::string& activity();
 
  private:
   bool terminal_ = false;

@@ -23,6 +23,7 @@ double phase_of(const json& repetition, const std::string& phase) {
   const auto get = [&](const char* name) { return repetition.at(name).get<double>(); };
   const auto changes = [&] { return get("plan_changes") + repetition.value("geometry_changes", 0.0); };
   if (phase == "query") return get("traversal") + get("triangle_tests");
+  if (phase == "upkeep") return get("update") + changes();
   if (phase == "candidates") return get("update") + get("traversal") + changes();
   if (phase == "total") return get("update") + get("traversal") + get("triangle_tests") + changes();
   if (phase == "total_with_motion") return get("motion") + phase_of(repetition, "total");
@@ -77,8 +78,13 @@ bool has_times(const json& record) {
 
 std::vector<double> phase_values(const json& record, const std::string& phase) {
   std::vector<double> values;
+  const bool per_event = phase == "update_per_event";
+  // Counters are of the whole clip, times of a frame.
+  const double events = per_event ? record.at("counters").value("certificates_failed", 0.0) /
+                                        record.at("scene").at("frames").get<double>()
+                                  : 1;
   for (const json& repetition : record.at("times").at("repetitions"))
-    values.push_back(phase_of(repetition, phase));
+    values.push_back(events > 0 ? phase_of(repetition, per_event ? "update" : phase) / events : 0);
   return values;
 }
 

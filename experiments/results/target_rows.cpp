@@ -101,14 +101,31 @@ json side_json(const Side& side) {
           {"run", record.value("run", std::string())}};
 }
 
+/// Whether the table is of the target's scalar and l.
+bool is_measured_as(const Target& target, const TargetGroup& group) {
+  return group.scene.at("scalar") == target.scalar && group.scene.at("per_keyframe") == target.per_keyframe;
+}
+
 bool is_counted(const Target& target, const std::string& scene) {
   return std::find(target.scenes.begin(), target.scenes.end(), scene) != target.scenes.end();
 }
 
+/// The table on which a side is measured: `group`, or the first of the selector's own scene.
+Side side_of(const TargetSelector& selector, const Target& target, const TargetGroup& group,
+             const std::vector<TargetGroup>& groups) {
+  if (selector.scene.empty()) return side_of(selector, group.records);
+  for (const TargetGroup& other : groups)
+    if (is_measured_as(target, other) && other.scene.at("name") == selector.scene)
+      return side_of(selector, other.records);
+  Side side;
+  side.missing = "'" + selector.scene + "' was left out";
+  return side;
+}
+
 /// Computes the ratio in one table, or the reason for its absence.
-json scene_row(const Target& target, const TargetGroup& group) {
-  const Side numerator = side_of(target.numerator, group.records);
-  const Side denominator = side_of(target.denominator, group.records);
+json scene_row(const Target& target, const TargetGroup& group, const std::vector<TargetGroup>& groups) {
+  const Side numerator = side_of(target.numerator, target, group, groups);
+  const Side denominator = side_of(target.denominator, target, group, groups);
   std::uint64_t triangles = 0;
   for (const json& body : group.scene.at("bodies"))
     if (body.at("moving").get<bool>()) triangles += body.at("primitives").get<std::uint64_t>();
@@ -137,15 +154,15 @@ json scene_row(const Target& target, const TargetGroup& group) {
 json scene_rows(const Target& target, const std::vector<TargetGroup>& groups) {
   std::vector<std::pair<std::string, json>> rows;  // by hash of the scene
   for (const TargetGroup& group : groups) {
-    if (group.scene.at("scalar") != target.scalar || group.scene.at("per_keyframe") != target.per_keyframe)
-      continue;
+    if (!is_measured_as(target, group)) continue;
     const std::string hash = group.scene.at("hash").get<std::string>();
     const auto known =
         std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == hash; });
     if (known == rows.end())
-      rows.emplace_back(hash, scene_row(target, group));
+      rows.emplace_back(hash, scene_row(target, group, groups));
     else if (known->second.at("ratio").is_null())
-      if (json row = scene_row(target, group); !row.at("ratio").is_null()) known->second = std::move(row);
+      if (json row = scene_row(target, group, groups); !row.at("ratio").is_null())
+        known->second = std::move(row);
   }
   json list = json::array();
   for (auto& [hash, row] : rows)

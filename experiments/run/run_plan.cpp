@@ -176,7 +176,7 @@ class Runner {
       return;
     }
     std::vector<double> knots = script.empty() ? overlaid_keyframes(scene)
-                                               : contact_times(frames_of(scene, loaded, script, 1), script);
+                                               : contact_times(scene, frames_of(scene, loaded, script, 1), script);
     if (study.frames_limit > 0 && knots.size() > study.frames_limit + 1) knots.resize(study.frames_limit + 1);
     if (knots.size() < 2) {
       note("note: " + scene.name + " is skipped: nothing moves, so there are no contacts between keyframes");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "core/judge/follow_script.hpp"
 #include "experiments/common/stopwatch.hpp"
 #include "experiments/io/animated_mesh.hpp"
 
@@ -38,18 +39,24 @@ void compare(const ContactBuffer& found, const ContactBuffer& truth, std::size_t
 }  // namespace
 
 template <class S>
-std::vector<double> contact_times(std::vector<double> frames, const PlanScript<S>& script) {
-  const double last = frames.back();
+std::vector<double> contact_times(const Scene<S>& scene, std::vector<double> frames,
+                                  const PlanScript<S>& script) {
+  const double first = frames.front(), last = frames.back();
+  const auto add = [&](double t) {
+    if (t > first && t < last) frames.push_back(t);
+  };
+  for (const double t : overlaid_keyframes(scene)) add(t);
   for (const auto& step : script.steps)
     for (const PlanChange<S>& change : step.changes)
-      for (const double t : change.times)
-        if (t < last) frames.push_back(t);
+      for (const double t : change.times) add(t);
   std::sort(frames.begin(), frames.end());
   frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
   return frames;
 }
-template std::vector<double> contact_times(std::vector<double>, const PlanScript<float>&);
-template std::vector<double> contact_times(std::vector<double>, const PlanScript<double>&);
+template std::vector<double> contact_times(const Scene<float>&, std::vector<double>,
+                                           const PlanScript<float>&);
+template std::vector<double> contact_times(const Scene<double>&, std::vector<double>,
+                                           const PlanScript<double>&);
 
 template <class S>
 ContactMeasurement<S>::ContactMeasurement(const Scene<S>& scene, std::vector<double> knots,
@@ -77,18 +84,18 @@ ContactMeasurement<S>::ContactMeasurement(const Scene<S>& scene, std::vector<dou
 
 template <class S>
 void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every) {
-  Entrant entrant;
+  ContactEntrant entrant;
   Measured& measured = entrant.measured;
   measured.spec = &spec;
   measured.sampled_every = oracle_every;
-  try {
+  entrant.attempt([&] {
     {
       Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
       PhaseTimes ignored;
       session.reset(knots_[0]);
       ScriptCursor<S> cursor(script_);
       for (std::size_t k = 0; k < truth_.size(); ++k) {
-        session.follow(cursor.at(knots_[k]), ignored);
+        follow(session, cursor.at(knots_[k]), ignored);
         contacts_.clear();
         measured.verification.candidates += session.contacts(knots_[k + 1], contacts_, ignored);
         if (k % oracle_every != 0 && k + 1 != truth_.size()) continue;
@@ -108,23 +115,18 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
       PhaseTimes ignored;
       ScriptCursor<S> cursor(script_);
       entrant.session->reset(knots_[0]);
-      entrant.session->follow(cursor.at(knots_[0]), ignored);
+      follow(*entrant.session, cursor.at(knots_[0]), ignored);
       contacts_.clear();
       entrant.session->contacts(knots_[1], contacts_, ignored);
     }
-  } catch (const ConfigError&) {
-    throw;
-  } catch (const std::exception& problem) {
-    entrant.session.reset();
-    refuse(measured, problem);
-  }
+  });
   entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
 const ClipTimes* ContactMeasurement<S>::play(std::size_t i) {
-  Entrant& entrant = entrants_[i];
-  try {
+  ContactEntrant& entrant = entrants_[i];
+  const bool played = entrant.attempt([&] {
     ClipTimes clip;
     const auto begin = std::chrono::steady_clock::now();
     entrant.session->reset(knots_[0]);
@@ -133,16 +135,12 @@ const ClipTimes* ContactMeasurement<S>::play(std::size_t i) {
     for (std::size_t k = 1; k < knots_.size(); ++k) {
       contacts_.clear();
       clip.frames.emplace_back();
-      entrant.session->follow(cursor.at(knots_[k - 1]), clip.frames.back());
+      follow(*entrant.session, cursor.at(knots_[k - 1]), clip.frames.back());
       entrant.session->contacts(knots_[k], contacts_, clip.frames.back());
     }
     entrant.measured.repetitions.push_back(std::move(clip));
-  } catch (const std::exception& problem) {
-    entrant.session.reset();
-    refuse(entrant.measured, problem);
-    return nullptr;
-  }
-  return &entrant.measured.repetitions.back();
+  });
+  return played ? &entrant.measured.repetitions.back() : nullptr;
 }
 
 template <class S>

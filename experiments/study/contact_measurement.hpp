@@ -8,9 +8,10 @@
 namespace kbvh::experiments {
 
 /// Returns the times between which contacts are found where plans change: the frames, and in between every
-/// possible knot of a changed plan.
+/// keyframe of a body and every possible knot of a changed plan.
 template <class S>
-std::vector<double> contact_times(std::vector<double> frames, const PlanScript<S>& script);
+std::vector<double> contact_times(const Scene<S>& scene, std::vector<double> frames,
+                                  const PlanScript<S>& script);
 
 /// Like Measurement, for the contacts of features while vertices move from one time of `knots` to the next.
 template <class S>
@@ -29,16 +30,14 @@ class ContactMeasurement {
   nlohmann::json extras(std::size_t i) const;
 
  private:
-  struct Entrant {
-    Measured measured;
+  struct ContactEntrant : Entrant<S> {
     ImpactStats impacts;
-    std::unique_ptr<Session<S>> session;
   };
   const Scene<S>* scene_;
   std::vector<double> knots_;
   const PlanScript<S>* script_;
   std::vector<ContactBuffer> truth_;  ///< [interval], sorted
-  std::vector<Entrant> entrants_;
+  std::vector<ContactEntrant> entrants_;
   ContactBuffer contacts_;
 };
 

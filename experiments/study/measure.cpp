@@ -6,6 +6,8 @@
 #include <limits>
 #include <new>
 #include <numeric>
+
+#include "core/judge/follow_script.hpp"
 #include "experiments/common/stopwatch.hpp"
 
 namespace kbvh::experiments {
@@ -34,13 +36,13 @@ ClipTimes play_clip(Session<S>& session, std::span<const double> frames, const P
     // lazy strategies work there.
     PhaseTimes ignored;
     session.query(pairs, ignored);
-    session.follow(cursor.at(frames[0]), ignored);
+    follow(session, cursor.at(frames[0]), ignored);
   }
   for (std::size_t f = frames.size() > 1 ? 1 : 0; f < frames.size(); ++f) {
     PhaseTimes frame;
     session.advance(frames[f], frame);
     session.query(pairs, frame);
-    session.follow(cursor.at(frames[f]), frame);
+    follow(session, cursor.at(frames[f]), frame);
     times.frames.push_back(frame);
   }
   return times;
@@ -56,7 +58,7 @@ void warm_up(Session<S>& session, std::span<const double> frames, const PlanScri
   for (std::size_t f = 0; f < frames.size() && (f == 0 || seconds_since(begin) < warm_up_seconds); ++f) {
     if (f > 0) session.advance(frames[f], ignored);
     session.query(pairs, ignored);
-    session.follow(cursor.at(frames[f]), ignored);
+    follow(session, cursor.at(frames[f]), ignored);
   }
 }
 
@@ -109,11 +111,11 @@ void refuse(Measured& measured, const std::exception& thrown) {
 
 template <class S>
 void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every) {
-  Entrant entrant;
+  Entrant<S> entrant;
   Measured& measured = entrant.measured;
   measured.spec = &spec;
   measured.sampled_every = oracle_every;
-  try {
+  entrant.attempt([&] {
     {
       Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
       measured.verification = verify<S>(session, frames_, *oracle_, script_, {oracle_every, quality_samples});
@@ -128,27 +130,18 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
       measured.build_seconds = seconds_since(begin);
       warm_up<S>(*entrant.session, frames_, script_, pairs_);
     }
-  } catch (const ConfigError&) {
-    throw;
-  } catch (const std::exception& problem) {
-    entrant.session.reset();
-    refuse(measured, problem);
-  }
+  });
   entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
 const ClipTimes* Measurement<S>::play(std::size_t i) {
-  Entrant& entrant = entrants_[i];
-  try {
+  Entrant<S>& entrant = entrants_[i];
+  const bool played = entrant.attempt([&] {
     entrant.measured.repetitions.push_back(play_clip<S>(*entrant.session, frames_, script_, pairs_));
     entrant.measured.choice = entrant.session->strategy().choice();
-  } catch (const std::exception& problem) {
-    entrant.session.reset();
-    refuse(entrant.measured, problem);
-    return nullptr;
-  }
-  return &entrant.measured.repetitions.back();
+  });
+  return played ? &entrant.measured.repetitions.back() : nullptr;
 }
 
 template class Measurement<float>;

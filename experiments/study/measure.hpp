@@ -37,6 +37,29 @@ struct Measured {
 /// verdict; the next run measures it again.
 void refuse(Measured& measured, const std::exception& thrown);
 
+/// One contestant, and the instance of it that is timed; no instance once it is refused.
+template <class S>
+struct Entrant {
+  Measured measured;
+  std::unique_ptr<Session<S>> session;
+
+  /// Runs `work`. Refuses the contestant for what it throws, but for ConfigError, which is passed on. Returns
+  /// whether it ran to its end.
+  template <class Work>
+  bool attempt(const Work& work) {
+    try {
+      work();
+      return true;
+    } catch (const ConfigError&) {
+      throw;
+    } catch (const std::exception& problem) {
+      session.reset();
+      refuse(measured, problem);
+      return false;
+    }
+  }
+};
+
 /// Receives progress messages; may be empty.
 using MeasureProgress = std::function<void(const std::string&)>;
 
@@ -67,15 +90,11 @@ class Measurement {
   nlohmann::json extras(std::size_t /*i*/) const { return nlohmann::json::object(); }
 
  private:
-  struct Entrant {
-    Measured measured;
-    std::unique_ptr<Session<S>> session;
-  };
   const Scene<S>* scene_;
   std::vector<double> frames_;
   Oracle<S>* oracle_;
   const PlanScript<S>* script_;
-  std::vector<Entrant> entrants_;
+  std::vector<Entrant<S>> entrants_;
   PairBuffer pairs_;
 };
 

@@ -15,7 +15,9 @@ struct Plan;
 struct TargetSelector {
   std::string strategy;              ///< id
   std::vector<std::string> or_else;  ///< ids of alternative strategies
-  std::string phase;  ///< "motion", "update", "traversal", "triangle_tests", "query", "candidates", "total"
+  std::string phase;  ///< "motion", "update", "traversal", "triangle_tests", "query", "candidates", "total",
+                      ///< "upkeep", "update_per_event"
+  std::string scene;  ///< empty, or the named scene that this side is measured on, whatever the target's
   BuilderRequest builder;  ///< any of these values; empty: all measured ones
   Sweep params;            ///< likewise
 };

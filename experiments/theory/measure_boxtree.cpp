@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "core/contract/registry.hpp"
 #include "core/families/boxtree/kinetic_boxtree.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "experiments/theory/measure_counts.hpp"
@@ -71,6 +72,18 @@ std::uint64_t most_events_of_planes(const Forest& forest, const Forest::Tree& tr
   return most;
 }
 
+/// What the strategy holds, as its AABB tree's bytes are counted (CountRun).
+std::uint64_t bytes_of_strategy(const SceneView<float>& view, Playback<float>& playback,
+                                const Topologies& topologies, double t) {
+  const StrategyEntry& entry = find_strategy("kinetic_boxtree");
+  const auto strategy =
+      create(entry, view, playback, topologies,
+             Params(entry.info.id, entry.info.parameters, {{"queue", "avl"}}), CountingPolicy::silent);
+  playback.seek(t);
+  strategy->reset(t);
+  return strategy->bytes();
+}
+
 std::vector<BoundChange> changes_of(const std::vector<Notice<float>>& log, const ExactMotion& motion,
                                     std::uint32_t body) {
   std::vector<BoundChange> result;
@@ -124,7 +137,7 @@ BoxTreeRun measure_boxtree(const Scene<float>& scene, const CountRun& counts, Pr
       run.most_of_planes = std::max(run.most_of_planes, most_events_of_planes(forest, forest.tree(body)));
   }
   run.values = notices;
-  run.bytes = forest.bytes();
+  run.bytes = bytes_of_strategy(view, playback, topologies, keyframes.front());
   for (std::uint32_t body = 0; body < view.body_count(); ++body) {
     const SearchCost& cost = forest.tree(body).search_cost();
     run.searches += cost.searches, run.searched += cost.nodes;

@@ -10,8 +10,11 @@
 namespace {
 using namespace kbvh;
 
+/// The families of contestants that this build has from other libraries.
+const std::vector<std::string> peers{KBVH_PEERS};
+
 bool is_peer(const Info& info) {
-  return info.family == "fcl" || info.family == "bullet" || info.family == "embree";
+  return std::find(peers.begin(), peers.end(), info.family) != peers.end();
 }
 
 /// Every combination of words that the parameters admit.
@@ -40,6 +43,13 @@ void for_each_peer(Check&& check) {
   for (const StrategyEntry& entry : registry())
     if (is_peer(entry.info) && entry.factory<S>() != nullptr)
       for (const auto& params : settings(entry.info)) check(Contestant{&entry, params, {}});
+}
+
+TEST(Peers, EveryLibraryHasContestants) {
+  for (const std::string& family : peers)
+    EXPECT_TRUE(std::any_of(registry().begin(), registry().end(),
+                            [&](const StrategyEntry& entry) { return entry.info.family == family; }))
+        << "no contestant has the family '" << family << "' that adapters/CMakeLists.txt names";
 }
 
 template <class S>

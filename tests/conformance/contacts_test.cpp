@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <map>
 
+#include "core/judge/oracle.hpp"
 #include "core/judge/session.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 

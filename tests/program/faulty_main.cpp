@@ -1,6 +1,7 @@
 // The program with a list of strategies of its own, as a project out of the tree links it: one honest
 // strategy and some that fail, to see that the program refuses them a time and says so.
 #include <cstdlib>
+#include <exception>
 #include <new>
 
 #include "core/contract/registry.hpp"
@@ -21,7 +22,10 @@ class EveryPair : public Strategy<S> {
   void reset_to(double) override {}
   void advance_to(double) override {
     if (fault == Fault::throws) throw std::runtime_error("out of luck");
-    if (fault == Fault::needs_memory && ++advances_ > memory_for()) throw std::bad_alloc();
+    if (fault == Fault::needs_memory && ++advances_ > memory_for()) {
+      if (memory_for() < 0) std::terminate();
+      throw std::bad_alloc();
+    }
   }
   QueryStatus find_candidates(double, PairBuffer& out, const Budget&) override {
     for (const BodyPair& pair : this->scene_.pairs())
@@ -38,7 +42,8 @@ class EveryPair : public Strategy<S> {
   std::size_t bytes() const override { return 0; }
 
  private:
-  /// How often it can advance before there is no memory left.
+  /// How often it can advance before there is no memory left; below 0 there is none to throw, either, and it
+  /// terminates the program as Embree can.
   static int memory_for() {
     const char* said = std::getenv("KBVH_TEST_MEMORY");
     return said == nullptr ? 0 : std::atoi(said);
@@ -81,17 +86,19 @@ Info info(const char* id, Guarantee guarantee) {
 
 }  // namespace
 
-std::vector<StrategyEntry> manifest_entries() {
+const std::vector<StrategyEntry>& registry() {
   Info small = info("only_small", Guarantee::exact);
   small.max_primitive_pairs = 10;
-  return {make_entry<Honest>(info("honest", Guarantee::exact)),
-          make_entry<Loses>(info("loses", Guarantee::exact)),
-          make_entry<Loses>(info("admits_to_lose", Guarantee::approximate)),
-          make_entry<Repeats>(info("repeats", Guarantee::candidate_superset)),
-          make_entry<Throws>(info("throws", Guarantee::exact)),
-          make_entry<NeedsMemory>(info("needs_memory", Guarantee::exact)),
-          make_entry<Honest>(small),
-          make_entry<Honest, Scalars::double_only>(info("only_double", Guarantee::exact))};
+  static const std::vector<StrategyEntry> entries{
+      make_entry<Honest>(info("honest", Guarantee::exact)),
+      make_entry<Loses>(info("loses", Guarantee::exact)),
+      make_entry<Loses>(info("admits_to_lose", Guarantee::approximate)),
+      make_entry<Repeats>(info("repeats", Guarantee::candidate_superset)),
+      make_entry<Throws>(info("throws", Guarantee::exact)),
+      make_entry<NeedsMemory>(info("needs_memory", Guarantee::exact)),
+      make_entry<Honest>(small),
+      make_entry<Honest, Scalars::double_only>(info("only_double", Guarantee::exact))};
+  return entries;
 }
 
 }  // namespace kbvh

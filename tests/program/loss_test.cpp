@@ -53,6 +53,19 @@ TEST_F(Binary, OutOfMemoryIsNoBrokenGuaranteeAndIsMeasuredAgain) {
     }
 }
 
+TEST_F(Binary, AContestantThatTerminatesTheProgramIsNamed) {
+  const Outcome first = kbvh("run " + tiny + "--strategies honest --out out", "", KBVH_FAULTY_PROGRAM);
+  ASSERT_EQ(first.code, 0) << first.err;
+  const Outcome second = kbvh("run " + tiny + "--strategies honest,needs_memory --out out",
+                              "KBVH_TEST_MEMORY=-1", KBVH_FAULTY_PROGRAM);
+  EXPECT_EQ(second.code, 3) << second.err;
+  EXPECT_NE(second.err.find("terminated by a library, without an exception, during"), std::string::npos)
+      << second.err;
+  EXPECT_NE(second.err.find("verifying needs_memory"), std::string::npos) << second.err;
+  EXPECT_EQ(records("out/results.jsonl").size(), 1u) << "what was measured before is kept";
+  EXPECT_EQ(kbvh("run " + tiny + "--strategies honest --out out", "", KBVH_FAULTY_PROGRAM).code, 0);
+}
+
 // Wherever memory ends, that is no fault of a contestant.
 TEST_F(Binary, WantOfMemoryIsNeverABrokenGuarantee) {
   if (known_strategy("embree_refit") == nullptr) GTEST_SKIP() << "built without Embree";

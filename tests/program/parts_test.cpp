@@ -1,19 +1,13 @@
-// The parts of the program: plans, parameters, placements, result files, keys, tables.
+// The parts of the program: texts, plans, placements, parameters, contestants.
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <functional>
-#include <limits>
 #include <tuple>
 
+#include "complaint.hpp"
 #include "experiments/common/json_reader.hpp"
 #include "experiments/common/text.hpp"
-#include "experiments/results/record.hpp"
-#include "experiments/results/results.hpp"
-#include "experiments/results/table.hpp"
 #include "experiments/scenes/scene_spec.hpp"
 #include "experiments/study/contestants.hpp"
-#include "experiments/study/measure.hpp"
 #include "experiments/study/plan.hpp"
 #include "temporary_folder.hpp"
 
@@ -22,23 +16,8 @@ namespace {
 
 using nlohmann::json;
 
-template <class Error = io::InputError>
-std::string complaint(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& problem) {
-    return problem.what();
-  }
-  return "nothing was thrown";
-}
-
 std::string plan_complaint(const std::string& text) {
   return complaint([&] { read_plan(parse_json(text, "p.json"), "p.json", {}); });
-}
-
-testing::AssertionResult contains(const std::string& text, const std::string& part) {
-  if (text.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "'" << text << "' does not contain '" << part << "'";
 }
 
 // --- text ---------------------------------------------------------------------------------------------
@@ -338,200 +317,6 @@ TEST(Contestants, EveryRegisteredStrategyHasADefaultConfiguration) {
   std::vector<std::string> notes;
   EXPECT_EQ(expand({{"all", {}, {}}}, {}, {}, notes).size(), registry().size());
   EXPECT_TRUE(notes.empty());
-}
-
-// --- results ------------------------------------------------------------------------------------------
-
-TEST(Results, ResumeAfterATruncatedLine) {
-  const TemporaryFolder folder;
-  const auto out = folder / "deep/er";
-  {
-    ResultStore store(out);
-    EXPECT_EQ(store.records(), 0u);
-    store.append({{"key", "a"}, {"value", 1}});
-    store.append({{"key", "b"}, {"value", 2}});
-    ASSERT_NE(store.find("a"), nullptr);
-  }
-  const std::string whole = text_of_file(out / "results.jsonl");
-  for (std::size_t cut = 1; cut < 10; ++cut) {
-    write_text(out / "results.jsonl", whole.substr(0, whole.size() - cut));
-    ResultStore store(out);
-    EXPECT_NE(store.find("a"), nullptr);
-    // Without its newline the last line is still whole; with less it is not.
-    EXPECT_EQ(store.find("b") != nullptr, cut == 1) << cut;
-    EXPECT_EQ(store.unreadable_lines(), cut == 1 ? 0u : 1u);
-    store.append({{"key", "c"}});
-    ResultStore again(out);
-    EXPECT_NE(again.find("c"), nullptr);
-    EXPECT_NE(again.find("a"), nullptr);
-    EXPECT_EQ(again.unreadable_lines(), cut == 1 ? 0u : 1u);
-  }
-}
-
-TEST(Results, NewestOfAKeyCountsAndNothingIsLost) {
-  const TemporaryFolder folder;
-  ResultStore store(folder.path());
-  store.append({{"key", "a"}, {"value", 1}});
-  store.append({{"key", "a"}, {"value", 2}});
-  ResultStore again(folder.path());
-  EXPECT_EQ(again.find("a")->at("value"), 2);
-  EXPECT_EQ(again.records(), 2u);
-}
-
-TEST(Results, NestingWithoutEndIsNoRecord) {
-  const TemporaryFolder folder;
-  const std::string open(300000, '['), close(300000, ']');
-  write_text(folder / "results.jsonl", open + "\n" + open + close + "\n{\"key\": \"a\", \"x\": " + open +
-                                           close + "}\n{\"key\": \"b\", \"x\": \"[[\\\"[\"}\n");
-  ResultStore store(folder.path());
-  EXPECT_EQ(store.unreadable_lines(), 3u);
-  EXPECT_NE(store.find("b"), nullptr);
-  EXPECT_FALSE(json_or_nothing(std::string(100, '[') + std::string(100, ']')).is_discarded());
-  EXPECT_TRUE(json_or_nothing(std::string(101, '[') + std::string(101, ']')).is_discarded());
-}
-
-TEST(Results, AFolderThatCannotBeMade) {
-  const TemporaryFolder folder;
-  write_text(folder / "file", "x");
-  EXPECT_TRUE(contains(complaint([&] { ResultStore store(folder / "file/out"); }), "cannot be made"));
-}
-
-json example_scene() {
-  return {{"hash", "1"}, {"scalar", "float"}, {"per_keyframe", 10}, {"frames", 591}, {"frame_times", "2"}};
-}
-json example_strategy() {
-  return {{"id", "x"}, {"params", {{"queue", "avl"}}}, {"builder", {{"width", 2}}}, {"title", "X"}};
-}
-const json example_machine{{"cpu", "c"},       {"compiler", "g"}, {"flags", "-O2"}, {"build_type", "Release"},
-                           {"kernels", "sse"}, {"os", "d"}};
-
-TEST(Results, KeysAreStableAndSeeWhatMatters) {
-  const Study study;
-  const auto key = [&](const json& scene, const json& strategy) {
-    return configuration_key(Harness::rounds, "abc", scene, strategy, study, example_machine);
-  };
-  const std::string usual = key(example_scene(), example_strategy());
-  // Pinned: a change of this value makes every stored result be measured again.
-  EXPECT_EQ(usual, "369dfdff041a777b");
-  json scene = example_scene(), strategy = example_strategy();
-  strategy["title"] = "another title";
-  EXPECT_EQ(key(scene, strategy), usual);
-  // A table and a report are of scenes by name: what was measured under another one is not in them.
-  scene["name"] = "another name";
-  EXPECT_NE(key(scene, example_strategy()), usual);
-  scene = example_scene();
-  scene["hash"] = "2";
-  EXPECT_NE(key(scene, example_strategy()), usual);
-  strategy["params"]["queue"] = "binary_heap";
-  EXPECT_NE(key(example_scene(), strategy), usual);
-  Study more = study;
-  more.repetitions = 4;
-  EXPECT_NE(
-      configuration_key(Harness::rounds, "abc", example_scene(), example_strategy(), more, example_machine),
-      usual);
-  json other_kernels = example_machine;
-  other_kernels["kernels"] = "portable";
-  EXPECT_NE(
-      configuration_key(Harness::rounds, "abc", example_scene(), example_strategy(), study, other_kernels),
-      usual);
-  EXPECT_NE(
-      configuration_key(Harness::rounds, "abd", example_scene(), example_strategy(), study, example_machine),
-      usual);
-  EXPECT_NE(configuration_key(Harness::google_benchmark, "abc", example_scene(), example_strategy(), study,
-                              example_machine),
-            usual);
-}
-
-// --- times and tables ---------------------------------------------------------------------------------
-
-TEST(Times, QuantilesAreOfTheMedianRepetition) {
-  Measured measured;
-  for (const double scale : {3.0, 1.0, 2.0}) {
-    ClipTimes clip;
-    for (int frame = 1; frame <= 100; ++frame) clip.frames.push_back({5, scale * frame * 1e-3, 0, 0, 0});
-    measured.repetitions.push_back(clip);
-  }
-  const json record = times_record(measured);
-  EXPECT_DOUBLE_EQ(record.at("total_p50"), 100);
-  EXPECT_DOUBLE_EQ(record.at("total_p99"), 198);
-  EXPECT_DOUBLE_EQ(record.at("total_worst"), 200);
-  EXPECT_EQ(record.at("repetitions").size(), 3u);
-  EXPECT_DOUBLE_EQ(record.at("repetitions")[0].at("update"), 151.5);
-}
-
-TEST(Times, MeansHaveEveryPhase) {
-  ClipTimes clip;
-  clip.frames = {{1, 2, 3, 4, 5, 6}, {3, 4, 5, 6, 7, 8}};
-  const PhaseTimes mean = clip.mean();
-  EXPECT_EQ(mean.motion, 2);
-  EXPECT_EQ(mean.update, 3);
-  EXPECT_EQ(mean.traversal, 4);
-  EXPECT_EQ(mean.triangle_tests, 5);
-  EXPECT_EQ(mean.plan_changes, 6);
-  EXPECT_EQ(mean.geometry_changes, 7);
-  EXPECT_DOUBLE_EQ(2 * mean.total(), clip.total());
-  Measured measured;
-  measured.repetitions = {clip};
-  EXPECT_DOUBLE_EQ(times_record(measured).at("repetitions")[0].at("geometry_changes"), 7e3);
-}
-
-json example_record(const std::string& id, const std::string& family, double update) {
-  json repetitions = json::array();
-  for (const double factor : {1.0, 3.0, 2.0})
-    repetitions.push_back({{"motion", 1.0},
-                           {"update", factor * update},
-                           {"traversal", 0.0},
-                           {"triangle_tests", 0.0},
-                           {"plan_changes", 0.0}});
-  return {
-      {"run", "r"},
-      {"scene", {{"name", "s"}, {"per_keyframe", 10}, {"scalar", "float"}, {"frames", 5}, {"primitives", 7}}},
-      {"strategy", {{"id", id}, {"label", id}, {"family", family}}},
-      {"verified",
-       {{"missed", 0}, {"extra", 1}, {"audited", true}, {"protrusion", 0.0}, {"looseness", 0.25}}},
-      {"times", {{"repetitions", repetitions}}}};
-}
-
-TEST(Table, RatiosAreAgainstTheBestRefit) {
-  json broken = example_record("wrong", "refit", 0.01);
-  broken["times"] = nullptr;
-  broken["refused"] = "it is wrong";
-  const std::vector<json> records{example_record("slow", "refit", 8), example_record("fast", "refit", 4),
-                                  example_record("own", "kinetic", 2), broken};
-  EXPECT_EQ(best_refit(records), &records[1]);
-  EXPECT_EQ(results_table(records),
-            "s, l = 10, float: 5 frames, 7 primitives\n"
-            "strategy   motion  update  query  x refit  with motion  missed  extra  protrusion  looseness\n"
-            "slow            1      16      0      0.5        0.529       0      1           0       0.25\n"
-            "fast            1       8      0        1            1       0      1           0       0.25\n"
-            "own             1       4      0        2          1.8       0      1           0       0.25\n"
-            "wrong     refused                                            0      1           0       0.25\n"
-            "  wrong is refused a time: it is wrong\n");
-}
-
-// A refit of one's own is shown in the table, and no ratio is against it unless it is declared a baseline.
-TEST(Table, OnlyDeclaredBaselinesAreTheDenominator) {
-  std::vector<json> records{example_record("mine", "refit", 1), example_record("bottom_up", "refit", 4),
-                            example_record("new", "other", 2)};
-  records[0]["strategy"]["baseline"] = false;
-  records[1]["strategy"]["baseline"] = true;
-  records[2]["strategy"]["baseline"] = false;
-  EXPECT_EQ(best_refit(records), &records[1]);
-  EXPECT_NE(results_table(records).find("\nmine            1       2      0        4"), std::string::npos)
-      << results_table(records);
-  records[2]["strategy"]["baseline"] = true;
-  EXPECT_EQ(best_refit(records), &records[2]);
-}
-
-TEST(Table, CountersOfAStrategysOwnAreShown) {
-  std::vector<json> records{example_record("mine", "refit", 1)};
-  records[0]["counters"] = {{"box_tests", 5}, {"restarts", 7}, {"never", 0}};
-  EXPECT_NE(results_table(records).find("  mine counted restarts 7\n"), std::string::npos)
-      << results_table(records);
-}
-
-TEST(Table, ColumnsCountCharacters) {
-  EXPECT_EQ(columns({{"ä", "b"}, {"long", "2"}}), "ä     b\nlong  2\n");
 }
 
 }  // namespace

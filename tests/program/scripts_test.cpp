@@ -1,8 +1,8 @@
 // Scripts of plan changes: what a user may write, what is refused and how, and a study that replays one.
 #include <gtest/gtest.h>
 
-#include <functional>
-
+#include "complaint.hpp"
+#include "core/judge/follow_script.hpp"
 #include "experiments/common/json_reader.hpp"
 #include "experiments/results/record.hpp"
 #include "experiments/results/table.hpp"
@@ -16,20 +16,6 @@ namespace kbvh::experiments {
 namespace {
 
 using nlohmann::json;
-
-std::string complaint(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const io::InputError& problem) {
-    return problem.what();
-  }
-  return "nothing was thrown";
-}
-
-testing::AssertionResult contains(const std::string& text, const std::string& part) {
-  if (text.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "'" << text << "' does not contain '" << part << "'";
-}
 
 LoadedScene scene_with(const json& script, const std::string& order = "given") {
   const json scene{{"bodies",
@@ -176,7 +162,7 @@ TEST(Scripts, AreReplayedToThoseWhoCanTakeThem) {
     Session<float> session(scene, spec.contestant(), CountingPolicy::silent);
     session.reset(frames[0]);
     PhaseTimes times;
-    session.follow(&script.steps[0], times);
+    follow(session, &script.steps[0], times);
     EXPECT_GT(times.motion, 0);
   }
   ASSERT_EQ(records.size(), 2u);

@@ -108,6 +108,20 @@ TEST_F(Binary, ContactsAreMeasuredWherePlansChange) {
   }
 }
 
+// Intervals of contacts end at the keyframes of bodies, too, wherever the frames of a script lie.
+TEST_F(Binary, ContactsOfAScriptWithFramesOfItsOwn) {
+  write_text(folder_ / "script.json",
+             R"({"frames": 10, "rate": 7, "steps": [
+                  {"time": 0.1, "changes": [{"body": 0, "vertex": 0, "velocity": [0, 0, 1]}]}]})");
+  const Outcome run = kbvh(
+      "run --scene random_soups --triangles 20 --obstacle 20 --keyframes 6 --script script.json --continuous "
+      "--repetitions 1 --strategies brute_force,interval_join,kinetic_separation_list --out out");
+  EXPECT_EQ(run.code, 0) << run.err;
+  const auto found = records();
+  ASSERT_EQ(found.size(), 3u);
+  for (const json& record : found) EXPECT_TRUE(record.at("verified").at("holds")) << record.at("verified");
+}
+
 TEST_F(Binary, PairsWithinBodiesAreCountedWhereTheyAreAskedFor) {
   // Two squares of one body, as a tent of which each side goes through the other.
   write_text(folder_ / "tent.obj",

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "core/judge/session.hpp"
+#include "core/judge/follow_script.hpp"
 
 namespace kbvh::test {
 
@@ -26,7 +26,7 @@ struct Play {
   /// A frame at t, after which plans change as `step` says; null: not at all.
   Counters frame(double t, const typename PlanScript<S>::Step* step = nullptr) {
     session.advance(t, times);
-    session.follow(step, times);
+    follow(session, step, times);
     session.query(pairs, times);
     const Counters now = session.strategy().counters();
     Counters added;

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "core/contract/registry.hpp"
-#include "core/judge/session.hpp"
+#include "core/judge/follow_script.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
@@ -112,8 +112,8 @@ void compare(const StrategyEntry& entry, const std::string& name,
     by_events.query(pairs_b, times);
     ASSERT_EQ(pairs_a, pairs_b) << "t = " << t;
     ASSERT_EQ(boxes_of(by_frames), boxes_of(by_events)) << "t = " << t;
-    by_frames.follow(cursor_a.at(t), times);
-    by_events.follow(cursor_b.at(t), times);
+    follow(by_frames, cursor_a.at(t), times);
+    follow(by_events, cursor_b.at(t), times);
     ASSERT_EQ(log_a, log_b) << "t = " << t;
   }
   const Counters a = by_frames.strategy().counters(), b = by_events.strategy().counters();

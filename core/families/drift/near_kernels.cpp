@@ -4,13 +4,6 @@
 
 namespace kbvh {
 
-template <>
-const NearKernels<float>& near_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, near_float);
-}
-template <>
-const NearKernels<double>& near_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, near_double);
-}
+KBVH_DEFINE_KERNEL_CHOICE(NearKernels, near_kernels, near)
 
 }  // namespace kbvh

@@ -4,13 +4,6 @@
 
 namespace kbvh {
 
-template <>
-const WideRealiserKernels<float>& wide_realiser_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_realisers_float);
-}
-template <>
-const WideRealiserKernels<double>& wide_realiser_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_realisers_double);
-}
+KBVH_DEFINE_KERNEL_CHOICE(WideRealiserKernels, wide_realiser_kernels, wide_realisers)
 
 }  // namespace kbvh

@@ -30,7 +30,8 @@ class WatchedEvent {
   BoundWatch<S>* watch_;
 };
 
-/// An observer of kinetic trees (see NoObserver) that writes changes of bounds where `watch` says.
+/// An observer of kinetic trees (see NoObserver in observer.hpp) that writes changes of bounds where `watch`
+/// says.
 template <class S>
 struct BoundObserver {
   const BoundWatch<S>* watch = nullptr;

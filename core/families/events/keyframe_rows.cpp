@@ -6,14 +6,7 @@
 
 namespace kbvh {
 
-template <>
-const RowScanKernels<float>& row_scan_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, row_scan_float);
-}
-template <>
-const RowScanKernels<double>& row_scan_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, row_scan_double);
-}
+KBVH_DEFINE_KERNEL_CHOICE(RowScanKernels, row_scan_kernels, row_scan)
 
 template <class S>
 KeyframeRows<S>::KeyframeRows(const FlightPlans<S>& plans)

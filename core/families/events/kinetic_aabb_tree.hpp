@@ -9,38 +9,17 @@
 
 #include "core/base/assert.hpp"
 #include "core/base/counters.hpp"
-#include "core/base/list_pool.hpp"
 #include "core/contract/event_source.hpp"
 #include "core/families/events/certificate_slots.hpp"
 #include "core/families/events/event.hpp"
+#include "core/families/events/leaf_vertex_lists.hpp"
+#include "core/families/events/observer.hpp"
 #include "core/families/events/realiser_boxes.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/topology/topology_edit.hpp"
 
 namespace kbvh {
-
-/// Change notices for a kinetic tree that nobody watches.
-///
-/// An observer may also have any of these, which tell how insertions and deletions change the nodes; they
-/// come when the topology is whole again and before the notices of the realisers that change in consequence:
-///   leaf_split(body, node, first_child)            a leaf became the parent of first_child, which is what it
-///                                                  was, and first_child + 1, which holds the new primitive
-///   leaf_changed(body, node)                       a leaf has other primitives, or is a new root
-///   node_removed(body, node)                       a leaf has lost its last primitive; the id means nothing
-///   node_moved(body, from, to)                     what was below `from` is below `to` now, which was its
-///                                                  parent, or a sibling that is gone; `from` means nothing
-///   subtree_rebuilt(body, node)                    everything below an inner node is other nodes now
-/// Nodes that are new have `no_vertex` as old realisers. An observer may have `reads_instants()`, too: while
-/// it says no, exact times of events are not made for its sake.
-struct NoObserver {
-  static constexpr bool reads_instants() { return false; }
-  template <class S>
-  void realiser_changed(std::uint32_t /*body*/, std::uint32_t /*node*/, Side /*side*/,
-                        std::uint32_t /*old_vertex*/, std::uint32_t /*new_vertex*/,
-                        const Instant<S>& /*now*/) {}
-  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
-};
 
 /// The kinetic AABB tree of one body (Z&W s.4): per node and side the vertex that realises the bound, and one
 /// certificate that it does; the earliest failure of each certificate is scheduled in a queue that several
@@ -62,7 +41,7 @@ class KineticAabbTree {
                   std::uint32_t first_slot, typename Queue::ClockType& clock, Queue& queue, Count& count,
                   Observer observer = {})
       : topology_(std::move(topology)),
-        leaf_vertices_(packed_leaf_vertices(topology_, primitives)),
+        leaf_vertices_(topology_, primitives),
         body_(body),
         slots_(first_slot, std::uint32_t(slot_count(topology_))),
         clock_(&clock),
@@ -184,12 +163,9 @@ class KineticAabbTree {
   /// The plans of `vertices` (ascending, unique) changed at t, each from its stored position: rechecks every
   /// certificate that they, or realisers that change in consequence, take part in.
   void plans_changed(double t, std::span<const std::uint32_t> vertices) {
-    index_leaves();
+    leaf_vertices_.index(topology_, vertex_count());
     touched_.clear();
-    for (std::uint32_t v : vertices) {
-      if (v >= leaves_.keys()) continue;  // new, and of no primitive yet
-      touched_.insert(touched_.end(), leaves_[v].begin(), leaves_[v].end());
-    }
+    leaf_vertices_.add_leaves_of(vertices, touched_);
     repair(t, vertices);
   }
 
@@ -208,7 +184,7 @@ class KineticAabbTree {
     follow_edit();
     unique_.assign(leaf_vertices_[leaf].begin(), leaf_vertices_[leaf].end());
     unique_.insert(unique_.end(), vertices.begin(), vertices.end());
-    set_leaf_vertices(leaf);
+    leaf_vertices_.assign(leaf, unique_, vertex_count());
     if (leaf != old_leaf && old_leaf != TopologyEditor::none)
       notify_split(old_leaf, leaf - 1);
     else
@@ -230,7 +206,7 @@ class KineticAabbTree {
     const std::uint32_t leaf = editor_->leaf_of(primitive);
     const bool removed = topology_.nodes[leaf].count() == 1;
     unique_.clear();
-    if (removed) set_leaf_vertices(leaf);
+    if (removed) leaf_vertices_.assign(leaf, unique_, vertex_count());
     editor_->remove(topology_, primitive, edit_);
     follow_edit();
     if (removed) {
@@ -241,14 +217,14 @@ class KineticAabbTree {
         const auto vertices = primitives[topology_.primitives[k]];
         unique_.insert(unique_.end(), vertices.begin(), vertices.end());
       }
-      set_leaf_vertices(leaf);
+      leaf_vertices_.assign(leaf, unique_, vertex_count());
       notify_leaf_changed(leaf);
     }
     repair(t, {});
   }
 
   std::size_t bytes() const {
-    return topology_.bytes() + leaf_vertices_.bytes() + leaves_.bytes() + moved_.size() + slots_.bytes() +
+    return topology_.bytes() + leaf_vertices_.bytes() + moved_.size() + slots_.bytes() +
            (realisers_.size() + marked_.size()) * sizeof(std::uint32_t) + (editor_ ? editor_->bytes() : 0);
   }
 
@@ -405,52 +381,13 @@ class KineticAabbTree {
     return clock_->overtakes_first(first, {}, other, {});
   }
 
-  static ListPool packed_leaf_vertices(const Topology& topology, const Primitives& primitives) {
-    LeafVertices lists = unique_leaf_vertices(topology, primitives);
-    return ListPool(lists.offsets, std::move(lists.vertices));
-  }
-  /// The leaves of each vertex, made when the first plan changes.
-  void index_leaves() {
-    if (leaves_.keys() != 0) return;
-    std::vector<std::uint32_t> offsets(clock_->plans(body_).vertex_count() + 1, 0);
-    for (std::uint32_t node = 0; node < topology_.size(); ++node)
-      for (std::uint32_t v : leaf_vertices_[node]) ++offsets[v + 1];
-    for (std::size_t v = 1; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
-    std::vector<std::uint32_t> leaves(offsets.back()), next(offsets.begin(), offsets.end() - 1);
-    for (std::uint32_t node = 0; node < topology_.size(); ++node)
-      for (std::uint32_t v : leaf_vertices_[node]) leaves[next[v]++] = node;
-    leaves_ = ListPool(offsets, std::move(leaves));
-  }
-  /// Makes `unique_`, in any order and with repetitions, the list of a leaf.
-  void set_leaf_vertices(std::uint32_t leaf) {
-    std::sort(unique_.begin(), unique_.end());
-    unique_.erase(std::unique(unique_.begin(), unique_.end()), unique_.end());
-    list_under(leaf, {});
-    leaf_vertices_.assign(leaf, unique_);
-    list_under(leaf, unique_);
-  }
-  /// Enters a leaf at the vertices of its list, or takes it out there if `vertices` is empty.
-  void list_under(std::uint32_t leaf, std::span<const std::uint32_t> vertices) {
-    if (leaves_.keys() == 0) return;
-    if (vertices.empty())
-      for (std::uint32_t v : leaf_vertices_[leaf]) leaves_.erase(v, leaf);
-    leaves_.resize(clock_->plans(body_).vertex_count());
-    for (std::uint32_t v : vertices) leaves_.push(v, leaf);
-  }
+  std::uint32_t vertex_count() const { return clock_->plans(body_).vertex_count(); }
 
   void start_editing(const Primitives& primitives) {
     if (!editor_) editor_.emplace(topology_, primitives.count());
   }
   /// Brings all that is kept by node in line with what the editor did, and notes which nodes to look at.
   void follow_edit() {
-    std::vector<std::pair<std::uint32_t, std::vector<std::uint32_t>>> lists;
-    for (const TopologyEdit::Move& move : edit_.moved) {
-      const auto list = leaf_vertices_[move.from];
-      if (list.empty()) continue;
-      lists.emplace_back(move.to, std::vector<std::uint32_t>(list.begin(), list.end()));
-      list_under(move.from, {});
-      leaf_vertices_.clear(move.from);
-    }
     for (const std::uint32_t node : edit_.vacated) {
       for (Side side = 0; side < 6; ++side) {
         discard(slot(node, side));
@@ -461,11 +398,7 @@ class KineticAabbTree {
     const std::uint32_t nodes = topology_.size();
     slots_.grow(6 * nodes, *queue_);
     realisers_.resize(std::size_t(6) * nodes, no_vertex);
-    leaf_vertices_.resize(nodes);
-    for (const auto& [to, list] : lists) {
-      leaf_vertices_.assign(to, list);
-      list_under(to, list);
-    }
+    leaf_vertices_.follow(edit_, nodes, vertex_count());
     touched_ = edit_.fresh;
     touched_.insert(touched_.end(), edit_.changed.begin(), edit_.changed.end());
   }
@@ -538,7 +471,7 @@ class KineticAabbTree {
   static constexpr std::uint8_t other_candidates = 1 << 6;  ///< in `moved_`
 
   Topology topology_;
-  ListPool leaf_vertices_;
+  LeafVertexLists leaf_vertices_;
   std::uint32_t body_;
   CertificateSlots slots_;
   typename Queue::ClockType* clock_;
@@ -546,8 +479,7 @@ class KineticAabbTree {
   Count* count_;
   Observer observer_;
   std::vector<std::uint32_t> realisers_;  ///< [node][side]
-  // For changes of plans, made when the first one comes: leaves of each vertex, marks of affected nodes.
-  ListPool leaves_;
+  // For changes of plans, made when the first one comes: marks of affected nodes.
   std::vector<std::uint32_t> touched_, marked_, affected_;
   std::vector<std::uint8_t> moved_;  ///< sides whose realiser changed in this pass, one bit each
   std::uint32_t mark_ = 0;

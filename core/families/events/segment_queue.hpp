@@ -75,12 +75,7 @@ class SegmentHeapEventQueue {
   }
 
   void schedule(const Event& event) {
-    Record& record = records_[event.slot];
-    withdraw(record);
-    if constexpr (packed)
-      record.event = clock_->pack(event);
-    else
-      record.event = event;
+    Record& record = replaced(event);
     const float error = error_above(event.error);
     const double begin = event.hint - double(error);
     if (const std::int32_t number = number_of(begin); number > opened_) {
@@ -95,12 +90,7 @@ class SegmentHeapEventQueue {
   bool review(const Event& event, double time) {
     const std::size_t segment = segment_of(time);
     if (segment <= segment_) return false;
-    Record& record = records_[event.slot];
-    withdraw(record);
-    if constexpr (packed)
-      record.event = clock_->pack(event);
-    else
-      record.event = event;
+    Record& record = replaced(event);
     wait(event.slot, record, most_bins + std::int32_t(segment), reviewed);
     return true;
   }
@@ -254,6 +244,16 @@ class SegmentHeapEventQueue {
     }
   }
 
+  /// Stores an event in its slot's record, whose former event is taken out.
+  Record& replaced(const Event& event) {
+    Record& record = records_[event.slot];
+    withdraw(record);
+    if constexpr (packed)
+      record.event = clock_->pack(event);
+    else
+      record.event = event;
+    return record;
+  }
   /// Takes an event out, wherever it is; says whether it was one.
   bool withdraw(Record& record) {
     const std::uint32_t place = record.place;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/families/linear/segment_interval.hpp"
 #include "core/families/linear/translated_boxes.hpp"
 #include "core/families/wide/kernels/bounds.hpp"
 #include "core/geometry/predicates.hpp"
@@ -59,33 +60,14 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
 
 template <class S>
 void LinearBounds<S>::choose_segment(Segment& segment, const SegmentMotion<S>& motion, double t) const {
-  double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
-  bool rest = true;
-  for (std::uint32_t body = 0; body < body_count(); ++body) {
-    begin = std::max(begin, motion.lines_begin(body));
-    end = std::min(end, motion.lines_end(body));
-    rest = rest && motion.at_rest(body);
-  }
-  if (rest || begin == -std::numeric_limits<double>::infinity()) begin = t;
-  // Plans without an end: takes as many frames ahead as plans have lasted lately, as far as known.
-  segment.endless = !rest && end == std::numeric_limits<double>::infinity();
-  if (segment.endless) {
-    segment.begin = std::max(begin, t);
-    segment.end = segment.knot = t + 1.01 * foreseen_ * (step_ > 0 ? step_ : 1.0 / 64);
-    return;
-  }
-  segment.begin = begin;
-  segment.end = segment.knot = end;
-  const std::uint32_t pieces = segment.pieces;
-  if (pieces == 1 || rest) return;
-  const auto cut = [&](std::uint32_t k) {
-    return k == pieces ? end : begin + (end - begin) * (double(k) / double(pieces));
-  };
-  std::uint32_t k = 0;
-  while (k + 1 < pieces && t >= cut(k + 1)) ++k;
-  if (!(cut(k) < cut(k + 1))) return;  // so short that no double lies between the cuts
-  segment.begin = cut(k);
-  segment.end = cut(k + 1);
+  // Plans without an end: as many frames ahead as segments have lasted lately.
+  const double endless_duration = 1.01 * foreseen_ * (step_ > 0 ? step_ : 1.0 / 64);
+  const SegmentInterval interval =
+      segment_interval(motion, body_count(), t, segment.pieces, endless_duration);
+  segment.begin = interval.begin;
+  segment.end = interval.end;
+  segment.knot = interval.knot;
+  segment.endless = interval.endless;
 }
 
 /// Starts to make the boxes of one end, which has its slot; returns the remaining work.

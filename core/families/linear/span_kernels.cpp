@@ -4,13 +4,6 @@
 
 namespace kbvh {
 
-template <>
-const SpanTestKernels<float>& span_test_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, span_tests_float);
-}
-template <>
-const SpanTestKernels<double>& span_test_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, span_tests_double);
-}
+KBVH_DEFINE_KERNEL_CHOICE(SpanTestKernels, span_test_kernels, span_tests)
 
 }  // namespace kbvh

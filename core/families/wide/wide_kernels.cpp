@@ -8,49 +8,10 @@
 
 namespace kbvh {
 
-template <>
-const BoundsKernels<float>& bounds_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, bounds_float);
-}
-template <>
-const BoundsKernels<double>& bounds_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, bounds_double);
-}
-
-template <>
-const WideInflateKernels<float>& wide_inflate_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_inflate_float);
-}
-template <>
-const WideInflateKernels<double>& wide_inflate_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_inflate_double);
-}
-
-template <>
-const WideLinearKernels<float>& wide_linear_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_linear_float);
-}
-template <>
-const WideLinearKernels<double>& wide_linear_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_linear_double);
-}
-
-template <>
-const WideOverlapKernels<float>& wide_overlap_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_overlap_float);
-}
-template <>
-const WideOverlapKernels<double>& wide_overlap_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_overlap_double);
-}
-
-template <>
-const WideRefitKernels<float>& wide_refit_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_refit_float);
-}
-template <>
-const WideRefitKernels<double>& wide_refit_kernels(KernelSet set) {
-  return KBVH_SELECT_KERNELS(set, wide_refit_double);
-}
+KBVH_DEFINE_KERNEL_CHOICE(BoundsKernels, bounds_kernels, bounds)
+KBVH_DEFINE_KERNEL_CHOICE(WideInflateKernels, wide_inflate_kernels, wide_inflate)
+KBVH_DEFINE_KERNEL_CHOICE(WideLinearKernels, wide_linear_kernels, wide_linear)
+KBVH_DEFINE_KERNEL_CHOICE(WideOverlapKernels, wide_overlap_kernels, wide_overlap)
+KBVH_DEFINE_KERNEL_CHOICE(WideRefitKernels, wide_refit_kernels, wide_refit)
 
 }  // namespace kbvh

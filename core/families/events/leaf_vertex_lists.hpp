@@ -1,0 +1,92 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/base/list_pool.hpp"
+#include "core/topology/topology.hpp"
+#include "core/topology/topology_edit.hpp"
+
+namespace kbvh {
+
+/// The unique vertices of every leaf of one body, ascending, by node; and, once `index` was called, the
+/// leaves of every vertex. Both follow edits of the topology.
+class LeafVertexLists {
+ public:
+  LeafVertexLists(const Topology& topology, const Primitives& primitives) {
+    LeafVertices lists = unique_leaf_vertices(topology, primitives);
+    vertices_ = ListPool(lists.offsets, std::move(lists.vertices));
+  }
+
+  /// The vertices of a leaf; none of an inner node.
+  std::span<const std::uint32_t> operator[](std::uint32_t node) const { return vertices_[node]; }
+
+  /// Makes the lists of leaves by vertex, the first time it is called. O(nodes + vertices of leaves).
+  void index(const Topology& topology, std::uint32_t vertex_count) {
+    if (leaves_.keys() != 0) return;
+    std::vector<std::uint32_t> offsets(vertex_count + 1, 0);
+    for (std::uint32_t node = 0; node < topology.size(); ++node)
+      for (std::uint32_t v : vertices_[node]) ++offsets[v + 1];
+    for (std::size_t v = 1; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
+    std::vector<std::uint32_t> leaves(offsets.back()), next(offsets.begin(), offsets.end() - 1);
+    for (std::uint32_t node = 0; node < topology.size(); ++node)
+      for (std::uint32_t v : vertices_[node]) leaves[next[v]++] = node;
+    leaves_ = ListPool(offsets, std::move(leaves));
+  }
+  /// Appends the leaves of each of `vertices`. A vertex that was added after `index` and belongs to no
+  /// primitive has none.
+  void add_leaves_of(std::span<const std::uint32_t> vertices, std::vector<std::uint32_t>& leaves) const {
+    for (std::uint32_t v : vertices) {
+      if (v >= leaves_.keys()) continue;
+      leaves.insert(leaves.end(), leaves_[v].begin(), leaves_[v].end());
+    }
+  }
+
+  /// Replaces the vertices of a leaf by `vertices`, which is sorted and made unique.
+  void assign(std::uint32_t leaf, std::vector<std::uint32_t>& vertices, std::uint32_t vertex_count) {
+    std::sort(vertices.begin(), vertices.end());
+    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+    unlist(leaf);
+    vertices_.assign(leaf, vertices);
+    list(leaf, vertex_count);
+  }
+  /// Moves the lists of nodes that an edit gave other ids, and makes room for `nodes` nodes.
+  void follow(const TopologyEdit& edit, std::uint32_t nodes, std::uint32_t vertex_count) {
+    std::vector<std::pair<std::uint32_t, std::vector<std::uint32_t>>> moved;
+    for (const TopologyEdit::Move& move : edit.moved) {
+      const auto vertices = vertices_[move.from];
+      if (vertices.empty()) continue;
+      moved.emplace_back(move.to, std::vector<std::uint32_t>(vertices.begin(), vertices.end()));
+      unlist(move.from);
+      vertices_.clear(move.from);
+    }
+    vertices_.resize(nodes);
+    for (const auto& [to, vertices] : moved) {
+      unlist(to);
+      vertices_.assign(to, vertices);
+      list(to, vertex_count);
+    }
+  }
+
+  std::size_t bytes() const { return vertices_.bytes() + leaves_.bytes(); }
+
+ private:
+  /// Enters a leaf in the lists of its vertices.
+  void list(std::uint32_t leaf, std::uint32_t vertex_count) {
+    if (leaves_.keys() == 0) return;
+    leaves_.resize(vertex_count);
+    for (std::uint32_t v : vertices_[leaf]) leaves_.push(v, leaf);
+  }
+  /// Takes a leaf out of the lists of its vertices.
+  void unlist(std::uint32_t leaf) {
+    if (leaves_.keys() == 0) return;
+    for (std::uint32_t v : vertices_[leaf]) leaves_.erase(v, leaf);
+  }
+
+  ListPool vertices_;  ///< by node
+  ListPool leaves_;    ///< by vertex; empty before `index`
+};
+
+}  // namespace kbvh

@@ -1,0 +1,32 @@
+#pragma once
+#include <cstdint>
+
+#include "core/families/events/event.hpp"
+
+namespace kbvh {
+
+/// The observer of a kinetic tree whose changes are not watched.
+///
+/// An observer may also have any of the following functions, which report how insertions and deletions change
+/// the nodes. They are called once the topology is whole again, and before the realisers that change in
+/// consequence are reported:
+///   leaf_split(body, node, first_child)            a leaf became the parent of first_child, which holds the
+///                                                  leaf's former primitives, and of first_child + 1, which
+///                                                  holds the new primitive
+///   leaf_changed(body, node)                       a leaf has other primitives, or is a new root
+///   node_removed(body, node)                       a leaf lost its last primitive; its id is free
+///   node_moved(body, from, to)                     the subtree of `from` is the subtree of `to` now, which
+///                                                  was its parent, or a removed sibling; `from` is free
+///   subtree_rebuilt(body, node)                    all nodes below an inner node are new
+/// New nodes have `no_vertex` as old realisers. An observer may have `reads_instants()`, too: while it
+/// returns false, the tree does not compute exact times of events for it.
+struct NoObserver {
+  static constexpr bool reads_instants() { return false; }
+  template <class S>
+  void realiser_changed(std::uint32_t /*body*/, std::uint32_t /*node*/, Side /*side*/,
+                        std::uint32_t /*old_vertex*/, std::uint32_t /*new_vertex*/,
+                        const Instant<S>& /*now*/) {}
+  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
+};
+
+}  // namespace kbvh

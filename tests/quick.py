@@ -1,0 +1,86 @@
+#!/usr/bin/env python3
+"""Runs the registered tests with one process for all cases of an executable, where CTest starts one for each case.
+
+usage: quick.py BUILD [CTEST OPTION...]
+
+The options choose tests as ctest does (-L, -LE, -R, -E). Executables run side by side, those with most cases first. A
+case that fails is printed with what its executable said. Exit code 1 if any failed.
+"""
+import concurrent.futures
+import json
+import os
+import subprocess
+import sys
+import time
+
+LONGEST_FILTER = 100_000  # of one argument; Linux takes 131,072 characters
+
+
+def registered(build, options):
+    """The tests that ctest would run, as {"name", "command", "properties"}."""
+    out = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1", *options], check=True,
+                         capture_output=True, text=True).stdout
+    return [test for test in json.loads(out)["tests"] if "command" in test]
+
+
+def batches(tests):
+    """Groups cases of one GoogleTest executable: [(name, number of cases, command, environment, folder)]."""
+    groups = {}
+    for test in tests:
+        properties = {p["name"]: p["value"] for p in test.get("properties", [])}
+        environment = tuple(properties.get("ENVIRONMENT", ()))
+        folder = properties.get("WORKING_DIRECTORY", ".")
+        cases = [word for word in test["command"] if word.startswith("--gtest_filter=")]
+        rest = [word for word in test["command"] if word not in cases and word != "--also_run_disabled_tests"]
+        case = cases[0].split("=", 1)[1] if cases else None
+        key = (tuple(rest), environment, folder, case is None and test["name"])
+        groups.setdefault(key, (test["name"], []))[1].append(case)
+    for (command, environment, folder, _), (name, cases) in groups.items():
+        if cases == [None]:
+            yield name, 1, list(command), environment, folder
+            continue
+        filters = [""]
+        for case in cases:
+            if len(filters[-1]) + len(case) > LONGEST_FILTER:
+                filters.append("")
+            filters[-1] += (":" if filters[-1] else "") + case
+        for part in filters:
+            yield (os.path.basename(command[0]), part.count(":") + 1,
+                   [*command, "--gtest_brief=1", "--gtest_filter=" + part], environment, folder)
+
+
+def run(batch):
+    name, count, command, environment, folder = batch
+    variables = {**os.environ, **dict(entry.split("=", 1) for entry in environment)}
+    if "--gtest_filter=" in command[-1]:
+        variables.pop("GTEST_FILTER", None)  # for the suites in shards; here the cases are named
+    begin = time.monotonic()
+    ran = subprocess.run(command, cwd=folder, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                         errors="replace")
+    return name, count, ran.returncode, ran.stdout, time.monotonic() - begin
+
+
+def main():
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    begin = time.monotonic()
+    work = sorted(batches(registered(sys.argv[1], sys.argv[2:])), key=lambda batch: -batch[1])
+    if not work:
+        sys.exit("no test is chosen")
+    failed, cases, times = [], 0, []
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count() or 2) as pool:
+        for name, count, code, output, seconds in pool.map(run, work):
+            cases += count
+            times.append((seconds, name))
+            if code != 0:
+                failed.append(name)
+                print(f"FAILED ({code}): {name}\n{output}", flush=True)
+    for seconds, name in sorted(times, reverse=True)[:8]:
+        print(f"{seconds:7.1f} s  {name}")
+    print(f"{cases} cases of {len(work)} executables in {time.monotonic() - begin:.0f} s, "
+          + (f"{len(failed)} failed: " + ", ".join(failed) if failed else "all passed"))
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()
