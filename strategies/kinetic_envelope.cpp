@@ -1,4 +1,4 @@
-// The exact tight AABB tree without a queue, for keyframed motion. At the begin of each segment one pass
+// The exact tight AABB tree without a queue, for keyframed motion. At the start of each segment one pass
 // finds the sides whose realiser will change in it. The upper envelopes of these few sides give a list of
 // stores, sorted by time, that frames apply (core/families/envelope/segment_envelope.hpp). If the whole clip
 // is known, the frames of a segment can share the pass for the next one.
@@ -143,7 +143,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     const bool rests = motion.at_rest(index);
     const double begin = rests ? t : motion.lines_begin(index);
     const S* first = motion.positions_on_lines(index, begin, state.room[0]);
-    // The realiser of a side at the end of one segment also realises it at the begin of the next.
+    // The realiser of a side at the end of one segment also realises it at the start of the next.
     const bool goes_on =
         state.known != Known::nothing && (rests ? motion.lines_begin(index) : begin) == state.end;
     if (goes_on && foreseen == Next::envelope) make_next(index, 1);

@@ -28,7 +28,7 @@ struct PlanChange {
 template <class S>
 struct Translation {
   std::array<S, 3> lower, upper;
-  bool exact;  ///< all steps are one vector that, added to a position at the begin, gives the position at the
+  bool exact;  ///< all steps are one vector that, added to a position at the start, gives the position at the
                ///< end without rounding
 };
 

@@ -236,7 +236,7 @@ void LinearBounds<S>::enter() {
   }
 }
 
-/// Assigns slots to a body's ends over a segment, and makes the boxes at its begin. Returns whether the other
+/// Assigns slots to a body's ends over a segment, and makes the boxes at its start. Returns whether the other
 /// end remains to be made. `before` is the preceding segment.
 template <class S>
 bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion,

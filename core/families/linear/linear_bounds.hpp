@@ -13,9 +13,9 @@
 namespace kbvh {
 
 /// Bounds of all bodies of a scene over a segment in which every vertex of every body stays on one line:
-/// boxes at its begin and at its end, linear in between. A maximum of linear functions is convex and lies
+/// boxes at its start and at its end, linear in between. A maximum of linear functions is convex and lies
 /// below its chord, so the boxes contain every vertex throughout; at the ends they are tight. A segment needs
-/// no updates, and the boxes at its end are those at the begin of the next one. Prior art:
+/// no updates, and the boxes at its end are those at the start of the next one. Prior art:
 /// core/adr/0010-prior-art-of-answering-intervals.md.
 ///
 /// Segments are those of all bodies overlaid: from the latest knot of any plan to the next one, cut as

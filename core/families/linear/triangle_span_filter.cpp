@@ -9,7 +9,7 @@ namespace {
 constexpr float fraction_slack = 0x1p-21F;
 }  // namespace
 
-/// Enters all pairs into the lists by their begin; pairs that overlap at the begin are attempted ahead, if
+/// Enters all pairs into the lists by their start; pairs that overlap at the start are attempted ahead, if
 /// requested.
 template <class S>
 void TriangleSpanFilter<S>::begin(const IntervalJoin<S>& join, When when) {
