@@ -67,7 +67,7 @@ struct Counters {
   std::vector<Named> named{};
   /// Adds n to a strategy's own counter, which starts at 0. Throws std::logic_error if a counter of the enum
   /// has that name. O(named counters).
-  void add(std::string_view own, std::uint64_t n);
+  void add(std::string_view own_name, std::uint64_t n);
 };
 
 /// Counting policies. Every strategy is compiled with both; reported times come from the silent one.

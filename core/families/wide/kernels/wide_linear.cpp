@@ -20,9 +20,9 @@ void make(const WideMoment<S>& moment, std::uint32_t node) {
   for (std::size_t i = 0; i < scalars; ++i) rows[i] = first[i] + s * (last[i] - first[i]) - margin;
   const S* own_first = moment.ends.node_bounds[0] + std::size_t(8) * node;
   const S* own_last = moment.ends.node_bounds[1] + std::size_t(8) * node;
-  S* own = moment.hierarchy.node_bounds + std::size_t(8) * node;
+  S* node_bounds = moment.hierarchy.node_bounds + std::size_t(8) * node;
   for (std::size_t i = 0; i < 8; ++i)
-    own[i] = own_first[i] + s * (own_last[i] - own_first[i]) + (i < 4 ? -margin : margin);
+    node_bounds[i] = own_first[i] + s * (own_last[i] - own_first[i]) + (i < 4 ? -margin : margin);
 }
 
 /// Stored boxes that are computed at the first visit.
