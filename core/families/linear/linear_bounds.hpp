@@ -113,8 +113,8 @@ class LinearBounds {
   void note_time();
   void next_segment();
   void forget_ahead();
-  /// Adds the skipped-body counts of a prebuilt segment when it becomes current.
-  Counts& left_alone(std::uint32_t body) { return ahead_exists_ ? ahead_counts_[body] : counts_[body]; }
+  /// Returns the skip counts to increase; those of a segment built ahead are added when it becomes current.
+  Counts& skip_counts(std::uint32_t body) { return ahead_exists_ ? ahead_counts_[body] : counts_[body]; }
   void choose_segment(Segment& segment, const SegmentMotion<S>& motion, double t) const;
   bool begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion, std::uint32_t body,
                   double t, Before what);

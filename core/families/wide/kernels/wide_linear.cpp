@@ -93,7 +93,7 @@ template <class S, class V>
 /// An upper bound of all rounding of a fraction, in `together` and in frames alike.
 constexpr float fraction_slack = 0x1p-20f;
 
-/// Returns the bits of the lanes that no side separates at the start, or none at the end.
+/// Returns the bits of the lanes in which no side separates the boxes at the start, or none at the end.
 template <class S, class V>
 [[gnu::always_inline]] inline unsigned together_at_an_end(const Gaps<S, V>& gaps) {
   V first = gaps.first[0], last = gaps.last[0];
