@@ -14,6 +14,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "core/base/heap_block.hpp"
 #include "core/geometry/lane_box.hpp"
 
 namespace kbvh::bullet {
@@ -89,8 +90,11 @@ class BulletDbvt final : public Contestant<Count> {
     std::size_t total = 0;
     for (const BodyState& state : bodies_) {
       const auto leaves = std::size_t(state.tree.m_leaves);
-      total += sizeof(btDbvt) + (leaves == 0 ? 0 : 2 * leaves - 1) * sizeof(btDbvtNode) +
-               state.nodes.size() * sizeof(btDbvtNode*);
+      // Bullet aligns each node to 16 bytes within a block, and keeps the block's address before it.
+      constexpr std::size_t node_bytes = heap_block_bytes(sizeof(btDbvtNode) + sizeof(void*) + 16);
+      total += sizeof(btDbvt) + (leaves == 0 ? 0 : 2 * leaves - 1) * node_bytes +
+               state.nodes.capacity() * sizeof(btDbvtNode*) +
+               std::size_t(state.tree.m_stkStack.capacity()) * sizeof(state.tree.m_stkStack[0]);
     }
     return total;
   }

@@ -383,8 +383,9 @@ def main(arguments: Optional[list[str]] = None) -> int:
         print(f"claims: {error}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"claims: {error.filename} cannot be written: {error.strerror}.", file=sys.stderr)
-        return 2
+        text, code = files.complaint(error)
+        print(f"claims: {text}", file=sys.stderr)
+        return code
     return 0
 
 

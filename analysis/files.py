@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from pathlib import Path
@@ -24,6 +25,13 @@ def parse_json(content: str) -> Any:
 def read_json(file: Path) -> Any:
     """Returns the value of a JSON file, with or without a byte order mark. Raises OSError and ValueError."""
     return parse_json(file.read_bytes().decode("utf-8"))
+
+
+def complaint(error: OSError) -> tuple[str, int]:
+    """Returns a sentence for an error of the system and an exit code: 3 where no input is at fault, 2 otherwise."""
+    if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):
+        return f"{error.strerror}: the limits of this process (ulimit) or machine are too low.", 3
+    return f"{error.filename} cannot be written: {error.strerror}.", 2
 
 
 def write_whole(file: Path, content: Union[str, bytes]) -> None:

@@ -85,8 +85,9 @@ def main(arguments: Optional[list[str]] = None) -> int:
         print(f"report: {error}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"report: {error.filename} cannot be written: {error.strerror}.", file=sys.stderr)
-        return 2
+        text, code = files.complaint(error)
+        print(f"report: {text}", file=sys.stderr)
+        return code
     for note in study.notes:
         print(f"report: {note}", file=sys.stderr)
     if options.printed:

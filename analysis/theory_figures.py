@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+import files
 from axes import KeyLines, fixed_log_axis, key, key_size, log_axis
 from canvas import Picture, picture
 from colours import Look, looks
@@ -293,8 +294,9 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     try:
         draw_all(theory, options.folder / "figures")
     except OSError as problem:
-        print(f"theory_figures.py: {problem.filename} cannot be written: {problem.strerror}.", file=sys.stderr)
-        return 2
+        text, code = files.complaint(problem)
+        print(f"theory_figures.py: {text}", file=sys.stderr)
+        return code
     return 0
 
 

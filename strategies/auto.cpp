@@ -202,7 +202,8 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
   }
 
   std::size_t bytes() const override {
-    std::size_t total = 0;
+    std::size_t total =
+        touching_.capacity() * sizeof(PrimitivePair) + changed_.capacity() * sizeof(PlanChange<S>);
     for (const Runner& runner : runners_) total += runner.strategy->bytes();
     return total;
   }

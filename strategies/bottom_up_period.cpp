@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "core/base/heap_block.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
 
@@ -72,7 +73,10 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>, public TakesPlanC
   }
 
   std::size_t bytes() const override {
-    return near_bodies_.bytes() + nodes_.size() * (sizeof(Node) + sizeof(void*));
+    std::size_t total = near_bodies_.bytes() + nodes_.size() * heap_block_bytes(sizeof(Node)) +
+                        nodes_.capacity() * sizeof(nodes_[0]);
+    for (const Topology& topology : topologies_) total += topology.bytes();
+    return total;
   }
 
  private:

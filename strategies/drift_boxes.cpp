@@ -134,7 +134,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
   }
 
   std::size_t bytes() const override {
-    std::size_t total = 0;
+    std::size_t total = query_.bytes();
     for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
     for (const auto& body : bodies_) total += body.before.capacity() * sizeof(S);
     for (const auto& lists : lists_of_) total += lists.bytes();

@@ -169,7 +169,9 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   }
 
   std::size_t bytes() const override {
-    std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes();
+    std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes() + query_.bytes() +
+                        (answered_.capacity() + to_test_.capacity()) * sizeof(PrimitivePair) +
+                        blocks_.capacity() * sizeof(Block) + joined_bodies_.capacity() * sizeof(BodyPair);
     for (const auto& sweep : sweeps_) total += sweep.bytes();
     return total + (swept_ ? swept_->bytes() : 0);
   }

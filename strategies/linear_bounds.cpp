@@ -65,7 +65,7 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>, public Take
   }
 
   std::size_t bytes() const override {
-    std::size_t total = bounds_.bytes();
+    std::size_t total = bounds_.bytes() + query_.bytes();
     for (const auto& marks : stale_) total += marks.size();
     return total;
   }

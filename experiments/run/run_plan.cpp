@@ -29,9 +29,10 @@ using nlohmann::json;
 
 namespace {
 
-/// The largest scene, in primitives, whose keyframes are written for its picture, and the number of
-/// keyframes.
+/// The largest scene whose keyframes are written for its picture, in primitives and in bodies (each is a
+/// file), and the number of keyframes.
 constexpr std::uint64_t largest_shown = 150'000;
+constexpr std::size_t most_bodies_shown = 1000;
 constexpr std::size_t keyframes_shown = 4;
 
 /// One run of a plan: the state shared by all its groups.
@@ -91,7 +92,7 @@ class Runner {
   std::string show_scene(const LoadedScene& loaded) {
     std::uint64_t primitives = 0;
     for (const io::AnimatedMesh& mesh : loaded.meshes) primitives += mesh.primitive_count();
-    if (primitives > largest_shown) return {};
+    if (primitives > largest_shown || loaded.meshes.size() > most_bodies_shown) return {};
     const std::string hash = hexadecimal(card_hash(loaded));
     const std::filesystem::path folder = store_->folder() / "scenes" / folder_name(loaded);
     if (is_card(folder / "card.json", hash)) return hash;
@@ -175,8 +176,9 @@ class Runner {
            " is skipped: contacts between keyframes do not support changes of geometry");
       return;
     }
-    std::vector<double> knots = script.empty() ? overlaid_keyframes(scene)
-                                               : contact_times(scene, frames_of(scene, loaded, script, 1), script);
+    std::vector<double> knots = script.empty()
+                                    ? overlaid_keyframes(scene)
+                                    : contact_times(scene, frames_of(scene, loaded, script, 1), script);
     if (study.frames_limit > 0 && knots.size() > study.frames_limit + 1) knots.resize(study.frames_limit + 1);
     if (knots.size() < 2) {
       note("note: " + scene.name + " is skipped: nothing moves, so there are no contacts between keyframes");

@@ -122,6 +122,27 @@ TEST_F(Binary, ContactsOfAScriptWithFramesOfItsOwn) {
   for (const json& record : found) EXPECT_TRUE(record.at("verified").at("holds")) << record.at("verified");
 }
 
+// Each body is a file of the scene's card, and the report could not draw thousands.
+TEST_F(Binary, ScenesOfThousandsOfBodiesAreNotWritten) {
+  const auto plan = [&](int bodies) {
+    json list = json::array();
+    for (int i = 0; i < bodies; ++i)
+      list.push_back(
+          {{"shape", "turning_box"}, {"translate", {0, 0, 3 * i}}, {"name", "b" + std::to_string(i)}});
+    write_text(folder_ / "plan.json", json{{"scenes", {{{"name", "many"}, {"bodies", list}}}},
+                                           {"strategies", "bottom_up"},
+                                           {"frames_limit", 2},
+                                           {"repetitions", 1}}
+                                          .dump());
+    const std::string out = "out" + std::to_string(bodies);
+    const Outcome run = kbvh("run --plan plan.json --out " + out);
+    EXPECT_EQ(run.code, 0) << run.err;
+    return std::filesystem::exists(folder_ / out / "scenes");
+  };
+  EXPECT_TRUE(plan(3));
+  EXPECT_FALSE(plan(1001));
+}
+
 TEST_F(Binary, PairsWithinBodiesAreCountedWhereTheyAreAskedFor) {
   // Two squares of one body, as a tent of which each side goes through the other.
   write_text(folder_ / "tent.obj",

@@ -214,16 +214,21 @@ double declared_over_held(const StrategyEntry& entry) {
       strategy->candidates_at(t, pairs, {});
       strategy->confirm(t, pairs);
     }
-  return double(strategy->bytes()) / double(heap_bytes() - before + handed_over);
+  const std::size_t declared = strategy->bytes(), held = heap_bytes() - before + handed_over;
+  if (std::getenv("KBVH_TEST_PRINT") != nullptr)
+    std::printf("%-26s %zu %10zu of %10zu\n", entry.info.id.c_str(), sizeof(S), declared, held);
+  return double(declared) / double(held);
 }
 
 TEST(Allocation, BytesAreWhatIsHeld) {
   for (const StrategyEntry& entry : registry()) {
     if (entry.info.max_primitive_pairs != 0) continue;
     SCOPED_TRACE(entry.info.id);
-    const auto check = [](double share) {
-      EXPECT_GE(share, 0.9) << "it holds more than it says";
-      EXPECT_LE(share, 1.1) << "it says more than it holds";
+    // Of a peer's own structures some are not accessible.
+    const double least = entry.info.topology.own ? 0.8 : 0.95;
+    const auto check = [&](double share) {
+      EXPECT_GE(share, least) << "it holds more than it says";
+      EXPECT_LE(share, 1.05) << "it says more than it holds";
     };
     if (entry.info.has_float) check(declared_over_held<float>(entry));
     if (entry.info.has_double) check(declared_over_held<double>(entry));

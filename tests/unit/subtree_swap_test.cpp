@@ -239,7 +239,9 @@ TEST(Collapse, EditedTreesBecomeWideOnes) {
           for (std::uint32_t c = node.first(); c < node.first() + node.count(); ++c)
             ASSERT_TRUE(wide.nodes[c].is_leaf());
         }
-        if (primitives == 200) EXPECT_GT(narrow, 0u);
+        if (primitives == 200) {
+          EXPECT_GT(narrow, 0u);
+        }
       }
     }
 }

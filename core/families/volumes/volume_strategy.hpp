@@ -117,7 +117,7 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
 
   std::size_t bytes() const override {
     return on_bodies([&](const auto& bodies) {
-      std::size_t total = near_bodies_.bytes();
+      std::size_t total = near_bodies_.bytes() + stack_.capacity() * sizeof(NodePair);
       for (const auto& body : bodies) total += body.bytes();
       return total;
     });
