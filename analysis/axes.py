@@ -20,7 +20,7 @@ from text import tick as plain_tick
 FormatTick = Callable[[float], str]
 
 
-#: Characters after which names of contestants go on in a second line.
+#: Characters after which names of contestants continue in a second line.
 WRAP = 38
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import text
 from load import Study
 
-TOTAL = ["update", "traversal", "triangle_tests"]  #: phases: positions are evaluated by whoever is chosen
+TOTAL = ["update", "traversal", "triangle_tests"]  #: phases: the chosen strategy evaluates positions
 
 
 @dataclass
@@ -19,7 +19,7 @@ class Choice:
     scalar: str
     l: str
     chosen: str
-    seen: str  #: from what it chose
+    seen: str  #: the inputs of the choice
     best: str  #: the fastest of the others in the same table
     ratio: float  #: its total over the chooser's; below 1: another would have been faster
 

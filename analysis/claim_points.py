@@ -30,7 +30,7 @@ COUNTED: dict[str, str] = {
 }
 SLACK = 1.25  #: measured sizes reach a claimed one within this factor
 MEASURES = ("ratio", "value", "exponent", "next_l", "ten_l", "across")
-#: What a term names of a run, by the column that says it.
+#: The names in a term, by column of a run.
 NAMED = {"id": "strategy", "family": "family", "baseline": "baseline"}
 RELATIONS = ("<", "<=", ">", ">=", "within a factor of")
 

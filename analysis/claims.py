@@ -371,9 +371,9 @@ def plain(claims: Claims) -> str:
 
 def main(arguments: Optional[list[str]] = None) -> int:
     """Runs the command; returns the exit code: 0, or 2 for unusable input. Verdicts are no errors."""
-    parser = argparse.ArgumentParser(prog="claims.py", description="Holds the paper's claims against RESULTS_DIR.")
+    parser = argparse.ArgumentParser(prog="claims.py", description="Checks the paper's claims against RESULTS_DIR.")
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl (and theory.json)")
-    parser.add_argument("--claims", metavar="FILE", type=Path, default=FILE, help="other claims than the paper's")
+    parser.add_argument("--claims", metavar="FILE", type=Path, default=FILE, help="claims other than the paper's")
     options = parser.parse_args(arguments)
     try:
         claims = evaluate(load(options.folder), options.folder, options.claims)

@@ -27,7 +27,7 @@ FAMILIES: dict[str, tuple[str, str]] = {
     "auto": ("#44AA99", "p"),
 }
 
-#: What families that are not known choose from.
+#: Choices for unknown families.
 FREE: tuple[tuple[str, str], ...] = (
     ("#5D4A9C", ">"),
     ("#117733", "*"),

@@ -10,7 +10,7 @@ import pandas as pd
 import text
 from load import Study
 
-#: The exact counterpart of contestants that promise nothing, and what the two differ in.
+#: The exact counterpart of each approximate contestant, and their difference.
 COUNTERPARTS = {
     "kinetic_aabb_approximate": ("kinetic_aabb", "event times and formula"),
     "bottom_up_approximate": ("bottom_up", "positions and rounding of boxes"),
@@ -30,7 +30,7 @@ class Comparison:
     pairs: int  #: true ones, of the frames that were compared
     missed: int
     extra: int
-    protrusion: float  #: furthest that a vertex left its box, in units of the scene
+    protrusion: float  #: largest distance of a vertex from its box, in units of the scene
 
 
 def comparisons(study: Study) -> list[Comparison]:
@@ -67,23 +67,23 @@ def paragraph(listed: list[Comparison]) -> str:
     cheap, dear = min(listed, key=lambda one: one.ratio), max(listed, key=lambda one: one.ratio)
     words = [
         f"In {text.plural(max(one.tables for one in listed), 'table')} the exact contestants took {text.factor(cheap.ratio)} "
-        f"({cheap.label}) to {text.factor(dear.ratio)} ({dear.label}) times as long as those that promise nothing, positions included."
+        f"({cheap.label}) to {text.factor(dear.ratio)} ({dear.label}) times as long as those without a guarantee, positions included."
     ]
     for one in wrong:
         words.append(
-            f"{one.label} missed {text.count(one.missed)} and made up {text.count(one.extra)} of {text.count(one.pairs)} pairs, for "
+            f"{one.label} missed {text.count(one.missed)} and added {text.count(one.extra)} of {text.count(one.pairs)} pairs, for "
             f"{_gain(one.ratio)}; a vertex left its box by up to {text.significant(one.protrusion, 2)}."
         )
     if leaves:
         furthest = max(one.protrusion for one in leaves)
         words.append(
-            f"Vertices leave boxes by up to {text.significant(furthest, 2)}, and by luck no pair is wrong: "
+            f"Vertices leave boxes by up to {text.significant(furthest, 2)}, but by chance no pair is wrong: "
             f"{text.listing([one.label for one in leaves])}."
         )
     if right:
         words.append(
-            f"Right on these scenes, with nothing to say so beforehand: {text.listing([one.label for one in right])} "
-            "(scenes made to break them are under Stress)."
+            f"Correct on these scenes, but without a guarantee: {text.listing([one.label for one in right])} "
+            "(adversarial scenes are under Stress)."
         )
     return " ".join(words)
 

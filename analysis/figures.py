@@ -40,7 +40,7 @@ from text import memory as bytes_of
 from text import memory_tick, percent_tick, significant, size, tick
 
 WIDTH = 10.5  #: of every figure, in inches
-#: Bars longer than this many times the fastest are torn off, or the others could not be read.
+#: Bars longer than this many times the fastest are torn off, so that the others stay readable.
 TORN = 12.0
 
 

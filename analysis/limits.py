@@ -31,14 +31,14 @@ def _noise(timed: pd.DataFrame) -> tuple[str, str]:
         noisy = int((several["spread"] > NOISY).sum())
         words.append(
             f"Repetitions of one run differ by {text.percent(spread)} (median of largest minus smallest total) and by up to "
-            f"{text.percent(worst['spread'])} ({worst['label']}, {worst['scene']}, l = {worst['l']:g}); differences smaller "
-            "than that are not findings."
+            f"{text.percent(worst['spread'])} ({worst['label']}, {worst['scene']}, l = {worst['l']:g}); smaller differences "
+            "are not findings."
         )
         if noisy:
             words.append(f"{noisy} of {text.plural(len(several), 'run')} spread by more than {text.percent(NOISY)}.")
         fewest = int(several["repetitions"].min())
         if fewest < 5:
-            words.append(f"Some runs have only {text.plural(fewest, 'repetition')}: their ranges are narrower than the truth.")
+            words.append(f"Some runs have only {text.plural(fewest, 'repetition')}: their ranges underestimate the noise.")
     if single:
         words.append(f"{text.plural(single, 'run')} of {len(timed)} had a single repetition and no estimate of noise.")
     sessions = timed.groupby("group")["session"].nunique()
@@ -95,7 +95,7 @@ def _extent(runs: pd.DataFrame) -> tuple[str, str]:
     scalars = sorted(runs["scalar"].unique())
     words = [
         f"{text.plural(runs['scene'].nunique(), 'scene')} with {sizes} primitives, l = "
-        f"{text.listing([f'{value:g}' for value in depths])}, in {text.listing(scalars)}: lines say nothing outside these "
+        f"{text.listing([f'{value:g}' for value in depths])}, in {text.listing(scalars)}: lines are not valid outside these "
         "values."
     ]
     shorter = runs[runs["frames"] < 100]
@@ -106,13 +106,13 @@ def _extent(runs: pd.DataFrame) -> tuple[str, str]:
         )
     seeds = runs["seed"][runs["seed"] != ""].unique()
     if len(seeds) == 1:
-        words.append(f"One seed only ({seeds[0]}): how results vary between scenes of one kind was not measured.")
+        words.append(f"One seed only ({seeds[0]}): the variation between scenes of one kind was not measured.")
     return "Extent", " ".join(words)
 
 
 def _machine(runs: pd.DataFrame) -> tuple[str, str]:
     machines = runs["machine"].nunique()
-    words = [f"{machines} machines; ratios are only made inside one." if machines > 1 else "One machine."]
+    words = [f"{machines} machines; ratios are only formed within one machine." if machines > 1 else "One machine."]
     words.append(
         "Everything ran on one thread; scaling over cores, GPUs, energy and hardware counters (cache misses, mispredicted "
         "branches) were not measured."
@@ -126,8 +126,8 @@ def _hidden(runs: pd.DataFrame) -> tuple[str, str]:
         return "Hidden boxes", ""
     return (
         "Hidden boxes",
-        f"The boxes of {text.listing(hidden)} could not be seen, so protrusion and looseness are unknown there; pairs were "
-        "checked all the same.",
+        f"The boxes of {text.listing(hidden)} are not visible, so protrusion and looseness are unknown there; pairs were "
+        "checked nevertheless.",
     )
 
 
@@ -138,9 +138,9 @@ def _absent(study: Study) -> tuple[str, str]:
     if len(timed) and not counted.all():
         words.append(f"{text.plural(int((~counted).sum()), 'run')} of {len(timed)} recorded no counters.")
     if len(timed) and not timed["baseline"].any():
-        words.append("No baseline was timed: there is nothing to compare with.")
+        words.append("No baseline was timed, so there are no ratios.")
     if len(study.refused):
-        words.append(f"{text.plural(len(study.refused), 'contestant run')} got no time; the reason stands below its table.")
+        words.append(f"{text.plural(len(study.refused), 'contestant run')} got no time; the reason is given below the table.")
     if len(timed) and not (timed["over_time"].map(len) > 0).any():
-        words.append("These results hold no quality of boxes over time: they are from an older program.")
+        words.append("These results have no quality of boxes over time, because they are from an older program.")
     return "Not measured", " ".join(words)

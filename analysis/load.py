@@ -234,7 +234,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "id": record.text("strategy.id"),
         "title": record.text("strategy.title", record.text("strategy.id")),
         "family": record.text("strategy.family", "unknown"),
-        # Records from before baselines were declared go by the family.
+        # Records from before baselines were declared are classified by family.
         "baseline": record.flag("strategy.baseline", record.text("strategy.family", "unknown") == "refit"),
         "guarantee": guarantee,
         "tightness": record.text("strategy.tightness", ""),

@@ -20,7 +20,7 @@ from figures import WIDTH
 
 AS_IN_PAPER = {"builder": {"width": 2, "leaf_size": 1}}
 BOXTREE = {"strategy": "kinetic_boxtree", "params": {"rebuild": "never", "leaf_boxes": "inherited"}}
-#: Who is in a panel: name and what claims.json calls a term. The baselines come from claims.json.
+#: The members of a panel: name, and a term as in claims.json. The baselines come from claims.json.
 KINETIC: list[tuple[str, dict[str, Any]]] = [
     ("kinetic AABB tree", {"strategy": "kinetic_aabb"}),
     ("kinetic BoxTree", BOXTREE),
@@ -71,14 +71,14 @@ FIGURES: tuple[PaperFigure, ...] = (
         "does not cost more time than the values that it saves.",
     ),
     PaperFigure(
-        "19", "spheres that turn round, and dress",
+        "19", "reversing spheres, and dress",
         (
             Panel("left", "reversing_spheres", "polygons", ("update",), "all", "spheres: update (ms per frame)"),
             Panel("middle", "dress", "polygons", ("events", "values"), "kinetic", "dress: events and values"),
             Panel("right", "dress", "polygons", ("update",), "all", "dress: update (ms per frame)"),
         ),
-        ON_SIZE + "Left, updates include the answers to changed flight plans; a kinetic line has to lie below both refits "
-        "for the paper's gain to be one today.",
+        ON_SIZE + "Left, updates include the answers to changed flight plans; a kinetic line must lie below both refits "
+        "for the paper's gain to hold today.",
     ),
     PaperFigure(
         "21", "shirt",
@@ -87,7 +87,7 @@ FIGURES: tuple[PaperFigure, ...] = (
             Panel("middle", "shirt", "polygons", ("update",), "all", "update (ms per frame)"),
             Panel("right", "shirt", "polygons", ("total",), "total", "update and check (ms per frame)"),
         ),
-        "Left, more frames between the same keyframes spread the same events thinner, so kinetic lines fall and those of "
+        "Left, more frames between the same keyframes spread the same events more thinly, so kinetic lines fall and those of "
         "refits stay level; where they cross is the break-even point. Middle and right are for one l over sizes, both axes "
         "logarithmic.",
     ),
@@ -98,7 +98,7 @@ FIGURES: tuple[PaperFigure, ...] = (
             Panel("middle", "dress", "l", ("total",), "total", "dress: total over l (ms)"),
             Panel("right", "tablecloth", "polygons", ("total",), "total", "tablecloth: total (ms per frame)"),
         ),
-        ON_SIZE + "The separation list never searches from the roots, so its line holds all that it does for collisions; the "
+        ON_SIZE + "The separation list never searches from the roots, so its line includes all its work for collisions; the "
         "others update and then search.",
     ),
 )
@@ -138,7 +138,7 @@ def why_not(table: Table, panel: Panel) -> str:
     if panel.x == "l":
         depths = text.listing([f"{l:g}" for l in sorted({l for _, l, _ in places})])
         return f"{panel.scene} was measured at l = {depths} only"
-    return f"none of the strategies that it shows was measured on {panel.scene}"
+    return f"none of its strategies was measured on {panel.scene}"
 
 
 @dataclass(frozen=True)

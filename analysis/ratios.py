@@ -11,7 +11,7 @@ import pandas as pd
 
 from load import PHASES, Study
 
-#: Which phases a ratio is about.
+#: The phases of a ratio.
 SCOPES: dict[str, tuple[str, ...]] = {
     "with_motion": PHASES,
     "without_motion": tuple(name for name in PHASES if name != "motion"),

@@ -55,7 +55,7 @@ class Section:
     pictures: list[Picture] = field(default_factory=list)
     errors: list[Picture] = field(default_factory=list)  #: time against error
     over_l: list[Picture] = field(default_factory=list)  #: time against frames per keyframe
-    missing: str = ""  #: why a figure that one would expect is not there
+    missing: str = ""  #: reason for a missing figure
     break_even: list[tuple[str, ...]] = field(default_factory=list)
 
 
@@ -290,51 +290,52 @@ def _group_pictures(
     made = [
         picture(
             folder, f"{slug}-cost", f"Where the time goes: {place}",
-            "Each bar is the mean time of one frame, split into its phases; the shorter, the better, and the fastest is on "
-            "top. A bar with a white zigzag at its end is longer than the picture: its number tells how long."
+            "Each bar is the mean time of one frame, split into its phases; shorter is better, and the fastest is on "
+            "top. A bar with a white zigzag at its end exceeds the picture: its number gives the length."
             + fastest_only,
             lambda: figures.cost_split(group, all_looks),
         ),
         picture(
             folder, f"{slug}-error", f"Time against error: {place}",
-            "Lower is faster, further left is more exact, and the grey strip holds those with no error at all. Nothing beats "
-            "the strategies on the dashed line in both at once; whatever lies above and right of it is beaten by one of them."
+            "Lower is faster, further left is more exact, and the grey strip holds contestants without any error. No "
+            "contestant beats "
+            "those on the dashed line in both at once; one of them beats each contestant above and to the right of the line."
             + (" Small marks are further configurations of a strategy." if crowd else "") + left_out,
             lambda: figures.time_against_error(group, all_looks),
         ),
         picture(
-            folder, f"{slug}-counters", f"Work that does not depend on the machine: {counted}",
+            folder, f"{slug}-counters", f"Machine-independent work: {counted}",
             "An event-driven strategy writes a bound only when an event changes it, while a refit writes all of them in every "
-            "frame: that is the work it saves. What it pays are the events, each of which costs more time than writing a value.",
+            "frame. This is the work that it saves. Its price is the events, each of which costs more time than writing a value.",
             lambda: figures.counters(group, sizes, all_looks),
         ),
         picture(
             folder, f"{slug}-depth", f"Where in the tree events happen: {place}",
-            "Each mark counts the events per frame that begin at nodes of one depth. A line that rises to the right says that "
-            "most events are near the leaves, where one changes few boxes above it: that is why an event is cheap."
+            "Each mark counts the events per frame that begin at nodes of one depth. A line that rises to the right means that "
+            "most events are near the leaves, where an event changes few boxes above it and is therefore cheap."
             + fastest_only,
             lambda: tree_figures.events_by_depth(group, all_looks),
         ),
         picture(
             folder, f"{slug}-quality", f"Does the tree age? {place}",
-            "A level line is a tree that suits the last frame of the clip as well as its first; a rising one is of a structure "
-            "that the motion has spoilt. The cost is that of a random query by the surface-area heuristic, over that of a "
+            "A level line is a tree that suits the last frame of the clip as well as its first; a rising line is a structure "
+            "that the motion has degraded. The cost is that of a random query by the surface-area heuristic, over that of a "
             "tree built with this heuristic at that time (1), so a line that starts above 1 has fuller leaves, or was split "
             "at medians, from the start." + fastest_only,
             lambda: tree_figures.over_time(group, all_looks),
         ),
         picture(
-            folder, f"{slug}-latency", f"Even or jerky: {place}",
-            "The dot is the median frame, the bar the time that 99 % of frames stay within, the cross the worst one; motion "
-            "evaluation is not included. A long line means that work is saved up for a few frames, which shows as a stutter "
-            "even if the mean is good."
+            folder, f"{slug}-latency", f"Distribution of frame times: {place}",
+            "The dot is the median frame, the bar the 99th percentile, the cross the worst frame; motion "
+            "evaluation is not included. A long line means that work is concentrated in a few frames, which is visible as a "
+            "stutter even if the mean is good."
             + fastest_only,
             lambda: figures.latency(group, all_looks),
         ),
         picture(
             folder, f"{slug}-memory", f"Memory: {place}",
-            "What a strategy's own structures hold after the clip, beside the meshes and their motion, which all share. Left "
-            "and low is small and fast; a strategy that is right of another has to be below it to be worth its memory."
+            "The memory of a strategy's own structures after the clip, without the shared meshes and their motion. Left "
+            "and low is small and fast; a strategy to the right of another is worth its memory only if it lies below."
             + fastest_only,
             lambda: figures.memory(group, all_looks),
         ),
@@ -344,7 +345,7 @@ def _group_pictures(
 
 def _left_out(rows: pd.DataFrame) -> str:
     oracles = sorted(set(rows["label"]) - set(ratios.without_oracles(rows)["label"]))
-    return f" Only the table has {text.listing(oracles)}, which would squeeze the others." if oracles else ""
+    return f" Only the table has {text.listing(oracles)}, which would compress the others." if oracles else ""
 
 
 def _trends(
@@ -366,15 +367,15 @@ def _trends(
     made = [
         picture(
             folder, f"{slug}-l", f"Frames per keyframe: {where}, {text.size(primitives)} primitives",
-            "The number of events depends on the keyframes only, so strategies that work at events gain as more frames are "
+            "The number of events depends on the keyframes only, so event-driven strategies gain as more frames are "
             "interpolated between two of them, while a refit (broad bands: blue is the best, grey the one of 2006) pays for every "
-            "frame. A ring marks a break-even point with either, from which on the falling line wins."
+            "frame. A ring marks a break-even point with one of them; beyond it the falling line wins."
             + left_out,
             lambda: figures.over_frames_per_keyframe(depths, all_looks),
         ),
         picture(
             folder, f"{slug}-n", f"Size: {where}, l = {depth:g}",
-            "Both axes are logarithmic, so a cost proportional to n is a straight line as steep as the thin grey one. A "
+            "Both axes are logarithmic, so a cost proportional to n is a straight line with the slope of the thin grey line. A "
             "steeper line grows faster than the scene; parallel lines differ by a constant factor at every size."
             + left_out,
             lambda: figures.over_size(sizes, all_looks),

@@ -13,7 +13,7 @@ from load import ResultError, read_json
 
 STRESS_FILE, CCD_FILE = "stress.json", "ccd.json"
 STRESS_SCHEMA = "kbvh-stress-1"
-#: What must not happen to anybody, and the word for one and for several of it.
+#: Failures of any contestant, with the singular and the plural.
 FAILURES = {"crashes": "crash", "hangs": "hang", "threw": "exception", "broken": "broken promise"}
 
 Cells = tuple[str, ...]

@@ -76,7 +76,7 @@ def view(folder: Path, figures_folder: Path, scene: str) -> Picture:
     width, height = scene_pictures.write(folder, file)
     uri = "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode("ascii")
     reading = (
-        "Some keyframes from the first to the last, seen with z upwards; each body has its colour. "
-        f"Drawn from the meshes in scenes/{folder.name}, which other programs can open, too."
+        "Some keyframes from the first to the last, with z upwards; each body has its own colour. "
+        f"Drawn from the meshes in scenes/{folder.name}, which other programs can also open."
     )
-    return Picture(file.stem, f"What it looks like: {scene}", reading, uri, width // 2, height // 2)
+    return Picture(file.stem, f"Picture of the scene: {scene}", reading, uri, width // 2, height // 2)

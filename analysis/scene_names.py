@@ -47,6 +47,6 @@ def told_apart(runs: pd.DataFrame) -> tuple[pd.Series, list[str]]:
         if rows["identity"].nunique() > 1:
             notes.append(
                 f"{rows['identity'].nunique()} scenes are called {rows['scene'].iloc[0]}: "
-                "the one measured last has the name, the others have their hash behind it."
+                "the one measured last has the bare name, the others have their hash appended."
             )
     return pd.Series(scenes, index=runs.index), list(dict.fromkeys(notes))

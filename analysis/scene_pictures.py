@@ -156,7 +156,7 @@ def written_out(results: Path) -> WrittenOut:
         try:
             scene_hash = card(file.parent).get("hash", "")
         except MeshError as problem:
-            found.notes.append(f"A scene is shown without picture: {problem}.")
+            found.notes.append(f"A scene is shown without a picture: {problem}.")
             continue
         if scene_hash:
             found.by_hash[scene_hash] = file.parent
@@ -197,10 +197,10 @@ def write(folder: Path, file: Path, height: int = 420) -> tuple[int, int]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="as `kbvh scene NAME --out FOLDER` writes it")
+    parser.add_argument("folder", type=Path, help="folder written by `kbvh scene NAME --out FOLDER`")
     parser.add_argument("out", type=Path, help="PNG file")
     parser.add_argument("--keyframes", type=int, nargs="+", default=[0, 15, 30, 45])
-    parser.add_argument("--azimuth", type=float, default=50.0, help="of the viewer, degrees from +x")
+    parser.add_argument("--azimuth", type=float, default=50.0, help="direction of the viewer, degrees from +x")
     parser.add_argument("--height", type=int, default=700, help="pixels")
     options = parser.parse_args()
     meshes = read_scene(options.folder)

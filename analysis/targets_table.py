@@ -185,8 +185,8 @@ def markdown(targets: list[Target]) -> str:
         verdict = VERDICTS[target.verdict] + (f": {target.reason}" if target.reason else "")
         lines.append(_row([target.what, measured, wanted(target.at_least), wanted(target.aim), verdict]))
     names = columns(targets)
-    lines += ["", facts(targets) + " Each number says how many times slower the other side is, on the scenes that count; "
-              "below it is given for every scene, in bold where the scene counts.", ""]  # fmt: skip
+    lines += ["", facts(targets) + " Each number is the factor by which the other side is slower, on the scenes that count; "
+              "the table below has every scene, in bold if it counts.", ""]  # fmt: skip
     lines += [_row(["what", *names]), _row(["---"] * (1 + len(names)))]
     for target in targets:
         cells = {scene.name: times(scene.ratio) for scene in target.scenes}
@@ -213,11 +213,11 @@ def main(arguments: Optional[list[str]] = None) -> int:
     """Runs the command; returns its exit code: 0, or 2 for an unusable file."""
     parser = argparse.ArgumentParser(
         prog="targets_table.py",
-        description="Prints the targets of a plan and what was measured as Markdown.",
+        description="Prints the targets of a plan and their measurements as Markdown.",
         epilog="example: targets_table.py results/targets.json --write README.md",
     )
     parser.add_argument("file", metavar="targets.json", type=Path, help="written by `kbvh bench --plan PLAN --out DIR`")
-    parser.add_argument("--write", metavar="PAGE", type=Path, help=f"put the tables between {BEGIN} and {END} of this file")
+    parser.add_argument("--write", metavar="PAGE", type=Path, help=f"write the tables between {BEGIN} and {END} of this file")
     options = parser.parse_args(arguments)
     try:
         table = markdown(load_targets(options.file))

@@ -249,7 +249,7 @@ FIGURES = (
     ),
     (
         "theory-events-l", "Values written and frames per keyframe", events_over_l,
-        "The kinetic tree's lines are level, for its events come from the keyframes, however many frames are between them. "
+        "The kinetic tree's lines are level, because its events depend on the keyframes, not on the frames between them. "
         "The refit writes every bound in every frame, so its dotted lines rise as l does.",
         ("T7",),
     ),

@@ -14,7 +14,7 @@ from figures import CROWD, WIDTH, Looks, thinned
 from ratios import without_oracles
 from text import percent_tick, tick
 
-#: Curves that never differ by more than this share are one curve for the eye.
+#: Curves that never differ by more than this share are drawn as one.
 SAME = 0.005
 
 

@@ -33,7 +33,7 @@ struct InflatedBody {
   double step = 0;      // motion from one frame to the next: the bound, or as observed
   std::uint64_t leaves = 0;
   std::uint64_t tests = 0;  // box tests of the last query that involved this body
-  bool looked = false;      // the margins were checked at this frame
+  bool checked = false;     // the margins were checked at this frame
   bool query_takes_all =
       false;             // the last query after a frame without a check evaluated all positions itself
   bool changed = false;  // vertices have their own plans: the body no longer counts as resting
@@ -81,7 +81,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
   void advance_to(double t) override {
     const double before = this->previous_time();
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
-      bodies_[index].looked = false;
+      bodies_[index].checked = false;
       if (!may_move(index)) continue;
       this->hierarchies_[index].positions_changed();
       if (bounded_)
@@ -111,7 +111,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     });
     this->count_.add(Counter::box_tests, all);
     for (std::uint32_t index = 0; index < bodies_.size(); ++index)
-      if (!bodies_[index].looked) bodies_[index].query_takes_all = this->sampled_.all_current(index);
+      if (!bodies_[index].checked) bodies_[index].query_takes_all = this->sampled_.all_current(index);
     return status;
   }
 
@@ -183,7 +183,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     constexpr double unit = std::numeric_limits<S>::epsilon() / 2;
     body.room = double(state.room) * (1 - 4 * unit);
     body.moved = 0;
-    body.looked = true;
+    body.checked = true;
     const Box<S> root = hierarchy.box(0);
     double largest = 0;
     for (int axis = 0; axis < 3; ++axis)
@@ -235,7 +235,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
 
   /// Returns the cost of a check, in box tests. Positions count only if the query would not evaluate them all
   /// anyway. A check that is due at every frame only costs its writes.
-  double look_cost(std::uint32_t index) const {
+  double check_cost(std::uint32_t index) const {
     constexpr double reading = 0.6, evaluating = 1.2, writing = 0.2;  // per vertex
     const double each = !bounded_ ? writing : bodies_[index].query_takes_all ? reading : reading + evaluating;
     return each * this->scene_.vertex_count(index);
@@ -255,7 +255,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     if (!(body.leaf_size > 0)) return 0;
     double best = 0, least = std::numeric_limits<double>::infinity();
     for (const double steps : {0., 1., 2., 3., 4., 6., 8., 12., 16., 24., 32., 48., 64.}) {
-      const double cost = look_cost(index) / (steps + 1) + query_cost(body, margin_for(body, steps));
+      const double cost = check_cost(index) / (steps + 1) + query_cost(body, margin_for(body, steps));
       if (!(cost < least)) continue;
       best = steps;
       least = cost;
@@ -268,7 +268,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     const Body& body = bodies_[index];
     if (!(body.leaf_size > 0)) return false;
     return query_cost(body, double(body.margin)) - query_cost(body, margin_for(body, best_steps(index))) >
-           look_cost(index);
+           check_cost(index);
   }
 
   SteppedMotion<S> stepped_;

@@ -1,4 +1,4 @@
-// The exact tight AABB tree without a queue, for keyframed motion. At the begin of each segment one pass
+// The exact tight AABB tree without a queue, for keyframed motion. At the start of each segment one pass
 // finds the sides whose realiser will change in it. The upper envelopes of these few sides give a list of
 // stores, sorted by time, that frames apply (core/families/envelope/segment_envelope.hpp). If the whole clip
 // is known, the frames of a segment can share the pass for the next one.
@@ -143,27 +143,27 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     const bool rests = motion.at_rest(index);
     const double begin = rests ? t : motion.lines_begin(index);
     const S* first = motion.positions_on_lines(index, begin, state.room[0]);
-    // The realiser of a side at the end of one segment also realises it at the begin of the next.
-    const bool goes_on =
+    // The realiser of a side at the end of one segment also realises it at the start of the next.
+    const bool continues =
         state.known != Known::nothing && (rests ? motion.lines_begin(index) : begin) == state.end;
-    if (goes_on && foreseen == Next::envelope) make_next(index, 1);
-    if (!goes_on)
+    if (continues && foreseen == Next::envelope) make_next(index, 1);
+    if (!continues)
       find_realisers(body.hierarchy, first, body.realisers);
     else if (state.known == Known::envelope)
       state.envelope.advance(state.end, body.realisers);
-    if (!goes_on) count_pass(index);
+    if (!continues) count_pass(index);
     state.end = motion.lines_end(index);
     if (rests) {
       state.known = Known::at_rest;
       body.line_ends[0] = nullptr;
-      return goes_on;
+      return continues;
     }
     const S* last = motion.positions_on_lines(index, state.end, state.room[1]);
     state.known = Known::envelope;
     bool made = true;
-    if (goes_on && foreseen == Next::envelope) {
+    if (continues && foreseen == Next::envelope) {
       state.envelope.take_next();
-    } else if ((goes_on && foreseen == Next::translated) || translates(motion, index)) {
+    } else if ((continues && foreseen == Next::translated) || translates(motion, index)) {
       // The same vector is added to all positions, exactly; and rounding is monotone.
       state.envelope.make_empty(begin, state.end);
       this->count_.add(Counter::bodies_translated);
@@ -178,7 +178,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     body.line_times[0] = begin;
     body.line_times[1] = state.end;
     if constexpr (ahead) foresee(index);
-    return made && goes_on;
+    return made && continues;
   }
 
   /// Starts the envelope of the next segment if it will need work.

@@ -25,17 +25,17 @@ const char* meaning(Counter counter) {
   return counter < Counter::count ? texts[std::size_t(counter)].meaning : "?";
 }
 
-void Counters::add(std::string_view own, std::uint64_t n) {
+void Counters::add(std::string_view own_name, std::uint64_t n) {
   for (Named& counter : named)
-    if (counter.name == own) {
+    if (counter.name == own_name) {
       counter.value += n;
       return;
     }
   for (std::size_t c = 0; c < values.size(); ++c)
-    if (own == name(Counter(c)))
-      throw std::logic_error("a strategy's own counter has the name '" + std::string(own) +
+    if (own_name == name(Counter(c)))
+      throw std::logic_error("a strategy's own counter has the name '" + std::string(own_name) +
                              "' of a shared counter");
-  named.push_back({own, n});
+  named.push_back({own_name, n});
 }
 
 }  // namespace kbvh

@@ -8,7 +8,7 @@
 
 namespace kbvh {
 
-/// Every counter that any strategy may use: X(name in code and in result files, what it counts).
+/// Every counter that any strategy may use: X(name in code and in result files, meaning).
 #define KBVH_COUNTERS(X)                                                                             \
   X(nodes_visited, "nodes whose bounds an update visited")                                           \
   X(values_written, "bound values stored (6 per AABB written; 1 per realiser changed)")              \
@@ -37,7 +37,7 @@ namespace kbvh {
   X(bodies_remembered, "bodies whose boxes were reused from an earlier play of the clip")            \
   X(bytes, "memory held by the strategy's own structures, in bytes (a level, not a sum)")
 
-/// What a strategy counts; reports and theory checks loop over it.
+/// The shared counters of strategies; reports and theory checks loop over them.
 enum class Counter : std::uint8_t {
 #define KBVH_COUNTER(name, meaning) name,
   KBVH_COUNTERS(KBVH_COUNTER)
@@ -47,7 +47,7 @@ enum class Counter : std::uint8_t {
 
 /// Returns the name of a counter in result files.
 const char* name(Counter counter);
-/// Returns what a counter counts, in a line.
+/// Returns the meaning of a counter in one line.
 const char* meaning(Counter counter);
 
 /// The counter table of one strategy instance; cleared by `reset`.
@@ -67,7 +67,7 @@ struct Counters {
   std::vector<Named> named{};
   /// Adds n to a strategy's own counter, which starts at 0. Throws std::logic_error if a counter of the enum
   /// has that name. O(named counters).
-  void add(std::string_view own, std::uint64_t n);
+  void add(std::string_view own_name, std::uint64_t n);
 };
 
 /// Counting policies. Every strategy is compiled with both; reported times come from the silent one.

@@ -3,14 +3,14 @@
 
 # Instruction sets for which the kernels of a room are compiled, and chosen from at run time
 # (core/kernels/kernel_set.hpp). A kernel file defines its tables in the namespace kbvh::kernels::KBVH_KERNELS and
-# includes nothing whose inline functions another file might share: the linker keeps one copy of those, and it could
-# be one that this processor cannot run.
+# includes no header whose inline functions another file might share: the linker keeps one copy of each, possibly one
+# that this processor cannot run.
 set(KBVH_KERNEL_OPTIMISATION -O3 CACHE STRING "optimisation level of the kernels, but in Debug builds")
 set(kbvh_kernel_flags_portable "")
 set(kbvh_kernel_flags_sse -msse4.2)
 set(kbvh_kernel_flags_avx2 -mavx2 -mfma)
 set(kbvh_kernel_flags_avx512 -mavx2 -mfma -mavx512f -mavx512vl -mavx512dq -mavx512bw -mprefer-vector-width=512
-  # GCC 12 complains about its own undefined registers.
+  # GCC 12 warns about its own undefined registers.
   -Wno-uninitialized)
 set(kbvh_kernel_sets portable)
 set(kbvh_kernel_definitions "")
@@ -21,8 +21,8 @@ endif()
 
 # kbvh_room(NAME SOURCES file... [KERNELS file...] [USES room...] [NO_UNITY]): the folder that calls it is a room, the library
 # kbvh_NAME. Its headers are staged alone, under the path that #include spells, so that a file sees the rooms that its
-# own room uses, those that these use in turn, and nothing else of the tree. USES are all edges: there are no others.
-# NO_UNITY: its sources are always compiled one by one, for they use the same names for different things.
+# own room uses, those that these use in turn, and nothing else of the tree. USES lists all edges.
+# NO_UNITY: its sources are always compiled one by one, because they use the same names for different entities.
 function(kbvh_room name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "NO_UNITY" "" "SOURCES;KERNELS;USES")
   cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY ${PROJECT_SOURCE_DIR} OUTPUT_VARIABLE path)
@@ -42,7 +42,7 @@ function(kbvh_room name)
       set_target_properties(kbvh_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
     endif()
     if(KBVH_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-      # Anonymous namespaces of sources are taken for those of headers.
+      # Anonymous namespaces of sources are mistaken for those of headers.
       target_compile_options(kbvh_${name} PRIVATE -Wno-subobject-linkage)
     endif()
     set(visibility PUBLIC)
@@ -71,7 +71,7 @@ function(kbvh_room name)
     target_compile_definitions(kbvh_${name}_${set}
       PRIVATE KBVH_KERNELS=${set} KBVH_KERNELS_${set} ${kbvh_kernel_definitions})
     target_compile_options(kbvh_${name}_${set} PRIVATE ${kbvh_kernel_flags_${set}}
-      # Loops over the points of a node have to be unrolled to stay in registers.
+      # Loops over the points of a node must be unrolled to stay in registers.
       $<$<NOT:$<CONFIG:Debug>>:${KBVH_KERNEL_OPTIMISATION}>)
     target_sources(kbvh_${name} PRIVATE $<TARGET_OBJECTS:kbvh_${name}_${set}>)
   endforeach()

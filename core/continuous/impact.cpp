@@ -148,11 +148,11 @@ class Filter {
 
   /// Visits cells from the earliest on, until one certainly contains a contact, or one is undecided.
   Verdict decide() {
-    int count = 1, looked_at = 0;
+    int count = 1, examined = 0;
     while (count > 0) {
       Cell& cell = cells_[count - 1];
-      if (++looked_at > most_cells) return Verdict::open;
-      const Verdict verdict = look_at(cell);
+      if (++examined > most_cells) return Verdict::open;
+      const Verdict verdict = examine(cell);
       if (verdict == Verdict::free) {
         --count;
       } else if (verdict == Verdict::touches) {
@@ -176,7 +176,7 @@ class Filter {
 
   /// At contact n and all its shares have the same sign: two of opposite signs exclude a contact. Where all
   /// have one sign, every root of the cubic is a contact.
-  Verdict look_at(const Cell& cell) const {
+  Verdict examine(const Cell& cell) const {
     const double bound = bounds_.cubic(cell.depth);
     if (nowhere_zero(cell.f, bound)) return Verdict::free;
     const bool crossing = changes_sign(cell.f, bound);

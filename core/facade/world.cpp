@@ -342,16 +342,16 @@ class TypedWorld final : public detail::WorldImplementation {
   void set(std::uint32_t body, std::span<const T> positions) {
     check_body(body);
     session();
-    const Body<S>& own = played_->bodies[body];
-    if (!own.plans.is_handed_in())
-      throw std::logic_error("the motion of body '" + own.name + "' is known; positions cannot be set");
-    const std::size_t size = std::size_t(3) * own.plans.vertex_count();
+    const Body<S>& target = played_->bodies[body];
+    if (!target.plans.is_handed_in())
+      throw std::logic_error("the motion of body '" + target.name + "' is known; positions cannot be set");
+    const std::size_t size = std::size_t(3) * target.plans.vertex_count();
     if (positions.size() != size && positions.size() != size + 1)
-      throw std::invalid_argument("body '" + own.name + "' has " + std::to_string(size) +
+      throw std::invalid_argument("body '" + target.name + "' has " + std::to_string(size) +
                                   " coordinates, not " + std::to_string(positions.size()));
     for (std::size_t i = 0; i < size; ++i)
       if (!(std::abs(S(positions[i])) <= admissible_magnitude<S>))
-        throw std::invalid_argument("body '" + own.name + "', vertex " + std::to_string(i / 3) +
+        throw std::invalid_argument("body '" + target.name + "', vertex " + std::to_string(i / 3) +
                                     ": coordinate " + std::to_string(positions[i]) +
                                     " is not finite or not admissible");
     if constexpr (std::is_same_v<S, T>)

@@ -13,7 +13,7 @@ namespace kbvh {
 template <class S>
 class ContactSweep {
  public:
-  /// Throws std::invalid_argument unless all bodies that are in pairs consist of triangles.
+  /// Throws std::invalid_argument unless all bodies in pairs consist of triangles.
   explicit ContactSweep(const Scene<S>& scene) : finder_(scene) {}
 
   /// Moves the playback to t by `seek` and appends the contacts on the way. Returns the number of pairs of
@@ -36,14 +36,14 @@ class ContactSweep {
     return pairs_.size();
   }
 
-  /// How contacts were decided, since this was made.
+  /// Returns how contacts were decided since construction.
   ImpactStats stats() const { return finder_.stats(); }
-  /// The swept pairs of the last call of `find`.
+  /// Returns the swept pairs of the last call of `find`.
   const PairBuffer& pairs() const { return pairs_; }
 
  private:
   ContactFinder<S> finder_;
-  std::vector<const S*> before_;  ///< positions at the begin, by body
+  std::vector<const S*> before_;  ///< positions at the start, by body
   PairBuffer pairs_;
 };
 

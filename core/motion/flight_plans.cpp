@@ -60,7 +60,7 @@ void FlightPlans<S>::evaluate(double t, S* out) const {
   } else {
     round_chord(keyframe(k), keyframe(k + 1), scalars, times[k], times[k + 1], t, out);
   }
-  for (const OwnPlan& plan : own_)
+  for (const OwnPlan& plan : own_plans_)
     for (int axis = 0; plan.group == none && axis < 3; ++axis)
       out[3 * std::size_t(plan.vertex) + std::size_t(axis)] = round_piece(own_piece(plan, axis, t), t);
   evaluate_rays(t, out);
@@ -102,7 +102,7 @@ void FlightPlans<S>::leave_rays(const OwnPlan& plan) {
   if (plan.group == none) return;
   Rays& rays = rays_[plan.group];
   const std::size_t last = rays.vertices.size() - 1;
-  own_[own_of_vertex_[rays.vertices[last]]].place = plan.place;
+  own_plans_[own_of_vertex_[rays.vertices[last]]].place = plan.place;
   rays.vertices[plan.place] = rays.vertices[last];
   for (std::vector<S>* values : {&rays.origins, &rays.velocities}) {
     std::copy_n(values->begin() + std::ptrdiff_t(3 * last), 3,
@@ -112,7 +112,7 @@ void FlightPlans<S>::leave_rays(const OwnPlan& plan) {
   rays.vertices.pop_back();
   if (!rays.vertices.empty()) return;
   const std::uint32_t group = plan.group;
-  for (const std::uint32_t vertex : rays_.back().vertices) own_[own_of_vertex_[vertex]].group = group;
+  for (const std::uint32_t vertex : rays_.back().vertices) own_plans_[own_of_vertex_[vertex]].group = group;
   if (group + 1 < rays_.size()) rays_[group] = std::move(rays_.back());
   rays_.pop_back();
 }
@@ -143,17 +143,17 @@ void FlightPlans<S>::evaluate(double t, std::span<const std::uint32_t> vertices,
       begin = std::find_if_not(end, vertices.end(), added);
     }
   }
-  if (own_.empty()) return;
+  if (own_plans_.empty()) return;
   for (std::uint32_t v : vertices)
     if (own_of_vertex_[v] != none)
       for (int axis = 0; axis < 3; ++axis)
         out[std::size_t(3) * v + std::size_t(axis)] =
-            round_piece(own_piece(own_[own_of_vertex_[v]], axis, t), t);
+            round_piece(own_piece(own_plans_[own_of_vertex_[v]], axis, t), t);
 }
 
 template <class S>
 Piece<S> FlightPlans<S>::piece_after(std::uint32_t vertex, int axis, double t) const {
-  if (has_own_plan(vertex)) return own_piece(own_[own_of_vertex_[vertex]], axis, t);
+  if (has_own_plan(vertex)) return own_piece(own_plans_[own_of_vertex_[vertex]], axis, t);
   const auto& times = keyframes_->times;
   const std::size_t k = segment_at(t), at = std::size_t(3) * vertex + std::size_t(axis);
   if (t < times[0]) return {t, times[0], keyframe(0)[at], S(0), PieceKind::ray};
@@ -164,7 +164,7 @@ Piece<S> FlightPlans<S>::piece_after(std::uint32_t vertex, int axis, double t) c
 
 template <class S>
 double FlightPlans<S>::piece_end(std::uint32_t vertex, double t) const {
-  const auto& times = has_own_plan(vertex) ? own_[own_of_vertex_[vertex]].times : keyframes_->times;
+  const auto& times = has_own_plan(vertex) ? own_plans_[own_of_vertex_[vertex]].times : keyframes_->times;
   const auto above = std::upper_bound(times.begin(), times.end(), t);
   return above == times.end() ? std::numeric_limits<double>::infinity() : *above;
 }
@@ -174,7 +174,7 @@ double FlightPlans<S>::lines_begin(double t) const {
   const auto& times = keyframes_->times;
   double begin =
       !has_knots() || t < times[0] ? -std::numeric_limits<double>::infinity() : times[segment_at(t)];
-  for (const OwnPlan& plan : own_) {
+  for (const OwnPlan& plan : own_plans_) {
     const auto above = std::upper_bound(plan.times.begin(), plan.times.end(), t);
     if (above != plan.times.begin()) begin = std::max(begin, *(above - 1));
   }
@@ -186,20 +186,20 @@ double FlightPlans<S>::lines_end(double t) const {
   const auto& times = keyframes_->times;
   const auto above = has_knots() ? std::upper_bound(times.begin(), times.end(), t) : times.end();
   double end = above == times.end() ? std::numeric_limits<double>::infinity() : *above;
-  for (const OwnPlan& plan : own_) end = std::min(end, piece_end(plan.vertex, t));
+  for (const OwnPlan& plan : own_plans_) end = std::min(end, piece_end(plan.vertex, t));
   return end;
 }
 
 template <class S>
 bool FlightPlans<S>::at_rest(double t) const {
   const auto& times = keyframes_->times;
-  return !handed_in_ && own_.empty() && (!has_knots() || t < times.front() || t >= times.back());
+  return !handed_in_ && own_plans_.empty() && (!has_knots() || t < times.front() || t >= times.back());
 }
 
 template <class S>
 std::optional<Translation<S>> FlightPlans<S>::translation(double t) const {
   const auto& times = keyframes_->times;
-  if (!own_.empty() || keyframed_count_ == 0 || t < times.front() || t >= times.back()) return {};
+  if (!own_plans_.empty() || keyframed_count_ == 0 || t < times.front() || t >= times.back()) return {};
   if (translations_.empty()) translations_.resize(times.size());
   auto& known = translations_[segment_at(t)];
   if (!known) known = find_translation(segment_at(t));
@@ -310,13 +310,13 @@ void FlightPlans<S>::change(double t, const PlanChange<S>& change, const S* posi
   if (own_of_vertex_.empty()) own_of_vertex_.assign(vertex_count_, none);
   std::uint32_t& slot = own_of_vertex_[change.vertex];
   if (slot == none) {
-    slot = std::uint32_t(own_.size());
-    own_.push_back(std::move(plan));
+    slot = std::uint32_t(own_plans_.size());
+    own_plans_.push_back(std::move(plan));
   } else {
-    leave_rays(own_[slot]);
-    own_[slot] = std::move(plan);
+    leave_rays(own_plans_[slot]);
+    own_plans_[slot] = std::move(plan);
   }
-  join_rays(own_[slot]);
+  join_rays(own_plans_[slot]);
 }
 
 template <class S>
@@ -330,10 +330,10 @@ void FlightPlans<S>::add_vertex(double t, const PlanChange<S>& plan, const S* po
   check_plan(t, plan, vertex_count_, position);
   own_speed_until_ = own_speed_from_;  // forces recomputation
   own_of_vertex_.resize(vertex_count_, none);
-  own_of_vertex_.push_back(std::uint32_t(own_.size()));
-  own_.push_back(own_plan(t, plan, vertex_count_, position));
+  own_of_vertex_.push_back(std::uint32_t(own_plans_.size()));
+  own_plans_.push_back(own_plan(t, plan, vertex_count_, position));
   ++vertex_count_;
-  join_rays(own_.back());
+  join_rays(own_plans_.back());
 }
 
 namespace {
@@ -384,7 +384,7 @@ double FlightPlans<S>::own_speed_bound(double t) const {
     own_speed_ = 0;
     own_speed_from_ = t;
     own_speed_until_ = std::numeric_limits<double>::infinity();
-    for (const OwnPlan& plan : own_) {
+    for (const OwnPlan& plan : own_plans_) {
       own_speed_ = std::max(own_speed_, own_speed(plan, t));
       own_speed_until_ = std::min(own_speed_until_, piece_end(plan.vertex, t));
     }
@@ -396,7 +396,7 @@ template <class S>
 double FlightPlans<S>::speed_bound(double t) const {
   const auto& times = keyframes_->times;
   const std::size_t k = segment_at(t);
-  double bound = own_.empty() ? 0 : own_speed_bound(t);
+  double bound = own_plans_.empty() ? 0 : own_speed_bound(t);
   if (k + 1 < times.size() && t >= times[0] && longest_step(k) > 0)
     bound = std::max(bound, rounded_up(longest_step(k) / (times[k + 1] - times[k])));
   return bound;
@@ -413,21 +413,21 @@ double FlightPlans<S>::displacement_bound(double t0, double t1) const {
     const double share = (end - begin) / (times[k + 1] - times[k]);
     common = rounded_up(common + longest_step(k) * std::min(1.0, rounded_up(share)));
   }
-  if (own_.empty()) return common;
-  double own = own_speed_bound(t0);
-  if (t1 <= own_speed_until_) return std::max(common, own == 0 ? 0 : rounded_up(own * (t1 - t0)));
+  if (own_plans_.empty()) return common;
+  double own_bound = own_speed_bound(t0);
+  if (t1 <= own_speed_until_) return std::max(common, own_bound == 0 ? 0 : rounded_up(own_bound * (t1 - t0)));
   // Some plan has a knot in between: follow each plan along its own pieces.
-  own = 0;
-  for (const OwnPlan& plan : own_) {
+  own_bound = 0;
+  for (const OwnPlan& plan : own_plans_) {
     double way = 0;
     for (double begin = t0; begin < t1;) {
       const double end = std::min(t1, piece_end(plan.vertex, begin)), speed = own_speed(plan, begin);
       if (speed > 0) way = rounded_up(way + speed * (end - begin));
       begin = end;
     }
-    own = std::max(own, way);
+    own_bound = std::max(own_bound, way);
   }
-  return std::max(common, own);
+  return std::max(common, own_bound);
 }
 
 template <class S>
@@ -435,8 +435,8 @@ std::size_t FlightPlans<S>::bytes() const {
   std::size_t total = keyframes_->times.size() * sizeof(double) + keyframes_->positions.size() * sizeof(S) +
                       longest_steps_.size() * sizeof(double) +
                       translations_.size() * sizeof(translations_[0]) +
-                      own_of_vertex_.size() * sizeof(std::uint32_t) + own_.size() * sizeof(OwnPlan);
-  for (const OwnPlan& plan : own_) total += plan.times.size() * (sizeof(double) + 3 * sizeof(S));
+                      own_of_vertex_.size() * sizeof(std::uint32_t) + own_plans_.size() * sizeof(OwnPlan);
+  for (const OwnPlan& plan : own_plans_) total += plan.times.size() * (sizeof(double) + 3 * sizeof(S));
   for (const Rays& rays : rays_)
     total += sizeof(Rays) + rays.vertices.size() * (sizeof(std::uint32_t) + 6 * sizeof(S));
   return total;

@@ -28,7 +28,7 @@ struct PlanChange {
 template <class S>
 struct Translation {
   std::array<S, 3> lower, upper;
-  bool exact;  ///< all steps are one vector that, added to a position at the begin, gives the position at the
+  bool exact;  ///< all steps are one vector that, added to a position at the start, gives the position at the
                ///< end without rounding
 };
 
@@ -63,11 +63,13 @@ class FlightPlans {
   /// Returns the positions of keyframe k, [keyframed vertex][3], without the vertices' own plans. One scalar
   /// past the end may be read.
   const S* keyframe(std::size_t k) const { return keyframes_->positions.data() + 3 * k * keyframed_count_; }
-  bool moving() const { return handed_in_ || keyframe_count() > 1 || !own_.empty(); }
+  bool moving() const { return handed_in_ || keyframe_count() > 1 || !own_plans_.empty(); }
   /// Returns whether lines end at keyframes; a body with a single keyframe rests there at all times.
   bool has_knots() const { return keyframed_count_ > 0 && keyframe_count() > 1; }
-  bool has_own_plans() const { return !own_.empty(); }
-  bool has_own_plan(std::uint32_t vertex) const { return !own_.empty() && own_of_vertex_[vertex] != none; }
+  bool has_own_plans() const { return !own_plans_.empty(); }
+  bool has_own_plan(std::uint32_t vertex) const {
+    return !own_plans_.empty() && own_of_vertex_[vertex] != none;
+  }
 
   /// Writes the position of every vertex at t: out[3 * vertex + axis]. O(vertices).
   void evaluate(double t, S* out) const;
@@ -157,7 +159,7 @@ class FlightPlans {
   bool handed_in_ = false;
   std::shared_ptr<const Keyframes> keyframes_;
   std::vector<std::uint32_t> own_of_vertex_;
-  std::vector<OwnPlan> own_;
+  std::vector<OwnPlan> own_plans_;
   std::vector<Rays> rays_;                     ///< none is empty
   mutable std::vector<double> longest_steps_;  // by segment; negative until the first request
   mutable std::vector<std::optional<std::optional<Translation<S>>>> translations_;  // by segment

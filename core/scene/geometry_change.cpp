@@ -147,15 +147,16 @@ std::vector<BodyChange> body_changes(const SceneView<S>& scene, const GeometryCh
     const auto count = [&](const auto& list) {
       return std::uint32_t(std::count_if(list.begin(), list.end(), in_body));
     };
-    BodyChange own;
-    own.body = body;
-    own.first_vertex = scene.vertex_count(body) - count(change.vertices);
-    own.first_primitive = scene.primitives(body).count() - count(change.primitives);
+    BodyChange body_change;
+    body_change.body = body;
+    body_change.first_vertex = scene.vertex_count(body) - count(change.vertices);
+    body_change.first_primitive = scene.primitives(body).count() - count(change.primitives);
     for (const auto& removed : change.removed_primitives)
-      if (in_body(removed)) own.removed_primitives.push_back(removed.id);
-    if (own.first_vertex != scene.vertex_count(body) ||
-        own.first_primitive != scene.primitives(body).count() || !own.removed_primitives.empty())
-      result.push_back(std::move(own));
+      if (in_body(removed)) body_change.removed_primitives.push_back(removed.id);
+    if (body_change.first_vertex != scene.vertex_count(body) ||
+        body_change.first_primitive != scene.primitives(body).count() ||
+        !body_change.removed_primitives.empty())
+      result.push_back(std::move(body_change));
   }
   return result;
 }

@@ -85,7 +85,7 @@ void time_passes(const ImpactQueries& queries, Row& row, double seconds, const T
     row.passes += passes;
   }
   row.seconds += here;
-  asm volatile("" : : "r"(touching));  // the verdicts count as used
+  asm volatile("" : : "r"(touching));  // marks the verdicts as used for the optimiser
 }
 
 /// Times the exact test and the peers alternately, each for `seconds` in total.

@@ -87,8 +87,8 @@ int finished(int code) {
   return code == success ? internal_error : code;
 }
 
-/// Says during which work a library called std::terminate, and ends the program. Embree does so when there is
-/// no memory for one of its threads.
+/// Reports the work during which a library called std::terminate, and ends the program. Embree calls it when
+/// memory for one of its threads runs out.
 [[noreturn]] void say_terminated() {
   std::string why = "terminated by a library, without an exception";
   if (const std::exception_ptr thrown = std::current_exception()) {

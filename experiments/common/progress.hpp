@@ -14,7 +14,7 @@ class Progress {
   void show(const std::string& line);
   /// Removes the line; call it before any other output.
   void clear();
-  /// The text that was shown last and is not cleared, on any standard error; empty if there is none.
+  /// Returns the last shown text that is not cleared, on any standard error; empty if there is none.
   static const std::string& activity();
 
  private:

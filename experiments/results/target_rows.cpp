@@ -101,7 +101,7 @@ json side_json(const Side& side) {
           {"run", record.value("run", std::string())}};
 }
 
-/// Whether the table is of the target's scalar and l.
+/// Returns whether the table has the target's scalar and l.
 bool is_measured_as(const Target& target, const TargetGroup& group) {
   return group.scene.at("scalar") == target.scalar && group.scene.at("per_keyframe") == target.per_keyframe;
 }
@@ -110,7 +110,7 @@ bool is_counted(const Target& target, const std::string& scene) {
   return std::find(target.scenes.begin(), target.scenes.end(), scene) != target.scenes.end();
 }
 
-/// The table on which a side is measured: `group`, or the first of the selector's own scene.
+/// Returns the table on which a side is measured: `group`, or the first table of the selector's own scene.
 Side side_of(const TargetSelector& selector, const Target& target, const TargetGroup& group,
              const std::vector<TargetGroup>& groups) {
   if (selector.scene.empty()) return side_of(selector, group.records);

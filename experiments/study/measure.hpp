@@ -37,14 +37,14 @@ struct Measured {
 /// verdict; the next run measures it again.
 void refuse(Measured& measured, const std::exception& thrown);
 
-/// One contestant, and the instance of it that is timed; no instance once it is refused.
+/// One contestant with its timed instance; without an instance once it is refused.
 template <class S>
 struct Entrant {
   Measured measured;
   std::unique_ptr<Session<S>> session;
 
-  /// Runs `work`. Refuses the contestant for what it throws, but for ConfigError, which is passed on. Returns
-  /// whether it ran to its end.
+  /// Runs `work`. Refuses the contestant if `work` throws, except for ConfigError, which is passed on.
+  /// Returns whether it ran to its end.
   template <class Work>
   bool attempt(const Work& work) {
     try {

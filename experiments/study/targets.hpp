@@ -17,7 +17,7 @@ struct TargetSelector {
   std::vector<std::string> or_else;  ///< ids of alternative strategies
   std::string phase;  ///< "motion", "update", "traversal", "triangle_tests", "query", "candidates", "total",
                       ///< "upkeep", "update_per_event"
-  std::string scene;  ///< empty, or the named scene that this side is measured on, whatever the target's
+  std::string scene;  ///< empty, or the scene of this side, which overrides the target's scenes
   BuilderRequest builder;  ///< any of these values; empty: all measured ones
   Sweep params;            ///< likewise
 };

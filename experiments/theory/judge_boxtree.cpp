@@ -29,7 +29,7 @@ Claim judge_boxtree_size(const std::vector<BoxTreeRun>& boxtrees) {
       .citation = "section 6, Theorem 5",
       .counter = "events alive per inner node; bytes and events beside the AABB tree's on one topology",
       .bound = "two events per inner node; bytes and events of the AABB tree",
-      .condition = "the root has its own six sides besides, which the paper omits",
+      .condition = "the root additionally stores its own six sides, which the paper omits",
       .data = boxtrees};
   if (boxtrees.empty()) return undecided(claim, "No BoxTree was played.");
   double most_memory = 0, most_events = 0;
@@ -59,9 +59,9 @@ Claim judge_boxtree_size(const std::vector<BoxTreeRun>& boxtrees) {
       fmt::format("at most {} events per inner node, {} at a root; {:.3g} of the bytes; {:.3g} of the events",
                   of_planes, of_roots, most_memory, most_events);
   claim.why = fmt::format(
-      "In {} no inner node's planes had more than {} events at once, and each root up to {} of its own; "
-      "trees and queue took at most {:.3g} of the AABB tree's bytes; in {} of {} clips with events there "
-      "were fewer, at most {:.3g} of the AABB tree's.",
+      "In {} the planes of an inner node never had more than {} events at once, and each root had up to {} "
+      "further events; trees and queue took at most {:.3g} of the AABB tree's bytes; in {} of {} clips with "
+      "events the BoxTree had fewer events, at most {:.3g} of the AABB tree's.",
       counted(boxtrees.size(), "clip"), of_planes, of_roots, most_memory, fewer, compared, most_events);
   return claim;
 }
@@ -75,7 +75,7 @@ Claim judge_boxtree_qualities(const std::vector<BoxTreeRun>& boxtrees,
                   "responsive only in the one-dimensional case.",
               .citation = "Theorem 5",
               .counter =
-                  "nodes looked at by a certificate search; certificates of a vertex; events that change "
+                  "nodes visited by a certificate search; certificates of a vertex; events that change "
                   "nothing; stored bounds against exact envelopes",
               .bound = "one axis: 2 log2 m + 1 nodes; root x, all else y: half of all nodes",
               .data = {{"boxtrees", boxtrees}, {"searches", searches}}};
@@ -123,14 +123,14 @@ Claim judge_boxtree_qualities(const std::vector<BoxTreeRun>& boxtrees,
   if (one != nullptr) {
     claim.measured =
         fmt::format("one axis: at most {} nodes of {} leaves", one->most_searched, number(one->leaves));
-    claim.why += fmt::format(" On one axis a search looks at {} of {} nodes at most;", one->most_searched,
+    claim.why += fmt::format(" On one axis a search visits at most {} of {} nodes;", one->most_searched,
                              number(2 * one->leaves - 1));
   }
   if (adversarial != nullptr) {
     claim.measured += fmt::format("; root x, else y: {}", number(adversarial->most_searched));
     claim.why += fmt::format(
-        " with the root split on x and all else on y one looks at up to {} of {} nodes, and an event at the "
-        "root's planes costs {} on average;",
+        " with the root split on x and all other nodes on y a search visits up to {} of {} nodes, and an "
+        "event at the root's planes costs {} on average;",
         number(adversarial->most_searched), number(2 * adversarial->leaves - 1),
         number(std::round(double(adversarial->searched_by_root) /
                           double(std::max<std::uint64_t>(adversarial->events_of_root, 1)))));

@@ -33,8 +33,8 @@ Claim judge_separation_list(const std::vector<SeparationRun>& separations) {
           "0 differences; four pairs per overlap and fathers event; 1.4405 log2(events + 2) + 1 comparisons "
           "per operation; a box in no more pairs than there are nodes",
       .condition =
-          "costs are counted per pair that appears or goes: new pairs may overlap at once, and with a father "
-          "goes all that stands below",
+          "costs are counted per added or removed pair: new pairs may overlap at once, and removing a father "
+          "removes all pairs below it",
       .data = separations};
   if (separations.empty()) return undecided(claim, "No separation list was played.");
   std::uint64_t audits = 0, entries = 0, differences = 0, most = 0, of_box = 0;

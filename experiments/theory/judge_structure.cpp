@@ -175,7 +175,7 @@ Claim judge_local(const std::vector<CountRun>& counts, const std::vector<CountRu
               .citation = "Theorem 1",
               .counter =
                   "certificates (of a node and side) with the vertex as winner or possible loser; candidates "
-                  "looked at by a change of one plan",
+                  "examined by a change of one plan",
               .condition = "the number of polygons at a vertex is bounded, as the paper assumes",
               .data = {{"counts", counts}, {"fans", fans}}};
   if (counts.empty()) return undecided(claim, "Nothing was counted.");
@@ -187,7 +187,7 @@ Claim judge_local(const std::vector<CountRun>& counts, const std::vector<CountRu
     claim.criteria.push_back({"most certificates of a vertex, " + place(run),
                               double(run.max_vertex_certificates), Relation::at_most, bound, 0, always});
     claim.criteria.push_back(
-        {"share of the candidates above a vertex that a change of its plan looked at, " + place(run),
+        {"share of the candidates above a vertex that a change of its plan examined, " + place(run),
          run.update_share, Relation::at_most, 1, 0, always});
     share = std::max(share, double(run.max_vertex_certificates) / bound);
     update_share = std::max(update_share, run.update_share);
@@ -200,13 +200,14 @@ Claim judge_local(const std::vector<CountRun>& counts, const std::vector<CountRu
                               6 * 6 * double(fan.depth + 1), 0, as_stated});
   claim.bound = "6 x leaves of the vertex x (depth + 1); changes: all candidates of the nodes above it";
   claim.measured = fmt::format(
-      "at {}: {} at most, {:.3g} on average; a change looks at {:.3g} candidates, {} at most",
+      "at {}: {} at most, {:.3g} on average; a change examines {:.3g} candidates, {} at most",
       place(*largest), number(largest->max_vertex_certificates), largest->mean_vertex_certificates,
       double(largest->sum_update_certificates) / double(std::max<std::uint64_t>(largest->updates, 1)),
       number(largest->max_update_certificates));
   claim.why = fmt::format(
-      "In {} no vertex took part in more than {:.0f}% of what its leaves and the depth allow, and {} changes "
-      "of single plans looked at no more than {:.0f}% of the candidates above the vertex",
+      "In {} no vertex took part in more than {:.0f}% of the certificates that its leaves and the depth "
+      "allow, and {} changes of single plans examined no more than {:.0f}% of the candidates above the "
+      "vertex",
       counted(counts.size(), "clip"), 100 * share, number(updates), 100 * update_share);
   for (const CountRun& fan : fans)
     claim.why += fmt::format("{} the hub of a fan of {} triangles takes part in {} certificates",
@@ -221,7 +222,7 @@ Claim judge_efficient(const std::vector<CountRun>& counts, const std::vector<Exa
               .title = "efficient: no internal events",
               .statement = "Every event changes the bounding volumes; there are no internal events.",
               .citation = "Theorem 1, section 5",
-              .counter = "events that change no realiser; events whose changes last for no time",
+              .counter = "events that change no realiser; events whose changes have no duration",
               .bound = "0",
               .condition = "no three vertices below a node meet at one point at one instant",
               .data = {{"counts", counts}, {"exact", exact}}};
@@ -233,17 +234,17 @@ Claim judge_efficient(const std::vector<CountRun>& counts, const std::vector<Exa
     events += run.events, silent += run.silent_events;
   }
   for (const ExactRun& run : exact) {
-    claim.criteria.push_back({"events that last for no time, at most those of ties, " + place(run),
+    claim.criteria.push_back({"events without duration, at most those of ties, " + place(run),
                               double(run.momentary_events), Relation::at_most, double(run.several_steps), 0,
                               always});
-    claim.criteria.push_back({"events that last for no time, " + place(run), double(run.momentary_events),
+    claim.criteria.push_back({"events without duration, " + place(run), double(run.momentary_events),
                               Relation::equal, 0, 0, as_stated});
     exact_events += run.events, momentary += run.momentary_events, tied += run.momentary_events > 0;
   }
-  claim.measured = fmt::format("{} of {} events change no realiser; {} of {} last for no time",
+  claim.measured = fmt::format("{} of {} events change no realiser; {} of {} have no duration",
                                number(silent), number(events), number(momentary), number(exact_events));
-  claim.why = fmt::format("{} of {} events left every realiser as it was.",
-                          silent == 0 ? "None" : number(silent), number(events));
+  claim.why = fmt::format("{} of {} events changed no realiser.", silent == 0 ? "None" : number(silent),
+                          number(events));
   if (momentary > 0)
     claim.why += fmt::format(
         " Where several vertices meet at one point, a bound may pass through some of them at a single "

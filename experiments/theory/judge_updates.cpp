@@ -75,8 +75,8 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
                   "segments x sum over nodes and sides of (vertices below - 1); lambda_1(n) - 1 = n - 1 "
                   "breakpoints per bound and segment; exponent of n log n not above 1 + 5%",
               .condition =
-                  "the bound with its factor, the number of segments, is meant; how close to n log n events "
-                  "stay depends on the motion",
+                  "the bound includes the number of segments as a factor; the closeness to n log n depends "
+                  "on the motion",
               .data = {{"counts", counts}, {"exact", exact}, {"fits", fits}}};
   if (counts.empty()) return undecided(claim, "Nothing was counted.");
   double share = 0, fullest = 0;
@@ -217,13 +217,12 @@ Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseR
                   number(net), number(envelope), number(ties));
   claim.why = fmt::format(
       "Among tight hierarchies {}: {} net changes against {} breakpoints in {} ({} of them in general "
-      "position, where every logged change is one); {} changes more are hand-overs through ties at one "
-      "instant.",
+      "position, where every logged change is one); {} further changes pass through ties at one instant.",
       net == envelope ? "none makes fewer" : "some make fewer", number(net), number(envelope),
       counted(exact.size(), "clip"), general, number(logged - net));
   if (!loose.empty())
     claim.why += fmt::format(
-        " Definition 1 asks for containment only, and one constant box per node, swept over the clip, {} at "
+        " Definition 1 requires containment only, and one constant box per node, swept over the clip, {} at "
         "every frame with no update at all beside {} changes; the price is a looseness of {:.3g} to {:.3g}.",
         outside == 0 ? "contains everything" : "does not contain everything", number(kinetic), least_loose,
         most_loose);
@@ -232,20 +231,21 @@ Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseR
 
 Claim judge_never_more_updates(const std::vector<FrameRun>& frames,
                                const std::vector<FrameRun>& constructed) {
-  Claim claim{.id = "T9",
-              .title = "the kinetic tree never performs more updates than bottom-up",
-              .statement = "The kinetic algorithm never performs more updates than the brute-force update.",
-              .citation = "section 5",
-              .counter = "values written in each frame by the kinetic tree and by bottom-up on its topology",
-              .bound = "in every frame at most bottom-up's six per node",
-              .condition = "no bound changes hands more than once between two frames (enough, not necessary)",
-              .data = {{"frames", frames}, {"constructed", constructed}}};
+  Claim claim{
+      .id = "T9",
+      .title = "the kinetic tree never performs more updates than bottom-up",
+      .statement = "The kinetic algorithm never performs more updates than the brute-force update.",
+      .citation = "section 5",
+      .counter = "values written per frame by the kinetic tree and by bottom-up on the same topology",
+      .bound = "in every frame at most bottom-up's six per node",
+      .condition = "no realiser changes more than once between two frames (sufficient, not necessary)",
+      .data = {{"frames", frames}, {"constructed", constructed}}};
   if (frames.empty() && constructed.empty()) return undecided(claim, "No frames were compared.");
   std::uint64_t all = 0, repeated = 0, worse = 0, made_worse = 0;
   double worst = 0;
   const auto judge = [&](const FrameRun& run) {
     claim.criteria.push_back(
-        {"frames with more values than bottom-up though no bound changes twice, " + place(run),
+        {"frames with more values than bottom-up although no bound changes twice, " + place(run),
          double(run.worse_without_repeat), Relation::equal, 0, 0, always});
     claim.criteria.push_back({"frames with more values than bottom-up, " + place(run),
                               double(run.worse_frames), Relation::equal, 0, 0, as_stated});
@@ -260,8 +260,8 @@ Claim judge_never_more_updates(const std::vector<FrameRun>& frames,
                                number(worse), number(all), number(made_worse));
   for (const FrameRun& run : constructed)
     claim.why += fmt::format(
-        "{}: in one frame one bound changes hands {} times and the kinetic tree writes {} values where "
-        "bottom-up writes {}. ",
+        "{}: in one frame the realiser of one bound changes {} times, and the kinetic tree writes {} values "
+        "where bottom-up writes {}. ",
         place(run), run.most_of_bound, number(run.values), number(run.bottom_up_values));
   if (!frames.empty())
     claim.why += fmt::format(
@@ -277,7 +277,7 @@ Claim judge_translation(const std::vector<TranslationRun>& translations) {
       .title = "a translation of all vertices causes no event",
       .statement = "If all vertices are translated, nothing needs to be done: no events occur.",
       .citation = "section 5",
-      .counter = "events of translations; of these, those between vertices at one place before",
+      .counter = "events of translations, and those between vertices that coincided before",
       .bound = "0 events",
       .condition = "the translated coordinates are exact in the scalar; else ties of rounded ones separate",
       .data = translations};
@@ -286,7 +286,7 @@ Claim judge_translation(const std::vector<TranslationRun>& translations) {
     claim.criteria.push_back(
         {"events, " + run.scene, double(run.events), Relation::equal, 0, 0, run.exact ? always : as_stated});
     if (!run.exact)
-      claim.criteria.push_back({"events that are no separating ties, " + run.scene,
+      claim.criteria.push_back({"events other than separating ties, " + run.scene,
                                 double(run.events) - double(run.separated_ties), Relation::equal, 0, 0,
                                 always});
     const std::string keyframes = counted(run.keyframes, "keyframe");
@@ -297,8 +297,8 @@ Claim judge_translation(const std::vector<TranslationRun>& translations) {
                                number(run.vertices), keyframes, number(run.events));
     else
       claim.why += fmt::format(
-          "{} ({} vertices, {}, {} coordinates rounded): {} events, {} of them between vertices whose "
-          "coordinates were equal before: rounding made ties, and these separate. ",
+          "{} ({} vertices, {}, {} coordinates rounded): {} events, {} of them between vertices with equal "
+          "coordinates before: rounding made ties, which then separate. ",
           run.scene, number(run.vertices), keyframes, number(run.rounded), number(run.events),
           number(run.separated_ties));
   }
@@ -369,18 +369,16 @@ Claim judge_lower_bound(const std::vector<LooseRun>& loose) {
   for (const LooseRun& run : loose) {
     // Only valid hierarchies can refute the claim, and only where there are events.
     if (run.linear_outside != 0 || run.swept_outside != 0 || run.kinetic_events == 0) continue;
-    claim.criteria.push_back(
-        {"updates between keyframes of a hierarchy that contains everything, " + place(run),
-         double(run.linear_updates), Relation::at_least, double(run.kinetic_events), 0, always});
+    claim.criteria.push_back({"updates between keyframes of a valid hierarchy, " + place(run),
+                              double(run.linear_updates), Relation::at_least, double(run.kinetic_events), 0,
+                              always});
     events += run.kinetic_events, values += run.kinetic_values, computed += run.linear_values;
     bottom_up += run.bottom_up_values, bounds += run.bounds, frames += run.frames;
     most_loose = std::max(most_loose, run.linear_looseness);
     ls.insert(run.l);
     ++clips;
   }
-  if (clips == 0)
-    return undecided(claim,
-                     "No loose hierarchy that contains everything was compared with a clip that has events.");
+  if (clips == 0) return undecided(claim, "No valid loose hierarchy was compared on a clip with events.");
   claim.measured =
       fmt::format("linear boxes: 0 updates between keyframes, {} values at keyframes; kinetic: {} changes",
                   number(computed), number(values));

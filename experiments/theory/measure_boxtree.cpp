@@ -72,7 +72,7 @@ std::uint64_t most_events_of_planes(const Forest& forest, const Forest::Tree& tr
   return most;
 }
 
-/// What the strategy holds, as its AABB tree's bytes are counted (CountRun).
+/// Returns the strategy's bytes, counted like those of the AABB tree (CountRun).
 std::uint64_t bytes_of_strategy(const SceneView<float>& view, Playback<float>& playback,
                                 const Topologies& topologies, double t) {
   const StrategyEntry& entry = find_strategy("kinetic_boxtree");

@@ -29,16 +29,16 @@ std::uint64_t exceeded(const EventSource<float>& source, const LeafVertices& lea
   const std::uint32_t realiser = source.realiser(body, node, side);
   std::uint64_t faults = 0;
   bool known = false;
-  const auto look = [&](std::uint32_t candidate) {
+  const auto check = [&](std::uint32_t candidate) {
     known = known || candidate == realiser;
     faults += ahead(motion, where, side, candidate, realiser);
   };
   const TopologyNode n = source.tree(body).nodes[node];
   if (n.is_leaf())
-    for (const std::uint32_t v : leaves[node]) look(v);
+    for (const std::uint32_t v : leaves[node]) check(v);
   else
     for (std::uint32_t child = n.first(); child < n.first() + n.count(); ++child)
-      look(source.realiser(body, child, side));
+      check(source.realiser(body, child, side));
   ++compared;
   return faults + !known;
 }

@@ -75,7 +75,7 @@ void compare_frames(const Scene<float>& scene, std::span<const double> frames, F
   }
 }
 
-/// Classifies whether winner and loser coincided at the begin of the segment of their event.
+/// Classifies whether winner and loser coincided at the start of the segment of their event.
 struct Classify {
   TranslationRun* run;
   const Scene<float>* scene;

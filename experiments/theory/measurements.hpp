@@ -93,7 +93,7 @@ struct TranslationRun {
   std::uint64_t rounded = 0;  ///< keyframe coordinates that differ from the exact translation
   std::uint64_t events = 0;
   std::uint64_t separated_ties =
-      0;  ///< events of vertices with equal coordinates at the begin of their segment
+      0;  ///< events of vertices with equal coordinates at the start of their segment
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TranslationRun, scene, exact, triangles, vertices, keyframes, rounded,
                                    events, separated_ties)

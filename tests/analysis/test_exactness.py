@@ -30,7 +30,7 @@ class TestExactness(unittest.TestCase):
         self.assertEqual((row.tables, row.lowest, row.highest), (2, 2.0, 4.0))
         self.assertEqual((row.missed, row.extra), (6, 2))
         says = exactness.paragraph([row])
-        self.assertIn("missed 6 and made up 2", says)
+        self.assertIn("missed 6 and added 2", says)
         self.assertIn("180\u00a0% of speed", says)
 
     def test_without_an_exact_counterpart_nothing_is_said(self) -> None:

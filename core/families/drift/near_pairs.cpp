@@ -14,15 +14,15 @@ constexpr std::size_t chunk_room = 2048;
 
 template <class S>
 NearLeaves<S> NearPairs<S>::leaves(const NearSide<S>& side) {
-  NearLeafRows<S>& own = *side.rows;
+  NearLeafRows<S>& rows = *side.rows;
   const std::size_t count = side.hierarchy->leaf_count();
-  if (own.stamps_.size() != count) {
-    own.stamps_.assign(count, 0);
-    own.rows_.resize(count * lane_scalars(std::max(4u, side.hierarchy->padded_leaf_size())));
-    own.stamp_ = 1;
+  if (rows.stamps_.size() != count) {
+    rows.stamps_.assign(count, 0);
+    rows.rows_.resize(count * lane_scalars(std::max(4u, side.hierarchy->padded_leaf_size())));
+    rows.stamp_ = 1;
   }
   NearLeaves<S> result{
-      side.hierarchy->leaf_lists(), own.rows_.data(), own.stamps_.data(), own.stamp_, side.positions, {}};
+      side.hierarchy->leaf_lists(), rows.rows_.data(), rows.stamps_.data(), rows.stamp_, side.positions, {}};
   std::copy_n(side.margin, 6, result.margin);
   return result;
 }

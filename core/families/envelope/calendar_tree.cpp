@@ -326,14 +326,14 @@ template <class S>
 void CalendarTree<S>::plans_changed(WideHierarchy<S>& hierarchy, WideRealisers& realisers,
                                     std::span<const PlanChange<S>> changes) {
   ++change_;
-  bool own = false;
+  bool affected = false;
   double end = end_;
   for (const PlanChange<S>& change : changes) {
     if (change.body != body_) continue;
-    own = true;
+    affected = true;
     if (!change.times.empty()) end = std::min(end, change.times.front());
   }
-  if (!own || hierarchy.empty()) return;
+  if (!affected || hierarchy.empty()) return;
   if (at_rest_ || end < end_) {
     start(hierarchy, realisers);
     return;

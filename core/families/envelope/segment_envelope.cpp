@@ -255,7 +255,7 @@ typename SegmentEnvelope<S>::Line* SegmentEnvelope<S>::room_for(std::size_t line
   return lines_.data();
 }
 
-/// Returns the fraction of the segment at which `later`, which is not ahead at the begin but at the end,
+/// Returns the fraction of the segment at which `later`, which is not ahead at the start but at the end,
 /// meets `now`.
 template <class S>
 double SegmentEnvelope<S>::meeting(const Line& now, const Line& later) {
@@ -263,7 +263,7 @@ double SegmentEnvelope<S>::meeting(const Line& now, const Line& later) {
   return behind / (behind + (double(later.end) - double(now.end)));
 }
 
-/// Walks from the line that is ahead at the begin to the line that is ahead at the end; `lines` are those
+/// Walks from the line that is ahead at the start to the line that is ahead at the end; `lines` are those
 /// that end further out than the first.
 template <class S>
 void SegmentEnvelope<S>::walk(std::uint32_t slot, Line now, Line* lines, std::size_t count) {

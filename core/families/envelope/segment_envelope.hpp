@@ -26,7 +26,7 @@ void find_realisers(WideHierarchy<S>& hierarchy, const S* positions, WideRealise
 /// The realisers of all sides of all boxes over one segment, in which every vertex of a body moves on a line
 /// between two stored positions.
 ///
-/// A side whose realiser at the begin also realises it at the end is realised by it throughout: both bounds
+/// A side whose realiser at the start also realises it at the end is realised by it throughout: both bounds
 /// are linear, and no vertex is ahead at either end. One pass with the cost of a few refits therefore finds
 /// the few *active* sides. Each active side is the upper envelope of lines, which is walked from crossing to
 /// crossing. Envelopes of inner nodes are those of the lines in the envelopes below. The result is a list of
@@ -67,7 +67,7 @@ class SegmentEnvelope {
   void step(WideHierarchy<S>& hierarchy, const WideRealisers& realisers, WideRealisers& at_end, double share);
   /// Returns the number of wide nodes whose sides have not been processed.
   std::uint32_t nodes_left() const { return nodes_left_; }
-  /// Makes the finished next segment current; the realisers must have been brought to its begin.
+  /// Makes the finished next segment current; the realisers must have been brought to its start.
   void take_next();
 
   /// Brings the realisers from the last requested time (first: t0) to t, t0 <= t <= t1. O(due stores).

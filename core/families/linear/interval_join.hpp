@@ -58,10 +58,10 @@ class IntervalJoin {
   /// segment. O(pairs that begin or end since the last call), plus one copy of the overlapping pairs.
   void read(float fraction, PairBuffer& out);
 
-  /// Returns all pairs of the segment: first those that overlap from its begin to its end, then the others
-  /// roughly in the order of their begin.
+  /// Returns all pairs of the segment: first those that overlap from its start to its end, then the others
+  /// roughly in the order of their start.
   std::span<const JoinedPair> pairs() const { return {sorted_.data(), count_}; }
-  /// Returns the size of a prefix of `pairs` that contains all pairs that overlap at the begin; pairs that
+  /// Returns the size of a prefix of `pairs` that contains all pairs that overlap at the start; pairs that
   /// overlap throughout are first in it.
   std::size_t from_begin() const { return bucket_end_[0]; }
   std::size_t throughout() const { return throughout_; }
@@ -113,7 +113,7 @@ class IntervalJoin {
   Columns found_throughout_, found_partly_;
   std::vector<JoinedPair> sorted_;          ///< may be longer than the number of pairs
   std::vector<std::uint32_t> bodies_of_;    ///< [sorted_] index into bodies_, if there are several
-  std::size_t throughout_ = 0, count_ = 0;  ///< counts in sorted_: from begin to end, and all
+  std::size_t throughout_ = 0, count_ = 0;  ///< counts in sorted_: from start to end, and all
   bool reading_ = false;
   std::uint32_t bucket_end_[FractionBuckets::count] = {};  ///< in sorted_
   std::uint32_t next_ = 0;  ///< index into sorted_: earlier pairs have begun, or are in `waiting_`

@@ -120,7 +120,7 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
     if (const auto* known = memory_.find(index, knot)) {
       at.child_bounds = known->child_bounds.data();
       at.node_bounds = known->node_bounds.data();
-      ++left_alone(index).remembered;
+      ++skip_counts(index).remembered;
       return {};
     }
   }
@@ -236,7 +236,7 @@ void LinearBounds<S>::enter() {
   }
 }
 
-/// Assigns slots to a body's ends over a segment, and makes the boxes at its begin. Returns whether the other
+/// Assigns slots to a body's ends over a segment, and makes the boxes at its start. Returns whether the other
 /// end remains to be made. `before` is the preceding segment.
 template <class S>
 bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion,
@@ -257,7 +257,7 @@ bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const 
   if (old.current && old.at_rest && side.at_rest &&
       old.at[1].positions == motion.positions_on_lines(body, t, bodies_[body].room[old.at[1].slot])) {
     side.at[0] = side.at[1] = old.at[1];
-    ++left_alone(body).at_rest;
+    ++skip_counts(body).at_rest;
     return false;
   }
   if (old.current && !old.at_rest && before.end == segment.begin) {

@@ -13,9 +13,9 @@
 namespace kbvh {
 
 /// Bounds of all bodies of a scene over a segment in which every vertex of every body stays on one line:
-/// boxes at its begin and at its end, linear in between. A maximum of linear functions is convex and lies
+/// boxes at its start and at its end, linear in between. A maximum of linear functions is convex and lies
 /// below its chord, so the boxes contain every vertex throughout; at the ends they are tight. A segment needs
-/// no updates, and the boxes at its end are those at the begin of the next one. Prior art:
+/// no updates, and the boxes at its end are those at the start of the next one. Prior art:
 /// core/adr/0010-prior-art-of-answering-intervals.md.
 ///
 /// Segments are those of all bodies overlaid: from the latest knot of any plan to the next one, cut as
@@ -113,8 +113,8 @@ class LinearBounds {
   void note_time();
   void next_segment();
   void forget_ahead();
-  /// Adds the skipped-body counts of a prebuilt segment when it becomes current.
-  Counts& left_alone(std::uint32_t body) { return ahead_exists_ ? ahead_counts_[body] : counts_[body]; }
+  /// Returns the skip counts to increase; those of a segment built ahead are added when it becomes current.
+  Counts& skip_counts(std::uint32_t body) { return ahead_exists_ ? ahead_counts_[body] : counts_[body]; }
   void choose_segment(Segment& segment, const SegmentMotion<S>& motion, double t) const;
   bool begin_side(Segment& segment, const Segment& before, const SegmentMotion<S>& motion, std::uint32_t body,
                   double t, Before what);

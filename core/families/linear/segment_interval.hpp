@@ -11,10 +11,10 @@ namespace kbvh {
 struct SegmentInterval {
   double begin = 0, end = 0;
   double knot = 0;       ///< end of the flight plans' segment, of which the interval may be a piece
-  bool endless = false;  ///< no plan ends: the length is a guess, and is not cut into pieces
+  bool endless = false;  ///< no plan ends: the length is an estimate, and the interval is not cut into pieces
 };
 
-/// The interval that contains t, in which every vertex of all `bodies` bodies moves on one line: the
+/// Returns the interval that contains t, in which every vertex of all `bodies` bodies moves on one line: the
 /// intersection of their segments, cut into `pieces` pieces of equal length. Where no plan ends, the interval
 /// lasts for `endless_duration` seconds from t on.
 template <class S>

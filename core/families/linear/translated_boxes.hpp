@@ -17,7 +17,7 @@ S largest_coordinate(const EndpointBounds<S>& end) {
   return largest;
 }
 
-/// Boxes at the end of a segment over which a body translates, from those at its begin: all of them, or only
+/// Boxes at the end of a segment over which a body translates, from those at its start: all of them, or only
 /// the root's. They contain the same vertices and exceed tight boxes by rounding only.
 template <class S>
 struct TranslatedBoxes {

@@ -9,7 +9,7 @@ namespace {
 constexpr float fraction_slack = 0x1p-21F;
 }  // namespace
 
-/// Enters all pairs into the lists by their begin; pairs that overlap at the begin are attempted ahead, if
+/// Enters all pairs into the lists by their start; pairs that overlap at the start are attempted ahead, if
 /// requested.
 template <class S>
 void TriangleSpanFilter<S>::begin(const IntervalJoin<S>& join, When when) {
@@ -108,9 +108,9 @@ void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const Scene
   verdicts_.resize(due_.size());
   for (std::size_t k = 0; k < due_.size(); ++k) {
     const JoinedPair pair = pairs[due_[k]];
-    if (const BodyPair own = join.bodies_of(due_[k]);
-        own.first != bodies.first || own.second != bodies.second)
-      take_bodies(own);
+    if (const BodyPair joined = join.bodies_of(due_[k]);
+        joined.first != bodies.first || joined.second != bodies.second)
+      take_bodies(joined);
     SpanPair<S>& span = tries_[k];
     for (std::size_t c = 0; c < 3; ++c) {
       const std::size_t va = std::size_t(3) * corners_a[std::size_t(3) * pair.primitive_a + c];

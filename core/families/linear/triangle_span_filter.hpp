@@ -20,7 +20,7 @@ class TriangleSpanFilter {
  public:
   /// Starts with the join of a new segment.
   void start(const IntervalJoin<S>& join);
-  /// Starts ahead of time: `step` attempts the given number of pairs that overlap at the begin of the
+  /// Starts ahead of time: `step` attempts the given number of pairs that overlap at the start of the
   /// segment. It returns true when none are left; only then may the filter be read.
   void start_ahead(const IntervalJoin<S>& join);
   bool step(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,

@@ -169,10 +169,10 @@ class AuditedVolumes final : public AuditVolumes {
   }
   double surface(std::uint32_t node) const override { return surface_area(volumes_[node]); }
   double tight_surface(std::span<const double> points) const override {
-    std::vector<VolumeScalar<V>> own(points.size());
-    for (std::size_t i = 0; i < own.size(); ++i) own[i] = VolumeScalar<V>(points[i]);
+    std::vector<VolumeScalar<V>> rounded(points.size());
+    for (std::size_t i = 0; i < rounded.size(); ++i) rounded[i] = VolumeScalar<V>(points[i]);
     V volume;
-    fit(volume, PointSet<VolumeScalar<V>>(own.data(), own.size() / 3));
+    fit(volume, PointSet<VolumeScalar<V>>(rounded.data(), rounded.size() / 3));
     return surface_area(volume);
   }
 

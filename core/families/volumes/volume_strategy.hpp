@@ -98,15 +98,15 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
   void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
     plans_changed_ = true;  // new vertices have their own plans
     on_bodies([&](auto& bodies) {
-      for (const BodyChange& own : body_changes(this->scene_, change)) {
-        auto& body = bodies[own.body];
-        const Primitives& primitives = this->scene_.primitives(own.body);
-        const S* positions = this->sampled_.positions(own.body);
+      for (const BodyChange& body_change : body_changes(this->scene_, change)) {
+        auto& body = bodies[body_change.body];
+        const Primitives& primitives = this->scene_.primitives(body_change.body);
+        const S* positions = this->sampled_.positions(body_change.body);
         VolumeHierarchy<Box<S>> boxes(body.topology(), primitives, Cover::vertices);
         boxes.refit(positions);
-        body.assign(edited_topology(body.topology(), boxes.volumes(), own, primitives, positions),
+        body.assign(edited_topology(body.topology(), boxes.volumes(), body_change, primitives, positions),
                     primitives);
-        update(body, own.body);
+        update(body, body_change.body);
       }
     });
   }

@@ -88,16 +88,17 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
   void edit_geometry(const GeometryChange<S>& change) {
     plans_changed_ = true;  // new vertices have their own plans
     swept_.reset();         // it uses the old topologies
-    for (const BodyChange& own : body_changes(this->scene_, change)) {
-      WideHierarchy<S>& hierarchy = hierarchies_[own.body];
-      const Primitives& primitives = this->scene_.primitives(own.body);
-      const S* positions = this->sampled_.positions(own.body);
+    for (const BodyChange& body_change : body_changes(this->scene_, change)) {
+      WideHierarchy<S>& hierarchy = hierarchies_[body_change.body];
+      const Primitives& primitives = this->scene_.primitives(body_change.body);
+      const S* positions = this->sampled_.positions(body_change.body);
       std::vector<Box<S>> boxes(hierarchy.topology().size());
       for (std::uint32_t node = 0; node < boxes.size(); ++node) boxes[node] = hierarchy.box(node);
-      hierarchy.assign(edited_topology(hierarchy.topology(), std::move(boxes), own, primitives, positions),
-                       primitives, hierarchy.kernels());
-      topology_changed(own.body);
-      update(own.body);
+      hierarchy.assign(
+          edited_topology(hierarchy.topology(), std::move(boxes), body_change, primitives, positions),
+          primitives, hierarchy.kernels());
+      topology_changed(body_change.body);
+      update(body_change.body);
     }
   }
   /// Called when the topology of a body's hierarchy has changed, to update dependent data.

@@ -22,7 +22,7 @@ class SweptHierarchies {
         hierarchies_(scene.body_count()),
         positions_(scene.body_count()) {
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
-      const WideHierarchy<S>& own = hierarchy_of(body);
+      const WideHierarchy<S>& hierarchy = hierarchy_of(body);
       const Primitives& primitives = scene.primitives(body);
       const std::uint32_t vertices = scene.vertex_count(body);
       Primitives twice;
@@ -35,7 +35,7 @@ class SweptHierarchies {
       }
       twice.removed = primitives.removed;
       twice.removed_count = primitives.removed_count;
-      hierarchies_[body].assign(own.topology(), twice, own.kernels());
+      hierarchies_[body].assign(hierarchy.topology(), twice, hierarchy.kernels());
       positions_[body].resize(std::size_t(6) * vertices + 1);
     }
   }

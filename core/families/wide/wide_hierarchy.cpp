@@ -200,10 +200,10 @@ void WideHierarchy<S>::set_box(std::uint32_t node, const Box<S>& box) {
       rows[(axis + 3) * width] = -box.upper[axis];
     }
     // The root's own box is read even if the root is a leaf.
-    const std::uint32_t own = place.wide != none ? place.wide : node == 0 ? 0 : none;
-    if (own == none) continue;
-    node_bounds_[std::size_t(8) * own + axis] = box.lower[axis];
-    node_bounds_[std::size_t(8) * own + axis + 4] = box.upper[axis];
+    const std::uint32_t wide = place.wide != none ? place.wide : node == 0 ? 0 : none;
+    if (wide == none) continue;
+    node_bounds_[std::size_t(8) * wide + axis] = box.lower[axis];
+    node_bounds_[std::size_t(8) * wide + axis + 4] = box.upper[axis];
   }
 }
 

@@ -128,13 +128,13 @@ void enclose(Obb<S>& box, std::span<const Obb<S>> children) {
   ObbFrames frames;
   for (const Obb<S>& child : children) {
     if (child.empty()) continue;
-    const ObbReach own = obb_reach(child);
+    const ObbReach extent = obb_reach(child);
     for (int corner = 0; corner < 8; ++corner) {
       double point[3];
       for (std::size_t d = 0; d < 3; ++d) {
-        point[d] = own.centre[d];
+        point[d] = extent.centre[d];
         for (std::size_t i = 0; i < 3; ++i)
-          point[d] += ((corner >> i) & 1 ? own.reach[i] : -own.reach[i]) * own.axis[i][d];
+          point[d] += ((corner >> i) & 1 ? extent.reach[i] : -extent.reach[i]) * extent.axis[i][d];
       }
       frames.add_extreme(point);
     }
@@ -146,13 +146,13 @@ void enclose(Obb<S>& box, std::span<const Obb<S>> children) {
       ObbFrames::Interval interval;
       for (const Obb<S>& child : children) {
         if (child.empty()) continue;
-        const ObbReach own = obb_reach(child);
+        const ObbReach extent = obb_reach(child);
         double way[3];
-        outward::difference(own.centre, from, way);
+        outward::difference(extent.centre, from, way);
         const double middle = outward::dot(axis, way).value;
         double around = 0;
         for (std::size_t j = 0; j < 3; ++j)
-          around += std::fabs(outward::dot(axis, own.axis[j]).value) * own.reach[j];
+          around += std::fabs(outward::dot(axis, extent.axis[j]).value) * extent.reach[j];
         interval.add(middle - around);
         interval.add(middle + around);
       }
@@ -171,9 +171,9 @@ void enclose(Obb<S>& box, std::span<const Obb<S>> children) {
     for (std::size_t i = 0; i < 3; ++i) std::copy_n(all.axis[i], 3, axis[i]);
     for (const Obb<S>& child : children) {
       if (child.empty()) continue;
-      const ObbReach own = obb_reach(child);
+      const ObbReach extent = obb_reach(child);
       for (std::size_t i = 0; i < 3; ++i)
-        all.half[i] = std::max(all.half[i], outward::up<S>(detail::furthest_along(axis[i], centre, own)));
+        all.half[i] = std::max(all.half[i], outward::up<S>(detail::furthest_along(axis[i], centre, extent)));
     }
   }
   box = all;
@@ -244,13 +244,13 @@ template <class S>
 Box<double> enclosing_box(const Obb<S>& box) {
   Box<double> result;
   if (box.empty()) return result;
-  const ObbReach own = obb_reach(box);
+  const ObbReach extent = obb_reach(box);
   for (std::size_t d = 0; d < 3; ++d) {
     double around = 0;
-    for (std::size_t i = 0; i < 3; ++i) around += std::fabs(own.axis[i][d]) * own.reach[i];
+    for (std::size_t i = 0; i < 3; ++i) around += std::fabs(extent.axis[i][d]) * extent.reach[i];
     if (around > 0) around = around * (1 + 8 * outward::unit_roundoff) + 4 * outward::least;
-    result.lower[d] = outward::down<double>(outward::two_sum(own.centre[d], -around));
-    result.upper[d] = outward::up<double>(outward::two_sum(own.centre[d], around));
+    result.lower[d] = outward::down<double>(outward::two_sum(extent.centre[d], -around));
+    result.upper[d] = outward::up<double>(outward::two_sum(extent.centre[d], around));
   }
   return result;
 }

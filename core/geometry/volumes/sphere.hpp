@@ -38,9 +38,9 @@ void fit(Sphere<S>& sphere, PointSet<S> points) {
     for (std::size_t i = 0; i < points.size(); ++i) {
       double way[3];
       outward::difference(points[i], from, way);
-      const double own = outward::length_above(way);
-      if (!(own > distance)) continue;
-      distance = own;
+      const double length = outward::length_above(way);
+      if (!(length > distance)) continue;
+      distance = length;
       furthest = points[i];
     }
     return furthest;
@@ -74,12 +74,12 @@ void enclose(Sphere<S>& sphere, std::span<const Sphere<S>> children) {
   for (const Sphere<S>& child : children) {
     if (child.empty()) continue;
     outward::difference(child.centre, centre, way);
-    const double distance = outward::length_above(way), own = double(child.radius);
-    if (radius < 0 || distance + radius <= own) {
+    const double distance = outward::length_above(way), child_radius = double(child.radius);
+    if (radius < 0 || distance + radius <= child_radius) {
       std::copy_n(child.centre, 3, centre);
-      radius = own;
-    } else if (distance + own > radius) {
-      const double grown = 0.5 * (distance + radius + own);
+      radius = child_radius;
+    } else if (distance + child_radius > radius) {
+      const double grown = 0.5 * (distance + radius + child_radius);
       for (std::size_t d = 0; d < 3; ++d) centre[d] += (grown - radius) / distance * way[d];
       radius = grown;
     }

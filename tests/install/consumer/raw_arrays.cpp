@@ -1,5 +1,5 @@
-// The installed library without a scene file or a program: links kbvh::all, looks up a strategy in the
-// registry, and plays a scene that is made of plain arrays, frame by frame.
+// Uses the installed library without a scene file or the program: links kbvh::all, looks up a strategy in the
+// registry, and plays a scene made of plain arrays, frame by frame.
 
 #include <cstdio>
 #include <utility>

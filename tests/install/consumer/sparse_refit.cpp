@@ -1,6 +1,5 @@
-// A refit that looks for what moved: leaves whose vertices all stand where they stood are left alone, and so
-// is every node above them whose children's boxes have not changed. Worth its comparisons where much of a
-// body rests.
+// A refit that detects motion: leaves whose vertices did not move are skipped, and so are all nodes above
+// them whose children's boxes did not change. The comparisons pay where large parts of a body rest.
 
 #include <algorithm>
 
@@ -42,11 +41,11 @@ class SparseRefit final : public kbvh::StoredHierarchyStrategy<S, Count> {
   }
 
  private:
-  /// What the boxes of one body were made from.
+  /// The inputs of one body's boxes.
   struct Seen {
     std::vector<S> positions;           ///< [vertex][3]
-    std::vector<std::uint8_t> moved;    ///< per vertex: since the last update
-    std::vector<std::uint8_t> changed;  ///< per node: did this update change its box?
+    std::vector<std::uint8_t> moved;    ///< per vertex: whether it moved since the last update
+    std::vector<std::uint8_t> changed;  ///< per node: whether this update changed its box
   };
 
   void update(std::uint32_t body) override {

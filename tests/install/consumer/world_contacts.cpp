@@ -1,5 +1,5 @@
-// Contacts between frames, before and after flight plans change: a leaf falls onto a table, and is thrown up
-// again when it has touched it.
+// Contacts between frames, before and after changes of flight plans: a leaf falls onto a table, and is thrown
+// up again after it has touched the table.
 
 #include <algorithm>
 #include <cstdio>

@@ -1,4 +1,5 @@
-// A kinetic AABB tree, event by event: what is scheduled, which bounds an event touches, what it schedules.
+// Steps through the events of a kinetic AABB tree: prints the scheduled events, the bounds that an event
+// touches, and the new certificates.
 
 #include <cstdio>
 #include <exception>

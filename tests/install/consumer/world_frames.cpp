@@ -1,5 +1,5 @@
-// A simulator's view of kbvh: positions come frame by frame, from an array of the simulator's own that is not
-// copied; pairs within the cloth are asked for, too. No template of the library, no keyframes.
+// Uses kbvh from a simulator: positions come frame by frame, from the simulator's own array, without a copy.
+// Pairs within the cloth are requested, too. Needs no template of the library and no keyframes.
 
 #include <cstdint>
 #include <cstdio>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint32_t side = 9;  // vertices
 
-/// A square cloth of triangles.
+/// Makes a square cloth of triangles.
 std::vector<std::uint32_t> cloth_triangles() {
   std::vector<std::uint32_t> triangles;
   for (std::uint32_t j = 0; j + 1 < side; ++j)
@@ -24,7 +24,8 @@ std::vector<std::uint32_t> cloth_triangles() {
   return triangles;
 }
 
-/// Folds the right half of the cloth over the left one, by `share`, and tilts it: in the end it goes through.
+/// Folds the right half of the cloth over the left one, by `share`, and tilts it: at the end it passes
+/// through.
 void simulate(float share, std::vector<float>& positions) {
   for (std::uint32_t v = 0; v < side * side; ++v) {
     const float x = float(v % side) / (side - 1) - 0.5F, y = float(v / side) / (side - 1);
@@ -38,7 +39,7 @@ void simulate(float share, std::vector<float>& positions) {
 
 int main() try {
   const std::vector<std::uint32_t> cloth = cloth_triangles(), table{0, 1, 2};
-  std::vector<float> positions(3 * side * side + 1);  // the last one means nothing: so it is not copied
+  std::vector<float> positions(3 * side * side + 1);  // one more than needed, so that it is not copied
   simulate(0, positions);
 
   kbvh::World world;
@@ -47,7 +48,7 @@ int main() try {
   world.add_body("table", {table}, std::vector<double>{0},
                  std::vector<float>{-1, -1, -0.1F, 2, -1, -0.1F, -1, 2, -0.1F});
   world.add_pair(0, 1);
-  world.add_pair(0, 0);  // the cloth with itself
+  world.add_pair(0, 0);  // pairs within the cloth
   world.start("bottom_up");
 
   std::vector<kbvh::WorldPair> pairs;

@@ -107,10 +107,10 @@ void widen(WideArrays<S> h, std::uint32_t node_count, const S* margin) {
     S* rows = h.child_bounds + std::size_t(n) * 6 * width;
     for (std::size_t k = 0; k < 6; ++k)
       for (std::size_t i = 0; i < width; ++i) rows[k * width + i] -= margin[k];
-    S* own = h.node_bounds + std::size_t(8) * n;
+    S* node_bounds = h.node_bounds + std::size_t(8) * n;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      own[axis] -= margin[axis];
-      own[axis + 4] += margin[axis + 3];
+      node_bounds[axis] -= margin[axis];
+      node_bounds[axis + 4] += margin[axis + 3];
     }
   }
 }

@@ -94,7 +94,7 @@ void place(WideArrays<S> h, const S* values, std::uint32_t node) {
   constexpr std::size_t scalars = 6 * width;
   const std::uint32_t count = h.nodes[node].count;
   S* rows = h.child_bounds + node * scalars;
-  S* own = h.node_bounds + std::size_t(8) * node;
+  S* node_bounds = h.node_bounds + std::size_t(8) * node;
   for (std::size_t i = 0; i < 3 * width; ++i) rows[i] = values[i];
   for (std::size_t i = 3 * width; i < scalars; ++i) rows[i] = -values[i];
   if (count != width)
@@ -103,7 +103,7 @@ void place(WideArrays<S> h, const S* values, std::uint32_t node) {
   for (std::size_t row = 0; row < 6; ++row) {
     S least = rows[row * width];
     for (std::size_t lane = 1; lane < width; ++lane) least = smaller(least, rows[row * width + lane]);
-    own[row < 3 ? row : row + 1] = row < 3 ? least : -least;
+    node_bounds[row < 3 ? row : row + 1] = row < 3 ? least : -least;
   }
 }
 

@@ -82,9 +82,9 @@ struct NodeFit {
     }
   }
 
-  [[gnu::always_inline]] inline void store_own(S* own) const {
-    P::store_smallest(own, smallest);
-    P::store_largest(own + 4, largest);
+  [[gnu::always_inline]] inline void store_own(S* node_bounds) const {
+    P::store_smallest(node_bounds, smallest);
+    P::store_largest(node_bounds + 4, largest);
   }
 };
 
@@ -98,7 +98,7 @@ constexpr S empty_box[8] = {infinity<S>,  infinity<S>,  infinity<S>,  infinity<S
 /// Few leaves next to nodes (SAH trees; the last nodes of a level): one box at a time.
 template <class S, std::uint32_t width>
 [[gnu::noinline]] void fit_single(const WideArrays<S>& h, const WideNode& node, const S* positions, S* rows,
-                                  S* own) {
+                                  S* node_bounds) {
   using P = Points<S, 1>;
   alignas(64) S leaves[width][8];
   const S* boxes[width];
@@ -122,12 +122,12 @@ template <class S, std::uint32_t width>
   }
   NodeFit<S, width> fit;
   fit.from_boxes(boxes, rows);
-  fit.store_own(own);
+  fit.store_own(node_bounds);
 }
 
 /// Many leaves, whose lists fill all lanes: afterwards the lanes of nodes and the empty lanes are corrected.
 template <class S, std::uint32_t width>
-[[gnu::noinline]] void put_right(const WideArrays<S>& h, const WideNode& node, S* rows, S* own) {
+[[gnu::noinline]] void put_right(const WideArrays<S>& h, const WideNode& node, S* rows, S* node_bounds) {
   for (std::uint32_t lane = node.leaf_count; lane < width; ++lane) {
     const S* box = lane < node.count
                        ? h.node_bounds + std::size_t(8) * (node.first_child + lane - node.leaf_count)
@@ -135,8 +135,8 @@ template <class S, std::uint32_t width>
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       rows[axis * width + lane] = box[axis];
       rows[(axis + 3) * width + lane] = -box[axis + 4];
-      own[axis] = smaller(own[axis], box[axis]);
-      own[axis + 4] = larger(own[axis + 4], box[axis + 4]);
+      node_bounds[axis] = smaller(node_bounds[axis], box[axis]);
+      node_bounds[axis + 4] = larger(node_bounds[axis + 4], box[axis + 4]);
     }
   }
 }
@@ -144,31 +144,31 @@ template <class S, std::uint32_t width>
 /// Fits a node whose children are all leaves.
 template <class S, std::uint32_t width>
 [[gnu::always_inline]] inline void fit_leaves(const WideArrays<S>& h, const WideNode& node,
-                                              const S* positions, S* rows, S* own) {
+                                              const S* positions, S* rows, S* node_bounds) {
   NodeFit<S, width> fit;
   fit.from_lists(h.vertices + node.list, node.length, positions, rows);
-  fit.store_own(own);
-  if (node.leaf_count != width) put_right<S, width>(h, node, rows, own);
+  fit.store_own(node_bounds);
+  if (node.leaf_count != width) put_right<S, width>(h, node, rows, node_bounds);
 }
 
 /// Fits any other node; the own boxes of children that are nodes must be current.
 template <class S, std::uint32_t width>
 [[gnu::always_inline]] inline void fit_above(const WideArrays<S>& h, const WideNode& node, const S* positions,
-                                             S* rows, S* own) {
+                                             S* rows, S* node_bounds) {
   NodeFit<S, width> fit;
   if (2 * node.leaf_count >= width) {
     fit.from_lists(h.vertices + node.list, node.length, positions, rows);
-    fit.store_own(own);
-    put_right<S, width>(h, node, rows, own);
+    fit.store_own(node_bounds);
+    put_right<S, width>(h, node, rows, node_bounds);
   } else if (node.leaf_count == 0) {
     const S* boxes[width];
     for (std::uint32_t lane = 0; lane < width; ++lane)
       boxes[lane] =
           lane < node.count ? h.node_bounds + std::size_t(8) * (node.first_child + lane) : empty_box<S>;
     fit.from_boxes(boxes, rows);
-    fit.store_own(own);
+    fit.store_own(node_bounds);
   } else {
-    fit_single<S, width>(h, node, positions, rows, own);
+    fit_single<S, width>(h, node, positions, rows, node_bounds);
   }
 }
 

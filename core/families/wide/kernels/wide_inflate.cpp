@@ -37,12 +37,12 @@ template <class S, std::uint32_t width>
 
 /// Compares and stores the box of an inflated node; returns whether it changed.
 template <class S>
-[[gnu::always_inline]] inline bool replace_own(S* own, const S* fresh) {
+[[gnu::always_inline]] inline bool replace_own(S* node_bounds, const S* fresh) {
   bool changed = false;
   for (std::size_t i = 0; i < 8; ++i) {
     if (i == 3 || i == 7) continue;
-    changed |= own[i] != fresh[i];
-    own[i] = fresh[i];
+    changed |= node_bounds[i] != fresh[i];
+    node_bounds[i] = fresh[i];
   }
   return changed;
 }
@@ -90,7 +90,7 @@ void check_margins(MarginCheck<S>& shared) {
     for (std::uint32_t c = node.first_child; c < node.first_child + (node.count - node.leaf_count); ++c)
       changed |= state.remade[c] != 0;
     S* rows = h.child_bounds + i * row_scalars;
-    S* own = h.node_bounds + std::size_t(8) * i;
+    S* node_bounds = h.node_bounds + std::size_t(8) * i;
     state.remade[i] = 0;
     if (node.leaf_count == 0) {
       if (!changed) continue;
@@ -138,7 +138,7 @@ void check_margins(MarginCheck<S>& shared) {
       }
       put_right<S, width>(h, node, rows, inflated);
     }
-    state.remade[i] = replace_own(own, inflated) ? 1 : 0;
+    state.remade[i] = replace_own(node_bounds, inflated) ? 1 : 0;
     if (changed) inner_boxes += std::uint32_t(node.count - node.leaf_count);
   }
   if (state.node_count > 1 && state.remade[0] != 0) ++inner_boxes;  // no row contains the root's box

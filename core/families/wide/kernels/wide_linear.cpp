@@ -20,9 +20,9 @@ void make(const WideMoment<S>& moment, std::uint32_t node) {
   for (std::size_t i = 0; i < scalars; ++i) rows[i] = first[i] + s * (last[i] - first[i]) - margin;
   const S* own_first = moment.ends.node_bounds[0] + std::size_t(8) * node;
   const S* own_last = moment.ends.node_bounds[1] + std::size_t(8) * node;
-  S* own = moment.hierarchy.node_bounds + std::size_t(8) * node;
+  S* node_bounds = moment.hierarchy.node_bounds + std::size_t(8) * node;
   for (std::size_t i = 0; i < 8; ++i)
-    own[i] = own_first[i] + s * (own_last[i] - own_first[i]) + (i < 4 ? -margin : margin);
+    node_bounds[i] = own_first[i] + s * (own_last[i] - own_first[i]) + (i < 4 ? -margin : margin);
 }
 
 /// Stored boxes that are computed at the first visit.
@@ -93,7 +93,7 @@ template <class S, class V>
 /// An upper bound of all rounding of a fraction, in `together` and in frames alike.
 constexpr float fraction_slack = 0x1p-20f;
 
-/// Returns the bits of the lanes that no side separates at the begin, or none at the end.
+/// Returns the bits of the lanes in which no side separates the boxes at the start, or none at the end.
 template <class S, class V>
 [[gnu::always_inline]] inline unsigned together_at_an_end(const Gaps<S, V>& gaps) {
   V first = gaps.first[0], last = gaps.last[0];
@@ -255,7 +255,7 @@ struct LeafReach {
   }
 };
 
-/// Lanes of a leaf that may overlap primitive i of another leaf at some time, and those that do so from begin
+/// Lanes of a leaf that may overlap primitive i of another leaf at some time, and those that do so from start
 /// to end.
 struct LaneBits {
   unsigned hit, throughout;
@@ -291,7 +291,7 @@ struct PartlyBatch {
   alignas(64) std::uint32_t primitive_a[room] = {}, primitive_b[room] = {};
   std::uint32_t count = 0;
 
-  /// Appends the pairs that do overlap, with the begin and end of the overlap, rounded outwards.
+  /// Appends the pairs that do overlap, with the start and end of the overlap, rounded outwards.
   [[gnu::noinline]] void flush(JoinColumns& to) {
     constexpr std::size_t lanes = register_lanes<S, room>;
     using V = Vector<S, lanes>;

@@ -8,7 +8,7 @@ namespace kbvh {
 enum class KernelSet : std::uint8_t;
 
 /// Boxes of a wide hierarchy that are linear in time over a segment: child and node bounds as in
-/// `WideArrays`, at its begin and at its end. A box at a fraction in between is the interpolation, inflated
+/// `WideArrays`, at its start and at its end. A box at a fraction in between is the interpolation, inflated
 /// by the margin on every side.
 template <class S>
 struct WideEnds {
@@ -65,7 +65,7 @@ struct WideLeafJoin {
   WideLinearLeaves<S> leaves_a, leaves_b;
   const LeafSlot* pairs;  ///< first, second, ...
   std::size_t next, count;
-  JoinColumns throughout;  ///< pairs that overlap from the begin of the segment to its end
+  JoinColumns throughout;  ///< pairs that overlap from the start of the segment to its end
   JoinColumns partly;      ///< the others
   std::uint64_t tests;
 };

@@ -23,8 +23,8 @@ template <class S>
   return box;
 }
 template <class S>
-[[gnu::always_inline]] inline SixSides<S> own_box(const S* own) {
-  return {{own[0], own[1], own[2]}, {own[4], own[5], own[6]}};
+[[gnu::always_inline]] inline SixSides<S> own_box(const S* node_bounds) {
+  return {{node_bounds[0], node_bounds[1], node_bounds[2]}, {node_bounds[4], node_bounds[5], node_bounds[6]}};
 }
 
 /// Returns a mask. Bit i: lane i of the rows overlaps the box. Empty lanes overlap nothing.
