@@ -71,6 +71,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
     on_forest([&](auto& forest) { forest.reset(t); });
     for (std::uint32_t body = 0; body < rows_.size(); ++body) {
       follow_tree(body);
+      rows_[body].start_over();
       changed_now(body);
     }
     plans_changed_ = false;

@@ -106,7 +106,6 @@ void BoxTreeRows<S>::list_planes(const BoxTreeBounds& tree, std::span<const std:
   sources_.assign(count * scalars, empty_entry);
   parent_row_.assign(count, 0);
   std::vector<std::uint32_t> list;
-  std::uint32_t w = 0;
   const auto plane_entry = [&](std::uint32_t place, std::uint32_t side) {
     const std::uint32_t first = first_plane_.back();
     std::uint32_t i = first;
@@ -114,7 +113,7 @@ void BoxTreeRows<S>::list_planes(const BoxTreeBounds& tree, std::span<const std:
     if (i == planes_.size()) planes_.push_back({place, side});
     return std::uint8_t(first_plane_entry + (i - first));
   };
-  // The sides of a child of wide node `w`: those that binary nodes from it up to the wide node own, the
+  // The sides of a child of a wide node: those that binary nodes from it up to the wide node own, the
   // nearest first, and the wide node's.
   const auto list_child = [&](std::uint32_t child, std::uint32_t top, std::size_t place) {
     const bool tight = leaf_boxes_ == LeafBoxes::tight && wide.nodes[child].is_leaf();
@@ -148,9 +147,7 @@ void BoxTreeRows<S>::list_planes(const BoxTreeBounds& tree, std::span<const std:
     vertices_.insert(vertices_.end(), list.begin(), list.end());
     first_vertex_.push_back(std::uint32_t(vertices_.size()));
     first_plane_.push_back(std::uint32_t(planes_.size()));
-    ++w;
   }
-  (void)w;
 }
 
 template <class S>

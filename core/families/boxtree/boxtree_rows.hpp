@@ -1,5 +1,7 @@
 #pragma once
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -21,6 +23,13 @@ class BoxTreeRows {
   /// Children of a wide node, at most.
   static constexpr std::uint32_t width = 8;
 
+  /// Forgets what was made, and learnt from queries: a clip that is played again costs the same again.
+  void start_over() {
+    std::fill(stale_.begin(), stale_.end(), std::uint8_t(1));
+    visited_.clear();
+    frames_ = 0;
+    wake();
+  }
   /// Lays everything out for the tree as it is now, unless it has not changed since the last time. O(nodes).
   void follow(const BoxTreeBounds& tree, const Primitives& primitives, LeafBoxes leaf_boxes);
 
