@@ -1,19 +1,28 @@
-// The kinetic BoxTree (Z&W 2006, s.6), with the errata of the reproduction: two planes per inner node, all
-// other sides inherited, valid at every time, updated at events only. Degenerated parts can be rebuilt.
+// The kinetic BoxTree (Z&W 2006, s.6), with the errata of the reproduction: at most two planes per inner
+// node, all other sides inherited, valid at every time, updated at events only; parts that have degenerated
+// can be rebuilt. Queries make boxes as they need them, many at once (BoxTreeRows).
 
 #include <numeric>
 #include <variant>
 
 #include "core/contract/registry.hpp"
 #include "core/families/boxtree/boxtree_degradation.hpp"
+#include "core/families/boxtree/boxtree_rows.hpp"
 #include "core/families/boxtree/kinetic_boxtree.hpp"
 #include "core/families/events/event_log.hpp"
 #include "core/families/wide/near_bodies.hpp"
-#include "core/geometry/lane_box.hpp"
-#include "core/topology/leaf_pairs.hpp"
 
 namespace kbvh {
 namespace {
+
+BoxTreeConstruction construction(const Params& params, LeafBoxes leaf_boxes, std::uint32_t wide) {
+  BoxTreeConstruction made;
+  made.planes = params.word("planes") == "clip" ? PlaneChoice::clip : PlaneChoice::start;
+  made.candidates = params.word("candidates") == "listed" ? Candidates::listed : Candidates::searched;
+  // Where the boxes of leaves are made of vertices, no query reads a side below a wide node of leaves.
+  if (made.planes == PlaneChoice::clip && leaf_boxes == LeafBoxes::tight) made.bare_leaves = wide;
+  return made;
+}
 
 template <class S, class Count>
 class KineticBox final : public CountedStrategy<S, Count>,
@@ -29,14 +38,18 @@ class KineticBox final : public CountedStrategy<S, Count>,
   KineticBox(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
              const Params& params)
       : CountedStrategy<S, Count>(scene, motion),
+        motion_(motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         leaf_boxes_(params.word("leaf_boxes") == "tight" ? LeafBoxes::tight : LeafBoxes::inherited),
+        rows_(scene.body_count()),
         rebuilds_(params.word("rebuild") != "never"),
         threshold_(params.number("degradation")),
         frames_per_check_(std::uint64_t(params.number("check_every"))) {
-    if (rebuilds_) method_ = build_method(params.word("rebuild"));
-    for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
-    if (rebuilds_) degradations_.resize(topologies.size());
+    if (rebuilds_) {
+      method_ = build_method(params.word("rebuild"));
+      for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
+      degradations_.resize(topologies.size());
+    }
     const BoundObserver<S> observer{&watch_};
     if (params.word("queue") == SegmentHeapQueue<S>::name)
       forest_ = std::make_unique<Forest<SegmentHeapQueue<S>>>(scene, motion, std::move(topologies),
@@ -47,12 +60,20 @@ class KineticBox final : public CountedStrategy<S, Count>,
     else
       forest_ = std::make_unique<Forest<BinaryHeapQueue<S>>>(scene, motion, std::move(topologies),
                                                              this->count_, observer);
+    const BoxTreeConstruction made = construction(params, leaf_boxes_, BoxTreeRows<S>::width);
+    on_forest([&](auto& forest) {
+      for (std::uint32_t body = 0; body < forest.size(); ++body) forest.tree(body).construct_as(made);
+    });
   }
 
   void reset_to(double t) override {
     near_bodies_.start_over();
     on_forest([&](auto& forest) { forest.reset(t); });
-    new_frame();
+    for (std::uint32_t body = 0; body < rows_.size(); ++body) {
+      follow_tree(body);
+      rows_[body].start_over();
+      changed_now(body);
+    }
     plans_changed_ = false;
     frames_ = 0;
     for (std::uint32_t body = 0; body < degradations_.size(); ++body)
@@ -65,7 +86,8 @@ class KineticBox final : public CountedStrategy<S, Count>,
 
   void advance_to(double t) override {
     on_forest([&](auto& forest) { forest.advance(t); });
-    new_frame();
+    for (std::uint32_t body = 0; body < rows_.size(); ++body) rows_[body].new_frame(motion_, body);
+    for (auto& cache : caches_) cache.new_frame();
     if (rebuilds_ && ++frames_ % frames_per_check_ == 0)
       for (std::uint32_t body = 0; body < degradations_.size(); ++body)
         if (this->scene_.moving(body) || plans_changed_) rebuild_degenerate(body);
@@ -73,60 +95,55 @@ class KineticBox final : public CountedStrategy<S, Count>,
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
-    BoxTests tests;
-    on_forest([&](auto& forest) {
-      const auto box_of = [&](std::uint32_t body) -> Box<double> {
-        const auto& tree = forest.tree(body);
-        if (tree.topology().empty()) return {};
-        auto own = boxes(tree, body);
-        own.ensure(0);
-        return to_double(own(0));
-      };
-      for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
-        const BodyPair& pair = this->scene_.pairs()[i];
-        if (tests.made >= budget.box_tests) {
-          ++status.pending;
-          continue;
-        }
-        const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
-        LeafPairs<S, BoxTests> several(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
-                                       b.topology(), tests, out);
-        // Inherited boxes of leaves are not tight, so the boxes of primitives are tested, too.
-        const auto leaves = [&](std::uint32_t leaf_a, std::uint32_t leaf_b) {
-          const TopologyNode na = a.topology().nodes[leaf_a], nb = b.topology().nodes[leaf_b];
-          if (leaf_boxes_ == LeafBoxes::inherited && na.count() == 1 && nb.count() == 1) {
-            tests.add(Counter::box_tests);
-            if (!tight_box(a, na, pair.first).overlaps(tight_box(b, nb, pair.second))) return;
-          }
-          several(leaf_a, leaf_b);
-        };
-        status.pending += traverse(a.topology(), boxes(a, pair.first), b.topology(), boxes(b, pair.second),
-                                   stack_, tests, rest_of(budget, tests.made), leaves)
-                              .pending;
+    std::uint64_t tests = 0;
+    for (std::uint32_t body = 0; body < rows_.size(); ++body)
+      this->count_.add(Counter::positions_fetched, rows_[body].make_visited(tree_of(body), motion_, body));
+    const auto box_of = [&](std::uint32_t body) {
+      const auto& hierarchy = rows_[body].hierarchy();
+      return hierarchy.empty() ? Box<double>{} : to_double(hierarchy.box(0));
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      if (tests >= budget.box_tests) {
+        ++status.pending;
+        continue;
       }
-    });
-    this->count_.add(Counter::box_tests, tests.made);
+      const auto side = [&](std::uint32_t body) -> typename WideQuery<S>::LazySide {
+        return {&rows_[body].hierarchy(), body, rows_[body].stale()};
+      };
+      const auto side_a = side(pair.first), side_b = side(pair.second);
+      query_.start_lazy(side_a, side_b, rest_of(budget, tests));
+      using Wanted = typename WideQuery<S>::Wanted;
+      while (const Wanted wanted = query_.step(side_a, side_b, this->scene_, this->sampled_, out, tests)) {
+        make_wanted(pair.first, wanted.first);
+        make_wanted(pair.second, wanted.second);
+      }
+      status.pending += query_.lazy_status().pending;
+    }
+    this->count_.add(Counter::box_tests, tests);
     return status;
   }
 
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
     on_forest([&](auto& forest) { forest.plans_changed(t, changes); });
     plans_changed_ = true;
-    new_frame();  // realisers may differ now
+    for (const PlanChange<S>& change : changes) rows_[change.body].wake();
+    for (std::uint32_t body = 0; body < rows_.size(); ++body) changed_now(body);  // realisers may differ now
   }
 
   void follow_geometry(double t, const GeometryChange<S>& change) override {
     const std::vector<BodyChange> changes = body_changes(this->scene_, change);
-    on_forest([&](auto& forest) {
-      forest.geometry_changed(t, this->scene_, this->sampled_, changes);
-      for (const BodyChange& own : changes) caches_[own.body].resize(forest.tree(own.body).topology().size());
-    });
-    plans_changed_ = true;  // resting bodies may move now
-    new_frame();
+    on_forest([&](auto& forest) { forest.geometry_changed(t, this->scene_, this->sampled_, changes); });
+    plans_changed_ = true;  // bodies may move that did not
+    for (const BodyChange& own : changes) {
+      follow_tree(own.body);
+      changed_now(own.body);
+    }
     if (!rebuilds_) return;
     on_forest([&](auto& forest) {
       for (const BodyChange& own : changes) {
         const auto& tree = forest.tree(own.body);
+        caches_[own.body].resize(tree.topology().size());
         const auto boxes = all_boxes(tree, own.body);
         degradations_[own.body].edited(tree.topology(), order_, boxes);
       }
@@ -155,13 +172,15 @@ class KineticBox final : public CountedStrategy<S, Count>,
       const auto& tree = forest.tree(body);
       std::vector<std::uint32_t> order;
       AuditView view{tree.compacted_topology(order), {}, {}};
-      BoxCache<S> cache =
-          caches_[body];  // counts the boxes that a query read; the others are derived from them
+      BoxCache<S> cache(tree.topology().size());
       InheritedBoxes<S, std::remove_cvref_t<decltype(tree)>> boxes(tree, this->sampled_, body, cache,
                                                                    leaf_boxes_);
       for (const std::uint32_t node : order) {
         boxes.ensure(node);
-        view.boxes.push_back(to_double(boxes(node)));
+        // What a query read counts.
+        Box<S> room;
+        const Box<S>* read = rows_[body].read_box(node, room);
+        view.boxes.push_back(to_double(read != nullptr ? *read : boxes(node)));
       }
       return view;
     });
@@ -169,7 +188,8 @@ class KineticBox final : public CountedStrategy<S, Count>,
 
   std::size_t bytes() const override {
     std::size_t total = on_forest([](auto& forest) { return forest.bytes(); });
-    total += near_bodies_.bytes();
+    total += near_bodies_.bytes() + query_.bytes();
+    for (const auto& rows : rows_) total += rows.bytes();
     for (const auto& cache : caches_) total += cache.bytes();
     for (const auto& degradation : degradations_) total += degradation.bytes();
     return total;
@@ -192,14 +212,26 @@ class KineticBox final : public CountedStrategy<S, Count>,
   decltype(auto) on_forest(Work&& work) const {
     return std::visit([&](const auto& forest) -> decltype(auto) { return work(*forest); }, forest_);
   }
-  void new_frame() {
-    for (auto& cache : caches_) cache.new_frame();
+  const BoxTreeBounds& tree_of(std::uint32_t body) const {
+    return on_forest([&](auto& forest) -> const BoxTreeBounds& { return forest.tree(body); });
   }
-  template <class Tree>
-  InheritedBoxes<S, Tree> boxes(const Tree& tree, std::uint32_t body) {
-    return {tree, this->sampled_, body, caches_[body], leaf_boxes_};
+  /// Lays a body's rows out anew if its tree has changed.
+  void follow_tree(std::uint32_t body) {
+    rows_[body].follow(tree_of(body), this->scene_.primitives(body), leaf_boxes_);
+    rows_[body].wake();
   }
-  /// Returns the boxes of all nodes; afterwards `order_` lists the nodes, parents before children.
+  /// Boxes made before are not those of the present time.
+  void changed_now(std::uint32_t body) {
+    rows_[body].new_frame(motion_, body);
+    if (rebuilds_) caches_[body].new_frame();
+  }
+  void make_wanted(std::uint32_t body, std::uint32_t node) {
+    if (node != WideQuery<S>::Wanted::none)
+      this->count_.add(Counter::positions_fetched,
+                       rows_[body].make_wanted(node, tree_of(body), motion_, body));
+  }
+
+  /// The boxes of all nodes; these are in `order_` then, parents before children.
   template <class Tree>
   InheritedBoxes<S, Tree> all_boxes(const Tree& tree, std::uint32_t body) {
     if (tree.edited()) {
@@ -208,16 +240,9 @@ class KineticBox final : public CountedStrategy<S, Count>,
       order_.resize(tree.topology().size());
       std::iota(order_.begin(), order_.end(), 0u);
     }
-    auto all = boxes(tree, body);
+    InheritedBoxes<S, Tree> all(tree, this->sampled_, body, caches_[body], leaf_boxes_);
     for (const std::uint32_t node : order_) all.ensure(node);
     return all;
-  }
-  /// Returns the box of the only primitive of a leaf.
-  template <class Tree>
-  LaneBox<S> tight_box(const Tree& tree, TopologyNode leaf, std::uint32_t body) const {
-    const auto vertices = this->scene_.primitives(body)[tree.topology().primitives[leaf.first()]];
-    this->sampled_.fetch(body, vertices);
-    return LaneBox<S>::of(vertices, this->sampled_.positions(body));
   }
 
   void rebuild_degenerate(std::uint32_t body) {
@@ -228,7 +253,8 @@ class KineticBox final : public CountedStrategy<S, Count>,
       const auto& nodes = degradations_[body].beyond(threshold_, tree.topology(), order_, all);
       if (nodes.empty()) return;
       for (const std::uint32_t node : nodes) tree.rebuild_below(node, all(node), this->sampled_, method_);
-      caches_[body].new_frame();
+      follow_tree(body);
+      changed_now(body);
       const auto rebuilt = all_boxes(tree, body);
       degradations_[body].rebuilt(tree.topology(), order_, rebuilt);
       this->count_.add(Counter::nodes_visited, tree.topology().size());
@@ -239,18 +265,21 @@ class KineticBox final : public CountedStrategy<S, Count>,
   std::variant<std::unique_ptr<Forest<SegmentHeapQueue<S>>>, std::unique_ptr<Forest<AvlQueue<S>>>,
                std::unique_ptr<Forest<BinaryHeapQueue<S>>>>
       forest_;
+  ClipMotion<S> motion_;
   NearBodies near_bodies_;
-  std::vector<BoxCache<S>> caches_;
-  std::vector<NodePair> stack_;
-  std::vector<std::uint32_t> order_;
-  std::uint64_t first_step_ = 0;
   LeafBoxes leaf_boxes_;
+  std::vector<BoxTreeRows<S>> rows_;  ///< [body]
+  WideQuery<S> query_;
+  std::uint64_t first_step_ = 0;
+  std::vector<std::uint32_t> order_;
   bool rebuilds_;
   bool plans_changed_ = false;
   BuildMethod method_ = BuildMethod::median;
   double threshold_;
   std::uint64_t frames_per_check_, frames_ = 0;
-  std::vector<BoxTreeDegradation> degradations_;  ///< [body]; none if nothing is rebuilt
+  // [body]; none if nothing is rebuilt
+  std::vector<BoxCache<S>> caches_;
+  std::vector<BoxTreeDegradation> degradations_;
 };
 
 }  // namespace
@@ -268,17 +297,26 @@ KBVH_STRATEGY(kinetic_boxtree) {
       .declares = {.continuous = true,
                    .restructures = true /* with rebuild=median or sah */,
                    .time_budget = true},
-      .topology = {.widths = {2}, .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+      .topology = {.widths = {2}, .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 4}},
       .parameters =
           {{"queue",
-            "avl",
+            "segment_heap",
             {"segment_heap", "avl", "binary_heap"},
             "event queue: lists by segment and a heap of what comes next, the paper's AVL tree, or "
             "an indexed binary heap"},
+           {"planes",
+            "clip",
+            {"clip", "start"},
+            "sides that nodes own: each the one that is expected to save most overlaps over the clip, or the "
+            "paper's, two on one axis for the least area at the start"},
+           {"candidates",
+            "listed",
+            {"listed", "searched"},
+            "candidates of a certificate: listed at the start, or searched for each time as in the paper"},
            {"leaf_boxes",
-            "inherited",
-            {"inherited", "tight"},
-            "boxes of leaves in queries: inherited like all others, or made of the leaf's vertices"},
+            "tight",
+            {"tight", "inherited"},
+            "boxes of leaves in queries: made of the leaf's vertices, or inherited like all others"},
            {"rebuild",
             "never",
             {"never", "median", "sah"},

@@ -76,9 +76,12 @@ std::uint64_t most_events_of_planes(const Forest& forest, const Forest::Tree& tr
 std::uint64_t bytes_of_strategy(const SceneView<float>& view, Playback<float>& playback,
                                 const Topologies& topologies, double t) {
   const StrategyEntry& entry = find_strategy("kinetic_boxtree");
-  const auto strategy =
-      create(entry, view, playback, topologies,
-             Params(entry.info.id, entry.info.parameters, {{"queue", "avl"}}), CountingPolicy::silent);
+  const auto strategy = create(
+      entry, view, playback, topologies,
+      Params(
+          entry.info.id, entry.info.parameters,
+          {{"queue", "avl"}, {"planes", "start"}, {"candidates", "searched"}, {"leaf_boxes", "inherited"}}),
+      CountingPolicy::silent);
   playback.seek(t);
   strategy->reset(t);
   return strategy->bytes();

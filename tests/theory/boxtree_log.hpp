@@ -71,6 +71,7 @@ struct BoxTreePlay {
   std::uint32_t frames_per_keyframe = 1;
   double start_after = 0;          ///< fraction of the clip that is skipped
   std::uint64_t rebuild_seed = 0;  ///< not 0: at every frame, parts chosen at random are rebuilt
+  BoxTreeConstruction construction{};
 };
 
 struct BoxTreeReport {
@@ -107,12 +108,15 @@ class BoxTreeProof {
                                        build_topologies(view_, playback_, play.builder), count_,
                                        BoxTreeRecorder<S>{&log_});
     for (const auto& body : test.scene.bodies) plans_.push_back(stored_plans(body.plans));
+    for (std::uint32_t body = 0; body < view_.body_count(); ++body)
+      forest_->tree(body).construct_as(play.construction);
   }
 
   BoxTreeReport play_all() {
     forest_->reset(first_);
     begin_ = first_;
     start_ = bounds();
+    for (std::uint32_t body = 0; body < view_.body_count(); ++body) check_bare(forest_->tree(body));
     auto step = test_.script.steps.begin();
     while (step != test_.script.steps.end() && step->time < first_) ++step;
     double last = first_;
@@ -137,6 +141,21 @@ class BoxTreeProof {
     for (std::uint32_t body = 0; body < view_.body_count(); ++body)
       all.push_back(stored_bounds(forest_->tree(body)));
     return all;
+  }
+
+  /// Sides are owned by all nodes that are to, and no others.
+  template <class Tree>
+  void check_bare(const Tree& tree) {
+    const std::uint32_t bare = play_.construction.bare_leaves;
+    std::vector<std::uint32_t> leaves(tree.topology().size(), 1);
+    for (std::uint32_t node = tree.topology().size(); node-- > 0;) {
+      const TopologyNode n = tree.topology().nodes[node];
+      if (!n.is_leaf()) leaves[node] = leaves[n.first()] + leaves[n.first() + 1];
+    }
+    for (std::uint32_t node = 1; node < tree.topology().size(); ++node) {
+      const bool owns = bare == 0 || (leaves[tree.topology().parents[node]] > bare && leaves[node] > 1);
+      if (owns != (tree.own_side(node) != no_side)) fail("a node without a side of its own, or with one");
+    }
   }
 
   void fail(const std::string& what) {

@@ -7,7 +7,9 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "core/families/boxtree/boxtree_rows.hpp"
 #include "core/judge/audit.hpp"
+#include "core/kernels/kernel_set.hpp"
 #include "tests/theory/boxtree_log.hpp"
 
 namespace kbvh::test {
@@ -41,6 +43,10 @@ BoxTreeReport prove_with_all_queues(const TestScene<S>& test, const BoxTreePlay&
   return report;
 }
 
+/// As `kinetic_boxtree` is made where nothing else is said, but that small trees have bare parts, too.
+constexpr BoxTreeConstruction for_the_clip{
+    .planes = PlaneChoice::clip, .candidates = Candidates::listed, .bare_leaves = 4};
+
 // ---- All synthetic scenes ------------------------------------------------------------------------------
 
 class BoxTreeEnvelopes : public testing::TestWithParam<std::string> {};
@@ -59,6 +65,23 @@ void prove_synthetic(const std::string& name) {
     prove(test, {.builder = {.method = method, .width = 2, .leaf_size = 3}, .frames_per_keyframe = 2});
   }
   prove(test, {.builder = {.method = BuildMethod::sah, .width = 2, .leaf_size = 2}, .rebuild_seed = 7});
+  {
+    SCOPED_TRACE("planes for the clip");
+    play.rebuild_seed = 0;
+    play.construction = for_the_clip;
+    std::printf("  with planes for the clip: %s\n", summary(prove_with_all_queues(test, play)).c_str());
+    play.construction.candidates = Candidates::searched;
+    prove(test, play);
+    play.construction = {.planes = PlaneChoice::clip, .candidates = Candidates::listed};
+    prove(test, play);
+    play.construction = {.candidates = Candidates::listed};
+    prove(test, play);
+    play.construction = for_the_clip;
+    play.rebuild_seed = 8;
+    play.builder = {.method = BuildMethod::sah, .width = 2, .leaf_size = 2};
+    prove(test, play);
+    play = {.frames_per_keyframe = 2};
+  }
   if (!test.script.steps.empty()) return;
   play.rebuild_seed = 0;
   play.start_after = 0.37;  // between keyframes
@@ -80,6 +103,20 @@ TEST(BoxTree, LogIsTheEnvelopeEntryByEntryInGeneralPosition) {
   EXPECT_EQ(report.envelope.logged, report.envelope.envelope);
   EXPECT_EQ(report.changes_by_event, report.values_written);  // no internal events
   EXPECT_GT(report.envelope.net, 300u);
+}
+
+TEST(BoxTree, ListedCandidatesAreThoseThatASearchFinds) {
+  for (const PlaneChoice planes : {PlaneChoice::start, PlaneChoice::clip}) {
+    const auto test = synthetic_scene<double>("soups");
+    BoxTreePlay play{.construction = {.planes = planes}};
+    const BoxTreeReport searched = prove(test, play);
+    play.construction.candidates = Candidates::listed;
+    const BoxTreeReport listed = prove(test, play);
+    EXPECT_EQ(searched.events, listed.events);
+    EXPECT_EQ(searched.values_written, listed.values_written);
+    EXPECT_EQ(searched.envelope.net, listed.envelope.net);
+    EXPECT_GT(listed.events, 200u);
+  }
 }
 
 TEST(BoxTree, EventsDoNotDependOnTheNumberOfFrames) {
@@ -183,6 +220,98 @@ TEST(BoxTree, IsValidBetweenEvents) {
     const std::uint64_t audits = audit_between_events<float>(name) + audit_between_events<double>(name);
     EXPECT_GT(audits, name == "soups" ? 400u : 3u);
   }
+}
+
+/// Points on slow circles: many realisers last for longer than queues look ahead at once.
+TestScene<float> circling_points(std::uint32_t count, std::uint32_t keyframes) {
+  Body<float> body;
+  body.name = "points";
+  body.primitives.kind = PrimitiveKind::points;
+  std::vector<double> times;
+  std::vector<float> positions;
+  for (std::uint32_t p = 0; p < count; ++p) body.primitives.add(std::vector<std::uint32_t>{p});
+  for (std::uint32_t k = 0; k < keyframes; ++k) {
+    times.push_back(k);
+    for (std::uint32_t p = 0; p < count; ++p)
+      for (std::uint32_t axis = 0; axis < 3; ++axis)
+        positions.push_back(float((1 + 0.1 * p) * std::sin(0.013 * k * (1 + 0.07 * p) + 2.1 * axis + p)));
+  }
+  body.plans = FlightPlans<float>(count, times, std::move(positions));
+  TestScene<float> test;
+  test.scene.name = "circling points";
+  test.scene.bodies.push_back(std::move(body));
+  return test;
+}
+
+TEST(BoxTree, LongClipsAreLookedAtInParts) {
+  const TestScene<float> test = circling_points(24, 300);
+  BoxTreePlay play;
+  const BoxTreeReport report = prove_with_all_queues(test, play);
+  EXPECT_GT(report.events, 100u);
+  play.construction = for_the_clip;
+  EXPECT_GT(prove_with_all_queues(test, play).events, 30u);
+}
+
+// ---- Rows that queries read ------------------------------------------------------------------------------
+
+/// Makes all rows of a scene's trees at each frame, as queries would, and holds them against the boxes that
+/// single nodes inherit. Returns how many boxes were compared.
+template <class S>
+std::uint64_t compare_rows(const std::string& name, const BoxTreeConstruction& construction,
+                           LeafBoxes leaf_boxes, std::uint32_t leaf_size) {
+  const auto test = synthetic_scene<S>(name);
+  const SceneView<S> view(test.scene);
+  Playback<S> playback(test.scene);
+  const std::vector<double> frames = frame_times(test.scene, 3);
+  playback.seek(frames.front());
+  const ClipMotion<S> motion(playback);
+  Counting count;
+  KineticBoxForest<S, SegmentHeapQueue<S>, Counting> forest(
+      view, motion, build_topologies(view, playback, {.width = 2, .leaf_size = leaf_size}), count);
+  for (std::uint32_t body = 0; body < view.body_count(); ++body) forest.tree(body).construct_as(construction);
+  forest.reset(frames.front());
+  std::vector<BoxTreeRows<S>> rows(view.body_count());
+  std::uint64_t compared = 0;
+  for (const double t : frames) {
+    playback.seek(t);
+    forest.advance(t);
+    for (std::uint32_t body = 0; body < view.body_count(); ++body) {
+      const auto& tree = forest.tree(body);
+      if (tree.topology().empty()) continue;
+      rows[body].follow(tree, view.primitives(body), leaf_boxes);
+      rows[body].new_frame(motion, body);
+      rows[body].make_visited(tree, motion, body);
+      for (std::uint32_t node = 0; node < rows[body].hierarchy().node_count(); ++node)
+        if (rows[body].stale()[node] != 0) rows[body].make_wanted(node, tree, motion, body);
+      BoxCache<S> cache(tree.topology().size());
+      InheritedBoxes<S, std::remove_cvref_t<decltype(tree)>> boxes(tree, motion, body, cache, leaf_boxes);
+      for (std::uint32_t node = 0; node < tree.topology().size(); ++node) {
+        boxes.ensure(node);
+        Box<S> room;
+        const Box<S>* read = rows[body].read_box(node, room);
+        if (read == nullptr) continue;
+        EXPECT_EQ(*read, boxes(node)) << name << ", t = " << t << ", body " << body << ", node " << node;
+        ++compared;
+      }
+      EXPECT_TRUE(boxes(0).contains(rows[body].hierarchy().box(0)));
+    }
+  }
+  return compared;
+}
+
+TEST(BoxTreeRows, AreTheInheritedBoxes) {
+  const KernelSet before = active_kernel_set();
+  for (const KernelSet set : supported_kernel_sets()) {
+    use_kernel_set(set);
+    for (const char* name : {"soups", "sheets", "integer_ties", "four_bodies_own_keyframes"})
+      for (const LeafBoxes leaf_boxes : {LeafBoxes::tight, LeafBoxes::inherited})
+        for (const std::uint32_t leaf_size : {1U, 3U})
+          for (const BoxTreeConstruction& construction : {BoxTreeConstruction{}, for_the_clip}) {
+            EXPECT_GT(compare_rows<float>(name, construction, leaf_boxes, leaf_size), 20u) << name;
+            EXPECT_GT(compare_rows<double>(name, construction, leaf_boxes, leaf_size), 20u) << name;
+          }
+  }
+  use_kernel_set(before);
 }
 
 // ---- The cost of certificate searches (T12)

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/families/boxtree/boxtree.hpp"
+#include "core/families/boxtree/boxtree_leaves.hpp"
 #include "core/families/events/event.hpp"
 #include "core/topology/topology.hpp"
 
@@ -41,22 +41,17 @@ class CandidateSearch {
   /// Vertices may have been added.
   void resize(std::uint32_t vertex_count) { seen_.resize(vertex_count, 0); }
 
-  /// Calls visit(vertex) once for every candidate of a node's certificate for one side; `own_sides` [node],
-  /// realiser(node) is the vertex of a node's own side. Returns how many nodes were looked at, up to
-  /// O(nodes).
-  template <class Realiser, class Visit>
+  /// Calls on_child(child) for every child with the same own side that the search of a node's certificate for
+  /// one side meets, and on_vertex(vertex) for the vertices of the leaves that it meets, each once;
+  /// `own_sides` [node]. Returns how many nodes were looked at, up to O(nodes).
+  template <class OnChild, class OnVertex>
   std::uint64_t run(const Topology& topology, const BoxTreeLeaves& leaves, const std::uint8_t* own_sides,
-                    std::uint32_t node, Side side, Realiser&& realiser, Visit&& visit) {
+                    std::uint32_t node, Side side, OnChild&& on_child, OnVertex&& on_vertex) {
     std::uint64_t visited = 0;
     if (++search_ == 0) {
       std::fill(seen_.begin(), seen_.end(), 0);
       search_ = 1;
     }
-    const auto visit_once = [&](std::uint32_t vertex) {
-      if (seen_[vertex] == search_) return;
-      seen_[vertex] = search_;
-      visit(vertex);
-    };
     open_.clear();
     open_.push_back(node);
     while (!open_.empty()) {
@@ -65,18 +60,25 @@ class CandidateSearch {
       ++visited;
       const TopologyNode n = topology.nodes[at];
       if (n.is_leaf()) {
-        for (std::uint32_t v : leaves[n]) visit_once(v);
+        for (std::uint32_t v : leaves[n])
+          if (first_visit(v)) on_vertex(v);
         continue;
       }
       for (std::uint32_t child = n.first() + 2; child-- > n.first();)
         if (own_sides[child] == side) {
           ++visited;
-          visit_once(realiser(child));
+          on_child(child);
         } else if (Rules::descends(own_sides[child], side)) {
           open_.push_back(child);
         }
     }
     return visited;
+  }
+  /// Within a search: was the vertex not met before? It is now.
+  bool first_visit(std::uint32_t vertex) {
+    if (seen_[vertex] == search_) return false;
+    seen_[vertex] = search_;
+    return true;
   }
 
   std::size_t bytes() const { return seen_.size() * sizeof(std::uint32_t); }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -227,6 +228,12 @@ class EventClock {
     std::size_t first_ahead(std::uint32_t loser, std::uint32_t winner, std::size_t limit) const {
       const S *const l = rows->row(loser, axis), *const w = rows->row(winner, axis);
       return upper ? rows->first_above(l, w, begin, limit) : rows->first_above(w, l, begin, limit);
+    }
+    /// The next of `losers`, from number `first` on, that is strictly ahead of `winner` at one of these
+    /// before `limit`, and at which.
+    RowAhead next_ahead(std::span<const std::uint32_t> losers, std::size_t first, std::uint32_t winner,
+                        std::size_t limit) const {
+      return rows->next_ahead(axis, upper, losers, first, winner, begin, limit);
     }
   };
   /// From an instant on, in segments that begin before `until`. Only for bodies with several keyframes.

@@ -28,6 +28,13 @@ class KeyframeRows {
   std::size_t first_above(const S* a, const S* b, std::size_t from, std::size_t end) const {
     return kernels_->first_above(a, b, from, end);
   }
+  /// The first of vertices[first .. count) that is ahead of `winner` on a side of the axis, and at which
+  /// keyframe in [from, end). Exact.
+  RowAhead next_ahead(int axis, bool upper, std::span<const std::uint32_t> vertices, std::size_t first,
+                      std::uint32_t winner, std::size_t from, std::size_t end) const {
+    return kernels_->next_ahead[upper ? 1 : 0]({row(0, axis), times_.size()}, vertices.data(), first,
+                                               vertices.size(), row(winner, axis), from, end);
+  }
   std::size_t bytes() const { return values_.size() * sizeof(S); }
 
  private:

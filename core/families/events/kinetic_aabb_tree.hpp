@@ -11,6 +11,7 @@
 #include "core/base/counters.hpp"
 #include "core/contract/event_source.hpp"
 #include "core/families/events/certificate_slots.hpp"
+#include "core/families/events/certifier.hpp"
 #include "core/families/events/event.hpp"
 #include "core/families/events/leaf_vertex_lists.hpp"
 #include "core/families/events/observer.hpp"
@@ -48,6 +49,7 @@ class KineticAabbTree {
         queue_(&queue),
         count_(&count),
         observer_(observer),
+        certifier_(clock, queue, count),
         realisers_(std::size_t(6) * topology_.size(), 0) {}
 
   static std::uint64_t slot_count(const Topology& topology) { return std::uint64_t(6) * topology.size(); }
@@ -262,123 +264,19 @@ class KineticAabbTree {
     observer_.template realiser_changed<S>(body_, node, side, old, vertex, now);
   }
 
-  void discard(std::uint32_t slot) {
-    if (!queue_->cancel(slot)) return;
-    count_->add(Counter::certificates_discarded);
-    count_->add(Counter::queue_operations);
-  }
   /// Schedules the earliest failure of the side's certificate from now on, in place of the one that stood.
   void certify(std::uint32_t node, Side side, const Instant<S>& now) {
-    if constexpr (requires { clock_->keyframe_search(body_, side, now, 0.0); })
-      if (!clock_->plans(body_).has_own_plans()) return certify_keyframed(node, side, now);
-    const std::uint32_t slot = this->slot(node, side), winner = realiser(node, side);
-    const std::uint32_t n = candidate_count(node);
-    Event event, earliest;
-    bool found = false;
-    event.winner = winner;
-    event.slot = slot;
-    event.body = body_ % Event::most_bodies;
-    event.side = side & 7U;
-    event.depth = topology_.depths[node];
-    // The queue must not hold this slot while the clock learns its new crossing.
-    discard(slot);
-    std::optional<Crossing<S>> own, earliest_own;
-    double horizon = never;
-    if constexpr (Queue::look_ahead > 0) horizon = clock_->horizon(body_, now, Queue::look_ahead);
-    for (;;) {
-      double until = horizon;
-      for (std::uint32_t i = 0; i < n; ++i) {
-        event.loser = candidate(node, side, i);
-        if (event.loser == winner) continue;
-        count_->add(Counter::certificates_made);
-        if (!clock_->first_failure(event, now, own, until)) continue;
-        if (found && !clock_->overtakes_first(event, own, earliest, earliest_own)) continue;
-        found = true;
-        earliest = event;
-        earliest_own = own;
-        until = std::min(until, earliest.end);
-      }
-      if (std::isinf(horizon)) break;
-      if (found && (earliest.end <= horizon || earliest.hint + earliest.error < horizon)) break;
-      clock_->remember(slot, {});
-      count_->add(Counter::queue_operations);
-      event.begin = horizon;
-      event.segment = Event::no_segment;
-      if (review_at(event, horizon)) return;
-      horizon = never;
-      found = false;
-    }
-    clock_->remember(slot, earliest_own);
-    if (!found) return;
-    queue_->schedule(earliest);
-    count_->add(Counter::queue_operations);
-    count_->peak(Counter::queue_peak, queue_->size());
-  }
-
-  /// `certify` where no vertex has a plan of its own.
-  void certify_keyframed(std::uint32_t node, Side side, const Instant<S>& now) {
-    const std::uint32_t slot = this->slot(node, side), winner = realiser(node, side);
-    discard(slot);
-    if (clock_->keyframe_count(body_) < 2) return;
-    double horizon = never;
-    if constexpr (Queue::look_ahead > 0) horizon = clock_->horizon(body_, now, Queue::look_ahead);
     Event event;
-    event.winner = winner;
-    event.slot = slot;
+    event.winner = realiser(node, side);
+    event.slot = slot(node, side);
     event.body = body_ % Event::most_bodies;
     event.side = side & 7U;
     event.depth = topology_.depths[node];
-    if (find_failure(event, node, clock_->keyframe_search(body_, side, now, horizon))) {
-      queue_->schedule(event);
-    } else {
-      if (horizon == never) return;
-      event.begin = horizon;
-      event.loser = winner;
-      if (!review_at(event, horizon)) {
-        if (!find_failure(event, node, clock_->keyframe_search(body_, side, now, never))) return;
-        queue_->schedule(event);
-      }
-    }
-    count_->add(Counter::queue_operations);
-    count_->peak(Counter::queue_peak, queue_->size());
-  }
-  bool review_at(const Event& event, double time) {
-    if constexpr (Queue::look_ahead > 0)
-      return queue_->review(event, time);
-    else
-      return false;
-  }
-  /// Fills in the earliest failure of a certificate, if there is one.
-  template <class Search>
-  bool find_failure(Event& event, std::uint32_t node, const Search& search) {
-    std::size_t limit = search.end, made = 0;
-    bool found = false;
-    const auto consider = [&](std::uint32_t challenger) {
-      if (challenger == event.winner) return;
-      ++made;
-      const std::size_t ahead_at = search.first_ahead(challenger, event.winner, limit);
-      if (ahead_at == limit) return;
-      if (found && ahead_at + 1 == limit && !comes_first(event, challenger, ahead_at)) return;
-      found = true;
-      event.loser = challenger;
-      limit = ahead_at + 1;
-    };
     const TopologyNode n = topology_.nodes[node];
-    if (n.is_leaf())
-      for (const std::uint32_t vertex : leaf_vertices_[node]) consider(vertex);
-    else
-      for (std::uint32_t i = 0; i < n.count(); ++i) consider(realiser(n.first() + i, event.side));
-    count_->add(Counter::certificates_made, made);
-    if (found) clock_->set_failure(event, limit - 1);
-    return found;
-  }
-  /// Of two that get ahead in one segment.
-  bool comes_first(const Event& than, std::uint32_t challenger, std::size_t ahead_at) const {
-    Event first = than, other = than;
-    first.loser = challenger;
-    clock_->set_failure(first, ahead_at);
-    clock_->set_failure(other, ahead_at);
-    return clock_->overtakes_first(first, {}, other, {});
+    if (n.is_leaf()) return certifier_.certify(event, now, leaf_vertices_[node]);
+    std::uint32_t candidates[8];  // children
+    for (std::uint32_t i = 0; i < n.count(); ++i) candidates[i] = realiser(n.first() + i, side);
+    certifier_.certify(event, now, {candidates, n.count()});
   }
 
   std::uint32_t vertex_count() const { return clock_->plans(body_).vertex_count(); }
@@ -390,7 +288,7 @@ class KineticAabbTree {
   void follow_edit() {
     for (const std::uint32_t node : edit_.vacated) {
       for (Side side = 0; side < 6; ++side) {
-        discard(slot(node, side));
+        certifier_.withdraw(slot(node, side));
         clock_->remember(slot(node, side), {});
         realisers_[std::size_t(6) * node + side] = no_vertex;
       }
@@ -467,7 +365,6 @@ class KineticAabbTree {
   }
   bool side_moved(std::uint32_t node, Side side) const { return (moved_[node] >> side) & 1; }
 
-  static constexpr double never = std::numeric_limits<double>::infinity();
   static constexpr std::uint8_t other_candidates = 1 << 6;  ///< in `moved_`
 
   Topology topology_;
@@ -478,6 +375,7 @@ class KineticAabbTree {
   Queue* queue_;
   Count* count_;
   Observer observer_;
+  Certifier<S, Queue, Count> certifier_;
   std::vector<std::uint32_t> realisers_;  ///< [node][side]
   // For changes of plans, made when the first one comes: marks of affected nodes.
   std::vector<std::uint32_t> touched_, marked_, affected_;

@@ -6,24 +6,47 @@ namespace kbvh {
 namespace {
 
 template <class S>
-std::size_t first_above(const S* a, const S* b, std::size_t from, std::size_t end) {
+[[gnu::always_inline]] inline std::size_t scan(const S* above, const S* below, std::size_t from,
+                                               std::size_t end) {
   constexpr std::size_t lanes = native_lanes<S>;
   static_assert(lanes <= row_padding);
   using V = Vector<S, lanes>;
   for (std::size_t i = from; i < end; i += lanes) {
-    const unsigned above = mask_bits(load_lanes<V>(a + i) > load_lanes<V>(b + i));
-    if (above == 0) continue;
-    const std::size_t found = i + std::size_t(__builtin_ctz(above));
+    const unsigned bits = mask_bits(load_lanes<V>(above + i) > load_lanes<V>(below + i));
+    if (bits == 0) continue;
+    const std::size_t found = i + std::size_t(__builtin_ctz(bits));
     return found < end ? found : end;
   }
   return end;
 }
 
+template <class S>
+std::size_t first_above(const S* a, const S* b, std::size_t from, std::size_t end) {
+  return scan(a, b, from, end);
+}
+
+template <class S, int upper>
+RowAhead next_ahead(RowTable<S> rows, const std::uint32_t* vertices, std::size_t first, std::size_t count,
+                    const S* winner, std::size_t from, std::size_t end) {
+  constexpr std::size_t fetched_ahead = 6;
+  for (std::size_t i = first; i < count; ++i) {
+    if (i + fetched_ahead < count)
+      __builtin_prefetch(rows.values + vertices[i + fetched_ahead] * rows.stride + from);
+    const S* const row = rows.values + vertices[i] * rows.stride;
+    const std::size_t at = upper == 1 ? scan(row, winner, from, end) : scan(winner, row, from, end);
+    if (at < end) return {i, at};
+  }
+  return {count, end};
+}
+
+template <class S>
+constexpr RowScanKernels<S> table{&first_above<S>, {&next_ahead<S, 0>, &next_ahead<S, 1>}};
+
 }  // namespace
 
 namespace kernels::KBVH_KERNELS {
-const RowScanKernels<float> row_scan_float{&first_above<float>};
-const RowScanKernels<double> row_scan_double{&first_above<double>};
+const RowScanKernels<float> row_scan_float = table<float>;
+const RowScanKernels<double> row_scan_double = table<double>;
 }  // namespace kernels::KBVH_KERNELS
 
 }  // namespace kbvh

@@ -1,0 +1,94 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/base/list_pool.hpp"
+#include "core/geometry/lane_box.hpp"
+#include "core/topology/topology.hpp"
+
+namespace kbvh {
+
+/// The unique vertices of leaves, ascending, found by the primitives a leaf holds and not by its node: they
+/// stay what they are when leaves move to other nodes.
+class BoxTreeLeaves {
+ public:
+  BoxTreeLeaves(const Topology& topology, const Primitives& primitives) {
+    const LeafVertices by_node = unique_leaf_vertices(topology, primitives);
+    std::vector<std::uint32_t> offsets(topology.primitives.size() + 1, 0);
+    for (std::uint32_t node = 0; node < topology.size(); ++node)
+      if (const TopologyNode n = topology.nodes[node]; n.is_leaf())
+        offsets[n.first() + 1] = std::uint32_t(by_node[node].size());
+    for (std::size_t i = 1; i < offsets.size(); ++i) offsets[i] += offsets[i - 1];
+    std::vector<std::uint32_t> vertices(offsets.back());
+    for (std::uint32_t node = 0; node < topology.size(); ++node)
+      if (const TopologyNode n = topology.nodes[node]; n.is_leaf())
+        std::copy(by_node[node].begin(), by_node[node].end(), vertices.begin() + offsets[n.first()]);
+    lists_ = ListPool(offsets, std::move(vertices));
+  }
+
+  std::span<const std::uint32_t> operator[](TopologyNode leaf) const { return lists_[leaf.first()]; }
+  template <class S>
+  Box<S> box(TopologyNode leaf, const S* positions) const {
+    return LaneBox<S>::of((*this)[leaf], positions).box();
+  }
+
+  /// Makes the lists of each vertex's leaves, unless they are there. O(nodes + vertices).
+  void index(const Topology& topology, std::uint32_t vertex_count) {
+    if (users_.keys() != 0) return;
+    std::vector<std::uint32_t> offsets(std::size_t(vertex_count) + 1, 0);
+    for (std::uint32_t entry = 0; entry < lists_.keys(); ++entry)
+      for (std::uint32_t v : lists_[entry]) ++offsets[v + 1];
+    for (std::size_t v = 1; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
+    std::vector<std::uint32_t> users(offsets.back()), next(offsets.begin(), offsets.end() - 1);
+    for (std::uint32_t entry = 0; entry < lists_.keys(); ++entry)
+      for (std::uint32_t v : lists_[entry]) users[next[v]++] = entry;
+    users_ = ListPool(offsets, std::move(users));
+    nodes_.assign(lists_.keys(), 0);
+    for (std::uint32_t node = 0; node < topology.size(); ++node)
+      if (const TopologyNode n = topology.nodes[node]; n.is_leaf() && n.count() > 0) nodes_[n.first()] = node;
+  }
+  /// Calls visit(node) for every leaf that has this vertex; `index` must have been called.
+  template <class Visit>
+  void for_leaves_of(std::uint32_t vertex, Visit&& visit) const {
+    if (vertex >= users_.keys()) return;  // new, and of no primitive yet
+    for (std::uint32_t entry : users_[vertex]) visit(nodes_[entry]);
+  }
+
+  /// A leaf's content lies at this node now.
+  void placed(TopologyNode leaf, std::uint32_t node) {
+    if (!nodes_.empty() && leaf.is_leaf() && leaf.count() > 0) nodes_[leaf.first()] = node;
+  }
+  /// Gives a leaf at a node another list, ascending and unique, of vertices below vertex_count. O(its
+  /// length).
+  void assign(TopologyNode leaf, std::uint32_t node, std::span<const std::uint32_t> vertices,
+              std::uint32_t vertex_count) {
+    if (lists_.keys() <= leaf.first()) lists_.resize(leaf.first() + leaf.count());
+    drop(leaf);
+    lists_.assign(leaf.first(), vertices);
+    if (users_.keys() == 0) return;
+    if (nodes_.size() < lists_.keys()) nodes_.resize(lists_.keys(), 0);
+    users_.resize(std::max(users_.keys(), vertex_count));
+    for (std::uint32_t v : vertices) users_.push(v, leaf.first());
+    nodes_[leaf.first()] = node;
+  }
+  /// Forgets the list of a leaf.
+  void drop(TopologyNode leaf) {
+    if (users_.keys() != 0)
+      for (std::uint32_t v : lists_[leaf.first()]) users_.erase(v, leaf.first());
+    lists_.clear(leaf.first());
+  }
+
+  std::size_t bytes() const {
+    return lists_.bytes() + users_.bytes() + nodes_.size() * sizeof(std::uint32_t);
+  }
+
+ private:
+  ListPool lists_;                    ///< by the leaf's first entry in the topology's primitives
+  ListPool users_;                    ///< by vertex: first entries of leaves; none before `index`
+  std::vector<std::uint32_t> nodes_;  ///< by first entry: the leaf's node; none before `index`
+};
+
+}  // namespace kbvh

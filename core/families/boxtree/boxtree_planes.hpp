@@ -1,0 +1,153 @@
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/base/assert.hpp"
+#include "core/geometry/box.hpp"
+#include "core/topology/builders.hpp"
+#include "core/topology/topology.hpp"
+
+namespace kbvh {
+
+/// Chooses the planes of a subtree: per inner node the axis and which child is the left one, such that the
+/// children's boxes, sides inherited, have the least summed area x primitives (the local surface-area cost);
+/// the least summed edges where areas are equal; then the first. Parents before children, for a child can
+/// only cut what its ancestors left.
+template <class S>
+class BoxTreePlanes {
+ public:
+  /// `nodes`: a node and all below it, ascending, of a topology that is laid out as a built one.
+  BoxTreePlanes(const Topology& topology, std::span<const std::uint32_t> nodes)
+      : topology_(&topology), nodes_(nodes), tight_(nodes.size()), weights_(nodes.size()) {}
+
+  /// The tight box of leaf nodes[i].
+  void set_leaf(std::size_t i, const Box<S>& box) {
+    tight_[i] = box;
+    weights_[i] = topology_->nodes[nodes_[i]].count();
+  }
+
+  /// Sets own_sides[node] for all nodes but the first, whose box is `box`, or the tight one. axis(node)
+  /// forces a split axis; 3 does not. O(nodes log nodes).
+  template <class Axis>
+  void choose(const Box<S>* box, Axis&& axis, std::vector<std::uint8_t>& own_sides) {
+    for (std::size_t i = nodes_.size(); i-- > 0;) {
+      if (topology_->nodes[nodes_[i]].is_leaf()) continue;
+      for (std::size_t child : children(i)) {
+        tight_[i].extend(tight_[child]);
+        weights_[i] += weights_[child];
+      }
+    }
+    inherited_.assign(nodes_.size(), {});
+    inherited_[0] = box != nullptr ? *box : tight_[0];
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+      if (!topology_->nodes[nodes_[i]].is_leaf()) split(i, axis(nodes_[i]), own_sides);
+  }
+
+ private:
+  std::array<std::size_t, 2> children(std::size_t i) const {
+    const std::uint32_t first = topology_->nodes[nodes_[i]].first();
+    const auto at = std::size_t(std::lower_bound(nodes_.begin(), nodes_.end(), first) - nodes_.begin());
+    return {at, at + 1};
+  }
+
+  void split(std::size_t i, int forced, std::vector<std::uint8_t>& own_sides) {
+    const auto pair = children(i);
+    std::pair<double, double> best;
+    bool found = false;
+    for (int axis = forced == 3 ? 0 : forced; axis < (forced == 3 ? 3 : forced + 1); ++axis)
+      for (const std::size_t left : {0, 1}) {
+        const std::array<Box<S>, 2> boxes =
+            cut(inherited_[i], axis, tight_[pair[left]], tight_[pair[1 - left]]);
+        const double weights[2] = {double(weights_[pair[left]]), double(weights_[pair[1 - left]])};
+        const std::pair<double, double> cost{
+            surface_area(boxes[0]) * weights[0] + surface_area(boxes[1]) * weights[1],
+            edges(boxes[0]) * weights[0] + edges(boxes[1]) * weights[1]};
+        if (found && !(cost < best)) continue;
+        found = true;
+        best = cost;
+        inherited_[pair[left]] = boxes[0];
+        inherited_[pair[1 - left]] = boxes[1];
+        own_sides[nodes_[pair[left]]] = std::uint8_t(2 * axis + 1);
+        own_sides[nodes_[pair[1 - left]]] = std::uint8_t(2 * axis);
+      }
+  }
+  static std::array<Box<S>, 2> cut(const Box<S>& box, int axis, const Box<S>& left, const Box<S>& right) {
+    std::array<Box<S>, 2> boxes{box, box};
+    boxes[0].upper[axis] = left.upper[axis];
+    boxes[1].lower[axis] = right.lower[axis];
+    return boxes;
+  }
+  static double edges(const Box<S>& box) {
+    double sum = 0;
+    for (int axis = 0; axis < 3; ++axis) sum += double(box.upper[axis]) - double(box.lower[axis]);
+    return sum;
+  }
+
+  const Topology* topology_;
+  std::span<const std::uint32_t> nodes_;
+  std::vector<Box<S>> tight_, inherited_;
+  std::vector<std::uint32_t> weights_;  ///< primitives below
+};
+
+/// A node and all below it, parents before children; of a topology in any order, as edited ones are.
+inline std::vector<std::uint32_t> subtree_of(const Topology& topology, std::uint32_t top) {
+  std::vector<std::uint32_t> ids{top};
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    if (const TopologyNode n = topology.nodes[ids[i]]; !n.is_leaf())
+      ids.insert(ids.end(), {n.first(), n.first() + 1});
+  return ids;
+}
+
+/// The own sides of the nodes of a subtree, `ids` as `subtree_of` gives them, as BoxTreePlanes chooses them;
+/// nothing is said of the first. box_of(leaf) is a leaf's tight box, axis(node) as there.
+template <class S, class BoxOf, class Axis>
+std::vector<std::uint8_t> choose_own_sides(const Topology& topology, const std::vector<std::uint32_t>& ids,
+                                           BoxOf&& box_of, const Box<S>* box, Axis&& axis) {
+  // The part is laid out in a topology of its own, in the order that BoxTreePlanes needs.
+  Topology part;
+  std::vector<std::uint32_t> places(ids.size());
+  std::iota(places.begin(), places.end(), 0u);
+  std::uint32_t next = 1;
+  for (const std::uint32_t id : ids) {
+    const TopologyNode n = topology.nodes[id];
+    part.nodes.push_back(n.is_leaf() ? n : TopologyNode::inner(next, 2));
+    if (!n.is_leaf()) next += 2;
+  }
+  std::vector<std::uint8_t> own_sides(ids.size(), 0);
+  BoxTreePlanes<S> planes(part, places);
+  for (std::size_t i = ids.size(); i-- > 0;)
+    if (part.nodes[i].is_leaf()) planes.set_leaf(i, box_of(part.nodes[i]));
+  planes.choose(
+      box, [&](std::uint32_t place) { return axis(ids[place]); }, own_sides);
+  return own_sides;
+}
+
+/// Builds the inner nodes of a subtree anew over its leaves, which stay what they are but change places.
+/// `ids` are its nodes, the top first and the others ascending; `boxes` those of its leaves, in that order.
+template <class S>
+void regrow_subtree(Topology& topology, std::span<const std::uint32_t> ids, std::span<const Box<S>> boxes,
+                    BuildMethod method) {
+  std::vector<TopologyNode> leaves;
+  for (const std::uint32_t id : ids)
+    if (const TopologyNode n = topology.nodes[id]; n.is_leaf()) leaves.push_back(n);
+  const Topology made = build_topology<S>(boxes, {.method = method, .width = 2, .leaf_size = 1});
+  KBVH_ASSERT(made.size() == ids.size());
+  // Children are pairs of neighbours here and there, so the order-preserving renaming keeps them pairs.
+  for (std::uint32_t i = 0; i < made.size(); ++i) {
+    const TopologyNode n = made.nodes[i];
+    const std::uint32_t id = ids[i];
+    topology.nodes[id] =
+        n.is_leaf() ? leaves[made.primitives[n.first()]] : TopologyNode::inner(ids[n.first()], 2);
+    if (i == 0) continue;
+    topology.parents[id] = ids[made.parents[i]];
+    topology.depths[id] = std::uint8_t(std::min(255, topology.depths[topology.parents[id]] + 1));
+  }
+  topology.perfect = false;
+}
+
+}  // namespace kbvh

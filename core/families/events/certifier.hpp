@@ -1,0 +1,191 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+
+#include "core/base/counters.hpp"
+#include "core/families/events/event.hpp"
+
+namespace kbvh {
+
+/// Computes the failures of certificates for a kinetic tree, and schedules them. A certificate says that one
+/// vertex, its winner, is ahead of other candidates on one side of a body; it fails when the first of them
+/// gets ahead. Certificates are passed as events that have a winner, a slot, a body, a side and a depth.
+template <class S, class Queue, class Count>
+class Certifier {
+  using Clock = typename Queue::ClockType;
+
+ public:
+  Certifier(Clock& clock, Queue& queue, Count& count) : clock_(&clock), queue_(&queue), count_(&count) {}
+
+  /// Takes a slot's scheduled failure off the queue, if there is one.
+  void withdraw(std::uint32_t slot) {
+    if (!queue_->cancel(slot)) return;
+    count_->add(Counter::certificates_discarded);
+    count_->add(Counter::queue_operations);
+  }
+
+  /// Schedules the certificate's earliest failure from `now` on, in place of the one that stood. The winner
+  /// may be among the candidates. O(candidates x segments until then).
+  void certify(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates) {
+    withdraw(event.slot);  // the queue must not hold this slot while the clock learns its new crossing
+    if constexpr (reads_keyframes)
+      if (!clock_->plans(event.body).has_own_plans()) return certify_keyframed(event, now, candidates);
+    std::optional<Crossing<S>> own, earliest_own;
+    Event earliest;
+    bool found = false;
+    double horizon = never;
+    if constexpr (Queue::look_ahead > 0) horizon = clock_->horizon(event.body, now, Queue::look_ahead);
+    for (;;) {
+      double until = horizon;
+      for (const std::uint32_t challenger : candidates) {
+        if (challenger == event.winner) continue;
+        event.loser = challenger;
+        count_->add(Counter::certificates_made);
+        if (!clock_->first_failure(event, now, own, until)) continue;
+        if (found && !clock_->overtakes_first(event, own, earliest, earliest_own)) continue;
+        found = true;
+        earliest = event;
+        earliest_own = own;
+        until = std::min(until, earliest.end);
+      }
+      if (std::isinf(horizon)) break;
+      if (found && (earliest.end <= horizon || earliest.hint + earliest.error < horizon)) break;
+      clock_->remember(event.slot, {});
+      count_->add(Counter::queue_operations);
+      event.begin = horizon;
+      event.segment = Event::no_segment;
+      if (review_at(event, horizon)) return;
+      horizon = never;
+      found = false;
+    }
+    clock_->remember(event.slot, earliest_own);
+    if (found) schedule(earliest);
+  }
+
+  /// The certificate has one candidate more, which is not ahead of its winner at `now`: it fails earlier, or
+  /// as it did.
+  void add_candidate(Event event, const Instant<S>& now, std::uint32_t challenger) {
+    if (challenger == event.winner) return;
+    event.loser = challenger;
+    count_->add(Counter::certificates_made);
+    if constexpr (reads_keyframes)
+      if (!clock_->plans(event.body).has_own_plans()) return add_keyframed(event, now);
+    const bool scheduled = queue_->scheduled(event.slot);
+    double until = scheduled ? queue_->event(event.slot).end : never;
+    if (const std::optional<double> review = review_time(event.slot)) until = *review;
+    std::optional<Crossing<S>> own, next_own;
+    if (!clock_->first_failure(event, now, own, until)) return;
+    if (scheduled) {
+      const Event next = queue_->event(event.slot);
+      const FlightPlans<S>& plans = clock_->plans(event.body);
+      if (plans.has_own_plan(next.winner) || plans.has_own_plan(next.loser))
+        next_own = clock_->crossing(next);
+      if (!clock_->overtakes_first(event, own, next, next_own)) return;
+    } else if (own && !std::isinf(until) && compare_crossing_to(*own, until) >= 0) {
+      return;  // all candidates are looked at again before that
+    }
+    withdraw(event.slot);
+    clock_->remember(event.slot, own);
+    schedule(event);
+  }
+
+ private:
+  static constexpr double never = std::numeric_limits<double>::infinity();
+  static constexpr bool reads_keyframes = requires(const Clock& clock, const Instant<S>& now) {
+    clock.keyframe_search(0, 0, now, 0.0);
+  };
+
+  void schedule(const Event& event) {
+    queue_->schedule(event);
+    count_->add(Counter::queue_operations);
+    count_->peak(Counter::queue_peak, queue_->size());
+  }
+  bool review_at(const Event& event, double time) {
+    if constexpr (Queue::look_ahead > 0)
+      return queue_->review(event, time);
+    else
+      return false;
+  }
+  /// When all candidates of a certificate without a scheduled failure are looked at again.
+  std::optional<double> review_time(std::uint32_t slot) const {
+    if constexpr (Queue::look_ahead > 0)
+      if (queue_->reviewing(slot)) return queue_->event(slot).begin;
+    return {};
+  }
+
+  /// `certify` where no vertex has a plan of its own.
+  void certify_keyframed(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates) {
+    if (clock_->keyframe_count(event.body) < 2) return;
+    double horizon = never;
+    if constexpr (Queue::look_ahead > 0) horizon = clock_->horizon(event.body, now, Queue::look_ahead);
+    if (find_failure(event, clock_->keyframe_search(event.body, event.side, now, horizon), candidates))
+      return schedule(event);
+    if (horizon == never) return;
+    event.begin = horizon;
+    event.loser = event.winner;
+    if (review_at(event, horizon)) {
+      count_->add(Counter::queue_operations);
+      count_->peak(Counter::queue_peak, queue_->size());
+    } else if (find_failure(event, clock_->keyframe_search(event.body, event.side, now, never), candidates)) {
+      schedule(event);
+    }
+  }
+  /// Fills in the earliest failure of a certificate, if there is one.
+  template <class Search>
+  bool find_failure(Event& event, const Search& search, std::span<const std::uint32_t> candidates) {
+    std::size_t limit = search.end, next = 0;
+    bool found = false;
+    if constexpr (Count::enabled)
+      count_->add(
+          Counter::certificates_made,
+          candidates.size() - std::size_t(std::count(candidates.begin(), candidates.end(), event.winner)));
+    for (;;) {
+      const RowAhead ahead = search.next_ahead(candidates, next, event.winner, limit);
+      if (ahead.index == candidates.size()) break;
+      next = ahead.index + 1;
+      const std::uint32_t challenger = candidates[ahead.index];
+      if (found && ahead.at + 1 == limit && !comes_first(event, challenger, ahead.at)) continue;
+      found = true;
+      event.loser = challenger;
+      limit = ahead.at + 1;
+    }
+    if (found) clock_->set_failure(event, limit - 1);
+    return found;
+  }
+  /// Of two that get ahead in one segment.
+  bool comes_first(const Event& than, std::uint32_t challenger, std::size_t ahead_at) const {
+    Event first = than, other = than;
+    first.loser = challenger;
+    clock_->set_failure(first, ahead_at);
+    clock_->set_failure(other, ahead_at);
+    return clock_->overtakes_first(first, {}, other, {});
+  }
+  void add_keyframed(Event event, const Instant<S>& now) {
+    if (clock_->keyframe_count(event.body) < 2) return;
+    double until = never;
+    std::optional<Event> next;
+    if (queue_->scheduled(event.slot)) {
+      next = queue_->event(event.slot);
+      until = next->end;
+    } else if (const std::optional<double> review = review_time(event.slot)) {
+      until = *review;
+    }
+    const auto search = clock_->keyframe_search(event.body, event.side, now, until);
+    const std::size_t ahead_at = search.first_ahead(event.loser, event.winner, search.end);
+    if (ahead_at >= search.end) return;
+    clock_->set_failure(event, ahead_at);
+    if (next && !clock_->overtakes_first(event, {}, *next, {})) return;
+    if (next) withdraw(event.slot);
+    schedule(event);
+  }
+
+  Clock* clock_;
+  Queue* queue_;
+  Count* count_;
+};
+
+}  // namespace kbvh
