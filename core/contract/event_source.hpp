@@ -18,7 +18,7 @@ enum class EventKind : std::uint8_t {
   boxes_meet,      ///< two boxes of a separation list begin to overlap
   boxes_separate,  ///< two boxes of a separation list cease to overlap
   review,          ///< nothing changes: the structure looks for the next event of a pair of boxes
-  window,          ///< nothing changes: the structure chooses anew which pairs of bodies it watches
+  window,          ///< nothing changes: which pairs of bodies or of boxes are watched is chosen anew
 };
 
 /// One certificate and when it fails. A side is numbered 2 * axis + (0 lower, 1 upper).
