@@ -31,6 +31,8 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
                         const Params& params)
       : CountedStrategy<S, Count>(scene, motion) {
     const int look_ahead = std::stoi(params.word("look_ahead"));
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      vertices_ += motion.plans(body).vertex_count();
     if (params.word("queue") == SegmentHeapQueue<S>::name)
       collision_ = std::make_unique<Collision<SegmentHeapEventQueue>>(scene, motion, std::move(topologies),
                                                                       this->count_, look_ahead);
@@ -43,6 +45,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   }
 
   void reset_to(double t) override {
+    many_candidates_ = false;
     on_collision([&](auto& collision) { collision.reset(t); });
   }
 
@@ -50,7 +53,12 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     on_collision([&](auto& collision) { collision.advance(t); });
   }
 
+  /// Where there are many candidates their vertices are most of all, and evaluating all of them is cheaper
+  /// than fetching them one by one.
+  bool wants_all_positions() const override { return many_candidates_; }
+
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
+    const std::size_t before = out.size();
     on_collision([&](auto& collision) {
       for_body_pairs(collision, [&](std::uint32_t i, const BodyPair& pair) {
         LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first,
@@ -60,6 +68,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
         for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) { leaves(leaf, leaf); });
       });
     });
+    many_candidates_ = 4 * (out.size() - before) > vertices_;
     return {};
   }
 
@@ -236,6 +245,8 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
                std::unique_ptr<Collision<BinaryHeapEventQueue>>>
       collision_;
   std::uint64_t first_step_ = 0;
+  std::size_t vertices_ = 0;      ///< of the scene when it began
+  bool many_candidates_ = false;  ///< at the last frame
 };
 
 }  // namespace
@@ -248,11 +259,11 @@ KBVH_STRATEGY(kinetic_separation_list) {
       .title = "kinetic separation list",
       .family = "kinetic",
       .citation = "Zachmann & Weller 2006, s.7",
-      .positions = PositionUse::fetched,
+      .positions = PositionUse::varying,
       .declares = {.continuous = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
       .parameters = {{"queue",
-                      "avl",
+                      "segment_heap",
                       {"segment_heap", "avl", "binary_heap"},
                       "event queue: lists by segment and a heap of what comes next, the paper's AVL tree, or "
                       "an indexed binary heap"},

@@ -18,7 +18,7 @@ enum class EventKind : std::uint8_t {
   boxes_meet,      ///< two boxes of a separation list begin to overlap
   boxes_separate,  ///< two boxes of a separation list cease to overlap
   review,          ///< no bound changes: the structure searches for the next event of a pair of boxes
-  window,          ///< no bound changes: the structure chooses the pairs of bodies to watch anew
+  window,  ///< no bound changes: the structure chooses the pairs of bodies, or of boxes, to watch anew
 };
 
 /// One certificate and its failure time. A side is numbered 2 * axis + (0 lower, 1 upper).

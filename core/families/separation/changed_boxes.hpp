@@ -10,10 +10,13 @@ namespace kbvh {
 /// What kinetic trees tell a separation list: boxes that have changed, in the order of the notices, and nodes
 /// that are not what they were.
 struct ChangedBoxes {
+  static constexpr Side all_sides = 6;
   struct Box {
     std::uint32_t body, node;
+    Side side = all_sides;  ///< the one that has another realiser
     auto operator<=>(const Box&) const = default;
   };
+
   /// A node that insertions or deletions have changed: it has other children, or became a leaf or ceased to
   /// be one; or it is gone, and its id means nothing or something else now.
   struct Node {
@@ -24,9 +27,9 @@ struct ChangedBoxes {
   std::vector<Node>* nodes;
 
   template <class S>
-  void realiser_changed(std::uint32_t body, std::uint32_t node, Side /*side*/, std::uint32_t /*old_vertex*/,
+  void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t /*old_vertex*/,
                         std::uint32_t /*new_vertex*/, const Instant<S>& /*now*/) {
-    boxes->push_back({body, node});
+    boxes->push_back({body, node, side});
   }
   void realiser_plan_changed(std::uint32_t body, std::uint32_t node) { boxes->push_back({body, node}); }
   void leaf_split(std::uint32_t body, std::uint32_t node, std::uint32_t /*first_child*/) {
@@ -44,6 +47,8 @@ struct ChangedBoxes {
 template <class S>
 struct WatchedBoxes : ChangedBoxes {
   BoundObserver<S> bounds;
+
+  bool reads_instants() const { return bounds.reads_instants(); }
 
   template <class T>
   void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t old_vertex,

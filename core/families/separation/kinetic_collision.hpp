@@ -32,7 +32,9 @@ class KineticCollision {
                 WatchedBoxes<S>{{&changed_, &nodes_}, {&watch_}}),
         list_(scene, forest_, count, look_ahead,
               near_bodies_.searches() ? List::BodyPairs::none : List::BodyPairs::all),
-        number_of_(near_bodies_.searches() ? body_pairs_.size() : 0, List::none) {}
+        number_of_(near_bodies_.searches() ? body_pairs_.size() : 0, List::none) {
+    if constexpr (requires { forest_.queue().serve(*this); }) forest_.queue().serve(*this);
+  }
   KineticCollision(const KineticCollision&) = delete;  // the trees point to `changed_` and `nodes_`
   KineticCollision& operator=(const KineticCollision&) = delete;
 
@@ -44,7 +46,7 @@ class KineticCollision {
       return;
     }
     near_bodies_.start_over();
-    list_.leave_all();
+    list_.leave_all(t);
     for (const std::uint32_t i : entered_) number_of_[i] = List::none;
     entered_.clear();
     window_ = 0;
@@ -54,36 +56,40 @@ class KineticCollision {
   void advance(double t) {
     while (due(t)) handle_next();
   }
-  bool due(double t) const { return forest_.due(t) || list_.due(t) || window_end_ < t; }
+  bool due(double t) const {
+    return forest_.due(t) || list_.due(t) || list_.segment_end() <= t || window_end_ < t;
+  }
   /// Is the first event of all one of a tree? At one instant trees come first: the list is then decided with
   /// their new realisers.
-  bool tree_is_first() const {
-    if (list_.empty()) return true;
-    if (forest_.queue().empty()) return false;
-    const Event& tree = forest_.queue().top();
-    const OverlapEvent<S>& pair = list_.top();
-    const double error = tree.error + pair.error;
-    if (tree.hint + error < pair.hint) return true;
-    if (pair.hint + error < tree.hint) return false;
-    return compare_crossings(forest_.clock().crossing(tree), pair.crossing) <= 0;
-  }
+  bool tree_is_first() const { return first_part() == Part::trees; }
 
   /// The first event of all; nothing if none is scheduled.
   std::optional<ScheduledEvent<S>> next_event() const {
-    if (window_end_ < never && !forest_.due(window_end_) && !list_.due(window_end_)) return window_event();
-    if (tree_is_first())
-      return forest_.queue().empty() ? std::optional<ScheduledEvent<S>>()
-                                     : described(forest_, forest_.queue().top());
-    return list_.described(list_.top());
+    switch (first_part()) {
+      case Part::trees:
+        return forest_.queue().empty() ? std::optional<ScheduledEvent<S>>()
+                                       : described(forest_, forest_.queue().top());
+      case Part::list:
+        return list_.described(list_.top());
+      case Part::segment:
+        return without_change(list_.segment_end());
+      case Part::window:
+        return without_change(window_end_);
+    }
+    return {};
   }
   /// Replaces `out` by all scheduled events, first event first.
   void scheduled_events(std::vector<ScheduledEvent<S>>& out) const {
-    std::vector<ScheduledEvent<S>> pairs;
-    list_events(forest_, out);
+    std::vector<ScheduledEvent<S>> trees, pairs;
+    list_events(forest_, trees);
     list_.list_events(pairs);
-    if (window_end_ < never) pairs.push_back(window_event());
+    out.clear();
+    if (list_.segment_end() < never) out.push_back(without_change(list_.segment_end()));
+    out.insert(out.end(), trees.begin(), trees.end());
     out.insert(out.end(), pairs.begin(), pairs.end());
-    // Each part is in order already; at one instant trees come first, and a window opens last.
+    if (window_end_ < never) out.push_back(without_change(window_end_));
+    // Each part is in order already; at one instant a segment begins first, trees come next, and a window
+    // opens last.
     std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return comes_before(a, b); });
   }
   /// Handles the first event of all if it is due by `until`, and describes it.
@@ -103,32 +109,49 @@ class KineticCollision {
 
   /// A double after the first event of all, if by little.
   double after_next() const {
-    if (!tree_is_first()) return list_.top().not_before();
-    const Event& event = forest_.queue().top();
-    return std::nextafter(event.hint + event.error, std::numeric_limits<double>::infinity());
+    switch (first_part()) {
+      case Part::trees: {
+        const Event& event = forest_.queue().top();
+        return std::nextafter(event.hint + event.error, never);
+      }
+      case Part::list:
+        return list_.top().not_before();
+      case Part::segment:
+        return std::nextafter(list_.segment_end(), never);
+      case Part::window:
+        break;
+    }
+    return std::nextafter(window_end_, never);
   }
   /// Handles the first event of all; `due` for some time.
   void handle_next() {
-    if (window_end_ < never && !forest_.due(window_end_) && !list_.due(window_end_)) {
-      open_window(window_end_);
-      return;
+    switch (first_part()) {
+      case Part::trees:
+        return handle_tree_event();
+      case Part::list:
+        return list_.handle_next();
+      case Part::segment:
+        return list_.open_segment();
+      case Part::window:
+        return open_window(window_end_);
     }
-    if (!tree_is_first()) {
-      list_.handle_next();
-      return;
-    }
-    const Event event = forest_.queue().top();
-    const Crossing<S> crossing = forest_.clock().crossing(event);
-    changed_.clear();
-    forest_.handle_next();
-    list_.boxes_changed(changed_, {event.begin, event.end, &crossing});
   }
+
+  /// What the queue of the trees asks its owner for: as the forest does it, and what the list will read.
+  void fetch_ahead(const PackedEvent& event, std::uint32_t slot, int step) const {
+    forest_.fetch_ahead(event, slot, step);
+    const auto& tree = forest_.tree(event.body);
+    const std::uint32_t node = tree.node_of(slot);
+    list_.fetch_ahead(event.body, node, step);
+    if (step > 0) list_.fetch_ahead(event.body, tree.topology().parents[node], step - 1);
+  }
+  void review(const Event& event, double t) { forest_.review(event, t); }
 
   /// Follows changes of plans at t that the motion shows already.
   void plans_changed(double t, std::span<const PlanChange<S>> changes) {
     changed_.clear();
     forest_.plans_changed(t, changes);
-    list_.boxes_changed(changed_, Instant<S>::at(t));
+    if (list_.take_over(changed_)) list_.boxes_changed(changed_, Moment<S>::at(t));
     if (near_bodies_.searches()) open_window(t);
   }
 
@@ -155,10 +178,48 @@ class KineticCollision {
   }
 
  private:
-  ScheduledEvent<S> window_event() const {
+  /// What the first event of all is one of; trees if there is none. At the end of a segment of the list, the
+  /// next one begins before anything else happens; a window opens when all has happened.
+  enum class Part : std::uint8_t { trees, list, segment, window };
+  Part first_part() const {
+    const bool no_tree = forest_.queue().empty(), no_pair = list_.empty();
+    const double segment_end = list_.segment_end();
+    if (segment_end < never && segment_end <= window_end_ && (no_tree || !tree_is_before(segment_end)) &&
+        (no_pair || !list_.clock().before(list_.top(), segment_end)))
+      return Part::segment;
+    if (window_end_ < never && !forest_.due(window_end_) && !list_.due(window_end_)) return Part::window;
+    if (no_pair) return Part::trees;
+    if (no_tree) return Part::list;
+    const Event& tree = forest_.queue().top();
+    const OverlapEvent<S>& pair = list_.top();
+    const double error = tree.error + pair.error;
+    if (tree.hint + error < pair.hint) return Part::trees;
+    if (pair.hint + error < tree.hint) return Part::list;
+    return compare_crossings(forest_.clock().crossing(tree), pair.crossing) <= 0 ? Part::trees : Part::list;
+  }
+  bool tree_is_before(double t) const {
+    const Event& event = forest_.queue().top();
+    if (event.hint + event.error < t) return true;
+    if (event.hint - event.error > t) return false;
+    return compare_crossing_to(forest_.clock().crossing(event), t) < 0;
+  }
+  void handle_tree_event() {
+    const Event event = forest_.queue().top();
+    // The clock forgets a crossing of plans of their own when its event is handled.
+    const bool own = forest_.clock().plans(event.body).has_own_plans();
+    Crossing<S> crossing;
+    if (own) crossing = forest_.clock().crossing(event);
+    changed_.clear();
+    forest_.handle_next();
+    if (!list_.take_over(changed_)) return;
+    if (!own) crossing = forest_.clock().crossing(event);
+    list_.boxes_changed(changed_, {{event.begin, event.end, &crossing}, event.hint, event.error});
+  }
+
+  static ScheduledEvent<S> without_change(double t) {
     ScheduledEvent<S> event;
     event.kind = EventKind::window;
-    event.time = {window_end_, 0};
+    event.time = {t, 0};
     return event;
   }
   static bool comes_before(const ScheduledEvent<S>& a, const ScheduledEvent<S>& b) {
@@ -240,7 +301,7 @@ class KineticCollision {
     }
     for (const std::uint32_t i : near) {
       if (number_of_[i] != List::none) continue;
-      number_of_[i] = list_.enter(body_pairs_[i], Instant<S>::at(t));
+      number_of_[i] = list_.enter(body_pairs_[i], t);
       still_.push_back(i);
     }
     std::sort(still_.begin(), still_.end());

@@ -22,11 +22,15 @@ template <class S>
 S widened_up(S x) {
   using Bits = std::conditional_t<sizeof(S) == 4, std::uint32_t, std::uint64_t>;
   constexpr S share = sizeof(S) == 4 ? S(0x1p-21) : S(0x1p-50);
+  constexpr Bits sign = std::bit_cast<Bits>(S(-0.0));
   const S sum = x + std::abs(x) * share;
-  if (sum == 0) return 2 * std::numeric_limits<S>::denorm_min();
   // Two units up, for the roundings of product and sum.
   const Bits bits = std::bit_cast<Bits>(sum);
-  return std::bit_cast<S>(sum > 0 ? bits + 2 : bits > std::bit_cast<Bits>(S(-0.0)) + 2 ? bits - 2 : Bits(0));
+  if ((bits & ~sign) <= 2) [[unlikely]] {
+    if (sum == 0) return 2 * std::numeric_limits<S>::denorm_min();
+    return std::bit_cast<S>(sum > 0 ? bits + 2 : Bits(0));
+  }
+  return std::bit_cast<S>(Bits(bits + 2 - ((bits & sign) != 0 ? 4 : 0)));
 }
 
 /// One coordinate of a vertex, piece by piece from an instant on.
@@ -157,6 +161,23 @@ class OverlapClock {
     if (event.hint + event.error < t) return true;
     if (event.hint - event.error > t) return false;
     return compare_crossing_to(event.crossing, t) <= 0;
+  }
+
+  /// Does the event happen before t?
+  bool before(const Event& event, double t) const {
+    if (event.hint + event.error < t) return true;
+    if (event.hint - event.error > t) return false;
+    return compare_crossing_to(event.crossing, t) < 0;
+  }
+  /// Fills in when an event happens; false: beyond any time that can be asked for.
+  static bool set(Event& event, const Crossing<S>& crossing) {
+    const TimeEstimate estimate = crossing_estimate(crossing);
+    if (!std::isfinite(estimate.time)) return false;
+    event.crossing = crossing;
+    event.hint = estimate.time;
+    event.error = estimate.error;
+    event.review = false;
+    return true;
   }
 
   /// Do the boxes overlap right after the instant?
@@ -324,14 +345,6 @@ class OverlapClock {
     event.hint = t;
     event.error = 0;
     event.review = true;
-  }
-  static bool set(Event& event, const Crossing<S>& crossing) {
-    const TimeEstimate estimate = crossing_estimate(crossing);
-    if (!std::isfinite(estimate.time)) return false;  // beyond any time that can be asked for
-    event.crossing = crossing;
-    event.hint = estimate.time;
-    event.error = estimate.error;
-    return true;
   }
 };
 

@@ -6,8 +6,9 @@
 
 #include "core/base/assert.hpp"
 #include "core/families/events/kinetic_forest.hpp"
-#include "core/families/separation/changed_boxes.hpp"
-#include "core/families/separation/overlap_clock.hpp"
+#include "core/families/separation/overlapping_leaves.hpp"
+#include "core/families/separation/pair_outlook.hpp"
+#include "core/families/separation/pair_tree.hpp"
 
 namespace kbvh {
 
@@ -46,37 +47,16 @@ struct ListEdit {
 ///
 /// Boxes are compared on the flight plans with the margin of OverlapClock: the list may hold a pair of boxes
 /// that are apart by some ulps, and misses none whose rounded boxes touch.
+///
+/// With a queue that orders events by segments, a pair has an event only if its boxes begin or cease to
+/// overlap before the present segment ends: `open_segment` looks at all pairs when the next one begins, and
+/// most of them are decided by the signs of their gaps at its ends (SegmentOverlap).
 template <class S, template <class> class Queue, class Count>
 class SeparationList {
   using Event = OverlapEvent<S>;
 
  public:
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-
-  /// Two boxes of a body pair and where they stand in the tree of pairs.
-  struct Pair {
-    std::uint32_t a, b;                  ///< nodes of the first and the second body
-    std::uint32_t parent = none;         ///< slot
-    std::uint32_t children = none;       ///< first of a block of slots, none of which may be in use
-    std::uint32_t next[2], previous[2];  ///< among the pairs linked from a, and from b
-    std::uint32_t place = none;          ///< among the overlapping leaves of the body pair
-    std::uint32_t depth = 0;
-    std::uint32_t bodies = 0;  ///< index of the body pair
-    bool used = false, overlapping = false;
-    bool dirty = false;  ///< has a node with other children, while a change of geometry is followed
-  };
-  /// Overlapping leaves, and since when at the earliest.
-  struct LeafPair {
-    std::uint32_t a, b, slot;
-    double since;
-  };
-
-  /// An overlap that is over: of which body pair, and until when at the latest.
-  struct EndedLeafPair {
-    std::uint32_t bodies;
-    LeafPair leaf;
-    double until;
-  };
+  static constexpr std::uint32_t none = PairTree::none;
 
   /// Which body pairs a list begins with.
   enum class BodyPairs : std::uint8_t { all, none };
@@ -84,14 +64,14 @@ class SeparationList {
   template <class Forest>
   SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count, int look_ahead,
                  BodyPairs pairs)
-      : clock_(look_ahead), queue_(clock_, 0), count_(&count) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
-      const auto& tree = forest.tree(body);
-      bodies_.push_back({&tree.topology(), nullptr, &forest.clock().plans(body), {}, {}});
-      block_ = std::max(block_, tree.topology().width * tree.topology().width);
-    }
-    if constexpr (requires { queue_.split_at(forest.clock().keyframe_times()); })
+      : tree_(forest_topologies(scene, forest)),
+        outlook_(scene, forest, tree_, by_segments ? LookAhead::segment : LookAhead::pieces, look_ahead),
+        queue_(outlook_.clock(), 0),
+        count_(&count) {
+    if constexpr (by_segments) {
       queue_.split_at(forest.clock().keyframe_times());
+      queue_.serve(*this);
+    }
     read_trees(forest);
     if (pairs == BodyPairs::none) return;
     for (const BodyPair& pair : scene.pairs()) number(pair);
@@ -101,18 +81,16 @@ class SeparationList {
 
   /// Starts over at t by one traversal.
   void reset(double t) {
-    clear();
-    time_ = t;
-    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i)
-      if (both_have_nodes(i)) start_pair(i, Instant<S>::at(t));
+    clear(t);
+    for (std::uint32_t i = 0; i < tree_.body_pair_count(); ++i)
+      if (tree_.both_have_nodes(i)) start_pair(i, Moment<S>::at(t));
   }
 
-  /// Enters a body pair at `now`, decided by one traversal; returns its number.
-  std::uint32_t enter(const BodyPair& pair, const Instant<S>& now) {
-    time_ = now.begin;
-    end_ = now.end;
+  /// Enters a body pair at t, decided by one traversal; returns its number.
+  std::uint32_t enter(const BodyPair& pair, double t) {
+    time_ = end_ = t;
     const std::uint32_t bodies = number(pair);
-    if (both_have_nodes(bodies)) start_pair(bodies, now);
+    if (tree_.both_have_nodes(bodies)) start_pair(bodies, Moment<S>::at(t));
     return bodies;
   }
   /// Takes out a pair of two bodies whose boxes are apart. Returns whether it did: not while its roots
@@ -120,72 +98,119 @@ class SeparationList {
   bool leave(std::uint32_t bodies) {
     const std::uint32_t root = roots_[bodies];
     if (root != none) {
-      if (pairs_[root].overlapping) return false;
+      if (tree_[root].overlapping) return false;
       list_changed(-1);
       remove(root);
-      free_blocks_.push_back(root);
+      tree_.free_block(root);
       roots_[bodies] = none;
     }
-    body_pairs_[bodies] = unused;
-    free_numbers_.push_back(bodies);
+    tree_.leave(bodies);
     return true;
   }
-  /// Takes out all body pairs.
-  void leave_all() {
-    clear();
-    body_pairs_.clear();
+  /// Takes out all body pairs, and starts over at t.
+  void leave_all(double t) {
+    clear(t);
+    tree_.leave_all();
     roots_.clear();
     self_roots_.clear();
-    leaves_.clear();
-    free_numbers_.clear();
   }
   /// Numbers of body pairs, some of which may not be in use.
-  std::uint32_t body_pair_count() const { return std::uint32_t(body_pairs_.size()); }
-  bool is_entered(std::uint32_t bodies) const { return body_pairs_[bodies].first != unused.first; }
-  const BodyPair& body_pair(std::uint32_t bodies) const { return body_pairs_[bodies]; }
+  std::uint32_t body_pair_count() const { return tree_.body_pair_count(); }
+  bool is_entered(std::uint32_t bodies) const { return tree_.is_entered(bodies); }
+  const BodyPair& body_pair(std::uint32_t bodies) const { return tree_.body_pair(bodies); }
 
-  bool due(double t) const { return !queue_.empty() && clock_.due(queue_.top(), t); }
+  bool due(double t) const {
+    if constexpr (requires { queue_.due(t); })
+      return queue_.due(t);
+    else
+      return !queue_.empty() && clock().due(queue_.top(), t);
+  }
   bool empty() const { return queue_.empty(); }
-  const Event& top() const { return queue_.top(); }
+  decltype(auto) top() const { return queue_.top(); }
 
   /// Takes the first event off the queue and handles it.
   void handle_next() {
     const Event event = queue_.top();
     queue_.pop();
     count_->add(Counter::queue_operations);
+    BoxPair& pair = tree_[event.slot];
+    pair.scheduled = false;
     if (event.review) {
-      schedule(event.slot, Instant<S>::at(event.hint));
+      put(event.slot, look(event.slot, Moment<S>::at(event.hint), state(pair)));
       return;
     }
     count_->add(Counter::certificates_failed);
-    count_->add(pairs_[event.slot].overlapping ? kind_of_separation(event.slot) : Counter::overlap_events);
+    count_->add(pair.overlapping ? kind_of_separation(pair) : Counter::overlap_events);
     time_ = event.not_after();
     end_ = event.not_before();
-    turn(event.slot, event.instant());
+    const Moment<S> now{{time_, end_, &event.crossing}, event.hint, event.error};
+    turn(event.slot, now, look(event.slot, now, pair.overlapping ? State::apart : State::overlapping));
   }
 
-  /// These boxes have other realisers, or realisers with other plans, from `now` on. Boxes may be named
-  /// twice.
-  void boxes_changed(std::span<const ChangedBoxes::Box> boxes, const Instant<S>& now) {
-    time_ = now.begin;
-    end_ = now.end;
+  /// Fetches what handling an event of a pair will read: first the pair, then its boxes.
+  void fetch_ahead(const Event& /*event*/, std::uint32_t slot, int step) const {
+    if (step == 0) tree_.prefetch(slot);
+    if (step == 1) outlook_.prefetch(tree_[slot]);
+  }
+  /// The queue is not asked for reviews: pairs without an event wait for the next segment.
+  void review(const Event& /*event*/, double /*t*/) {}
+  /// Fetches what a change of a node's box will read: first its boxes and where its pairs are, then the first
+  /// of these, then that one's boxes.
+  void fetch_ahead(std::uint32_t body, std::uint32_t node, int step) const {
+    if (step == 0) {
+      tree_.prefetch_first_of(body, node);
+      outlook_.prefetch(body, node);
+    } else if (const std::uint32_t slot = tree_.first_of(body, node); slot != none) {
+      step == 1 ? tree_.prefetch(slot) : outlook_.prefetch(tree_[slot]);
+    }
+  }
+
+  /// When the present segment ends; infinite if there is none. `open_segment` is due then, before any event
+  /// from then on.
+  double segment_end() const { return outlook_.segment_end(); }
+  /// Goes on to the next segment: looks which pairs have an event in it.
+  void open_segment() {
+    const Moment<S> now = Moment<S>::at(outlook_.open_segment());
+    const std::uint32_t slots = tree_.slots();
+    constexpr std::uint32_t ahead = 12;
+    for (std::uint32_t slot = 0; slot < slots; ++slot) {
+      if (slot + ahead < slots) outlook_.prefetch(tree_[slot + ahead]);
+      const BoxPair& pair = tree_[slot];
+      if (pair.used && !pair.scheduled) put(slot, look(slot, now, state(pair)));
+    }
+  }
+
+  /// These boxes have other realisers, or realisers with other plans. Returns whether they are in any pair:
+  /// `boxes_changed` is called then.
+  bool take_over(std::span<const ChangedBoxes::Box> boxes) {
+    outlook_.take_over(boxes);
+    return std::any_of(boxes.begin(), boxes.end(),
+                       [&](const auto& box) { return tree_.first_of(box.body, box.node) != none; });
+  }
+  /// Decides anew the pairs of boxes that have changed at `now`. Boxes may be named twice.
+  void boxes_changed(std::span<const ChangedBoxes::Box> boxes, const Moment<S>& now) {
+    time_ = now.instant.begin;
+    end_ = now.instant.end;
     // Of a node that went while the geometry changed, no pair is left.
     for (const auto& box : boxes) {
       linked_.clear();
-      for (std::uint32_t slot = bodies_[box.body].first_pair[box.node]; slot != none;
-           slot = pairs_[slot].next[side_of(slot, box.body, box.node)])
+      for (std::uint32_t slot = tree_.first_of(box.body, box.node); slot != none;
+           slot = tree_.next_of(slot, box.body, box.node)) {
         linked_.push_back(slot);
+        outlook_.prefetch(tree_[slot]);
+      }
       if (linked_.empty()) continue;
       count_->add(Counter::bound_change_events);
       for (const std::uint32_t slot : linked_) {
         // What a collapse has removed, or an expansion made anew in its place, needs nothing.
-        if (!pairs_[slot].used || !has_node(slot, box.body, box.node)) continue;
+        if (!tree_[slot].used || !tree_.has_node(slot, box.body, box.node)) continue;
         count_->add(Counter::nodes_visited);
         ++work_done_.decided;
-        if (overlap_after(slot, now) != pairs_[slot].overlapping)
-          turn(slot, now);
+        const Outlook outlook = look(slot, now, State::unknown);
+        if (outlook.overlapping != tree_[slot].overlapping)
+          turn(slot, now, outlook);
         else
-          schedule(slot, now);
+          put(slot, outlook);
       }
     }
   }
@@ -198,19 +223,21 @@ class SeparationList {
   template <class Forest>
   ListEdit geometry_changed(double t, const Forest& forest, std::span<const ChangedBoxes::Node> nodes,
                             std::vector<ChangedBoxes::Box>& boxes) {
-    KBVH_ASSERT(!recording_);
-    const auto now = Instant<S>::at(t);
+    KBVH_ASSERT(!is_recording());
+    const auto now = Moment<S>::at(t);
     time_ = t;
     work_done_ = {};
     read_trees(forest);
-    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i) remove_self_pairs(i);
+    for (auto& box : boxes) box.side = ChangedBoxes::all_sides;
+    take_over(boxes);
+    for (std::uint32_t i = 0; i < tree_.body_pair_count(); ++i) remove_self_pairs(i);
     remove_changed(nodes);
     for (const std::uint32_t slot : tops_) {
       work_.assign(1, slot);
       settle_new(now);
     }
-    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i)
-      if (roots_[i] == none && self_roots_[i].empty() && both_have_nodes(i)) start_pair(i, now);
+    for (std::uint32_t i = 0; i < tree_.body_pair_count(); ++i)
+      if (roots_[i] == none && self_roots_[i].empty() && tree_.both_have_nodes(i)) start_pair(i, now);
     std::sort(boxes.begin(), boxes.end());
     boxes.erase(std::unique(boxes.begin(), boxes.end()), boxes.end());
     boxes_changed(boxes, now);
@@ -219,14 +246,14 @@ class SeparationList {
 
   /// An event of the list as the contract describes it.
   ScheduledEvent<S> described(const Event& event) const {
-    const Pair& pair = pairs_[event.slot];
+    const BoxPair& pair = tree_[event.slot];
     ScheduledEvent<S> out;
     out.kind = event.review       ? EventKind::review
                : pair.overlapping ? EventKind::boxes_separate
                                   : EventKind::boxes_meet;
-    out.body = body_of(pair, 0);
+    out.body = tree_.body_of(pair, 0);
     out.node = pair.a;
-    out.other_body = body_of(pair, 1);
+    out.other_body = tree_.body_of(pair, 1);
     out.other_node = pair.b;
     out.time = {event.hint, event.error};
     out.has_crossing = !event.review;
@@ -239,377 +266,214 @@ class SeparationList {
     for (std::uint32_t slot = 0; slot < queue_.slots(); ++slot)
       if (queue_.scheduled(slot)) events.push_back(queue_.event(slot));
     std::sort(events.begin(), events.end(),
-              [&](const Event& a, const Event& b) { return clock_.earlier(a, b); });
+              [&](const Event& a, const Event& b) { return clock().earlier(a, b); });
     for (const Event& event : events) out.push_back(described(event));
   }
 
   /// The overlapping leaves of one body pair, in no order.
-  std::span<const LeafPair> leaf_pairs(std::size_t body_pair) const { return leaves_[body_pair]; }
+  std::span<const OverlappingLeaves> leaf_pairs(std::size_t body_pair) const { return leaves_.of(body_pair); }
   /// Pairs in the list: apart, or overlapping leaves.
   std::size_t size() const { return list_size_; }
   /// All pairs by slot, for audits.
-  std::span<const Pair> pairs() const { return pairs_; }
-  const OverlapClock<S>& clock() const { return clock_; }
-  RealisedBox<S> box(std::uint32_t body, std::uint32_t node) const {
-    return {bodies_[body].plans, bodies_[body].realisers + std::size_t(6) * node};
-  }
+  std::span<const BoxPair> pairs() const { return tree_.pairs(); }
+  const OverlapClock<S>& clock() const { return outlook_.clock(); }
 
   /// From now on ended overlaps of leaves are kept; those that last already count from t.
-  void start_spans(double t) {
-    for (auto& leaves : leaves_)
-      for (LeafPair& leaf : leaves) leaf.since = t;
-    ended_.clear();
-    recording_ = true;
-  }
-  bool is_recording() const { return recording_; }
+  void start_spans(double t) { leaves_.start_spans(t); }
+  bool is_recording() const { return leaves_.is_recording(); }
   /// The overlaps that ended since `start_spans`; those that last are the leaf pairs.
-  std::span<const EndedLeafPair> stop_spans() {
-    recording_ = false;
-    return ended_;
-  }
+  std::span<const EndedOverlap> stop_spans() { return leaves_.stop_spans(); }
 
   std::uint64_t steps() const { return queue_.steps(); }
   std::size_t bytes() const {
-    std::size_t total =
-        queue_.bytes() + pairs_.capacity() * sizeof(Pair) +
-        (free_blocks_.capacity() + work_.capacity() + linked_.capacity() + roots_.size() + tops_.capacity()) *
-            4;
-    for (const auto& body : bodies_) total += body.first_pair.size() * 4 + body.gone.size();
-    for (const auto& leaves : leaves_) total += leaves.capacity() * sizeof(LeafPair);
-    return total + body_pairs_.capacity() * (sizeof(BodyPair) + sizeof(leaves_[0]) + sizeof(self_roots_[0]));
+    return queue_.bytes() + tree_.bytes() + outlook_.bytes() + leaves_.bytes() +
+           (work_.capacity() + linked_.capacity() + roots_.capacity() + tops_.capacity()) *
+               sizeof(std::uint32_t) +
+           self_roots_.capacity() * sizeof(self_roots_[0]);
   }
 
  private:
-  static constexpr BodyPair unused{none, none};
-
-  struct BodyBoxes {
-    const Topology* topology;
-    const std::uint32_t* realisers;
-    const FlightPlans<S>* plans;
-    std::vector<std::uint32_t> first_pair;  ///< linked from each node, or none
-    std::vector<std::uint8_t> gone;         ///< nodes, while a change of geometry is followed
+  using State = typename PairOutlook<S>::State;
+  using Outlook = typename PairOutlook<S>::Outlook;
+  /// Does the queue keep what waits by segments?
+  static constexpr bool by_segments = requires(Queue<OverlapClock<S>> queue) {
+    queue.split_at(std::span<const double>());
   };
 
-  /// Where the trees keep their realisers now, and room for all their nodes; ids are never given up.
+  template <class Forest>
+  static std::vector<const Topology*> forest_topologies(const SceneView<S>& scene, const Forest& forest) {
+    std::vector<const Topology*> topologies;
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      topologies.push_back(&forest.tree(body).topology());
+    return topologies;
+  }
+  /// Where the trees keep their realisers now, and room for all their nodes.
   template <class Forest>
   void read_trees(const Forest& forest) {
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
-      BodyBoxes& own = bodies_[body];
-      own.realisers = own.topology->empty() ? nullptr : forest.tree(body).realisers(0);
-      if (own.first_pair.size() < own.topology->size()) own.first_pair.resize(own.topology->size(), none);
-    }
+    tree_.follow_topologies();
+    outlook_.read_trees(forest);
   }
-  void clear() {
+  void clear(double t) {
     queue_.clear();
-    pairs_.clear();
-    free_blocks_.clear();
+    tree_.clear();
+    outlook_.start(t);
+    time_ = t;
     list_size_ = 0;
-    for (auto& leaves : leaves_) leaves.clear();
-    for (auto& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
+    leaves_.clear();
     std::fill(roots_.begin(), roots_.end(), none);
     for (auto& roots : self_roots_) roots.clear();
   }
   std::uint32_t number(const BodyPair& pair) {
-    if (!free_numbers_.empty()) {
-      const std::uint32_t bodies = free_numbers_.back();
-      free_numbers_.pop_back();
-      body_pairs_[bodies] = pair;
-      return bodies;
+    const std::uint32_t bodies = tree_.enter(pair);
+    if (bodies == roots_.size()) {
+      roots_.push_back(none);
+      self_roots_.emplace_back();
+      leaves_.resize(roots_.size());
     }
-    body_pairs_.push_back(pair);
-    roots_.push_back(none);
-    self_roots_.emplace_back();
-    leaves_.emplace_back();
-    return std::uint32_t(body_pairs_.size() - 1);
-  }
-  bool both_have_nodes(std::uint32_t bodies) const {
-    return is_entered(bodies) && !bodies_[body_pairs_[bodies].first].topology->empty() &&
-           !bodies_[body_pairs_[bodies].second].topology->empty();
+    return bodies;
   }
   /// Makes the list of a body pair that has none.
-  void start_pair(std::uint32_t bodies, const Instant<S>& now) {
-    if (body_pairs_[bodies].first == body_pairs_[bodies].second) {
-      start_self_pairs(bodies, now);
-      return;
-    }
-    roots_[bodies] = new_block();
-    insert(roots_[bodies], bodies, 0, 0, none, 0);
-    work_.assign(1, roots_[bodies]);
-    settle_new(now);
-  }
-
-  /// Each two children of each inner node, in a block for each.
-  void start_self_pairs(std::uint32_t bodies, const Instant<S>& now) {
-    const Topology& topology = *bodies_[body_pairs_[bodies].first].topology;
-    std::vector<std::uint32_t> inner;
-    if (!topology.nodes[0].is_leaf()) inner.push_back(0);
+  void start_pair(std::uint32_t bodies, const Moment<S>& now) {
     work_.clear();
-    while (!inner.empty()) {
-      const TopologyNode parent = topology.nodes[inner.back()];
-      inner.pop_back();
-      const std::uint32_t end = parent.first() + parent.count();
-      for (std::uint32_t child = parent.first(); child < end; ++child)
-        if (!topology.nodes[child].is_leaf()) inner.push_back(child);
-      if (parent.count() < 2) continue;
-      std::uint32_t slot = new_block();
-      self_roots_[bodies].push_back(slot);
-      for (std::uint32_t a = parent.first(); a < end; ++a)
-        for (std::uint32_t b = a + 1; b < end; ++b) {
-          insert(slot, bodies, a, b, none, 0);
-          work_.push_back(slot++);
-        }
+    if (tree_.body_pair(bodies).first == tree_.body_pair(bodies).second) {
+      tree_.insert_self_roots(
+          bodies, [&](std::uint32_t block) { self_roots_[bodies].push_back(block); },
+          [&](std::uint32_t slot) { work_.push_back(slot); });
+    } else {
+      roots_[bodies] = tree_.new_block();
+      tree_.insert(roots_[bodies], bodies, 0, 0, none, 0);
+      work_.push_back(roots_[bodies]);
     }
     settle_new(now);
   }
   /// Removes all pairs within a body, as far as there are any.
   void remove_self_pairs(std::uint32_t bodies) {
     for (const std::uint32_t block : self_roots_[bodies]) {
-      for (std::uint32_t slot = block; slot < block + block_ && pairs_[slot].used; ++slot) {
+      tree_.for_block(block, [&](std::uint32_t slot) {
         unsettle(slot);
         remove(slot);
-      }
-      free_blocks_.push_back(block);
+      });
+      tree_.free_block(block);
     }
     self_roots_[bodies].clear();
   }
-
-  bool has_gone_node(const Pair& pair) const {
-    const auto gone = [&](std::uint32_t body, std::uint32_t node) {
-      return node < bodies_[body].gone.size() && bodies_[body].gone[node] != 0;
-    };
-    return gone(body_of(pair, 0), pair.a) || gone(body_of(pair, 1), pair.b);
-  }
   /// Removes all pairs below those of changed nodes, and leaves the highest of these in `tops_`, as pairs of
   /// which nothing is known. Root pairs of a body that has nothing left go.
-  ///
-  /// All goes by the tree of pairs, which is that of the trees before the change, whatever the ids mean now:
-  /// an id that lost its meaning lay, then, below a node that the trees named.
   void remove_changed(std::span<const ChangedBoxes::Node> nodes) {
-    for (const auto& changed : nodes) {
-      BodyBoxes& body = bodies_[changed.body];
-      if (!changed.gone) continue;
-      body.gone.resize(body.first_pair.size(), 0);
-      body.gone[changed.node] = 1;
-    }
-    linked_.clear();
-    for (const auto& changed : nodes)
-      for (std::uint32_t slot = bodies_[changed.body].first_pair[changed.node]; slot != none;
-           slot = pairs_[slot].next[side_of(slot, changed.body, changed.node)]) {
-        std::uint32_t top = slot;
-        while (pairs_[top].parent != none && has_gone_node(pairs_[top])) top = pairs_[top].parent;
-        if (pairs_[top].dirty) continue;
-        pairs_[top].dirty = true;
-        linked_.push_back(top);
-      }
-    tops_.clear();
-    for (const std::uint32_t slot : linked_) {
-      std::uint32_t above = pairs_[slot].parent;
-      while (above != none && !pairs_[above].dirty) above = pairs_[above].parent;
-      if (above == none) tops_.push_back(slot);
-    }
-    for (const std::uint32_t slot : linked_) pairs_[slot].dirty = false;
+    tree_.find_highest_changed(nodes, tops_);
     for (const std::uint32_t slot : tops_) unsettle(slot);
-    for (const auto& changed : nodes)
-      if (changed.gone) bodies_[changed.body].gone[changed.node] = 0;
-    for (std::uint32_t i = 0; i < body_pairs_.size(); ++i) {
+    for (std::uint32_t i = 0; i < tree_.body_pair_count(); ++i) {
       const std::uint32_t root = roots_[i];
-      if (root == none || both_have_nodes(i)) continue;
+      if (root == none || tree_.both_have_nodes(i)) continue;
       // The body's last node was its root, so this pair is one of them, and the only one of its list.
       [[maybe_unused]] const std::size_t found = std::erase(tops_, root);
       KBVH_ASSERT(found == 1);
       remove(root);
-      free_blocks_.push_back(root);
+      tree_.free_block(root);
       roots_[i] = none;
     }
   }
   /// Makes a pair one that `settle_new` has still to decide.
   void unsettle(std::uint32_t slot) {
-    pairs_[slot].overlapping = false;
-    if (pairs_[slot].place != none) end_leaf(slot);
-    if (pairs_[slot].children != none)
+    tree_[slot].overlapping = false;
+    if (tree_[slot].place != none) leaves_.end(tree_, slot, end_);
+    if (tree_[slot].children != none)
       remove_below(slot);
     else
       list_changed(-1);
   }
 
-  std::uint32_t body_of(const Pair& pair, int side) const {
-    return side == 0 ? body_pairs_[pair.bodies].first : body_pairs_[pair.bodies].second;
-  }
-  /// Of a pair that has the node.
-  int side_of(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
-    return body_pairs_[pairs_[slot].bodies].first == body && pairs_[slot].a == node ? 0 : 1;
-  }
-  bool has_node(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
-    const BodyPair& bodies = body_pairs_[pairs_[slot].bodies];
-    return (bodies.first == body && pairs_[slot].a == node) ||
-           (bodies.second == body && pairs_[slot].b == node);
-  }
-  TopologyNode node(const Pair& pair, int side) const {
-    return bodies_[body_of(pair, side)].topology->nodes[side == 0 ? pair.a : pair.b];
-  }
-  bool both_leaves(const Pair& pair) const { return node(pair, 0).is_leaf() && node(pair, 1).is_leaf(); }
-  Counter kind_of_separation(std::uint32_t slot) const {
-    return both_leaves(pairs_[slot]) ? Counter::leaves_apart_events : Counter::fathers_apart_events;
-  }
-  RealisedBox<S> box_a(const Pair& pair) const { return box(body_of(pair, 0), pair.a); }
-  RealisedBox<S> box_b(const Pair& pair) const { return box(body_of(pair, 1), pair.b); }
-  bool overlap_after(std::uint32_t slot, const Instant<S>& now) const {
-    return clock_.overlap_after(box_a(pairs_[slot]), box_b(pairs_[slot]), now);
-  }
-
-  std::uint32_t new_block() {
-    if (!free_blocks_.empty()) {
-      const std::uint32_t block = free_blocks_.back();
-      free_blocks_.pop_back();
-      return block;
-    }
-    const std::size_t block = pairs_.size();
-    if (block + block_ >= none) throw std::length_error("a separation list of more than 2^32 pairs");
-    pairs_.resize(block + block_);
-    queue_.grow(std::uint32_t(pairs_.capacity()));
-    return std::uint32_t(block);
-  }
-
-  void insert(std::uint32_t slot, std::uint32_t bodies, std::uint32_t a, std::uint32_t b,
-              std::uint32_t parent, std::uint32_t depth) {
-    Pair& pair = pairs_[slot];
-    pair = {};
-    pair.a = a;
-    pair.b = b;
-    pair.parent = parent;
-    pair.depth = depth;
-    pair.bodies = bodies;
-    pair.used = true;
-    for (const int side : {0, 1}) {
-      const std::uint32_t own = side == 0 ? a : b;
-      std::uint32_t& first = bodies_[body_of(pair, side)].first_pair[own];
-      pair.previous[side] = none;
-      pair.next[side] = first;
-      if (first != none) pairs_[first].previous[side_of(first, body_of(pair, side), own)] = slot;
-      first = slot;
-    }
+  static State state(const BoxPair& pair) { return pair.overlapping ? State::overlapping : State::apart; }
+  Counter kind_of_separation(const BoxPair& pair) const {
+    return tree_.both_leaves(pair) ? Counter::leaves_apart_events : Counter::fathers_apart_events;
   }
   void remove(std::uint32_t slot) {
-    Pair& pair = pairs_[slot];
-    for (const int side : {0, 1}) {
-      const std::uint32_t body = body_of(pair, side), next = pair.next[side], previous = pair.previous[side];
-      const std::uint32_t own = side == 0 ? pair.a : pair.b;
-      if (next != none) pairs_[next].previous[side_of(next, body, own)] = previous;
-      if (previous != none)
-        pairs_[previous].next[side_of(previous, body, own)] = next;
-      else
-        bodies_[body].first_pair[own] = next;
-    }
+    tree_.remove(slot);
     cancel(slot);
-    pair.used = false;
     ++work_done_.removed;
   }
   void cancel(std::uint32_t slot) {
-    if (!queue_.cancel(slot)) return;
+    if (!tree_[slot].scheduled) return;
+    tree_[slot].scheduled = false;
+    queue_.cancel(slot);
     count_->add(Counter::certificates_discarded);
     count_->add(Counter::queue_operations);
   }
 
   /// Decides the pairs in `work_`, which are new, and all below them that have to be there.
-  void settle_new(const Instant<S>& now) {
+  void settle_new(const Moment<S>& now) {
+    queue_.grow(tree_.slot_capacity());
     while (!work_.empty()) {
       const std::uint32_t slot = work_.back();
       work_.pop_back();
       count_->add(Counter::nodes_visited);
       ++work_done_.decided;
       list_changed(1);
-      if (overlap_after(slot, now))
-        begin_overlap(slot, now);
-      else
-        schedule(slot, now);
+      const Outlook outlook = look(slot, now, State::unknown);
+      put(slot, outlook);
+      if (outlook.overlapping) begin_overlap(slot);
     }
   }
 
-  /// A pair in the list overlaps: notes it, schedules its end, and leaves its new children, if there are any,
-  /// in `work_`.
-  void begin_overlap(std::uint32_t slot, const Instant<S>& now) {
-    pairs_[slot].overlapping = true;
-    schedule(slot, now);
-    const Pair pair = pairs_[slot];  // by value: blocks move
-    const TopologyNode a = node(pair, 0), b = node(pair, 1);
-    if (a.is_leaf() && b.is_leaf()) {
-      auto& leaves = leaves_[pair.bodies];
-      pairs_[slot].place = std::uint32_t(leaves.size());
-      leaves.push_back({pair.a, pair.b, slot, time_});
+  /// A pair in the list overlaps: notes it, and leaves its new children, if there are any, in `work_`.
+  void begin_overlap(std::uint32_t slot) {
+    tree_[slot].overlapping = true;
+    if (tree_.both_leaves(tree_[slot])) {
+      leaves_.begin(tree_, slot, time_);
       return;
     }
     list_changed(-1);
-    const std::uint32_t block = new_block();
-    pairs_[slot].children = block;
-    const std::uint32_t begin_a = a.is_leaf() ? pair.a : a.first(), count_a = a.is_leaf() ? 1 : a.count();
-    const std::uint32_t begin_b = b.is_leaf() ? pair.b : b.first(), count_b = b.is_leaf() ? 1 : b.count();
-    std::uint32_t child = block;
-    for (std::uint32_t i = begin_a; i < begin_a + count_a; ++i)
-      for (std::uint32_t j = begin_b; j < begin_b + count_b; ++j) {
-        insert(child, pair.bodies, i, j, slot, pair.depth + 1);
-        work_.push_back(child++);
-      }
+    tree_.insert_children(slot, [&](std::uint32_t child) { work_.push_back(child); });
+    queue_.grow(tree_.slot_capacity());
   }
 
-  /// A pair changes between apart and overlapping at `now`.
-  void turn(std::uint32_t slot, const Instant<S>& now) {
-    if (!pairs_[slot].overlapping) {
+  /// A pair changes between apart and overlapping at `now`; what lies ahead of it is given.
+  void turn(std::uint32_t slot, const Moment<S>& now, const Outlook& outlook) {
+    put(slot, outlook);
+    if (!tree_[slot].overlapping) {
       work_.clear();
-      begin_overlap(slot, now);
+      begin_overlap(slot);
       settle_new(now);
       return;
     }
-    pairs_[slot].overlapping = false;
-    if (pairs_[slot].place != none)
-      end_leaf(slot);
-    else {
+    tree_[slot].overlapping = false;
+    if (tree_[slot].place != none) {
+      leaves_.end(tree_, slot, end_);
+    } else {
       remove_below(slot);
       list_changed(1);
     }
-    schedule(slot, now);
-  }
-
-  void end_leaf(std::uint32_t slot) {
-    Pair& pair = pairs_[slot];
-    auto& leaves = leaves_[pair.bodies];
-    if (recording_) ended_.push_back({pair.bodies, leaves[pair.place], end_});
-    pairs_[leaves.back().slot].place = pair.place;
-    leaves[pair.place] = leaves.back();
-    leaves.pop_back();
-    pair.place = none;
   }
 
   void remove_below(std::uint32_t top) {
-    work_.assign(1, pairs_[top].children);
-    pairs_[top].children = none;
+    work_.assign(1, tree_[top].children);
+    tree_[top].children = none;
     while (!work_.empty()) {
       const std::uint32_t block = work_.back();
       work_.pop_back();
-      for (std::uint32_t slot = block; slot < block + block_ && pairs_[slot].used; ++slot) {
+      tree_.for_block(block, [&](std::uint32_t slot) {
         count_->add(Counter::nodes_visited);
-        if (pairs_[slot].place != none) end_leaf(slot);
-        if (pairs_[slot].children != none)
-          work_.push_back(pairs_[slot].children);
+        if (tree_[slot].place != none) leaves_.end(tree_, slot, end_);
+        if (tree_[slot].children != none)
+          work_.push_back(tree_[slot].children);
         else
           list_changed(-1);
         remove(slot);
-      }
-      free_blocks_.push_back(block);
+      });
+      tree_.free_block(block);
     }
   }
 
-  /// Puts the pair's next event into the queue, in place of the one that stood.
-  void schedule(std::uint32_t slot, const Instant<S>& now) {
-    cancel(slot);
-    Event event;
-    event.slot = slot;
-    event.depth = pairs_[slot].depth;
+  Outlook look(std::uint32_t slot, const Moment<S>& now, State known) {
     count_->add(Counter::certificates_made);
-    const RealisedBox<S> a = box_a(pairs_[slot]), b = box_b(pairs_[slot]);
-    const bool found = pairs_[slot].overlapping ? clock_.next_separation(a, b, now, event)
-                                                : clock_.next_overlap(a, b, now, event);
-    if (!found) return;
-    queue_.schedule(event);
+    return outlook_.look(slot, now, known);
+  }
+  /// Puts the pair's next event into the queue, in place of the one that stood.
+  void put(std::uint32_t slot, const Outlook& outlook) {
+    cancel(slot);
+    if (!outlook.changes) return;
+    tree_[slot].scheduled = true;
+    queue_.schedule(outlook_.event());
     count_->add(Counter::queue_operations);
     count_->peak(Counter::queue_peak, queue_.size());
   }
@@ -619,24 +483,17 @@ class SeparationList {
     count_->peak(Counter::list_peak, list_size_);
   }
 
-  OverlapClock<S> clock_;
+  PairTree tree_;
+  PairOutlook<S> outlook_;
   Queue<OverlapClock<S>> queue_;
   Count* count_;
-  std::vector<BodyBoxes> bodies_;
-  std::vector<BodyPair> body_pairs_;  ///< by number
-  std::vector<std::uint32_t> free_numbers_;
-  std::uint32_t block_ = 4;  ///< most children of a pair
-  std::vector<Pair> pairs_;  ///< in blocks of siblings; the used ones come first in a block
-  std::vector<std::uint32_t> free_blocks_;
-  std::vector<std::vector<LeafPair>> leaves_;  ///< [body pair]
+  LeafOverlaps leaves_;
   std::size_t list_size_ = 0;
   std::vector<std::uint32_t> roots_;                    ///< slot of each body pair's root pair, or none
   std::vector<std::vector<std::uint32_t>> self_roots_;  ///< [body pair] blocks of roots within one body
   std::vector<std::uint32_t> work_, linked_, tops_;
   ListEdit work_done_;         ///< since the last change of geometry began
   double time_ = 0, end_ = 0;  ///< around the instant of the event at hand
-  bool recording_ = false;
-  std::vector<EndedLeafPair> ended_;
 };
 
 }  // namespace kbvh

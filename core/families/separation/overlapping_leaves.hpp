@@ -1,0 +1,73 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/families/separation/pair_tree.hpp"
+
+namespace kbvh {
+
+/// Overlapping leaves, and since when at the earliest.
+struct OverlappingLeaves {
+  std::uint32_t a, b, slot;
+  double since;
+};
+/// An overlap that is over: of which body pair, and until when at the latest.
+struct EndedOverlap {
+  std::uint32_t bodies;
+  OverlappingLeaves leaf;
+  double until;
+};
+
+/// The overlapping leaves of each body pair, as a separation list answers with them; and those that have
+/// ended while somebody asks for spans. A pair's `place` is that among its body pair's.
+class LeafOverlaps {
+ public:
+  void resize(std::size_t body_pairs) { leaves_.resize(body_pairs); }
+  void clear() {
+    for (auto& leaves : leaves_) leaves.clear();
+  }
+  /// Of one body pair, in no order.
+  std::span<const OverlappingLeaves> of(std::size_t body_pair) const { return leaves_[body_pair]; }
+
+  void begin(PairTree& tree, std::uint32_t slot, double since) {
+    BoxPair& pair = tree[slot];
+    auto& leaves = leaves_[pair.bodies];
+    pair.place = std::uint32_t(leaves.size());
+    leaves.push_back({pair.a, pair.b, slot, since});
+  }
+  void end(PairTree& tree, std::uint32_t slot, double until) {
+    BoxPair& pair = tree[slot];
+    auto& leaves = leaves_[pair.bodies];
+    if (recording_) ended_.push_back({pair.bodies, leaves[pair.place], until});
+    tree[leaves.back().slot].place = pair.place;
+    leaves[pair.place] = leaves.back();
+    leaves.pop_back();
+    pair.place = PairTree::none;
+  }
+
+  /// From now on ended overlaps are kept; those that last already count from t.
+  void start_spans(double t) {
+    for (auto& leaves : leaves_)
+      for (OverlappingLeaves& leaf : leaves) leaf.since = t;
+    ended_.clear();
+    recording_ = true;
+  }
+  bool is_recording() const { return recording_; }
+  std::span<const EndedOverlap> stop_spans() {
+    recording_ = false;
+    return ended_;
+  }
+  std::size_t bytes() const {
+    std::size_t total = leaves_.capacity() * sizeof(leaves_[0]) + ended_.capacity() * sizeof(EndedOverlap);
+    for (const auto& leaves : leaves_) total += leaves.capacity() * sizeof(OverlappingLeaves);
+    return total;
+  }
+
+ private:
+  std::vector<std::vector<OverlappingLeaves>> leaves_;  ///< [body pair]
+  bool recording_ = false;
+  std::vector<EndedOverlap> ended_;
+};
+
+}  // namespace kbvh

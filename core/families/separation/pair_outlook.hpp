@@ -1,0 +1,153 @@
+#pragma once
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "core/families/separation/pair_tree.hpp"
+#include "core/families/separation/segment_overlap.hpp"
+
+namespace kbvh {
+
+/// How far ahead the next event of a pair of boxes is looked for.
+enum class LookAhead : std::uint8_t {
+  pieces,  ///< so many linear pieces (OverlapClock)
+  /// Until the present segment ends, between keyframes that all moving bodies have in common; else pieces.
+  /// All pairs without an event are looked at when the next segment begins.
+  segment,
+};
+
+/// Finds out of pairs of boxes whether they overlap, and when that changes: by the signs of their gaps at
+/// both ends of the segment where these tell (SegmentOverlap), else with OverlapClock.
+template <class S>
+class PairOutlook {
+ public:
+  /// What is known of a pair right after an instant.
+  enum class State : std::uint8_t { unknown, apart, overlapping };
+  /// Whether boxes overlap right after an instant, and whether that changes: `event()` is when.
+  struct Outlook {
+    bool overlapping, changes;
+  };
+
+  template <class Forest>
+  PairOutlook(const SceneView<S>& scene, const Forest& forest, const PairTree& tree, LookAhead look_ahead,
+              int pieces)
+      : clock_(pieces), tree_(&tree), boxes_(plans_of(scene, forest), scene.pairs()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      bodies_.push_back({nullptr, &forest.clock().plans(body)});
+    by_segments_ = look_ahead == LookAhead::segment && boxes_.usable();
+  }
+
+  const OverlapClock<S>& clock() const { return clock_; }
+  RealisedBox<S> box(std::uint32_t body, std::uint32_t node) const {
+    return {bodies_[body].plans, bodies_[body].realisers + std::size_t(6) * node};
+  }
+
+  /// Where the trees keep their realisers now, and room for all their nodes.
+  template <class Forest>
+  void read_trees(const Forest& forest) {
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
+      const Topology& topology = tree_->topology(body);
+      bodies_[body].realisers = topology.empty() ? nullptr : forest.tree(body).realisers(0);
+      if (by_segments_) boxes_.follow_tree(body, topology.size(), bodies_[body].realisers);
+    }
+  }
+  /// Starts over at t.
+  void start(double t) {
+    if (by_segments_) boxes_.start(t);
+  }
+  /// When the present segment ends; infinite if there is none.
+  double segment_end() const { return by_segments_ ? boxes_.end() : std::numeric_limits<double>::infinity(); }
+  /// Goes on to the next segment, and returns when it begins.
+  double open_segment() {
+    boxes_.go_on();
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
+      boxes_.make_all(body,
+                      [&](std::uint32_t node) { return tree_->first_of(body, node) != PairTree::none; });
+    return boxes_.begin();
+  }
+  /// These boxes have other realisers, or realisers with other plans.
+  void take_over(std::span<const ChangedBoxes::Box> boxes) {
+    if (!by_segments_) return;
+    for (const auto& box : boxes)
+      if (box.side == ChangedBoxes::all_sides)
+        boxes_.node_changed(box.body, box.node);
+      else
+        boxes_.side_changed(box.body, box.node, box.side);
+  }
+  /// Fetches the boxes of a pair.
+  void prefetch(const BoxPair& pair) const {
+    if (!by_segments_ || !pair.used) return;
+    boxes_.prefetch(tree_->body_of(pair, 0), BoxRole::first, pair.a);
+    boxes_.prefetch(tree_->body_of(pair, 1), BoxRole::second, pair.b);
+  }
+
+  /// Fetches the boxes of a node.
+  void prefetch(std::uint32_t body, std::uint32_t node) const {
+    if (!by_segments_) return;
+    boxes_.prefetch(body, BoxRole::first, node);
+    boxes_.prefetch(body, BoxRole::second, node);
+  }
+
+  /// Looks at a pair from `now` on; its state right after is found out if it is not known.
+  Outlook look(std::uint32_t slot, const Moment<S>& now, State known) {
+    using Kind = typename SegmentOverlap<S>::Kind;
+    const BoxPair& pair = (*tree_)[slot];
+    const std::uint32_t body_a = tree_->body_of(pair, 0), body_b = tree_->body_of(pair, 1);
+    if (by_segments_) {
+      const SegmentBox<S>&a = boxes_.box(body_a, BoxRole::first, pair.a),
+            &b = boxes_.box(body_b, BoxRole::second, pair.b);
+      const Kind kind = SegmentOverlap<S>::kind(a, b);
+      if (kind == Kind::apart || kind == Kind::overlapping)
+        return {known == State::unknown ? kind == Kind::overlapping : known == State::overlapping, false};
+      if (kind == Kind::changes) {
+        const SegmentOverlap<S> overlap(boxes_, body_a, a, body_b, b);
+        return look(
+            pair, slot, known, [&] { return overlap.overlap_after(now); },
+            [&] { return overlap.next_separation(event_); },
+            [&] { return overlap.next_overlap(now, event_); });
+      }
+    }
+    const RealisedBox<S> a = box(body_a, pair.a), b = box(body_b, pair.b);
+    const Instant<S>& instant = now.instant;
+    return look(
+        pair, slot, known, [&] { return clock_.overlap_after(a, b, instant); },
+        [&] { return clock_.next_separation(a, b, instant, event_); },
+        [&] { return clock_.next_overlap(a, b, instant, event_); });
+  }
+  /// Of the pair that was looked at last, if its state changes.
+  const OverlapEvent<S>& event() const { return event_; }
+
+  std::size_t bytes() const { return boxes_.bytes(); }
+
+ private:
+  struct BodyPlans {
+    const std::uint32_t* realisers;
+    const FlightPlans<S>* plans;
+  };
+
+  template <class OverlapAfter, class NextSeparation, class NextOverlap>
+  Outlook look(const BoxPair& pair, std::uint32_t slot, State known, const OverlapAfter& overlap_after,
+               const NextSeparation& next_separation, const NextOverlap& next_overlap) {
+    event_.slot = slot;
+    event_.depth = pair.depth;
+    const bool overlapping = known == State::unknown ? overlap_after() : known == State::overlapping;
+    return {overlapping, overlapping ? next_separation() : next_overlap()};
+  }
+  template <class Forest>
+  static std::vector<const FlightPlans<S>*> plans_of(const SceneView<S>& scene, const Forest& forest) {
+    std::vector<const FlightPlans<S>*> plans;
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      plans.push_back(&forest.clock().plans(body));
+    return plans;
+  }
+
+  OverlapClock<S> clock_;
+  const PairTree* tree_;
+  SegmentBoxes<S> boxes_;
+  bool by_segments_ = false;
+  std::vector<BodyPlans> bodies_;
+  OverlapEvent<S> event_;
+};
+
+}  // namespace kbvh

@@ -1,0 +1,290 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "core/base/assert.hpp"
+#include "core/families/separation/changed_boxes.hpp"
+#include "core/scene/pairs.hpp"
+#include "core/topology/topology.hpp"
+
+namespace kbvh {
+
+/// Two boxes of a body pair and where they stand in the tree of pairs. 48 bytes.
+struct BoxPair {
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  std::uint32_t a, b;                  ///< nodes of the first and the second body
+  std::uint32_t parent = none;         ///< slot
+  std::uint32_t children = none;       ///< first of a block of slots, none of which may be in use
+  std::uint32_t next[2], previous[2];  ///< among the pairs linked from a, and from b
+  std::uint32_t place = none;          ///< among the overlapping leaves of the body pair
+  std::uint32_t bodies = 0;            ///< number of the body pair
+  std::uint32_t depth = 0;             ///< below the pair of roots
+  bool used = false, overlapping = false;
+  bool scheduled = false;  ///< has an event in the queue
+  bool dirty = false;      ///< has a node with other children, while a change of geometry is followed
+};
+static_assert(sizeof(BoxPair) == 48);
+
+/// The tree of pairs of a separation list (separation_list.hpp): its pairs in blocks of siblings, numbered by
+/// slot, each linked from both of its boxes; and the numbers of the body pairs. It knows topologies, and
+/// nothing of motion.
+class PairTree {
+ public:
+  static constexpr std::uint32_t none = BoxPair::none;
+
+  /// Over the topologies of a scene's bodies, which it reads whenever it is asked.
+  explicit PairTree(const std::vector<const Topology*>& topologies) {
+    for (const Topology* topology : topologies) {
+      bodies_.push_back({topology, {}, {}});
+      block_ = std::max(block_, topology->width * topology->width);
+    }
+  }
+  const Topology& topology(std::uint32_t body) const { return *bodies_[body].topology; }
+  /// Makes room for links from all nodes that there are now; ids are never given up.
+  void follow_topologies() {
+    for (Body& body : bodies_)
+      if (body.first_pair.size() < body.topology->size()) body.first_pair.resize(body.topology->size(), none);
+  }
+  /// Removes all pairs; body pairs keep their numbers.
+  void clear() {
+    pairs_.clear();
+    free_blocks_.clear();
+    for (Body& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
+  }
+
+  // ---- Body pairs
+
+  /// Enters a body pair and returns its number.
+  std::uint32_t enter(const BodyPair& pair) {
+    if (free_numbers_.empty()) {
+      body_pairs_.push_back(pair);
+      return std::uint32_t(body_pairs_.size() - 1);
+    }
+    const std::uint32_t number = free_numbers_.back();
+    free_numbers_.pop_back();
+    body_pairs_[number] = pair;
+    return number;
+  }
+  /// Takes out a body pair that has no pairs of boxes.
+  void leave(std::uint32_t number) {
+    body_pairs_[number] = unused;
+    free_numbers_.push_back(number);
+  }
+  void leave_all() {
+    body_pairs_.clear();
+    free_numbers_.clear();
+  }
+  /// Numbers of body pairs, some of which may not be in use.
+  std::uint32_t body_pair_count() const { return std::uint32_t(body_pairs_.size()); }
+  bool is_entered(std::uint32_t number) const { return body_pairs_[number].first != unused.first; }
+  const BodyPair& body_pair(std::uint32_t number) const { return body_pairs_[number]; }
+  bool both_have_nodes(std::uint32_t number) const {
+    return is_entered(number) && !topology(body_pairs_[number].first).empty() &&
+           !topology(body_pairs_[number].second).empty();
+  }
+
+  // ---- Pairs of boxes
+
+  BoxPair& operator[](std::uint32_t slot) { return pairs_[slot]; }
+  const BoxPair& operator[](std::uint32_t slot) const { return pairs_[slot]; }
+  /// All pairs by slot, the unused ones included.
+  std::span<const BoxPair> pairs() const { return pairs_; }
+  std::uint32_t slots() const { return std::uint32_t(pairs_.size()); }
+  std::uint32_t slot_capacity() const { return std::uint32_t(pairs_.capacity()); }
+
+  std::uint32_t body_of(const BoxPair& pair, int side) const {
+    return side == 0 ? body_pairs_[pair.bodies].first : body_pairs_[pair.bodies].second;
+  }
+  TopologyNode node(const BoxPair& pair, int side) const {
+    return topology(body_of(pair, side)).nodes[side == 0 ? pair.a : pair.b];
+  }
+  bool both_leaves(const BoxPair& pair) const { return node(pair, 0).is_leaf() && node(pair, 1).is_leaf(); }
+
+  /// The first pair that has a node, or none.
+  std::uint32_t first_of(std::uint32_t body, std::uint32_t node) const {
+    return bodies_[body].first_pair[node];
+  }
+  /// The pair after `slot` that has the node, or none.
+  std::uint32_t next_of(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
+    return pairs_[slot].next[side_of(slot, body, node)];
+  }
+  void prefetch_first_of(std::uint32_t body, std::uint32_t node) const {
+    __builtin_prefetch(bodies_[body].first_pair.data() + node);
+  }
+  void prefetch(std::uint32_t slot) const { __builtin_prefetch(pairs_.data() + slot); }
+  bool has_node(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
+    const BodyPair& bodies = body_pairs_[pairs_[slot].bodies];
+    return (bodies.first == body && pairs_[slot].a == node) ||
+           (bodies.second == body && pairs_[slot].b == node);
+  }
+
+  /// A block of slots for siblings, none of which is in use. Pairs may move in memory.
+  std::uint32_t new_block() {
+    if (!free_blocks_.empty()) {
+      const std::uint32_t block = free_blocks_.back();
+      free_blocks_.pop_back();
+      return block;
+    }
+    const std::size_t block = pairs_.size();
+    if (block + block_ >= none) throw std::length_error("a separation list of more than 2^32 pairs");
+    pairs_.resize(block + block_);
+    return std::uint32_t(block);
+  }
+  /// Gives up a block of slots, none of which is in use any more.
+  void free_block(std::uint32_t block) { free_blocks_.push_back(block); }
+  /// Calls work(slot) for each pair of a block; work may remove it.
+  template <class Work>
+  void for_block(std::uint32_t block, const Work& work) {
+    for (std::uint32_t slot = block; slot < block + block_ && pairs_[slot].used; ++slot) work(slot);
+  }
+
+  /// Makes a pair in a free slot and links it from its boxes. Used slots come first in a block.
+  void insert(std::uint32_t slot, std::uint32_t bodies, std::uint32_t a, std::uint32_t b,
+              std::uint32_t parent, std::uint32_t depth) {
+    BoxPair& pair = pairs_[slot];
+    pair = {};
+    pair.a = a;
+    pair.b = b;
+    pair.parent = parent;
+    pair.depth = depth;
+    pair.bodies = bodies;
+    pair.used = true;
+    for (const int side : {0, 1}) {
+      const std::uint32_t own = side == 0 ? a : b;
+      std::uint32_t& first = bodies_[body_of(pair, side)].first_pair[own];
+      pair.previous[side] = none;
+      pair.next[side] = first;
+      if (first != none) pairs_[first].previous[side_of(first, body_of(pair, side), own)] = slot;
+      first = slot;
+    }
+  }
+  /// Makes the pairs of a pair's children in a new block, as many as there are, and calls made(slot) for
+  /// each.
+  template <class Made>
+  void insert_children(std::uint32_t parent, const Made& made) {
+    const std::uint32_t block = new_block();
+    pairs_[parent].children = block;
+    const BoxPair pair = pairs_[parent];  // by value: blocks move
+    const TopologyNode a = node(pair, 0), b = node(pair, 1);
+    const std::uint32_t begin_a = a.is_leaf() ? pair.a : a.first(), count_a = a.is_leaf() ? 1 : a.count();
+    const std::uint32_t begin_b = b.is_leaf() ? pair.b : b.first(), count_b = b.is_leaf() ? 1 : b.count();
+    std::uint32_t child = block;
+    for (std::uint32_t i = begin_a; i < begin_a + count_a; ++i)
+      for (std::uint32_t j = begin_b; j < begin_b + count_b; ++j) {
+        insert(child, pair.bodies, i, j, parent, pair.depth + 1);
+        made(child++);
+      }
+  }
+  /// Makes, within one body, the pairs of two children of each inner node, in a block for each node: the
+  /// roots of its tree of pairs. Calls made_block(block), then made(slot) for each of its pairs. O(nodes).
+  template <class MadeBlock, class Made>
+  void insert_self_roots(std::uint32_t bodies, const MadeBlock& made_block, const Made& made) {
+    const Topology& own = topology(body_pairs_[bodies].first);
+    std::vector<std::uint32_t> inner;
+    if (!own.nodes[0].is_leaf()) inner.push_back(0);
+    while (!inner.empty()) {
+      const TopologyNode parent = own.nodes[inner.back()];
+      inner.pop_back();
+      const std::uint32_t end = parent.first() + parent.count();
+      for (std::uint32_t child = parent.first(); child < end; ++child)
+        if (!own.nodes[child].is_leaf()) inner.push_back(child);
+      if (parent.count() < 2) continue;
+      std::uint32_t slot = new_block();
+      made_block(slot);
+      for (std::uint32_t a = parent.first(); a < end; ++a)
+        for (std::uint32_t b = a + 1; b < end; ++b) {
+          insert(slot, bodies, a, b, none, 0);
+          made(slot++);
+        }
+    }
+  }
+  /// Takes a pair out; its block stays taken.
+  void remove(std::uint32_t slot) {
+    BoxPair& pair = pairs_[slot];
+    for (const int side : {0, 1}) {
+      const std::uint32_t body = body_of(pair, side), next = pair.next[side], previous = pair.previous[side];
+      const std::uint32_t own = side == 0 ? pair.a : pair.b;
+      if (next != none) pairs_[next].previous[side_of(next, body, own)] = previous;
+      if (previous != none)
+        pairs_[previous].next[side_of(previous, body, own)] = next;
+      else
+        bodies_[body].first_pair[own] = next;
+    }
+    pair.used = false;
+  }
+
+  /// Replaces `tops` by the highest pairs that have a changed node and will stay, for below a pair of a node
+  /// that is gone stands nothing that stays. All goes by the tree of pairs, which is that of the trees before
+  /// the change, whatever the ids mean now: an id that lost its meaning lay, then, below a node that the
+  /// trees named. O(pairs that have a changed node, times the depth).
+  void find_highest_changed(std::span<const ChangedBoxes::Node> nodes, std::vector<std::uint32_t>& tops) {
+    for (const auto& changed : nodes) {
+      if (!changed.gone) continue;
+      Body& body = bodies_[changed.body];
+      body.gone.resize(body.first_pair.size(), 0);
+      body.gone[changed.node] = 1;
+    }
+    changed_.clear();
+    for (const auto& node : nodes)
+      for (std::uint32_t slot = first_of(node.body, node.node); slot != none;
+           slot = next_of(slot, node.body, node.node)) {
+        std::uint32_t top = slot;
+        while (pairs_[top].parent != none && has_gone_node(pairs_[top])) top = pairs_[top].parent;
+        if (pairs_[top].dirty) continue;
+        pairs_[top].dirty = true;
+        changed_.push_back(top);
+      }
+    tops.clear();
+    for (const std::uint32_t slot : changed_) {
+      std::uint32_t above = pairs_[slot].parent;
+      while (above != none && !pairs_[above].dirty) above = pairs_[above].parent;
+      if (above == none) tops.push_back(slot);
+    }
+    for (const std::uint32_t slot : changed_) pairs_[slot].dirty = false;
+    for (const auto& changed : nodes)
+      if (changed.gone) bodies_[changed.body].gone[changed.node] = 0;
+  }
+
+  std::size_t bytes() const {
+    std::size_t total = pairs_.capacity() * sizeof(BoxPair) + body_pairs_.capacity() * sizeof(BodyPair) +
+                        (free_blocks_.capacity() + changed_.capacity()) * sizeof(std::uint32_t);
+    for (const Body& body : bodies_)
+      total += body.first_pair.size() * sizeof(std::uint32_t) + body.gone.size();
+    return total;
+  }
+
+ private:
+  static constexpr BodyPair unused{none, none};
+
+  struct Body {
+    const Topology* topology;
+    std::vector<std::uint32_t> first_pair;  ///< linked from each node, or none
+    std::vector<std::uint8_t> gone;         ///< nodes, while a change of geometry is followed
+  };
+
+  /// Of a pair that has the node: 0 if it is the first, else 1.
+  int side_of(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
+    return body_pairs_[pairs_[slot].bodies].first == body && pairs_[slot].a == node ? 0 : 1;
+  }
+  bool has_gone_node(const BoxPair& pair) const {
+    const auto gone = [&](std::uint32_t body, std::uint32_t node) {
+      return node < bodies_[body].gone.size() && bodies_[body].gone[node] != 0;
+    };
+    return gone(body_of(pair, 0), pair.a) || gone(body_of(pair, 1), pair.b);
+  }
+
+  std::uint32_t block_ = 4;  ///< most children of a pair
+  std::vector<BoxPair> pairs_;
+  std::vector<std::uint32_t> free_blocks_;
+  std::vector<Body> bodies_;
+  std::vector<BodyPair> body_pairs_;  ///< by number
+  std::vector<std::uint32_t> free_numbers_;
+  std::vector<std::uint32_t> changed_;
+};
+
+}  // namespace kbvh

@@ -1,0 +1,149 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include "core/families/separation/segment_boxes.hpp"
+
+namespace kbvh {
+
+/// An instant and a double near it: |instant - hint| <= error.
+template <class S>
+struct Moment {
+  Instant<S> instant;
+  double hint, error;
+
+  static Moment at(double t) { return {Instant<S>::at(t), t, 0}; }
+};
+
+/// Decides when two boxes overlap within one segment. Each of the six gaps is linear there, so that the
+/// boxes overlap throughout one interval, from the last gap's closing until the first one's opening, or
+/// never; signs at begin and end of the segment mostly tell that they do all the time or never. Decides
+/// exactly, and as OverlapClock does; leaves to it what is at zero at an end.
+template <class S>
+class SegmentOverlap {
+ public:
+  enum class Kind : std::uint8_t { apart, overlapping, changes, unsure };
+
+  /// What signs at the ends of the segment tell.
+  static Kind kind(const SegmentBox<S>& a, const SegmentBox<S>& b) {
+    Mask separates{}, positive = ~Mask{}, sure = ~Mask{};
+    for (std::size_t lane = 0; lane < SegmentBox<S>::lanes; lane += width) {
+      const Lanes first = load(a.at[0] + lane) + load(b.at[0] + lane),
+                  last = load(a.at[1] + lane) + load(b.at[1] + lane);
+      const Lanes zero{};
+      const Mask negative_first = first < zero, negative_last = last < zero;
+      const Mask positive_first = first > zero, positive_last = last > zero;
+      separates |= negative_first & negative_last;
+      positive &= positive_first & positive_last;
+      sure &= (negative_first | positive_first) & (negative_last | positive_last);
+    }
+    if (any(separates)) return Kind::apart;
+    if (!any(~positive)) return Kind::overlapping;
+    return any(~sure) ? Kind::unsure : Kind::changes;
+  }
+
+  /// Two boxes of a kind that changes.
+  SegmentOverlap(const SegmentBoxes<S>& boxes, std::uint32_t body_a, const SegmentBox<S>& a,
+                 std::uint32_t body_b, const SegmentBox<S>& b)
+      : boxes_(&boxes),
+        body_a_(body_a),
+        body_b_(body_b),
+        a_(&a),
+        b_(&b),
+        error_(16 * std::numeric_limits<double>::epsilon() *
+               std::max(std::abs(boxes.begin()), std::abs(boxes.end()))) {
+    for (std::size_t side = 0; side < 6; ++side) {
+      // Exact in float, else rounded once; signs are.
+      const double first = double(a.at[0][side]) + double(b.at[0][side]),
+                   last = double(a.at[1][side]) + double(b.at[1][side]);
+      if (first > 0 && last > 0) continue;
+      const Root root{boxes.begin() + (boxes.end() - boxes.begin()) * (first / (first - last)),
+                      std::uint8_t(side)};
+      // Of several at one instant the first side counts.
+      if (first < 0) {
+        if (closing_.side == no_side || compare(root, closing_) > 0) closing_ = root;
+      } else if (opening_.side == no_side || compare(root, opening_) < 0) {
+        opening_ = root;
+      }
+    }
+    never_ = closing_.side != no_side && opening_.side != no_side && compare(closing_, opening_) >= 0;
+  }
+
+  /// Do the boxes overlap right after an instant of the segment?
+  bool overlap_after(const Moment<S>& now) const {
+    return !never_ && (closing_.side == no_side || compare(closing_, now) <= 0) &&
+           (opening_.side == no_side || compare(opening_, now) > 0);
+  }
+  /// Whether boxes that are apart right after an instant begin to overlap later in the segment; and when.
+  bool next_overlap(const Moment<S>& now, OverlapEvent<S>& event) const {
+    if (never_ || closing_.side == no_side || compare(closing_, now) <= 0) return false;
+    return OverlapClock<S>::set(event, crossing(closing_.side, Turn::closes));
+  }
+  /// Whether boxes that overlap right after an instant cease to do so later in the segment; and when.
+  bool next_separation(OverlapEvent<S>& event) const {
+    if (opening_.side == no_side) return false;
+    return OverlapClock<S>::set(event, crossing(opening_.side, Turn::opens));
+  }
+
+ private:
+  static constexpr std::size_t width = 16 / sizeof(S);
+  using Lanes [[gnu::vector_size(16)]] = S;
+  using Mask = decltype(Lanes{} < Lanes{});
+  static constexpr std::uint8_t no_side = 6;
+  enum class Turn : std::uint8_t { closes, opens };
+
+  /// When a gap is zero, roughly.
+  struct Root {
+    double time = 0;
+    std::uint8_t side = no_side;
+  };
+
+  static Lanes load(const S* from) {
+    Lanes lanes;
+    std::memcpy(&lanes, from, sizeof lanes);
+    return lanes;
+  }
+  static bool any(Mask mask) {
+    std::uint64_t words[2];
+    std::memcpy(words, &mask, sizeof words);
+    return (words[0] | words[1]) != 0;
+  }
+
+  Crossing<S> crossing(std::uint8_t side, Turn turn) const {
+    const S a0 = a_->at[0][side], a1 = a_->at[1][side], b0 = b_->at[0][side], b1 = b_->at[1][side];
+    // An even side is a's upper bound minus b's lower one, an odd side b's upper bound minus a's.
+    const bool even = side % 2 == 0;
+    const Piece<S> of_a = even ? boxes_->piece(body_a_, a0, a1) : boxes_->piece(body_a_, -a0, -a1);
+    const Piece<S> of_b = even ? boxes_->piece(body_b_, -b0, -b1) : boxes_->piece(body_b_, b0, b1);
+    const Piece<S>&upper = even ? of_a : of_b, &lower = even ? of_b : of_a;
+    return turn == Turn::closes ? Crossing<S>{lower, upper} : Crossing<S>{upper, lower};
+  }
+  /// The sign of x - y, exact.
+  int compare(const Root& x, const Root& y) const {
+    if (x.time + 3 * error_ < y.time) return -1;
+    if (y.time + 3 * error_ < x.time) return 1;
+    return compare_crossings(crossing(x.side, Turn::closes), crossing(y.side, Turn::closes));
+  }
+  int compare(const Root& x, const Moment<S>& now) const {
+    const double error = 2 * error_ + now.error;
+    if (x.time + error < now.hint) return -1;
+    if (now.hint + error < x.time) return 1;
+    const Crossing<S> root = crossing(x.side, Turn::closes);
+    if (now.instant.exact == nullptr) return compare_crossing_to(root, now.instant.begin);
+    const Crossing<S>& exact = *now.instant.exact;
+    if (root == exact || (root.winner == exact.loser && root.loser == exact.winner)) return 0;
+    return compare_crossings(root, exact);
+  }
+
+  const SegmentBoxes<S>* boxes_;
+  std::uint32_t body_a_, body_b_;
+  const SegmentBox<S>*a_, *b_;
+  double error_;  ///< of a root: differences, sum, quotient, product and final sum are each rounded once
+  Root closing_, opening_;  ///< of the last gap to close, and of the first one to open
+  bool never_ = false;
+};
+
+}  // namespace kbvh
