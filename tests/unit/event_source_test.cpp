@@ -169,7 +169,7 @@ std::vector<ScheduledEvent<S>> log_of(const StrategyEntry& entry, const TestScen
     }
     session.query(answers.emplace_back(), times);
     std::sort(answers.back().begin(), answers.back().end());
-    session.follow(cursor.at(frames[f]), times);
+    follow(session, cursor.at(frames[f]), times);
   }
   return log;
 }
