@@ -86,6 +86,9 @@ ResultStore::ResultStore(const std::filesystem::path& folder)
     : folder_(folder), file_(folder / "results.jsonl") {
   prepare_folder(folder);
   std::error_code error;
+  const bool leads_nowhere =
+      std::filesystem::is_symlink(file_, error) && !std::filesystem::exists(file_, error);
+  if (leads_nowhere) throw io::InputError(file_.string() + ": is a link that leads to no file");
   if (std::filesystem::exists(file_, error) && !std::filesystem::is_regular_file(file_, error))
     throw io::InputError(file_.string() + ": is not a file to which results can be appended");
   if (const int descriptor = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC); descriptor >= 0)

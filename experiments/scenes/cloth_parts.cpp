@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "experiments/io/animated_mesh.hpp"
+#include "experiments/io/bytes.hpp"
 
 namespace kbvh::scenes::cloth {
 
@@ -63,8 +64,8 @@ std::string ConfigHash::digits() const {
 
 void check_range(const char* scene, double value, double lowest, double highest, const char* what) {
   if (!(value >= lowest) || !(value <= highest))
-    throw io::InputError(std::string(scene) + ": " + what + " is " + std::to_string(value) +
-                         ", must be from " + std::to_string(lowest) + " to " + std::to_string(highest));
+    throw io::InputError(std::string(scene) + ": " + what + " is " + io::text_of(value) + ", must be from " +
+                         io::text_of(lowest) + " to " + io::text_of(highest));
 }
 
 }  // namespace kbvh::scenes::cloth

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "experiments/common/text.hpp"
+#include "experiments/io/bytes.hpp"
 #include "experiments/scenes/nurbs.hpp"
 #include "experiments/scenes/shapes.hpp"
 
@@ -23,7 +24,7 @@ Point point(JsonReader& keys, const std::string& key, const Point& otherwise) {
 
 double positive(JsonReader& keys, const std::string& key, double otherwise) {
   const double value = keys.number(key).value_or(otherwise);
-  if (value <= 0) keys.fail(key, "must be positive, got " + std::to_string(value));
+  if (value <= 0) keys.fail(key, "must be positive, got " + io::text_of(value));
   return value;
 }
 

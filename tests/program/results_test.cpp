@@ -63,6 +63,17 @@ TEST(Results, NestingWithoutEndIsNoRecord) {
   EXPECT_TRUE(json_or_nothing(std::string(101, '[') + std::string(101, ']')).is_discarded());
 }
 
+TEST(Results, LinksToNothingAreSeenBeforeAnythingIsMeasured) {
+  const TemporaryFolder folder;
+  for (const char* target : {"nowhere", "results.jsonl"}) {
+    const auto out = folder / target;
+    std::filesystem::create_directories(out);
+    std::filesystem::create_symlink(target, out / "results.jsonl");
+    EXPECT_TRUE(contains(complaint([&] { ResultStore store(out); }), "is a link that leads to no file"))
+        << target;
+  }
+}
+
 TEST(Results, AFolderThatCannotBeMade) {
   const TemporaryFolder folder;
   write_text(folder / "file", "x");
