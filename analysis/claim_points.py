@@ -52,7 +52,7 @@ class Value:
 class Point:
     """A check's value at one place."""
 
-    baseline: str  #: id of the baseline, or "" where the check has none
+    corner: str  #: id of the corner or baseline, or "" where the check has none
     quantity: str
     scene: str
     size: float
@@ -65,13 +65,34 @@ class Point:
     close: bool  #: do repetitions disagree on whether the check is met?
 
 
+@dataclass(frozen=True)
+class Corner:
+    """Who a check compares with whom: a corner of its square, or one of the baselines, or all that there is."""
+
+    id: str  #: "" where the check has only one
+    name: str  #: in a sentence
+    who: str  #: the side that is judged, without what it is compared with
+    short: str  #: beside a picture
+    above: dict[str, Any]  #: the numerator, or the only term
+    below: Optional[dict[str, Any]]
+    optional: bool  #: its absence leaves the claim decided
+    needs: Optional[dict[str, Any]]  #: tables without a run of this term do not count: nothing but others was measured there
+
+
 @dataclass
 class Looked:
     """All points of one check, and what is missing to decide it."""
 
     check: dict[str, Any]
+    corners: list[Corner] = field(default_factory=list)
     points: list[Point] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
+    gaps: dict[str, list[str]] = field(default_factory=dict)  #: by optional corner: what was not measured of it
+
+    def unmeasured(self) -> list[Corner]:
+        """Corners without any point, of a check that has several and some points."""
+        known = {point.corner for point in self.points}
+        return [one for one in self.corners if self.points and one.id not in known]
 
 
 def met(check: dict[str, Any], value: float) -> bool:
@@ -158,7 +179,11 @@ class Table:
 
 def _fits(row: dict[str, Any], term: dict[str, Any], quantity: str) -> bool:
     """Is a run one that the term means?"""
+    if "one_of" in term:
+        return any(_fits(row, one, quantity) for one in term["one_of"])
     if any(row[column] != term[name] for column, name in NAMED.items() if name in term):
+        return False
+    if row["id"] in term.get("except", []):
         return False
     if row["guarantee"] == "approximate" or row["id"] in term.get("not_for", {}).get(quantity, []):
         return False
@@ -196,6 +221,8 @@ def quotient(table: Table, above: int, below: int, quantity: str) -> Optional[Va
 
 def words_of(term: dict[str, Any]) -> str:
     """A term in words, for what is missing."""
+    if "one_of" in term:
+        return " or ".join(words_of(one) for one in term["one_of"])
     settings = {**term.get("builder", {}), **term.get("params", {})}
     told = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in settings.items())
     who = term.get("strategy") or ("any baseline" if "baseline" in term else f"any {term['family']}")
@@ -205,47 +232,75 @@ def words_of(term: dict[str, Any]) -> str:
 class Looker:
     """Looks at checks in one study."""
 
-    def __init__(self, table: Table, baselines: list[dict[str, Any]]) -> None:
+    def __init__(
+        self, table: Table, baselines: list[dict[str, Any]], squares: Optional[dict[str, list[dict[str, Any]]]] = None
+    ) -> None:
         self.table = table
-        self.baselines = baselines
+        self.baselines = {one["id"]: one for one in baselines}
+        self.squares = squares or {}
 
     def look(self, check: dict[str, Any]) -> Looked:
         """All points of the check, and what is missing. Raises ClaimError for a check that makes no sense."""
         if check["measure"] not in MEASURES:
             raise ClaimError(f'the measure "{check["measure"]}" is none of {", ".join(MEASURES)}')
-        looked = Looked(check)
+        looked = Looked(check, self._corners(check))
         for quantity in check["quantities"]:
-            for baseline, above, below in self._sides(check):
+            for corner in looked.corners:
                 for scene in check["scenes"]:
-                    points, missing = self._scene(check, quantity, baseline, above, below, scene)
+                    points, missing = self._scene(check, quantity, corner, scene)
                     looked.points += points
-                    looked.missing += [one for one in missing if one not in looked.missing]
+                    listed = looked.gaps.setdefault(corner.id, []) if corner.optional else looked.missing
+                    listed += [one for one in missing if one not in listed]
                 for scene in check.get("optional_scenes", []):
-                    looked.points += self._scene(check, quantity, baseline, above, below, scene)[0]
+                    looked.points += self._scene(check, quantity, corner, scene)[0]
         return looked
 
-    def _sides(self, check: dict[str, Any]) -> list[tuple[str, dict[str, Any], Optional[dict[str, Any]]]]:
-        """Baseline, the term above and the one below (None where there is but one), for each baseline that counts."""
-        above, below = check.get("numerator", check.get("of")), check.get("denominator")
+    def _corners(self, check: dict[str, Any]) -> list[Corner]:
+        """The corners of the check's square; each of the baselines in turn; or the only thing that it is about."""
+        if "square" in check:
+            if check["square"] not in self.squares:
+                raise ClaimError(f'there is no square "{check["square"]}"')
+            listed = self.squares[check["square"]]
+        elif "baselines" in (check.get("numerator"), check.get("denominator"), check.get("of")):
+            sides = {name: check[name] for name in ("numerator", "denominator", "of") if name in check}
+            listed = [
+                {**{name: one["id"] if term == "baselines" else term for name, term in sides.items()},
+                 "id": one["id"], "name": f"against {one['name']}", "short": one["short"]}
+                for one in self.baselines.values()
+            ]  # fmt: skip
+        else:
+            listed = [{**check, "id": "", "name": "", "short": ""}]
+        return [self._corner(check, one) for one in listed]
+
+    def _corner(self, check: dict[str, Any], said: dict[str, Any]) -> Corner:
+        above, below = said.get("numerator", said.get("of")), said.get("denominator")
         if above is None or (check["measure"] == "ratio") != (below is not None):
             raise ClaimError(f'the check "{check["what"]}" does not say what it is of')
-        if "baselines" not in (above, below):
-            return [("", above, below)]
-        return [
-            (one["id"], one if above == "baselines" else above, one if below == "baselines" else below)
-            for one in self.baselines
-        ]
+        return Corner(
+            said["id"], said["name"], said.get("who", said["name"]), said["short"], self._term(above), None if below is None else self._term(below),
+            bool(said.get("optional", False)), said.get("needs"),
+        )  # fmt: skip
 
-    def _scene(
-        self, check: dict[str, Any], quantity: str, baseline: str, above: dict[str, Any],
-        below: Optional[dict[str, Any]], scene: str,
-    ) -> tuple[list[Point], list[str]]:  # fmt: skip
+    def _term(self, said: Any) -> dict[str, Any]:
+        """A term, or the one of the baseline that is named."""
+        if isinstance(said, dict):
+            return said
+        if said not in self.baselines:
+            raise ClaimError(f'there is no baseline "{said}"')
+        return self.baselines[said]
+
+    def _scene(self, check: dict[str, Any], quantity: str, corner: Corner, scene: str) -> tuple[list[Point], list[str]]:
         """Points of one scene, and why they do not suffice."""
+        above, below = corner.above, corner.below
         low, high = check["size"]
         everywhere = self.table.places(scene)
         if not everywhere:
             return [], [f"results of the scene {scene}"]
         places = [place for place in everywhere if low / SLACK <= place[0] <= high * SLACK]
+        if places and corner.needs is not None:
+            places = [one for one in places if any(_fits(row, corner.needs, quantity) for row in one[2])]
+            if not places:
+                return [], [f"{words_of(corner.needs)} on {scene}"]
         wanted = f"{text.size(low)} to {text.size(high)}"
         if not places:
             there = text.listing([text.size(size) for size in sorted({place[0] for place in everywhere})])
@@ -253,7 +308,7 @@ class Looker:
         made = {
             "ratio": self._ratio, "value": self._value, "exponent": self._exponent, "next_l": self._over_l,
             "ten_l": self._over_l, "across": self._across,
-        }[check["measure"]](check, quantity, baseline, above, below, scene, places)  # fmt: skip
+        }[check["measure"]](check, quantity, corner.id, above, below, scene, places)  # fmt: skip
         if not made:
             terms = text.listing([words_of(term) for term in (above, below) if term is not None])
             return [], [self._why_nothing(check, terms, scene, places)]
@@ -286,7 +341,7 @@ class Looker:
             gaps.append(f"{scene} at l = {check['l_reaches']:g} or more (measured: {depths})")
         return gaps
 
-    def _point(self, check: dict[str, Any], quantity: str, baseline: str, scene: str, size: float, l: float,
+    def _point(self, check: dict[str, Any], quantity: str, corner: str, scene: str, size: float, l: float,
                value: Optional[Value], runs: list[int]) -> list[Point]:  # fmt: skip
         if value is None or not math.isfinite(value.middle):
             return []
@@ -294,32 +349,32 @@ class Looker:
         ends = {met(check, value.low), met(check, value.high)}
         return [
             Point(
-                baseline, quantity, scene, size, l, value, met(check, value.middle),
+                corner, quantity, scene, size, l, value, met(check, value.middle),
                 tuple(dict.fromkeys(str(row["group"]) for row in rows)), tuple(str(row["key"]) for row in rows),
                 " / ".join(dict.fromkeys(str(row["label"]) for row in rows)), len(ends) > 1,
             )
         ]  # fmt: skip
 
-    def _ratio(self, check, quantity, baseline, above, below, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+    def _ratio(self, check, quantity, corner, above, below, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
         points: list[Point] = []
         for size, l, rows in places:
             a, b = self.table.chosen(rows, above, quantity), self.table.chosen(rows, below, quantity)
             if a is not None and b is not None:
                 value = quotient(self.table, a, b, quantity)
-                points += self._point(check, quantity, baseline, scene, size, l, value, [a, b])
+                points += self._point(check, quantity, corner, scene, size, l, value, [a, b])
         return points
 
-    def _value(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+    def _value(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
         points: list[Point] = []
         for size, l, rows in places:
             run = self.table.chosen(rows, of, quantity)
             if run is not None:
                 known = self.table.values(run, quantity)
                 value = Value(float(np.median(known)), float(known.min()), float(known.max()))
-                points += self._point(check, quantity, baseline, scene, size, l, value, [run])
+                points += self._point(check, quantity, corner, scene, size, l, value, [run])
         return points
 
-    def _exponent(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+    def _exponent(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
         """The slope through logarithms at each l that has enough sizes; its extremes come from leaving one size out."""
         points: list[Point] = []
         for depth in sorted({l for _, l, _ in places}):
@@ -335,10 +390,10 @@ class Looker:
             every = np.ones(len(x), dtype=bool)
             without = [slope(np.arange(len(x)) != i) for i in range(len(x))] if len(x) > 2 else [slope(every)]
             value = Value(slope(every), min(without), max(without))
-            points += self._point(check, quantity, baseline, scene, found[-1][0], depth, value, [one[2] for one in found])
+            points += self._point(check, quantity, corner, scene, found[-1][0], depth, value, [one[2] for one in found])
         return points
 
-    def _over_l(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+    def _over_l(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
         """At each size the next l over the one before it, or ten times an l over it; only within one clip."""
         points: list[Point] = []
         for size in sorted({size for size, _, _ in places}):
@@ -347,11 +402,14 @@ class Looker:
             if check["measure"] == "ten_l":
                 pairs = [(one, other) for one in depths for other in depths if other[0] == 10 * one[0]]
             for (_, fewer), (l, more) in pairs:
-                a, b = self.table.chosen(more, of, quantity), self.table.chosen(fewer, of, quantity)
+                both = {row["contestant"] for row in more} & {row["contestant"] for row in fewer}
+                a, b = (
+                    self.table.chosen([row for row in rows if row["contestant"] in both], of, quantity) for rows in (more, fewer)
+                )
                 if a is None or b is None or not self._one_clip(a, b):
                     continue
                 value = quotient(self.table, a, b, quantity)
-                points += self._point(check, quantity, baseline, scene, size, l, value, [a, b])
+                points += self._point(check, quantity, corner, scene, size, l, value, [a, b])
         return points
 
     def _one_clip(self, one: int, other: int) -> bool:
@@ -365,7 +423,7 @@ class Looker:
         a, b = self.table.row(one), self.table.row(other)
         return all(a[name] == b[name] for name in ("machine", "commit", "dirty"))
 
-    def _across(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+    def _across(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
         """Each place over the largest of the other scene at the same l."""
         low, high = check["other_size"]
         others: dict[float, int] = {}
@@ -377,5 +435,5 @@ class Looker:
             run = self.table.chosen(rows, of, quantity)
             if run is not None and l in others and self._comparable(run, others[l]):
                 value = quotient(self.table, run, others[l], quantity)
-                points += self._point(check, quantity, baseline, scene, size, l, value, [run, others[l]])
+                points += self._point(check, quantity, corner, scene, size, l, value, [run, others[l]])
         return points

@@ -17,6 +17,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 import choices
+import claim_pictures
+import claim_tables
 import claims as paper_claims
 import exactness
 import figures
@@ -135,6 +137,7 @@ def write(
         claims=claims,
         tally=_tally(claims),
         claim_links=_claim_links(claims, study, groups, drawn),
+        **_claim_parts(claims),
         theory=theory,
         paper=paper,
         sections=[section for section in sections if not section.own],
@@ -159,6 +162,17 @@ def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:
     """How many claims have which verdict."""
     verdicts = (paper_claims.HOLDS, paper_claims.CONDITION, paper_claims.FAILS, paper_claims.OPEN)
     return [(verdict, sum(row.verdict == verdict for row in claims.rows)) for verdict in verdicts]
+
+
+def _claim_parts(claims: paper_claims.Claims) -> dict[str, object]:
+    """What claims show and fold out, by id."""
+    return {
+        "theory_ids": {row.id for row in claims.rows if not row.looked},
+        "several_checks": {row.id: len({corner.check for corner in row.corners}) > 1 for row in claims.rows},
+        "claim_pictures": {row.id: Markup(claim_pictures.picture(row.looked, row.checks)) for row in claims.rows},
+        "claim_tables": {row.id: claim_tables.tables(row.looked) for row in claims.rows},
+        "claim_criteria": {row.id: claim_tables.criteria(row.checks) if not row.looked else [] for row in claims.rows},
+    }
 
 
 def _claim_links(
