@@ -151,9 +151,12 @@ def draw(blocks: Sequence[Block], unit: str = "") -> str:
     for block in blocks:
         y = _block(parts, block, axis, y)
     bottom = y
-    lines = [f'<line class="grid{" one" if tick == 1 else ""}" x1="{axis.at(tick):.1f}" x2="{axis.at(tick):.1f}" y1="{HEAD:.1f}" y2="{bottom:.1f}"/>'
-             for tick in axis.ticks]  # fmt: skip
-    names = [f'<text class="tick" x="{axis.at(tick):.1f}" y="{bottom + 12:.1f}">{number(tick)}</text>' for tick in axis.ticks]
+    lines, names = [], []
+    for tick in axis.ticks:
+        x = f"{axis.at(tick):.1f}"
+        kind = "grid one" if tick == 1 else "grid"
+        lines.append(f'<line class="{kind}" x1="{x}" x2="{x}" y1="{HEAD:.1f}" y2="{bottom:.1f}"/>')
+        names.append(f'<text class="tick" x="{x}" y="{bottom + 12:.1f}">{number(tick)}</text>')
     if axis.zero:
         names.append(f'<text class="tick" x="{axis.at(0):.1f}" y="{bottom + 12:.1f}">0</text>')
     if unit:
@@ -178,9 +181,8 @@ def _block(parts: list[str], block: Block, axis: Axis, y: float) -> float:
     under = f'<rect class="zone" x="{left:.1f}" y="{top:.1f}" width="{max(right - left, 1):.1f}" height="{bottom - top:.1f}"/>'
     over = f'<text class="name head" x="0" y="{y + 12:.1f}">{escape(_short(block.name))}</text>' if block.name else ""
     if bounded:
-        over += (
-            f'<text class="claimed{" end" if end else ""}" x="{place + (-3 if end else 3):.1f}" y="{y + 12:.1f}">claimed {escape(sign)}</text>'
-        )
+        beside = f'class="claimed{" end" if end else ""}" x="{place + (-3 if end else 3):.1f}" y="{y + 12:.1f}"'
+        over += f"<text {beside}>claimed {escape(sign)}</text>"
         if block.relation != "within a factor of":
             over += f'<line class="bound" x1="{place:.1f}" x2="{place:.1f}" y1="{y + 3:.1f}" y2="{bottom:.1f}"/>'
     for number_of_row, bar in enumerate(block.bars):

@@ -9,7 +9,7 @@ from typing import Any, Optional
 import numpy as np
 
 import text
-from load import Study
+from load import PHASES, Study
 
 #: Phases that make up a time, in the names of claims.json.
 TIMES: dict[str, tuple[str, ...]] = {
@@ -90,9 +90,10 @@ class Looked:
     gaps: dict[str, list[str]] = field(default_factory=dict)  #: by optional corner: what was not measured of it
 
     def unmeasured(self) -> list[Corner]:
-        """Corners without any point, of a check that has several and some points."""
+        """Corners without any point, of a check of which anything was measured or all is optional."""
         known = {point.corner for point in self.points}
-        return [one for one in self.corners if self.points and one.id not in known]
+        counts = self.points or all(one.optional for one in self.corners)
+        return [one for one in self.corners if counts and one.id not in known]
 
 
 def met(check: dict[str, Any], value: float) -> bool:
@@ -127,7 +128,7 @@ class Table:
         self.rows["size"] = self.rows["size"].where(self.rows["size"] > 0, self.rows["primitives"])
         self._row: dict[int, dict[str, Any]] = {int(row["run"]): row for row in self.rows.to_dict("records")}
         repetitions = study.repetitions.sort_values(["run", "repetition"])
-        self._times = {int(run): times for run, times in repetitions.groupby("run")}
+        self._times = {int(run): times[list(PHASES)].to_numpy(dtype=float) for run, times in repetitions.groupby("run")}
         self._places: dict[str, list[Place]] = {}
 
     def places(self, scene: str) -> list[Place]:
@@ -147,7 +148,7 @@ class Table:
         row = self._row[run]
         scale = row["l"] if quantity.endswith("per keyframe") else 1.0
         if quantity in TIMES:
-            return self._times[run][list(TIMES[quantity])].to_numpy(dtype=float).sum(axis=1) * scale
+            return self._times[run][:, [PHASES.index(name) for name in TIMES[quantity]]].sum(axis=1) * scale
         if quantity == "values per event":
             events = row["certificates_failed_per_frame"]
             known = [row["values_written_per_frame"] / events] if events > 0 else []
@@ -277,8 +278,8 @@ class Looker:
         if above is None or (check["measure"] == "ratio") != (below is not None):
             raise ClaimError(f'the check "{check["what"]}" does not say what it is of')
         return Corner(
-            said["id"], said["name"], said.get("who", said["name"]), said["short"], self._term(above), None if below is None else self._term(below),
-            bool(said.get("optional", False)), said.get("needs"),
+            said["id"], said["name"], said.get("who", said["name"]), said["short"], self._term(above),
+            None if below is None else self._term(below), bool(said.get("optional", False)), said.get("needs"),
         )  # fmt: skip
 
     def _term(self, said: Any) -> dict[str, Any]:
@@ -404,7 +405,8 @@ class Looker:
             for (_, fewer), (l, more) in pairs:
                 both = {row["contestant"] for row in more} & {row["contestant"] for row in fewer}
                 a, b = (
-                    self.table.chosen([row for row in rows if row["contestant"] in both], of, quantity) for rows in (more, fewer)
+                    self.table.chosen([row for row in rows if row["contestant"] in both], of, quantity)
+                    for rows in (more, fewer)
                 )
                 if a is None or b is None or not self._one_clip(a, b):
                     continue

@@ -92,7 +92,8 @@ def unmeasured(looked: list[Looked]) -> list[str]:
         absent = one.unmeasured()
         for corner in one.corners:
             if corner in absent:
-                found.setdefault("", []).append(corner.who if all(o in absent for o in one.corners if o.who == corner.who) else corner.name)
+                whole = all(other in absent for other in one.corners if other.who == corner.who)
+                found.setdefault("", []).append(corner.who if whole else corner.name)
             for gap in one.gaps.get(corner.id, []) if corner not in absent else []:
                 if gap not in said_already:
                     found.setdefault(f" ({gap})", []).append(corner.who)
@@ -145,7 +146,7 @@ def condition(looked: list[Looked]) -> str:
     """Under which condition all checks are met, one clause for each that is not met everywhere."""
     clauses = []
     for one in looked:
-        if all(point.met for point in one.points):
+        if all(point.met for point in one.points):  # or none was measured of an optional one
             continue
         met = [corner for corner in one.corners if any(p.met for p in one.points if p.corner == corner.id)]
         parts = [f"{corner.name} {rule(one, corner)}".strip() for corner in met]

@@ -169,6 +169,7 @@ def experiment_row(claim: dict[str, Any], looker: Looker) -> Row:
 
 def verdict_of(looked: list[Looked]) -> str:
     """Undecided while anything is missing; refuted by a check that is met nowhere; else by whether all points are met."""
+    looked = [one for one in looked if one.points or not all(corner.optional for corner in one.corners)]
     if not looked or any(one.missing or not one.points for one in looked):
         return OPEN
     if any(not any(point.met for point in one.points) for one in looked):

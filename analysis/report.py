@@ -17,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 import choices
+import break_even
 import claim_pictures
 import claim_tables
 import claims as paper_claims
@@ -58,7 +59,6 @@ class Section:
     errors: list[Picture] = field(default_factory=list)  #: time against error
     over_l: list[Picture] = field(default_factory=list)  #: time against frames per keyframe
     missing: str = ""  #: why a figure that one would expect is not there
-    break_even: list[tuple[str, ...]] = field(default_factory=list)
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
@@ -138,6 +138,7 @@ def write(
         tally=_tally(claims),
         claim_links=_claim_links(claims, study, groups, drawn),
         **_claim_parts(claims),
+        **_break_even(study, claims, all_looks, folder / "figures", which),
         theory=theory,
         paper=paper,
         sections=[section for section in sections if not section.own],
@@ -162,6 +163,24 @@ def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:
     """How many claims have which verdict."""
     verdicts = (paper_claims.HOLDS, paper_claims.CONDITION, paper_claims.FAILS, paper_claims.OPEN)
     return [(verdict, sum(row.verdict == verdict for row in claims.rows)) for verdict in verdicts]
+
+
+def _break_even(
+    study: Study, claims: paper_claims.Claims, all_looks: dict[str, Look], folder: Path, which: str
+) -> dict[str, object]:
+    """From which l on who is faster: a figure and tables."""
+    names, places, single = break_even.places(Table(study, "float"), claims.baselines)
+    reading = (
+        "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest l measured. An open arrow "
+        "at the right says that it is slower at every l measured: where the break-even point is beyond them, nobody knows."
+    )
+    made = picture(
+        folder, "break-even", "From which l on kinetic contestants are faster", reading,
+        lambda: break_even.figure(places, names, all_looks),
+    ) if which != "none" else None  # fmt: skip
+    return {
+        "break_even_baselines": names, "break_even_places": places, "break_even_single": single, "break_even_picture": made,
+    }  # fmt: skip
 
 
 def _claim_parts(claims: paper_claims.Claims) -> dict[str, object]:
@@ -264,7 +283,7 @@ def _sections(
                         section.pictures += _group_pictures(
                             timed[timed["group"] == other], timed[:0], all_looks, folder, name
                         )
-            over, section.break_even = _trends(timed, head, all_looks, folder, slug)
+            over = _trends(timed, head, all_looks, folder, slug)
             section.over_l = [one for one in over if one.name == f"{slug}-l"]
             section.pictures += [one for one in over if one.name != f"{slug}-l"]
         result.append(section)
@@ -362,7 +381,7 @@ def _left_out(rows: pd.DataFrame) -> str:
 
 def _trends(
     timed: pd.DataFrame, head: str, all_looks: dict[str, Look], folder: Path, slug: str
-) -> tuple[list[Picture], list[tuple[str, ...]]]:
+) -> list[Picture]:
     """Lines over l and over n: at the size with most l and at the l with most sizes, or else those of the headline group."""
     first = timed[timed["group"] == head].iloc[0]
     same = timed[(timed["scalar"] == first["scalar"]) & (timed["machine"] == first["machine"])]
@@ -391,7 +410,7 @@ def _trends(
             lambda: figures.over_size(sizes, all_looks),
         ),
     ]  # fmt: skip
-    return [one for one in made if one is not None], tables.break_even(depths) if depths["l"].nunique() > 1 else []
+    return [one for one in made if one is not None]
 
 
 def _most(rows: pd.DataFrame, column: str, counted: str, usual: float) -> float:
