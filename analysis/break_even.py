@@ -71,9 +71,9 @@ def break_even(depths: Sequence[float], faster: Sequence[float]) -> Optional[Bre
     measured = tuple(float(l) for l in depths)
     ahead = [ratio > 1 for ratio in faster]
     if all(ahead):
-        return BreakEven(AHEAD, first, measured, f"at every l measured, from l = {first:g}")
+        return BreakEven(AHEAD, first, measured, f"every l from {first:g}")
     if not any(ahead):
-        return BreakEven(BEHIND, last, measured, f"beyond the measured l (up to {last:g})")
+        return BreakEven(BEHIND, last, measured, f"beyond l = {last:g}")
     found = ratios.crossings(np.asarray(depths, dtype=float), 1 / np.asarray(faster, dtype=float), np.ones(len(depths)))
     told = ", ".join(f"{'faster' if one.faster else 'slower'} from l ≈ {_short(one.x)}" for one in found)
     if ahead[-1]:

@@ -208,7 +208,12 @@ def _bar(bar: Bar, axis: Axis, y: float) -> str:
 
 
 def _short(name: str, most: int = 27) -> str:
-    return name if len(name) <= most else name[: most - 1].rstrip(" ,") + "…"
+    """A name that fits beside the drawing: what tells it from others often stands at its end."""
+    if len(name) <= most:
+        return name
+    tail = name.rpartition(", ")[2]
+    end = f"…, {tail}" if len(tail) < most / 2 else "…"
+    return name[: most - len(end)].rstrip(" ,") + end
 
 
 class Axis:
