@@ -1,6 +1,6 @@
 #pragma once
-// What both contestants of Bullet 3.24 (Coumans) have in common. Both are float, as Debian's Bullet, and take
-// float scenes only; both know triangles only or boxes.
+// The shared part of both contestants of Bullet 3.24 (Coumans). Both are float, as in Debian's Bullet, and
+// accept float scenes only. btOptimizedBvh takes triangles, btDbvt boxes.
 #include <LinearMath/btVector3.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ inline btVector3 vector(const float* p) {
   return btVector3(p[0], p[1], p[2]);
 }
 
-/// Lays a binary tree out as an audit wants it: siblings next to each other and after their parent.
+/// Lays a binary tree out in the form of an audit: siblings next to each other and after their parent.
 /// `children(node)` is a pair of handles, `primitive(node)` a primitive id or -1 for inner nodes.
 template <class Handle, class Primitive, class Children, class BoxOf>
 AuditView breadth_first(Handle root, const Primitive& primitive, const Children& children, const BoxOf& box) {
@@ -46,7 +46,7 @@ AuditView breadth_first(Handle root, const Primitive& primitive, const Children&
   return view;
 }
 
-/// What both have in common: which bodies move, and that time does not run backwards.
+/// The shared part: which bodies move, and the check that time does not run backwards.
 template <class Count>
 class Contestant : public CountedStrategy<float, Count>, public TakesPlanChanges<float> {
  public:
@@ -84,7 +84,7 @@ class Contestant : public CountedStrategy<float, Count>, public TakesPlanChanges
   std::vector<std::uint8_t> moves_;
 };
 
-/// What the registration of both says.
+/// Returns the Info that both registrations share.
 inline Info info(const char* id, const char* title) {
   Info made;
   made.id = id;

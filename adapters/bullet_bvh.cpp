@@ -1,24 +1,25 @@
 // Bullet's quantised triangle-mesh hierarchy (Coumans, Bullet 3.24) as a contestant: btOptimizedBvh, kept up
 // to date by refit().
 //
-// - Without quantisation refit() silently does nothing, so it is always quantised.
-// - refit() enlarges the bounds in which it quantises by 1.0, whatever the unit: a mesh of a few centimetres
-// is
-//   then a handful of cells wide, and returns thousands of false pairs. By default the mesh's own scaling
-//   (setScaling) is therefore a power of two, which is exact, that makes the scene 32768 to 65536 units wide.
-//   `scale=none` shows what happens to those who do not know.
+// - Without quantisation refit() silently does nothing, so the hierarchy is always quantised.
+// - refit() enlarges the quantised bounds by 1.0, whatever the unit. A mesh of a few centimetres is then a
+//   handful of
+//   cells wide and returns thousands of false pairs. By default the mesh's own scaling (setScaling) is
+//   therefore a power of two, which is exact, that makes the scene 32768 to 65536 units wide. `scale=none`
+//   shows the unscaled behaviour.
 // - All bodies are quantised in one grid, so that cells of different bodies can be compared. Quantisation is
-//   monotone, lower bounds go to even and upper ones to odd cells, so boxes that touch have cells that
-//   overlap: no pair is lost. The grid has a slack of 1/8, and is laid anew, with all bodies, when the scene
-//   leaves it or shrinks to a quarter of it. Finding the scene's bounds is part of the update.
-// - Bullet's own query is a box against a tree (reportAabbOverlappingNodex): `query=primitives` asks one for
-// each
-//   primitive of the smaller body. Its walk of two trees is not open to users, so the default `query=trees`
-//   descends both of Bullet's node arrays here, which is faster; the overlap test is Bullet's.
+//   monotone;
+//   lower bounds go to even and upper ones to odd cells, so boxes that touch have cells that overlap: no pair
+//   is lost. The grid has a slack of 1/8. It is laid again, for all bodies, when the scene leaves it or
+//   shrinks to a quarter of it. Finding the scene's bounds is part of the update.
+// - Bullet's own query is a box against a tree (reportAabbOverlappingNodex): `query=primitives` runs it for
+//   each primitive
+//   of the smaller body. Its walk of two trees is not public. The default `query=trees` therefore descends
+//   both of Bullet's node arrays here, which is faster; the overlap test is Bullet's.
 // - A primitive index has 21 bits.
-// - A primitive of more than 3 vertices is given to it as the triangle (lower, upper, first vertex), which
-// has
-//   the polygon's box.
+// - A primitive of more than 3 vertices is passed as the triangle (lower, upper, first vertex), which has the
+//   polygon's
+//   box.
 #include "bullet.hpp"
 
 #include <BulletCollision/CollisionShapes/btOptimizedBvh.h>
@@ -34,7 +35,7 @@
 namespace kbvh::bullet {
 namespace {
 
-/// Collects what one box overlaps in a quantised tree.
+/// Collects the primitives in a quantised tree that overlap one box.
 class BoxHits final : public btNodeOverlapCallback {
  public:
   PrimitivePair pair{};
@@ -70,8 +71,8 @@ class BulletBvh final : public Contestant<Count> {
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     std::uint64_t tests = 0;
-    // The box of a body's vertices, rounded to cells as both queries round: what overlaps there may do so
-    // here.
+    // Returns the box of a body's vertices, rounded to cells as both queries round: boxes that overlap there
+    // may overlap here.
     const auto box_of = [&](std::uint32_t body) { return root_box(bodies_[body]); };
     for (const std::uint32_t i : this->near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
@@ -85,7 +86,7 @@ class BulletBvh final : public Contestant<Count> {
     return {};
   }
 
-  /// The box of a node is everything that the query cannot tell from its cells.
+  /// The box of a node covers everything that the query cannot distinguish by its cells.
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     const BodyState& state = bodies_[body];
     if (!state.bvh) return AuditView{};
@@ -116,19 +117,20 @@ class BulletBvh final : public Contestant<Count> {
   struct BodyState {
     std::vector<int> indices;             // 3 per primitive
     std::vector<std::uint32_t> polygons;  // primitives of more than 3 vertices
-    std::vector<float> vertices;          // the body's, then lower and upper of each polygon; none: no copy
+    std::vector<float> vertices;  // the body's, then lower and upper corner of each polygon; empty: no copy
     std::unique_ptr<btTriangleIndexVertexArray> mesh;
     std::unique_ptr<btOptimizedBvh> bvh;  // none for a body without primitives
     Box<float> box;
   };
 
-  /// The quantisation of a tree, found by asking it: cell = (x - origin) * cells_per_unit, in scaled units.
+  /// The quantisation of a tree, determined by querying it: cell = (x - origin) * cells_per_unit, in scaled
+  /// units.
   class Grid {
    public:
     Grid(const btOptimizedBvh& bvh, double scale) : scale_(scale) {
       const unsigned short zero[3] = {0, 0, 0};
       const btVector3 origin = bvh.unQuantize(zero);
-      // Access to the protected quantisation through what derives from it, for reading only.
+      // Gives read access to the protected quantisation by deriving from the tree.
       struct Reader : btOptimizedBvh {
         static btVector3 of(const btOptimizedBvh& tree) { return tree.*(&Reader::m_bvhQuantization); }
       };
@@ -141,7 +143,7 @@ class BulletBvh final : public Contestant<Count> {
     Box<double> box(const btQuantizedBvhNode& node) const {
       Box<double> box;
       for (int axis = 0; axis < 3; ++axis) {
-        // A coordinate's cell comes of two roundings in float: up to 65535 * 2^-23 of a cell.
+        // A coordinate's cell results from two roundings in float: up to 65535 * 2^-23 of a cell.
         box.lower[axis] = (origin_[axis] + (node.m_quantizedAabbMin[axis] - .01) / cells_[axis]) / scale_;
         box.upper[axis] = (origin_[axis] + (node.m_quantizedAabbMax[axis] + .01) / cells_[axis]) / scale_;
       }
@@ -195,7 +197,7 @@ class BulletBvh final : public Contestant<Count> {
     read_vertices(body);
   }
 
-  /// Shows the current vertices to Bullet, and finds their box.
+  /// Passes the current vertices to Bullet, and finds their box.
   void read_vertices(std::uint32_t body) {
     BodyState& state = bodies_[body];
     const float* positions = this->sampled_.positions(body);
@@ -273,7 +275,7 @@ class BulletBvh final : public Contestant<Count> {
     for (int axis = 0; axis < 3; ++axis) {
       const double lower = box.lower[axis], upper = box.upper[axis];
       furthest = std::max({furthest, std::abs(lower), std::abs(upper)});
-      // Never flat, and never below what float can tell apart at this distance from the origin.
+      // Never flat, and never below the resolution of float at this distance from the origin.
       const double slack = (upper - lower) / 8 + laid_extent_ / 1024 +
                            std::max(std::abs(lower), std::abs(upper)) * 0x1p-20 +
                            std::numeric_limits<float>::min();
@@ -282,7 +284,8 @@ class BulletBvh final : public Contestant<Count> {
       largest = std::max(largest, upper - lower + 2 * slack);
     }
     if (!scaled_) return;
-    // Bullet starts its boxes at 1e18, so nothing may come near that; and the scale itself has to be a float.
+    // Bullet initialises its boxes with 1e18, so no coordinate may come near that; and the scale itself must
+    // be a float.
     const int wanted = 15 - std::ilogb(largest), limit = 57 - std::ilogb(std::max(furthest, largest));
     scale_ = std::ldexp(1.f, std::clamp(std::min(wanted, limit), -120, 120));
   }
@@ -334,7 +337,7 @@ class BulletBvh final : public Contestant<Count> {
   bool scaled_, trees_;
   float scale_ = 1;
   Box<float> grid_;         // in scene units
-  double laid_extent_ = 0;  // of the scene, when the grid was laid
+  double laid_extent_ = 0;  // of the scene, at the time of the last grid
   std::vector<BodyState> bodies_;
   std::vector<std::pair<const btQuantizedBvhNode*, const btQuantizedBvhNode*>> stack_;
   BoxHits hits_;
@@ -350,12 +353,12 @@ KBVH_STRATEGY(bullet_bvh) {
   info.parameters.push_back({"query",
                              "trees",
                              {"trees", "primitives"},
-                             "descend both trees, or ask Bullet for each primitive of the smaller body",
+                             "descend both trees, or query Bullet once per primitive of the smaller body",
                              0});
   info.parameters.push_back({"scale",
                              "fit",
                              {"fit", "none"},
-                             "scale the scene so that Bullet's margin of 1.0 is small, or leave it",
+                             "scale the scene so that Bullet's margin of 1.0 is small, or use it unscaled",
                              0});
   return {make_entry<bullet::BulletBvh, Scalars::float_only>(std::move(info))};
 }

@@ -1,10 +1,11 @@
 // Bullet's dynamic tree (Coumans, Bullet 3.24) as a contestant: btDbvt with one leaf per primitive, tree by
 // optimizeTopDown(), queries by collideTT.
 //
-// - Bullet updates it leaf by leaf (`update=leaves`): each leaf is removed and inserted again, which also
-//   changes the tree. The default `update=refit` recomputes the volumes of all nodes instead, children first,
-//   by Bullet's Merge; that loop is not in Bullet, but an order of magnitude faster. Boxes are tight either
-//   way.
+// - Bullet updates the tree leaf by leaf (`update=leaves`): each leaf is removed and inserted again, which
+//   also changes
+//   the tree. The default `update=refit` instead recomputes the volumes of all nodes, children first, by
+//   Bullet's Merge. That loop is not part of Bullet, but an order of magnitude faster. Boxes are tight in
+//   both cases.
 // - The tree is first built by insertion: identical boxes make a list of it before it is optimised.
 #include "bullet.hpp"
 
@@ -13,6 +14,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "core/base/heap_block.hpp"
 #include "core/geometry/lane_box.hpp"
 
 namespace kbvh::bullet {
@@ -58,7 +60,7 @@ class BulletDbvt final : public Contestant<Count> {
     for (const std::uint32_t i : this->near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
       hits_.bodies = pair;
-      // As collideTT, with a stack that stays allocated.
+      // Like collideTT, with a stack that stays allocated.
       bodies_[pair.first].tree.collideTTpersistentStack(bodies_[pair.first].tree.m_root,
                                                         bodies_[pair.second].tree.m_root, hits_);
     }
@@ -88,8 +90,11 @@ class BulletDbvt final : public Contestant<Count> {
     std::size_t total = 0;
     for (const BodyState& state : bodies_) {
       const auto leaves = std::size_t(state.tree.m_leaves);
-      total += sizeof(btDbvt) + (leaves == 0 ? 0 : 2 * leaves - 1) * sizeof(btDbvtNode) +
-               state.nodes.size() * sizeof(btDbvtNode*);
+      // Bullet aligns each node to 16 bytes within a block, and keeps the block's address before it.
+      constexpr std::size_t node_bytes = heap_block_bytes(sizeof(btDbvtNode) + sizeof(void*) + 16);
+      total += sizeof(btDbvt) + (leaves == 0 ? 0 : 2 * leaves - 1) * node_bytes +
+               state.nodes.capacity() * sizeof(btDbvtNode*) +
+               std::size_t(state.tree.m_stkStack.capacity()) * sizeof(state.tree.m_stkStack[0]);
     }
     return total;
   }
@@ -111,8 +116,9 @@ class BulletDbvt final : public Contestant<Count> {
     const std::uint32_t count = this->scene_.primitives(body).count();
     if (count == 0) return;
     {
-      // Insertion and optimizeTopDown() multiply extents: far from 1 they overflow, and the latter then
-      // writes out of bounds. The shape of the tree is decided at a sane size; true volumes follow below.
+      // Insertion and optimizeTopDown() multiply extents: far from 1 they overflow, and optimizeTopDown()
+      // then writes out of bounds. The shape of the tree is decided at a moderate scale; true volumes follow
+      // below.
       const float scale = sane_scale(body);
       btDbvt grown;
       for (int p = 0; p < int(count); ++p) {
@@ -120,10 +126,10 @@ class BulletDbvt final : public Contestant<Count> {
         grown.insert(btDbvtVolume::FromMM(real.Mins() * scale, real.Maxs() * scale), nullptr)->dataAsInt = p;
       }
       grown.optimizeTopDown();
-      // The copy has its nodes in memory as a descent meets them: both refits and queries profit.
+      // The copy has its nodes in memory in the order of a descent: both refits and queries profit.
       btDbvt::IClone nothing_more;
       grown.clone(state.tree, &nothing_more);
-      state.tree.m_leaves = grown.m_leaves;  // which clone() forgets
+      state.tree.m_leaves = grown.m_leaves;  // not copied by clone()
     }
     state.nodes.resize(refits_ ? 0 : count);
     std::vector<btDbvtNode*> stack{state.tree.m_root};
@@ -135,8 +141,8 @@ class BulletDbvt final : public Contestant<Count> {
         if (!refits_) state.nodes[std::size_t(node->dataAsInt)] = node;
         continue;
       }
-      // clone() puts the node at place i of its stack into childs[i & 1]; so this order is that of the
-      // memory.
+      // clone() puts the node at place i of its stack into childs[i & 1]; this order is therefore the memory
+      // order.
       const std::size_t place = stack.size();
       stack.push_back(node->childs[place & 1]);
       stack.push_back(node->childs[(place + 1) & 1]);
@@ -157,7 +163,7 @@ class BulletDbvt final : public Contestant<Count> {
     if (refits_) std::reverse(state.nodes.begin(), state.nodes.end());
   }
 
-  /// A power of two that brings the body's coordinates to about 1000.
+  /// Returns a power of two that scales the body's coordinates to about 1000.
   float sane_scale(std::uint32_t body) const {
     float largest = 0;
     for (std::uint32_t p = 0; p < this->scene_.primitives(body).count(); ++p) {

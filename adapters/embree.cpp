@@ -1,32 +1,35 @@
-// Embree 3.13 (Wald et al. 2014) as a contestant: a scene per body, refitted, and rtcCollide.
+// Embree 3.13 (Wald et al. 2014) as a contestant: one scene per body, refitted, and rtcCollide.
 //
 // Refit. RTC_BUILD_QUALITY_REFIT of a geometry is ignored (a full rebuild, 30 times dearer) unless its scene
-// is both RTC_BUILD_QUALITY_LOW and RTC_SCENE_FLAG_DYNAMIC; any tri_accel or object_accel of the device but
-// the default ends it, too. Compact scenes refit fastest: their leaves hold indices, and only nodes are
+// is both RTC_BUILD_QUALITY_LOW and RTC_SCENE_FLAG_DYNAMIC. Any non-default tri_accel or object_accel of the
+// device disables it, too. Compact scenes refit fastest: their leaves hold indices, and only nodes are
 // written. Robust scenes, other instruction sets and vertices of 16 bytes gain nothing.
 //
-// Geometry. rtcCollide takes user geometry only, whose refit calls back for every primitive. Triangle
-// geometry, which Embree refits by itself and faster, cannot answer. Hence the parameter `geometry`:
+// Geometry. rtcCollide accepts user geometry only, and a refit of user geometry calls back for every
+// primitive. Embree refits triangle geometry by itself and faster, but cannot query it by rtcCollide. Hence
+// the parameter `geometry`:
 // - user: the update refits user geometry and the query collides it: one hierarchy, and both times are
 //   Embree's.
-// - triangles: the update refits triangle geometry over shared buffers, Embree's fastest, which nothing
-//   reads. The query first refits user geometry: ITS TIME HOLDS A SECOND REFIT AND IS NOT TO BE QUOTED.
-//   Bodies of other than triangles are given a triangle (lower, upper, lower) per primitive, whose box is
-//   the primitive's; writing these is part of their update.
+// - triangles: the update refits triangle geometry over shared buffers, which is Embree's fastest refit, but
+//   no query
+//   reads it. The query first refits user geometry: ITS TIME INCLUDES A SECOND REFIT AND MUST NOT BE QUOTED.
+//   Bodies with primitives other than triangles are given one triangle (lower, upper, lower) per primitive,
+//   which has the primitive's box; writing these triangles is part of their update.
 //
-// Threads. Every instance asks for one. In Embree 3 with TBB that limit is process-wide while a device lives.
-// So rtcCollide calls back from the caller's thread, which takes no lock; calls from others would find one.
+// Threads. Every instance asks for one thread. In Embree 3 with TBB that limit is process-wide while a device
+// exists. rtcCollide therefore calls back from the caller's thread, which takes no lock; calls from other
+// threads would take one.
 //
-// Candidates. rtcCollide compares node boxes, and so those of primitives that have a leaf to themselves. The
-// candidates of larger leaves are all their pairs: these come several at a time, and are filtered by their
-// boxes.
+// Candidates. rtcCollide compares node boxes, and therefore the boxes of primitives with a leaf of their own.
+// For larger leaves it reports all pairs: these come several at a time, and are filtered by their boxes.
 //
-// Denormals. Embree flushes them. Denormal bounds are widened to the smallest normal number, so that this
-// cannot lose a pair; bounds beyond 1.8e18, which Embree takes for invalid, are clamped. Both are monotone,
-// as is flushing: what touches still does. kbvh's own test follows after the floating-point state is
-// restored. Upper bounds are an ulp or two larger: Embree's builder asserts that the box of all is no point.
+// Denormals. Embree flushes them. Denormal bounds are widened to the smallest normal number, so that flushing
+// cannot lose a pair. Bounds beyond 1.8e18, which Embree treats as invalid, are clamped. Both operations are
+// monotone, like flushing: boxes that touch still touch. kbvh's own test follows after the floating-point
+// state is restored. Upper bounds are an ulp or two larger, because Embree's builder asserts that the box of
+// all primitives is not a point.
 //
-// The hierarchy cannot be seen, so there is no audit. Float scenes only.
+// The hierarchy is not visible, so there is no audit. Float scenes only.
 #include <embree3/rtcore.h>
 
 #include <Eigen/Core>
@@ -48,7 +51,7 @@
 namespace kbvh {
 namespace {
 
-/// Embree flushes denormals and may not say so afterwards: what comes after must not notice.
+/// Restores the floating-point state: Embree flushes denormals and may leave that mode set.
 class KeepFloatingPointState {
  public:
 #if defined(__SSE__)
@@ -82,7 +85,7 @@ using DevicePointer = std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseD
 using ScenePointer = std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene>;
 using GeometryPointer = std::unique_ptr<std::remove_pointer_t<RTCGeometry>, ReleaseGeometry>;
 
-/// A scene of one geometry that commits by refitting.
+/// A scene of one geometry that is refitted at each commit.
 struct RefitScene {
   ScenePointer scene;  // none for an empty body
   GeometryPointer geometry;
@@ -184,7 +187,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
     for (const auto& change : changes) bodies_[change.body].moves = true;
   }
 
-  /// What Embree has allocated, by its own account, and what is kept for it.
+  /// Returns the bytes that Embree reports as allocated, plus those of this adapter's own buffers.
   std::size_t bytes() const override {
     std::size_t total = std::size_t(memory_.load()) + bodies_.size() * sizeof(BodyState);
     for (const BodyState& state : bodies_)
@@ -204,7 +207,8 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
     RefitScene boxes;
     RefitScene triangles;  // made on demand by `geometry`
     const float* shared_vertices = nullptr;
-    std::vector<float> own_vertices;  // three per primitive and padding, for bodies of other than triangles
+    std::vector<float>
+        own_vertices;  // three per primitive and padding, for bodies with primitives other than triangles
     std::vector<std::uint32_t> own_indices;
   };
   struct Collected {
@@ -213,7 +217,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
     const BodyState* b = nullptr;
     PairBuffer* out = nullptr;
     std::uint64_t box_tests = 0;
-    std::thread::id thread;  // its calls need no lock
+    std::thread::id thread;  // calls from this thread need no lock
     std::mutex mutex;
     std::vector<RTCCollision> from_others;
   };
@@ -287,7 +291,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
       refit_boxes(state);
     }
     check();
-    // Nodes and writes are Embree's secret.
+    // Embree does not report node visits and writes.
     this->count_.add(Counter::vertex_reads, state.primitives->vertices.size());
   }
 
@@ -324,7 +328,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
     return box;
   }
 
-  static constexpr float largest = 1.8e18f;  // of a bound that is handed over
+  static constexpr float largest = 1.8e18f;  // largest bound that is passed to Embree
 
   template <auto bounds_of>
   static void fit(const RTCBoundsFunctionArguments* args) {
@@ -342,7 +346,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
     std::memcpy(&box, sides, sizeof(box));
   }
 
-  /// The root of the triangles, which nothing else reads, lies within that of the boxes, as far as these
+  /// The root box of the triangles, which no query reads, must lie within that of the boxes, as far as these
   /// reach.
   static bool bounds_triangles(const BodyState& state) {
     RTCBounds boxes, triangles;
@@ -361,7 +365,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
     to.out->push_back({to.bodies.first, found.primID0, to.bodies.second, found.primID1});
   }
 
-  /// Those whose boxes overlap. All partners of a primitive come in a row.
+  /// Appends the partners whose boxes overlap. All partners of a primitive come in a row.
   static void append_overlapping(Collected& to, std::span<const RTCCollision> candidates) {
     to.box_tests += candidates.size();
     std::uint32_t current = none;
@@ -399,14 +403,14 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
     if (error != RTC_ERROR_NONE) fail("Embree reports an error", error);
   }
 
-  /// Throws std::bad_alloc where memory was wanting: that says nothing about Embree.
+  /// Throws std::bad_alloc if memory ran out, because that is no fault of Embree.
   [[noreturn]] static void fail(const char* what, RTCError error) {
     if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
     throw std::runtime_error(what + (": number " + std::to_string(int(error))));
   }
 
   Refits refits_;
-  std::atomic<std::int64_t> memory_{0};  // outlives the device
+  std::atomic<std::int64_t> memory_{0};  // must outlive the device
   DevicePointer device_;
   std::vector<BodyState> bodies_;
   NearBodies near_bodies_;
@@ -428,13 +432,12 @@ KBVH_STRATEGY(embree) {
   info.positions = PositionUse::all;
   info.topology.own = true;
   info.own_scalar = "float";
-  info.parameters = {
-      {"geometry",
-       "user",
-       {"user", "triangles"},
-       "what the update refits: user geometry, which the query collides; or triangle geometry, "
-       "Embree's fastest refit, which cannot be collided: the query then refits user geometry "
-       "first, and its time is not to be quoted"}};
+  info.parameters = {{"geometry",
+                      "user",
+                      {"user", "triangles"},
+                      "geometry that the update refits: user geometry, which the query collides; or triangle "
+                      "geometry, Embree's fastest refit, which Embree cannot collide: the query then refits "
+                      "user geometry first, and its time must not be quoted"}};
   std::vector<StrategyEntry> entries;
   entries.push_back(make_entry<EmbreeRefit, Scalars::float_only>(std::move(info)));
   return entries;

@@ -1,23 +1,27 @@
 // FCL 0.7 (Pan et al. 2012) as contestants: its BVHModel<AABB> and its mesh traversal, in float and in
 // double.
 //
-// How it is driven, and why:
-// - Frames come through beginReplaceModel / endReplaceModel(refit, bottomup). begin/endUpdateModel would fit
-//   boxes to the previous and the current frame together: right for continuous, wrong for discrete tests.
+// How FCL is driven:
+// - Frames are passed by beginReplaceModel / endReplaceModel(refit, bottomup). begin/endUpdateModel would fit
+//   boxes to the
+//   previous and the current frame together: right for continuous tests, wrong for discrete ones.
 // - The traversal node is driven directly. fcl::collide() copies both models on every call.
-// - leafTesting only collects primitive ids; kbvh's exact test then confirms them, as for everybody else.
-//   `fcl_*_own_verdict` confirm with FCL's separating-axis test in floating point instead, which is why they
-//   are approximate. They do so after the traversal, not within it, so that the two phases are timed apart.
-// - Splitter and fitter are shared between copies of a model, so each body's model is made on its own.
-// - FCL knows triangles only, one per leaf. A primitive of fewer vertices is a degenerate triangle; one of
-// more
-//   is handed over as the triangle (lower, upper, first vertex) over two vertices that follow the body's own.
-//   That triangle has the polygon's box, so leaves are primitives, points and control nets are answered, too,
-//   and no pair is reported twice. It favours FCL over fanning polygons, which would need more leaves.
-// - FCL's AABB overlap is closed and its boxes are unions of vertices: tight, to the last bit.
-// - FCL recurses, in its mean-split tree as in its traversal: depth is bounded by the primitives, not by log
-// n.
-// - The float version cannot take double scenes: rounding positions would lose pairs.
+// - leafTesting only collects primitive ids; kbvh's exact test then confirms them, as for all contestants.
+//   The contestants
+//   `fcl_*_own_verdict` confirm with FCL's separating-axis test in floating point instead, so they are
+//   approximate. They confirm after the traversal, not within it, so that the two phases are timed
+//   separately.
+// - Copies of a model share splitter and fitter, so each body's model is created separately.
+// - FCL supports triangles only, one per leaf. A primitive of fewer vertices is a degenerate triangle. A
+//   primitive of more
+//   vertices is passed as the triangle (lower, upper, first vertex) over two vertices that follow the body's
+//   own. That triangle has the polygon's box, so leaves are primitives, points and control nets are answered,
+//   too, and no pair is reported twice. It favours FCL over fanning polygons, which would need more leaves.
+// - FCL's AABB overlap is closed, and its boxes are unions of vertices: tight, to the last bit.
+// - FCL recurses in its mean-split tree and in its traversal; the depth is bounded by the number of
+//   primitives, not by
+//   log n.
+// - The float version does not accept double scenes: rounding positions would lose pairs.
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/bv/AABB.h>
 #include <fcl/math/bv/utility.h>  // BVHModel uses its fit() without including it
@@ -71,7 +75,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
       for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
       build(body);
     }
-    if (near_bodies_.searches()) return;  // one node for each pair of bodies would be too much
+    if (near_bodies_.searches()) return;  // one node per pair of bodies would need too much memory
     for (const BodyPair& pair : scene.pairs())
       if (bodies_[pair.first].model && bodies_[pair.second].model) collectors_.push_back(collector(pair));
   }
@@ -117,7 +121,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     AuditView view;
     const Model* model = bodies_[body].model.get();
     if (model == nullptr) return view;
-    // FCL numbers siblings next to each other and after their parent, just as a topology does.
+    // FCL numbers siblings next to each other and after their parent, like a topology.
     const auto size = std::uint32_t(model->getNumBVs());
     view.topology.parents.assign(size, 0);
     view.topology.depths.assign(size, 0);
@@ -144,7 +148,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     return view;
   }
 
-  /// What FCL allocates for its arrays; its own memUsage() returns a status code instead.
+  /// Computes the size of FCL's arrays; FCL's own memUsage() returns a status code instead.
   std::size_t bytes() const override {
     std::size_t total = 0;
     for (const BodyState& state : bodies_) {
@@ -180,7 +184,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     }
   }
 
-  /// FCL's traversal of two bodies that both have triangles.
+  /// Makes FCL's traversal of two bodies that both have triangles.
   std::unique_ptr<LeafCollector<Own>> collector(const BodyPair& pair) {
     auto node = std::make_unique<LeafCollector<Own>>();
     fcl::Transform3<Own> here = fcl::Transform3<Own>::Identity();
@@ -245,7 +249,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     for_each_vertex(body, [&](const Vector& p) { model.replaceVertex(p); });
     check(model.endReplaceModel(mode != Mode::rebuild, mode == Mode::bottom_up), body);
     if constexpr (Count::enabled) {
-      // A rebuild reads what lies below a node to fit its box, to find its mean, and to divide it.
+      // A rebuild reads everything below a node to fit its box, to find its mean, and to divide it.
       const auto nodes = std::uint64_t(model.getNumBVs());
       if (mode == Mode::rebuild) state.fitted_vertices = 3 * vertices_below_nodes(model);
       this->count_.add(Counter::nodes_visited, nodes);
@@ -266,7 +270,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
                                std::to_string(status));
   }
 
-  /// FCL's triangle test; polygons as fans, of which FCL would only compare triangles whose boxes overlap.
+  /// Performs FCL's triangle test. Polygons are fans; FCL would compare only triangles whose boxes overlap.
   bool own_verdict(const PrimitivePair& pair) {
     const Primitives& primitives_a = this->scene_.primitives(pair.body_a);
     const Primitives& primitives_b = this->scene_.primitives(pair.body_b);
@@ -277,7 +281,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     for (std::size_t i = 0; i < fan(a); ++i)
       for (std::size_t j = 0; j < fan(b); ++j) {
         const auto p = fan_triangle(pair.body_a, a, i), q = fan_triangle(pair.body_b, b, j);
-        // Boxes of triangles have been compared already.
+        // Single triangles: the boxes have been compared already.
         if (fan(a) * fan(b) > 1 &&
             !fcl::AABB<Own>(p[0], p[1], p[2]).overlap(fcl::AABB<Own>(q[0], q[1], q[2])))
           continue;
@@ -298,7 +302,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
 
   std::vector<BodyState> bodies_;
   NearBodies near_bodies_;
-  fcl::CollisionResult<Own> result_;  // stays empty: no leaf is tested by FCL
+  fcl::CollisionResult<Own> result_;  // stays empty: FCL tests no leaf
   std::vector<std::unique_ptr<LeafCollector<Own>>> collectors_;
 };
 
@@ -308,10 +312,10 @@ struct Bind {
   using Type = Fcl<Own, mode, verdict, S, Count>;
 };
 
-/// FCL's own test of a vertex and a face, or of two edges, in linear motion: the cubic's roots in floating
-/// point, by bisection or Newton's method, and tolerances for what is inside. These are lengths: FCL misses
-/// whatever is small against them. Scaled by a power of two, which rounds nothing, the largest coordinate
-/// lies between 512 and 1024.
+/// Performs FCL's own test of a vertex and a face, or of two edges, in linear motion: it finds the cubic's
+/// roots in floating point, by bisection or Newton's method, and tests the inside with tolerances. These
+/// tolerances are lengths, so FCL misses features that are small against them. The input is scaled by a power
+/// of two, which rounds nothing, so that the largest coordinate lies between 512 and 1024.
 bool fcl_impact(Contact::Kind kind, const MovingPoints& points) {
   fcl::Vector3d p[2][4];
   double largest = 0;
@@ -327,7 +331,7 @@ bool fcl_impact(Contact::Kind kind, const MovingPoints& points) {
   double time = 0;
   fcl::Vector3d place;
   using Test = fcl::detail::Intersect<double>;
-  // FCL names the face first.
+  // FCL expects the face first.
   return kind == Contact::Kind::vertex_face ? Test::intersect_VF(p[0][1], p[0][2], p[0][3], p[0][0], p[1][1],
                                                                  p[1][2], p[1][3], p[1][0], &time, &place)
                                             : Test::intersect_EE(p[0][0], p[0][1], p[0][2], p[0][3], p[1][0],

@@ -1,9 +1,10 @@
-"""Do two studies give the claims the same verdicts?
+"""Compares the verdicts of two studies on the claims.
 
 usage: agree.py FOLDER FOLDER
 
-Each folder holds a claims.json, which `kbvh report` writes. Prints a line for each claim that both decide otherwise, and what
-only one of them decides. Exit codes: 0 no two verdicts differ, 1 some do, 2 wrong use. Only the standard library is needed.
+Each folder holds a claims.json, which `kbvh report` writes. Prints a line for each claim with two different verdicts, and
+lists claims that only one study decides. Exit codes: 0 no two verdicts differ, 1 some do, 2 wrong use. Only the standard
+library is needed.
 """
 
 from __future__ import annotations
@@ -28,13 +29,13 @@ class Agreement:
 
 
 def verdicts(folder: Path) -> dict[str, str]:
-    """By claim. Raises OSError, ValueError or KeyError if there is no readable claims.json."""
+    """Returns the verdicts by claim. Raises OSError, ValueError or KeyError if there is no readable claims.json."""
     whole = json.loads((folder / "claims.json").read_text(encoding="utf-8"))
     return {claim["id"]: claim["verdict"] for claim in whole["claims"]}
 
 
 def agreement(first: dict[str, str], second: dict[str, str]) -> Agreement:
-    """Compares verdicts; a claim that a study does not know is one that it does not decide."""
+    """Compares verdicts; a claim unknown to a study counts as undecided by it."""
     found = Agreement()
     for claim in [*first, *(claim for claim in second if claim not in first)]:
         one, other = first.get(claim, OPEN), second.get(claim, OPEN)
@@ -50,7 +51,7 @@ def agreement(first: dict[str, str], second: dict[str, str]) -> Agreement:
 
 
 def main(arguments: list[str]) -> int:
-    """See the usage above."""
+    """Runs the command; see the usage above."""
     if len(arguments) != 2:
         print("usage: agree.py FOLDER FOLDER", file=sys.stderr)
         return 2

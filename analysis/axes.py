@@ -1,4 +1,4 @@
-"""Small helpers that figures share: log axes with readable ticks, labels that keep apart, key lists."""
+"""Shared helpers of the figures: log axes with readable ticks, separated labels, key lists."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ WRAP = 38
 
 
 class KeyLines(Enum):
-    """Are contestants drawn as lines, so that a key has to show the line styles?"""
+    """Whether contestants are drawn as lines, so that a key must show the line styles."""
 
     shown = "shown"
     hidden = "hidden"
 
 
 def settle(figure: Figure) -> None:
-    """Lays a figure out once and for all, and to the same digits in every run (the solver varies in the last)."""
+    """Lays a figure out once, with rounded digits, because the solver's last digits vary between runs."""
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axes in figure.axes:
@@ -40,7 +40,7 @@ def settle(figure: Figure) -> None:
 
 
 def log_axis(axes: Axes, which: str, values: Sequence[float], tick: FormatTick = plain_tick) -> None:
-    """A log axis over positive values with some room, and ticks at 1, 2, 5 if it spans little."""
+    """Sets a log axis over positive values with some margin, and ticks at 1, 2, 5 if it spans little."""
     low, high = min(values), max(values)
     room = max((high / low) ** 0.06, 1.15)
     low, high = low / room, high * room
@@ -63,7 +63,7 @@ def log_axis(axes: Axes, which: str, values: Sequence[float], tick: FormatTick =
 
 
 def fixed_log_axis(axes: Axes, which: str, values: Sequence[float], tick: FormatTick) -> None:
-    """A log axis whose ticks are the measured values themselves, as far as they do not crowd."""
+    """Sets a log axis with ticks at the measured values, as far as they do not crowd."""
     places = sorted(set(values))
     kept: list[float] = []
     whole = math.log(places[-1] / places[0]) or 1.0
@@ -81,7 +81,7 @@ def fixed_log_axis(axes: Axes, which: str, values: Sequence[float], tick: Format
 
 
 def zero_log_axis(axes: Axes, values: Sequence[float], tick: FormatTick) -> None:
-    """A logarithmic x axis with a grey strip for exact zeros at its left; without zeros, a plain one."""
+    """Sets a logarithmic x axis with a grey strip for exact zeros at its left; without zeros, a plain one."""
     positive = [value for value in values if value > 0]
     if len(positive) == len(values):
         log_axis(axes, "x", values, tick)
@@ -102,13 +102,13 @@ def zero_log_axis(axes: Axes, values: Sequence[float], tick: FormatTick) -> None
 
 
 def mark(axes: Axes, x: float, y: float, look: Look, size: float = 7.5, zorder: float = 3) -> None:
-    """One contestant's marker in data coordinates."""
+    """Draws one contestant's marker in data coordinates."""
     axes.plot([x], [y], marker=look.marker, color=look.colour, markerfacecolor=look.face, markersize=size,
               markeredgewidth=1.5, linestyle="none", zorder=zorder, clip_on=False)  # fmt: skip
 
 
 def contestants_on_y(axes: Axes, labels: Sequence[str], looks: Sequence[Look]) -> None:
-    """A row per contestant from top to bottom, named at the left with its marker."""
+    """Draws a row per contestant from top to bottom, named at the left with its marker."""
     axes.set_yticks(range(len(labels)))
     axes.set_yticklabels([textwrap.fill(label, WRAP) for label in labels], linespacing=0.95)
     axes.set_ylim(len(labels) - 0.4, -0.6)
@@ -120,7 +120,7 @@ def contestants_on_y(axes: Axes, labels: Sequence[str], looks: Sequence[Look]) -
 
 
 def key(axes: Axes, entries: Sequence[tuple[str, Look]], lines: KeyLines) -> None:
-    """A list of contestants in axes of its own: marker, line style if they are drawn as lines, and name."""
+    """Draws a list of contestants in separate axes: marker, line style if they are drawn as lines, and name."""
     axes.set_axis_off()
     below = 0.0
     for label, look in entries:
@@ -143,14 +143,14 @@ def key(axes: Axes, entries: Sequence[tuple[str, Look]], lines: KeyLines) -> Non
 
 
 def key_size(labels: Sequence[str]) -> tuple[float, float]:
-    """Width and height in inches that a key of these names needs."""
+    """Returns width and height in inches of a key of these names."""
     wrapped = [textwrap.wrap(label, WRAP) for label in labels]
     widest = max(len(line) for lines in wrapped for line in lines)
     return 0.8 + 0.074 * widest, 0.35 + sum(16 + 11 * (len(lines) - 1) for lines in wrapped) / 72
 
 
 def _segment(axes: Axes, left: Transform, look: Look) -> Line2D:
-    """34 points of a contestant's line, starting where `left` takes the top left of the axes."""
+    """Returns 34 points of a contestant's line, starting where `left` meets the top left of the axes."""
     line = Line2D([0, 34], [0, 0], color=look.colour, linestyle=look.line, linewidth=1.6, clip_on=False)
     inches = Affine2D().scale(1 / 72) + axes.figure.dpi_scale_trans
     line.set_transform(inches + ScaledTranslation(0, 1, left))
@@ -158,7 +158,7 @@ def _segment(axes: Axes, left: Transform, look: Look) -> Line2D:
 
 
 def keep_labels_apart(axes: Axes, points: Sequence[tuple[float, float]], labels: Sequence[str]) -> None:
-    """Writes a short label beside each point where it covers neither markers nor other labels.
+    """Writes a short label next to each point, where it covers neither markers nor other labels.
 
     Call it once the axes' limits and place are final; a thin line leads to labels that had to move away.
     """

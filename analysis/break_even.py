@@ -1,4 +1,4 @@
-"""From which l on a strategy is faster than a baseline: per scene and size, between measured l only."""
+"""Finds the l from which on a strategy is faster than a baseline: per scene and size, between measured l only."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ class Place:
     rows: list[Row]
 
     def known(self, names: Sequence[str]) -> list[str]:
-        """The baselines that anything can be said of here."""
+        """Returns the baselines that were measured here."""
         return [name for name in names if any(row.found.get(name) for row in self.rows)]
 
 
 def break_even(depths: Sequence[float], faster: Sequence[float]) -> Optional[BreakEven]:
-    """The break-even point of a ratio (above 1 is faster) measured at some l; None with fewer than two of them.
+    """Finds the break-even point of a ratio (above 1 is faster) measured at some l; None with fewer than two of them.
 
-    Between two measured l the ratio is a straight line on logarithmic axes; nothing is said of l that were not measured.
+    Between two measured l the ratio is a straight line on logarithmic axes; it is never extrapolated.
     """
     if len(depths) < 2:
         return None
@@ -87,7 +87,7 @@ def _short(l: float) -> str:
 
 
 def baselines_of(table: Table, declared: Sequence[dict[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
-    """Names and terms: those of claims.json, then each strategy that declares itself a baseline."""
+    """Returns names and terms: those of claims.json, then each strategy that declares itself a baseline."""
     named = [(one["short"], one) for one in declared]
     not_for = next((one["not_for"] for one in declared if "not_for" in one), {})
     rows = table.rows[table.rows["baseline"] & (table.rows["guarantee"] != "approximate")]
@@ -98,7 +98,7 @@ def baselines_of(table: Table, declared: Sequence[dict[str, Any]]) -> list[tuple
 
 
 def places(table: Table, declared: Sequence[dict[str, Any]]) -> tuple[list[str], list[Place], list[str]]:
-    """Names of the baselines, every scene and size with at least two l, and what has only one."""
+    """Returns the names of the baselines, every scene and size with at least two l, and the names of those with one l."""
     baselines = baselines_of(table, declared)
     found, single = [], []
     for scene in dict.fromkeys(table.rows["scene"]):
@@ -120,7 +120,7 @@ def places(table: Table, declared: Sequence[dict[str, Any]]) -> tuple[list[str],
 
 
 def contestants(at: Sequence[tuple[float, list[dict[str, Any]]]]) -> list[tuple[str, str, str]]:
-    """All that are no baselines, with labels and families: the kinetic ones first."""
+    """Returns contestants that are no baselines, with labels and families, kinetic ones first."""
     known = {
         (str(row["contestant"]), str(row["label"]), str(row["family"]))
         for _, rows in at
@@ -149,7 +149,7 @@ def _row(
 
 
 def figure(found: Sequence[Place], names: Sequence[str], looks: dict[str, Look]) -> Optional[Figure]:
-    """Break-even points against the two baselines of claims.json, updates left and totals right."""
+    """Draws break-even points against the two baselines of claims.json, updates left and totals right."""
     listed = [(place, row) for place in found for row in place.rows if (row.family, row.quantity) == (FAMILY, DRAWN[0][0])]
     if not listed:
         return None
@@ -188,7 +188,7 @@ def _name(label: str) -> str:
 
 
 def _draw(axes: Axes, one: BreakEven, y: float, colour: str) -> None:
-    """From where on it is faster, as a bar to the largest measured l; open arrows where that is beyond it."""
+    """Draws a bar from the break-even point to the largest measured l, or an open arrow at that l without one."""
     low, high = one.measured[0], one.measured[-1]
     axes.plot([low, high], [y, y], color="#DDDDDD", linewidth=1, zorder=1)
     if one.kind == BEHIND:
@@ -202,7 +202,7 @@ def _draw(axes: Axes, one: BreakEven, y: float, colour: str) -> None:
 
 
 def _lines_between(panels: Sequence[Axes], listed: Sequence[tuple[Place, Row]]) -> None:
-    """A thin line where the next scene or size begins."""
+    """Draws a thin line between scenes and sizes."""
     for number in range(1, len(listed)):
         if listed[number][0] is not listed[number - 1][0]:
             for axes in panels:

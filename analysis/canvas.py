@@ -1,4 +1,4 @@
-"""Figures as files and as something a page can embed. What they show is decided in figures.py."""
+"""Writes figures to files and embeds them in a page. figures.py decides their content."""
 
 from __future__ import annotations
 

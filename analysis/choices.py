@@ -1,4 +1,4 @@
-"""What strategies that choose among others chose, and how that compares with the best fixed choice."""
+"""The choices of strategies that choose among others, compared with the best fixed choice."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ TOTAL = ["update", "traversal", "triangle_tests"]  #: phases: positions are eval
 
 @dataclass
 class Choice:
-    """One run of one such strategy."""
+    """One run of a choosing strategy."""
 
     scene: str
     size: str
@@ -25,7 +25,7 @@ class Choice:
 
 
 def choices(study: Study) -> list[Choice]:
-    """A row for each run that was timed and says what it chose; best are kbvh's own, with one thread."""
+    """Returns a row for each timed run that reports its choice; the best fixed choices are kbvh's own, with one thread."""
     found = []
     timed = study.timed
     for _, rows in timed.groupby("group", sort=False):

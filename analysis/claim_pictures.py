@@ -1,4 +1,4 @@
-"""A claim as a small picture: what was claimed and what was measured, by corner, on a logarithmic axis.
+"""Draws a claim as a small picture: claimed and measured values, by corner, on a logarithmic axis.
 
 Inline SVG: its colours are variables of the page's style, so that it is readable in light and dark, and a label says the same
 in words.
@@ -53,7 +53,7 @@ class Block:
     bars: list[Bar] = field(default_factory=list)
 
     def zone(self) -> tuple[float, float]:
-        """Where the claim is met: from, to."""
+        """Returns the values that meet the claim: from, to."""
         if self.relation == "within a factor of":
             factor = self.bound * (1 + self.tolerance)
             return 1 / factor, factor
@@ -63,7 +63,7 @@ class Block:
 
 
 def of_experiment(looked: Sequence[Looked]) -> str:
-    """The picture of a claim's checks; empty if nothing of it was measured.
+    """Draws a claim's checks; empty without measurements.
 
     A check with corners has a block of its own, or shares one with those of the same "row"; checks without corners that claim
     the same share one, too.
@@ -84,7 +84,7 @@ def of_experiment(looked: Sequence[Looked]) -> str:
 
 
 def _bars(one: Looked) -> list[Bar]:
-    """A bar for each corner; without corners one for the check, or for each scene where the check has no name."""
+    """Returns a bar for each corner; without corners one for the check, or one for each scene if the check has no name."""
 
     def marks(points: list[Point]) -> list[Mark]:
         return [Mark(p.value.middle, p.met, p.quantity.endswith("with motion")) for p in points]
@@ -109,7 +109,7 @@ def _bound(check: dict[str, Any]) -> tuple[str, float, float]:
 
 
 def of_theory(criteria: Sequence[dict[str, Any]]) -> str:
-    """The picture of a claim of theory.json: what was counted over its bound; empty where no bound is a positive number."""
+    """Draws a claim of theory.json: counts over their bounds; empty without a positive bound."""
     blocks: dict[str, Block] = {}
     for name, listed in grouped(criteria).items():
         relation = listed[0]["relation"]
@@ -126,12 +126,12 @@ def of_theory(criteria: Sequence[dict[str, Any]]) -> str:
     return draw(list(blocks.values()), "measured over bound")
 
 
-#: How the name of a criterion goes on where it says on which clip it was counted.
+#: The part of a criterion's name that names its clip.
 CLIP = re.compile(r", (?:l = \d+|[^,]*, [\d,]+ (?:polygons?|leaves)|[A-Za-z_-]+)(?:, l = \d+)?$")
 
 
 def grouped(criteria: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
-    """Criteria that say the same of several clips, together."""
+    """Groups criteria that differ in the clip only."""
     found: dict[str, list[dict[str, Any]]] = {}
     for one in criteria:
         name = CLIP.sub("", str(one["what"]))
@@ -141,7 +141,7 @@ def grouped(criteria: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]
 
 
 def draw(blocks: Sequence[Block], unit: str = "") -> str:
-    """The blocks one below the other on one axis; empty without any value."""
+    """Draws the blocks one below the other on one axis; empty without values."""
     values = [mark.value for block in blocks for bar in block.bars for mark in bar.marks]
     if not values:
         return ""
@@ -169,7 +169,7 @@ def draw(blocks: Sequence[Block], unit: str = "") -> str:
 
 
 def _block(parts: list[str], block: Block, axis: Axis, y: float) -> float:
-    """Draws a block below y, shades and what lies on them in turn; returns where it ends."""
+    """Draws a block below y: a shade, then the marks on it; returns the y of its end."""
     low, high = block.zone()
     left, right = axis.at(low), axis.at(high)
     top = y + HEAD
@@ -208,7 +208,7 @@ def _bar(bar: Bar, axis: Axis, y: float) -> str:
 
 
 def _short(name: str, most: int = 27) -> str:
-    """A name that fits beside the drawing: what tells it from others often stands at its end."""
+    """Shortens a name in its middle: similar names often differ at their ends."""
     if len(name) <= most:
         return name
     tail = name.rpartition(", ")[2]
@@ -217,7 +217,7 @@ def _short(name: str, most: int = 27) -> str:
 
 
 class Axis:
-    """Where values lie: logarithmic, zero at the left edge."""
+    """Maps values to places: logarithmic, zero at the left edge."""
 
     def __init__(self, values: Sequence[float], zero: bool) -> None:
         low, high = math.log10(min(values)), math.log10(max(values))
@@ -227,7 +227,7 @@ class Axis:
         self.ticks = [one for one in ticks(10**self.low, 10**self.high) if not zero or self.at(one) > LEFT + 22]
 
     def at(self, value: float) -> float:
-        """The place of a value; what is outside lies at the edge."""
+        """Returns the place of a value, clipped to the edges."""
         if value <= 0:
             return LEFT + 5.0 if self.zero else float(LEFT)
         if math.isinf(value):
@@ -238,7 +238,7 @@ class Axis:
 
 
 def ticks(low: float, high: float, most: int = 6) -> list[float]:
-    """At most so many round numbers from low to high."""
+    """Returns round numbers from low to high, `most` at most."""
     if high / low < 4:
         rounds = (digit * 10.0**power for power, digit in itertools.product(range(-12, 13), (1, 2, 5)))
         step = next(one for one in rounds if (high - low) / one < most)
@@ -252,7 +252,7 @@ def ticks(low: float, high: float, most: int = 6) -> list[float]:
 
 
 def said(blocks: Sequence[Block], unit: str = "") -> str:
-    """The picture in words."""
+    """Describes the picture in words."""
     told = []
     for block in blocks:
         rows = []
@@ -269,5 +269,5 @@ def said(blocks: Sequence[Block], unit: str = "") -> str:
 
 
 def picture(looked: Sequence[Looked], criteria: Optional[Sequence[dict[str, Any]]] = None) -> str:
-    """The picture of either kind of claim."""
+    """Draws either kind of claim."""
     return of_experiment(looked) if looked else of_theory(criteria or [])

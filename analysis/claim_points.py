@@ -1,4 +1,4 @@
-"""Where a claim's check can be looked at in a study: values at scenes, sizes and l, beside what the check wants."""
+"""Finds the points of a study at which a claim's check can be evaluated: values at scenes, sizes and l."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ RELATIONS = ("<", "<=", ">", ">=", "within a factor of")
 
 
 class ClaimError(Exception):
-    """A claims.json that cannot be used; the text is one sentence."""
+    """Reports an unusable claims.json in one sentence."""
 
 
 @dataclass(frozen=True)
 class Value:
-    """A number with the extremes that its repetitions allow (the same number where nothing is timed)."""
+    """A number with the extremes of its repetitions (equal to the number if nothing is timed)."""
 
     middle: float
     low: float
@@ -67,7 +67,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Corner:
-    """Who a check compares with whom: a corner of its square, or one of the baselines, or all that there is."""
+    """The two sides of a check: a corner of its square, a baseline in turn, or the check's own terms."""
 
     id: str  #: "" where the check has only one
     name: str  #: in a sentence
@@ -76,28 +76,28 @@ class Corner:
     above: dict[str, Any]  #: the numerator, or the only term
     below: Optional[dict[str, Any]]
     optional: bool  #: its absence leaves the claim decided
-    needs: Optional[dict[str, Any]]  #: tables without a run of this term do not count: nothing but others was measured there
+    needs: Optional[dict[str, Any]]  #: tables without a run of this term do not count
 
 
 @dataclass
 class Looked:
-    """All points of one check, and what is missing to decide it."""
+    """All points of one check, and the missing data."""
 
     check: dict[str, Any]
     corners: list[Corner] = field(default_factory=list)
     points: list[Point] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
-    gaps: dict[str, list[str]] = field(default_factory=dict)  #: by optional corner: what was not measured of it
+    gaps: dict[str, list[str]] = field(default_factory=dict)  #: by optional corner: the missing data
 
     def unmeasured(self) -> list[Corner]:
-        """Corners without any point, of a check of which anything was measured or all is optional."""
+        """Returns the corners without points; none if the check is required and has no points at all."""
         known = {point.corner for point in self.points}
         counts = self.points or all(one.optional for one in self.corners)
         return [one for one in self.corners if counts and one.id not in known]
 
 
 def met(check: dict[str, Any], value: float) -> bool:
-    """Does a value satisfy the check, its tolerance in the claim's favour?"""
+    """Returns whether a value satisfies the check, with its tolerance in the claim's favour."""
     bound, room = check["bound"], check["tolerance"] * abs(check["bound"])
     relation = check["relation"]
     if relation == "<":
@@ -119,7 +119,7 @@ Place = tuple[float, float, list[dict[str, Any]]]
 
 
 class Table:
-    """The timed runs of a study as claims see them: one scalar, the last commit's, with sizes."""
+    """The timed runs of a study in the form of claims: one scalar, the runs of the last commit, with sizes."""
 
     def __init__(self, study: Study, scalar: str) -> None:
         rows = study.timed
@@ -132,7 +132,7 @@ class Table:
         self._places: dict[str, list[Place]] = {}
 
     def places(self, scene: str) -> list[Place]:
-        """Every table of a scene; of tables for the same size and l, the one measured last."""
+        """Returns every table of a scene; of tables for the same size and l, the one measured last."""
         if scene in self._places:
             return self._places[scene]
         found = self.rows[self.rows["scene"] == scene]
@@ -144,7 +144,7 @@ class Table:
         return self._places[scene]
 
     def values(self, run: int, quantity: str) -> np.ndarray:
-        """The quantity of each repetition of a run; a single number where it is counted; empty if unknown."""
+        """Returns the quantity of each repetition of a run; a single number for counts; empty if unknown."""
         row = self._row[run]
         scale = row["l"] if quantity.endswith("per keyframe") else 1.0
         if quantity in TIMES:
@@ -163,7 +163,7 @@ class Table:
         return np.array([value for value in known if math.isfinite(value)], dtype=float)
 
     def chosen(self, rows: list[dict[str, Any]], term: dict[str, Any], quantity: str) -> Optional[int]:
-        """The run of a table that a term means: the fastest, or of counts the smallest, if several fit."""
+        """Selects the run of a table for a term: the fastest, or for counts the smallest, if several match."""
         best: Optional[tuple[float, int]] = None
         for row in rows:
             if not _fits(row, term, quantity):
@@ -174,12 +174,12 @@ class Table:
         return None if best is None else best[1]
 
     def row(self, run: int) -> dict[str, Any]:
-        """One run."""
+        """Returns one run."""
         return self._row[run]
 
 
 def _fits(row: dict[str, Any], term: dict[str, Any], quantity: str) -> bool:
-    """Is a run one that the term means?"""
+    """Returns whether a run matches the term."""
     if "one_of" in term:
         return any(_fits(row, one, quantity) for one in term["one_of"])
     if any(row[column] != term[name] for column, name in NAMED.items() if name in term):
@@ -195,7 +195,7 @@ def _fits(row: dict[str, Any], term: dict[str, Any], quantity: str) -> bool:
 
 
 def ageing(samples: list[dict[str, float]]) -> float:
-    """SAH cost over that of a rebuilt tree, of the last sample over the first; NaN with fewer than two."""
+    """Returns the SAH cost over that of a rebuilt tree, of the last sample over the first; NaN with fewer than two."""
     if len(samples) < 2:
         return math.nan
     first, last = (one["sah"] / one["sah_rebuilt"] for one in (samples[0], samples[-1]))
@@ -203,13 +203,13 @@ def ageing(samples: list[dict[str, float]]) -> float:
 
 
 def largest_moving(bodies: Any) -> float:
-    """Primitives of the largest body that moves; 0 if unknown."""
+    """Returns the number of primitives of the largest moving body; 0 if unknown."""
     counts = [body.get("primitives") for body in bodies if isinstance(body, dict) and body.get("moving") is True]
     return float(max((count for count in counts if isinstance(count, (int, float))), default=0))
 
 
 def quotient(table: Table, above: int, below: int, quantity: str) -> Optional[Value]:
-    """One run's quantity over another's: repetition by repetition within a session, else of medians."""
+    """Divides one run's quantity by another's: repetition by repetition within a session, else by medians."""
     a, b = table.values(above, quantity), table.values(below, quantity)
     if not len(a) or not len(b) or b.min() <= 0:
         return None
@@ -221,7 +221,7 @@ def quotient(table: Table, above: int, below: int, quantity: str) -> Optional[Va
 
 
 def words_of(term: dict[str, Any]) -> str:
-    """A term in words, for what is missing."""
+    """Describes a term in words, for messages about missing data."""
     if "one_of" in term:
         return " or ".join(words_of(one) for one in term["one_of"])
     settings = {**term.get("builder", {}), **term.get("params", {})}
@@ -231,7 +231,7 @@ def words_of(term: dict[str, Any]) -> str:
 
 
 class Looker:
-    """Looks at checks in one study."""
+    """Evaluates checks on one study."""
 
     def __init__(
         self, table: Table, baselines: list[dict[str, Any]], squares: Optional[dict[str, list[dict[str, Any]]]] = None
@@ -241,7 +241,7 @@ class Looker:
         self.squares = squares or {}
 
     def look(self, check: dict[str, Any]) -> Looked:
-        """All points of the check, and what is missing. Raises ClaimError for a check that makes no sense."""
+        """Returns all points of the check, and the missing data. Raises ClaimError for an inconsistent check."""
         if check["measure"] not in MEASURES:
             raise ClaimError(f'the measure "{check["measure"]}" is none of {", ".join(MEASURES)}')
         looked = Looked(check, self._corners(check))
@@ -257,7 +257,7 @@ class Looker:
         return looked
 
     def _corners(self, check: dict[str, Any]) -> list[Corner]:
-        """The corners of the check's square; each of the baselines in turn; or the only thing that it is about."""
+        """Returns the corners of the check's square, else a corner for each baseline that it names, else one for its own terms."""
         if "square" in check:
             if check["square"] not in self.squares:
                 raise ClaimError(f'there is no square "{check["square"]}"')
@@ -283,7 +283,7 @@ class Looker:
         )  # fmt: skip
 
     def _term(self, said: Any) -> dict[str, Any]:
-        """A term, or the one of the baseline that is named."""
+        """Returns a term, or the term of the named baseline."""
         if isinstance(said, dict):
             return said
         if said not in self.baselines:
@@ -291,7 +291,7 @@ class Looker:
         return self.baselines[said]
 
     def _scene(self, check: dict[str, Any], quantity: str, corner: Corner, scene: str) -> tuple[list[Point], list[str]]:
-        """Points of one scene, and why they do not suffice."""
+        """Returns the points of one scene, and the reasons why they do not suffice."""
         above, below = corner.above, corner.below
         low, high = check["size"]
         everywhere = self.table.places(scene)
@@ -329,7 +329,7 @@ class Looker:
 
     @staticmethod
     def _gaps(check: dict[str, Any], scene: str, points: list[Point]) -> list[str]:
-        """What points do not cover of the claimed sizes and of l."""
+        """Lists the claimed sizes and l that the points do not cover."""
         low, high = check["size"]
         sizes, deepest = sorted({one.size for one in points}), max(one.l for one in points)
         gaps = []
@@ -376,7 +376,7 @@ class Looker:
         return points
 
     def _exponent(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
-        """The slope through logarithms at each l that has enough sizes; its extremes come from leaving one size out."""
+        """Returns the slope in logarithms at each l with enough sizes; its extremes come from leaving one size out."""
         points: list[Point] = []
         for depth in sorted({l for _, l, _ in places}):
             found = []
@@ -395,7 +395,10 @@ class Looker:
         return points
 
     def _over_l(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
-        """At each size the next l over the one before it, or ten times an l over it; only within one clip."""
+        """Compares, at each size, the next l with the preceding l, or ten times an l with that l; within one clip only.
+
+        Only contestants that were measured at both l count.
+        """
         points: list[Point] = []
         for size in sorted({size for size, _, _ in places}):
             depths = [(l, rows) for at, l, rows in places if at == size]
@@ -415,18 +418,18 @@ class Looker:
         return points
 
     def _one_clip(self, one: int, other: int) -> bool:
-        """Are two runs of the same scene over the same keyframe intervals?"""
+        """Returns whether two runs are of the same scene over the same keyframe intervals."""
         a, b = self.table.row(one), self.table.row(other)
         cut_alike = (a["frames"] - 1) * b["l"] == (b["frames"] - 1) * a["l"]
         return bool(a["hash"] == b["hash"] and cut_alike and self._comparable(one, other))
 
     def _comparable(self, one: int, other: int) -> bool:
-        """Are two runs of one machine and one commit?"""
+        """Returns whether two runs are from one machine and one commit."""
         a, b = self.table.row(one), self.table.row(other)
         return all(a[name] == b[name] for name in ("machine", "commit", "dirty"))
 
     def _across(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
-        """Each place over the largest of the other scene at the same l."""
+        """Divides each point by the largest of the other scene at the same l."""
         low, high = check["other_size"]
         others: dict[float, int] = {}
         for size, l, rows in self.table.places(check["other_scene"]):

@@ -1,4 +1,4 @@
-"""What a claim folds out: every point behind it, as tables of finished texts."""
+"""Makes the tables that a claim folds out: every point behind it, as finished texts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Cell:
     value: str
     range: str
     met: bool
-    close: bool  #: repetitions disagree on whether it is met
+    close: bool  #: the repetitions disagree on `met`
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,13 @@ class Table:
     wanted: str
     columns: list[str]
     rows: list[tuple[str, list[Cell | None]]]
-    configurations: list[tuple[str, str]]  #: corner and who is compared there
+    configurations: list[tuple[str, str]]  #: corner and its configurations
     missing: list[str]
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """Criteria of the theory that say the same of several clips."""
+    """Criteria of the theory that differ in the clip only."""
 
     what: str
     clips: int
@@ -48,7 +48,7 @@ class Criterion:
 
 
 def tables(looked: Sequence[Looked]) -> list[Table]:
-    """All points of a claim's checks."""
+    """Returns a table for each of a claim's checks."""
     return [_table(one) for one in looked]
 
 
@@ -79,7 +79,7 @@ def _cell(point: Point) -> Cell:
 
 
 def criteria(listed: Sequence[dict[str, Any]]) -> list[Criterion]:
-    """The criteria of a claim of the theory, a line for those that say the same of several clips."""
+    """Returns the criteria of a claim of the theory, one line for those that differ in the clip only."""
     result = []
     for what, same in grouped(listed).items():
         met = sum(bool(one["met"]) for one in same)

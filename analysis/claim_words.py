@@ -1,4 +1,4 @@
-"""What claims say in words: where a check is met, under which condition, and why in two sentences."""
+"""Describes claims in words: where a check is met, under which condition, and why in two sentences."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ NOT_MEASURED = "not measured here"
 
 
 def wanted(check: dict[str, Any]) -> str:
-    """What a check claims of its values."""
+    """Describes the values that a check requires."""
     words = {"<": "below", "<=": "at most", ">": "above", ">=": "at least"}.get(check["relation"], check["relation"])
     room = f", give or take {text.percent(check['tolerance'])}" if check["tolerance"] else ""
     return f"{words} {number(check['bound'])}{room}"
 
 
 def number(value: float) -> str:
-    """A bound as the paper writes it: without zeros that say nothing."""
+    """Formats a bound without trailing zeros."""
     return text.tick(float(f"{value:.3g}"))
 
 
 def place(point: Point) -> str:
-    """Where a point is, in words."""
+    """Describes the place of a point."""
     return f"{point.scene} {text.size(point.size)}, l = {point.l:g}"
 
 
 def where(points: list[Point]) -> str:
-    """At which of the points the check is met: the simplest rule that says it exactly, or a count."""
+    """Describes the points at which the check is met: the simplest rule that separates them exactly, or a count."""
     good = [point for point in points if point.met]
     if len(good) == len(points):
         return "met everywhere"
@@ -52,19 +52,19 @@ def where(points: list[Point]) -> str:
 
 
 def several(looked: Looked) -> bool:
-    """Is the check looked at with and without motion evaluation?"""
+    """Returns whether the check is evaluated with and without motion evaluation."""
     return any(quantity.endswith("with motion") for quantity in looked.check["quantities"])
 
 
 def motion(looked: Looked, quantity: str) -> str:
-    """How a quantity of a check differs from its others, in words."""
+    """Describes the difference between a quantity and the check's other quantities."""
     if quantity.endswith("with motion"):
         return "with motion evaluation"
     return "without motion evaluation" if several(looked) else ""
 
 
 def kinds(looked: Looked) -> list[tuple[Corner, str, list[Point]]]:
-    """Corner, quantity and points, for each pair that has points."""
+    """Returns corner, quantity and points, for each pair with points."""
     found = []
     for corner in looked.corners:
         for quantity in looked.check["quantities"]:
@@ -75,7 +75,7 @@ def kinds(looked: Looked) -> list[tuple[Corner, str, list[Point]]]:
 
 
 def rule(looked: Looked, corner: Corner) -> str:
-    """Where a corner is met, over its quantities; "not measured here" without points."""
+    """Describes where a corner is met, over its quantities; "not measured here" without points."""
     rules = {quantity: where(mine) for one, quantity, mine in kinds(looked) if one.id == corner.id}
     if not rules:
         return NOT_MEASURED
@@ -85,7 +85,7 @@ def rule(looked: Looked, corner: Corner) -> str:
 
 
 def unmeasured(looked: list[Looked]) -> list[str]:
-    """What a claim lacks, in words: corners, and parts of them."""
+    """Names the corners, and parts of corners, that were not measured."""
     found: dict[str, list[str]] = {}  # names by what is said of them
     said_already = {gap for one in looked for gap in one.missing}
     for one in looked:
@@ -101,13 +101,13 @@ def unmeasured(looked: list[Looked]) -> list[str]:
 
 
 def details(looked: Looked) -> list[str]:
-    """All that is missing of one check, for readers who want to measure it."""
+    """Lists the missing data of one check, optional corners included."""
     optional = [f"{corner.name}: {gap}" for corner in looked.corners for gap in looked.gaps.get(corner.id, [])]
     return looked.missing + optional
 
 
 def as_in_2006(looked: list[Looked]) -> list[str]:
-    """Names of corners at their best whose points are all from the same records as those of an earlier corner."""
+    """Names the structures at their best whose points come from the same records as those of an earlier corner."""
     names = []
     for one in looked:
         seen: set[frozenset[Any]] = set()
@@ -120,7 +120,7 @@ def as_in_2006(looked: list[Looked]) -> list[str]:
 
 
 def sentence(one: Looked) -> str:
-    """What was measured for a check, where it is met, and what it wants."""
+    """Describes a check: the measured values, where it is met, and the requirement."""
     parts = []
     for corner, quantity, mine in kinds(one):
         low, high = min(mine, key=lambda p: p.value.middle), max(mine, key=lambda p: p.value.middle)
@@ -143,7 +143,7 @@ def sentence(one: Looked) -> str:
 
 
 def condition(looked: list[Looked]) -> str:
-    """Under which condition all checks are met, one clause for each that is not met everywhere."""
+    """Returns the condition under which all checks are met, one clause for each check that is not met everywhere."""
     clauses = []
     for one in looked:
         if all(point.met for point in one.points):  # or none was measured of an optional one
@@ -157,7 +157,7 @@ def condition(looked: list[Looked]) -> str:
 
 
 def brief(looked: list[Looked], missing: list[str]) -> str:
-    """Why the verdict is as it is, in two sentences: where the checks are met, and what was measured."""
+    """Explains the verdict in two sentences: where the checks are met, and the measured range."""
     known = [one for one in looked if one.points]
     if missing:
         more = f" and {text.plural(len(missing) - 2, 'other thing')}" if len(missing) > 2 else ""
@@ -175,7 +175,7 @@ def brief(looked: list[Looked], missing: list[str]) -> str:
 
 
 def brief_theory(condition_said: str, why: str) -> str:
-    """The same for a claim that theory.json judges."""
+    """Explains the verdict of theory.json in two sentences."""
     sentences = [_capital(one) for one in re.split(r"(?<=[a-z0-9)%]\.)\s+(?=[A-Za-z0-9])", why)]
     if condition_said:
         return f"Condition: {condition_said}. {sentences[0]}".strip()
@@ -183,13 +183,13 @@ def brief_theory(condition_said: str, why: str) -> str:
 
 
 def _alike(looked: list[Looked], first: Looked) -> list[Looked]:
-    """The checks that want the same as the first one."""
+    """Returns the checks with the same requirement as the first one."""
     same = ("measure", "relation", "bound")
     return [one for one in looked if all(one.check[name] == first.check[name] for name in same)]
 
 
 def _rules(one: Looked, named: bool) -> str:
-    """Where one check is met, corners with the same rule together."""
+    """Describes where one check is met; corners with the same rule share a clause."""
     by_rule: dict[str, list[str]] = {}
     for corner in one.corners:
         told = re.sub(r" \([^()]*; …\)", "", rule(one, corner))
@@ -204,7 +204,7 @@ def _rules(one: Looked, named: bool) -> str:
 
 
 def _range(looked: list[Looked], word: str) -> str:
-    """The extremes of what was measured, beside what is claimed."""
+    """Compares the measured extremes with the claimed value."""
     points = [(point, one) for one in looked for point in one.points]
     if not points:
         return ""

@@ -1,9 +1,9 @@
-"""Holds the paper's claims against results: RESULTS_DIR/results.jsonl and theory.json become RESULTS_DIR/claims.json.
+"""Checks the paper's claims against results: RESULTS_DIR/results.jsonl and theory.json become RESULTS_DIR/claims.json.
 
 usage: claims.py RESULTS_DIR [--claims FILE]
 
-What a claim is, and what decides it, is data: claims.json beside this file for the experiments, theory.json for the
-theory. Nothing here knows a claim by its name.
+Claims and their criteria are data: claims.json in this folder for the experiments, theory.json for the theory. This module
+has no code for single claims.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ HOLDS, CONDITION, FAILS, OPEN = "holds", "holds with a condition", "does not hol
 
 @dataclass
 class Apart:
-    """A claim on some of its scenes: those that it is decided on, or one that was made elsewhere."""
+    """A claim on some of its scenes: those that decide it, or one scene from another source."""
 
     scenes: list[str]
     l: list[float]
@@ -51,7 +51,7 @@ class CornerVerdict:
 
 @dataclass
 class Row:
-    """One claim as the report shows it."""
+    """One claim in the form of the report."""
 
     id: str
     claim: str
@@ -78,7 +78,7 @@ class Row:
 
 @dataclass
 class Claims:
-    """All rows, and what the baselines are called."""
+    """All rows, and the names of the baselines."""
 
     rows: list[Row]
     baselines: list[dict[str, Any]]
@@ -90,7 +90,7 @@ def read_claims(file: Path = FILE) -> dict[str, Any]:
 
 
 def evaluate(study: Study, folder: Path, file: Path = FILE) -> Claims:
-    """Every claim, theory first. Raises ClaimError."""
+    """Evaluates every claim, theory first. Raises ClaimError."""
     said = read_claims(file)
     looker = Looker(Table(study, said["scalar"]), said["baselines"], said.get("squares", {}))
     try:
@@ -102,7 +102,7 @@ def evaluate(study: Study, folder: Path, file: Path = FILE) -> Claims:
 
 
 def theory_rows(listed: list[dict[str, Any]], folder: Path) -> list[Row]:
-    """The claims of theory.json as they are judged there; undecided where it is missing."""
+    """Takes the claims of theory.json with their verdicts; undecided if the file is missing."""
     path = folder / "theory.json"
     known: dict[str, dict[str, Any]] = {}
     missing = [f"{path.name} in this folder, which kbvh theory --out writes"]
@@ -131,7 +131,7 @@ def theory_rows(listed: list[dict[str, Any]], folder: Path) -> list[Row]:
 
 
 def experiment_row(claim: dict[str, Any], looker: Looker) -> Row:
-    """One claim held against what was measured."""
+    """Checks one claim against the measurements."""
     looked = [looker.look(check) for check in claim["checks"]]
     missing = list(dict.fromkeys(gap for one in looked for gap in one.missing))
     verdict = verdict_of(looked)
@@ -168,7 +168,10 @@ def experiment_row(claim: dict[str, Any], looker: Looker) -> Row:
 
 
 def verdict_of(looked: list[Looked]) -> str:
-    """Undecided while anything is missing; refuted by a check that is met nowhere; else by whether all points are met."""
+    """Decides: undecided while data are missing; refuted by a check that is met nowhere; else by whether all points are met.
+
+    A check with optional corners only does not count without points.
+    """
     looked = [one for one in looked if one.points or not all(corner.optional for corner in one.corners)]
     if not looked or any(one.missing or not one.points for one in looked):
         return OPEN
@@ -178,7 +181,7 @@ def verdict_of(looked: list[Looked]) -> str:
 
 
 def corner_verdicts(looked: Looked) -> list[CornerVerdict]:
-    """Each corner of a check as if it were the only one."""
+    """Evaluates each corner of a check by itself."""
     found = []
     for corner in looked.corners:
         mine = [point for point in looked.points if point.corner == corner.id]
@@ -188,8 +191,9 @@ def corner_verdicts(looked: Looked) -> list[CornerVerdict]:
 
 
 def apart(looked: list[Looked]) -> list[Apart]:
-    """The claim on the scenes that it is decided on, and on each optional one, at the l that all of them have; nothing
-    where there is no optional one."""
+    """Evaluates the claim on the deciding scenes, and on each optional scene, at the l that all of them have; empty without
+    optional scenes.
+    """
     optional = list(dict.fromkeys(scene for one in looked for scene in one.check.get("optional_scenes", [])))
     depths: dict[str, set[float]] = {}
     for one in looked:
@@ -212,7 +216,7 @@ def apart(looked: list[Looked]) -> list[Apart]:
 
 
 def differences(separate: list[Apart], table: Table, claim: dict[str, Any]) -> str:
-    """What was counted on each of the scenes, if their verdicts or conditions are not the same."""
+    """Lists the counts on each of the scenes if their verdicts or conditions differ."""
     if len({(one.verdict, one.condition) for one in separate}) < 2 or "apart_shown" not in claim:
         return ""
     one, check = claim["apart_shown"], claim["checks"][0]
@@ -234,7 +238,7 @@ def differences(separate: list[Apart], table: Table, claim: dict[str, Any]) -> s
 
 
 def ours(looked: list[Looked]) -> dict[str, str]:
-    """The range of the first check of each corner, further quantities and checks after it."""
+    """Returns the range of the first check for each corner, followed by further quantities and checks."""
     result: dict[str, list[str]] = {}
     for one in looked:
         for corner in dict.fromkeys(point.corner for point in one.points):
@@ -254,7 +258,7 @@ def _range(values: list[float]) -> str:
 
 
 def shown(one: dict[str, Any], table: Table, claim: dict[str, Any]) -> str:
-    """A number beside the verdict: at the largest size of the claim's first scene, at each l."""
+    """Returns a number next to the verdict: at the largest size of the claim's first scene, at each l."""
     check = claim["checks"][0]
     low, high = check["size"]
     found = []
@@ -286,7 +290,7 @@ def _check_record(one: Looked) -> dict[str, Any]:
 
 
 def write(claims: Claims, folder: Path) -> Path:
-    """Writes claims.json into the results folder; its path."""
+    """Writes claims.json into the results folder; returns its path."""
     path = folder / "claims.json"
     rows = [
         {
@@ -304,7 +308,7 @@ def write(claims: Claims, folder: Path) -> Path:
 
 
 def plain(claims: Claims) -> str:
-    """One line per claim with its verdict, its reason below."""
+    """Formats one line per claim with its verdict, its reason below."""
     lines = []
     for row in claims.rows:
         lines.append(f"{row.id:<4} {row.verdict:<23} {row.claim}")
@@ -319,7 +323,7 @@ def plain(claims: Claims) -> str:
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
-    """The command; its exit code: 0, or 2 for input that cannot be used. Verdicts are no errors."""
+    """Runs the command; returns the exit code: 0, or 2 for unusable input. Verdicts are no errors."""
     parser = argparse.ArgumentParser(prog="claims.py", description="Holds the paper's claims against RESULTS_DIR.")
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl (and theory.json)")
     parser.add_argument("--claims", metavar="FILE", type=Path, default=FILE, help="other claims than the paper's")
@@ -332,8 +336,9 @@ def main(arguments: Optional[list[str]] = None) -> int:
         print(f"claims: {error}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"claims: {error.filename} cannot be written: {error.strerror}.", file=sys.stderr)
-        return 2
+        text, code = files.complaint(error)
+        print(f"claims: {text}", file=sys.stderr)
+        return code
     return 0
 
 

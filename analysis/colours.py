@@ -1,8 +1,8 @@
-"""The one place that decides how a strategy looks: colour and marker by family, line style within it.
+"""Decides the look of every strategy: colour and marker by family, line style within the family.
 
-Colours are Okabe and Ito's, told apart by colour-blind readers; markers differ per family so that
-nothing hangs on colour alone. Families that this file does not know (strategies from outside the
-project) get a free colour that depends on their name only, unless two of them would collide.
+Colours are Okabe and Ito's, which colour-blind readers can distinguish; markers differ per family, so that no information
+depends on colour alone. Unknown families (strategies from outside the project) get a free colour that depends on their name
+only, unless two of them would collide.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ PHASE_NAMES: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Look:
-    """How one contestant is drawn, in every figure and table."""
+    """The look of one contestant in every figure and table."""
 
     colour: str
     marker: str
@@ -68,12 +68,12 @@ class Look:
 
     @property
     def face(self) -> str:
-        """Colour inside the marker: open markers tell members of a family apart without colour."""
+        """Returns the colour inside the marker: open markers distinguish members of a family without colour."""
         return self.colour if self.filled else "#FFFFFF"
 
 
 def families(names: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Colour and marker of each family; the same for a name in every report, unless free ones collide."""
+    """Returns colour and marker of each family; the same for a name in every report, unless free ones collide."""
     chosen = {name: FAMILIES[name] for name in names if name in FAMILIES}
     taken: set[int] = set()
     for name in sorted(set(names) - set(FAMILIES)):
@@ -89,17 +89,17 @@ def families(names: Iterable[str]) -> dict[str, tuple[str, str]]:
 
 
 def mix(colour: str, shade: float) -> str:
-    """`colour` (#RRGGBB) mixed with white (shade > 0) or black (shade < 0)."""
+    """Mixes `colour` (#RRGGBB) with white (shade > 0) or black (shade < 0)."""
     towards = 255 if shade > 0 else 0
     channels = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return "#" + "".join(f"{round(c + (towards - c) * abs(shade)):02X}" for c in channels)
 
 
 def looks(contestants: Iterable[tuple[str, str, str]]) -> dict[str, Look]:
-    """Looks by contestant, from (contestant, strategy id, family).
+    """Returns looks by contestant, from (contestant, strategy id, family).
 
-    Strategies of a family take shades and line styles in the order of their ids; configurations of
-    one strategy share its colour and differ by line style.
+    Strategies of a family take shades and line styles in the order of their ids; configurations of one strategy share its
+    colour and differ by line style.
     """
     listed = list(contestants)
     by_family = families([family for _, _, family in listed])
@@ -146,7 +146,7 @@ _POLYGONS: dict[str, str] = {
 
 
 def symbol(look: Look) -> str:
-    """The marker as a small inline SVG."""
+    """Returns the marker as a small inline SVG."""
     paint = f'fill="{look.face}" stroke="{look.colour}" stroke-width="1.6"'
     points = _POLYGONS.get(look.marker)
     shape = f'<polygon points="{points}" {paint}/>' if points else f'<circle r="4.2" {paint}/>'

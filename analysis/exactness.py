@@ -1,4 +1,4 @@
-"""What exactness costs, and what it buys: approximate contestants beside the exact ones that they are made from."""
+"""The cost and the benefit of exactness: approximate contestants next to their exact counterparts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Comparison:
 
 
 def comparisons(study: Study) -> list[Comparison]:
-    """In the order of the file."""
+    """Returns the comparisons in the order of the file."""
     timed = study.timed
     found: dict[str, list[tuple[float, pd.Series]]] = {}
     for _, rows in timed.groupby("group", sort=False):
@@ -58,7 +58,7 @@ def comparisons(study: Study) -> list[Comparison]:
 
 
 def paragraph(listed: list[Comparison]) -> str:
-    """What exactness costs, in a few sentences; nothing without contestants to say it from."""
+    """Describes the cost of exactness in a few sentences; empty without suitable contestants."""
     if not listed:
         return ""
     right = [one for one in listed if not one.missed and not one.extra and not one.protrusion > 0]

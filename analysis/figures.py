@@ -1,4 +1,4 @@
-"""What each figure shows: functions from data to axes. Each returns None where there is nothing to show."""
+"""The content of each figure: functions from data to axes. Each returns None if there is nothing to show."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ TORN = 12.0
 
 
 def _refits(rows: pd.DataFrame) -> pd.Series:
-    """Which rows refit every box in every frame: baselines, their family, and the refit as in 2006."""
+    """Marks rows that refit every box in every frame: baselines, their family, and the refit of 2006."""
     return rows["baseline"] | rows["family"].isin(("refit", "period"))
 
 Looks = dict[str, Look]
@@ -62,12 +62,12 @@ def _rows_figure(labels: Sequence[str], legend: float = 0.0) -> Figure:
 
 
 def thinned(rows: pd.DataFrame) -> pd.DataFrame:
-    """All rows, or the fastest configuration of each strategy where they would be a crowd."""
+    """Returns all rows, or the fastest configuration of each strategy if there are too many."""
     return fastest_configurations(rows) if len(rows) > CROWD else rows
 
 
 def cost_split(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Stacked bars of the time per frame by phase, fastest on top."""
+    """Draws stacked bars of the time per frame by phase, fastest on top."""
     rows = thinned(group).sort_values("total_motion")
     if rows.empty or not rows["total_motion"].max() > 0:
         return None
@@ -78,7 +78,7 @@ def cost_split(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
 
 
 def draw_cost_split(axes: Axes, rows: pd.DataFrame, looks: Looks) -> None:
-    """`rows` from top to bottom; bars that would hide the others are torn and keep their number."""
+    """Draws `rows` from top to bottom; bars that would dwarf the others are torn and keep their number."""
     contestants_on_y(axes, list(rows["label"]), [looks[c] for c in rows["contestant"]])
     totals = rows["total_motion"].to_numpy()
     limit = max(total for total in totals if total <= TORN * totals.min())
@@ -113,11 +113,12 @@ def draw_cost_split(axes: Axes, rows: pd.DataFrame, looks: Looks) -> None:
 
 
 def time_against_error(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Total time against looseness and false candidates, with Pareto fronts; errors of approximate ones apart.
+    """Draws total time against looseness and false candidates, with Pareto fronts; errors of approximate contestants are
+    drawn separately.
 
-    Contestants are numbered by speed. In a crowd only the fastest configuration of each strategy and those on a
-    front have a number; the others are small marks. None where nobody differs from the others in any error.
-    Boxes that are too small are not less than tight: their error is the protrusion.
+    Contestants are numbered by speed. With many contestants only the fastest configuration of each strategy and those on a
+    front have a number; the others are small marks. None if no contestant differs from the others in any error. Boxes that
+    are too small are not tighter than tight: their error is the protrusion.
     """
     rows = without_oracles(group[group["total_motion"] > 0]).sort_values("total_motion").reset_index(drop=True)
     rows["looseness"] = rows["looseness"].clip(lower=0)
@@ -158,7 +159,7 @@ def time_against_error(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
 
 
 def _numbers(rows: pd.DataFrame, errors: Sequence[str]) -> list[int]:
-    """Numbers from 1 for the contestants that are named, 0 for the others."""
+    """Returns numbers from 1 for the named contestants, 0 for the others."""
     named = set(rows.index)
     if len(rows) > CROWD:
         named = set(fastest_configurations(rows).index)
@@ -175,7 +176,7 @@ def _numbers(rows: pd.DataFrame, errors: Sequence[str]) -> list[int]:
 def draw_error_panel(
     axes: Axes, rows: pd.DataFrame, looks: Looks, column: str
 ) -> tuple[list[tuple[float, float]], list[str]]:
-    """Time against one error that is 0 at best; returns the points that have a number, and the numbers."""
+    """Draws time against one error that is 0 at best; returns the numbered points, and their numbers."""
     known = rows[rows[column].notna()]
     log_axis(axes, "y", list(rows["total_motion"]))
     zero_log_axis(axes, list(known[column]), percent_tick if column == "looseness" else tick)
@@ -203,7 +204,7 @@ def _stair_y(front: Sequence[tuple[float, float]]) -> list[float]:
 
 
 def draw_wrong_pairs(axes: Axes, rows: pd.DataFrame, looks: Looks) -> tuple[list[tuple[float, float]], list[str]]:
-    """Time against the share of missed (filled) and extra (open) pairs of those that make mistakes."""
+    """Draws time against the share of missed (filled) and extra (open) pairs of contestants with errors."""
     log_axis(axes, "y", list(rows["total_motion"]))
     wrong = rows[(rows["missed"] > 0) | (rows["extra"] > 0)]
     truth = np.maximum(wrong["pairs"], 1)
@@ -229,7 +230,7 @@ def draw_wrong_pairs(axes: Axes, rows: pd.DataFrame, looks: Looks) -> tuple[list
 def _lines(
     rows: pd.DataFrame, looks: Looks, x: str, panels: Sequence[tuple[str, str]], x_label: str
 ) -> tuple[Figure, list[Axes]]:
-    """Panels of lines over `x` with one key at the right."""
+    """Draws panels of lines over `x` with one key at the right."""
     last = rows.sort_values(x).groupby("contestant").tail(1).sort_values(panels[-1][0], ascending=False)
     entries = [(label, looks[c]) for label, c in zip(last["label"], last["contestant"])]
     side, tall = key_size([label for label, _ in entries])
@@ -258,7 +259,7 @@ def _time_panels(rows: pd.DataFrame) -> list[tuple[str, str]]:
 
 
 def over_frames_per_keyframe(rows: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Update and total time against l; where a line crosses the best refit or that of 2006 is marked."""
+    """Draws update and total time against l; marks crossings with the best refit and with the refit of 2006."""
     panels = _time_panels(rows)
     if rows["l"].nunique() < 2 or not panels:
         return None
@@ -292,7 +293,7 @@ def over_frames_per_keyframe(rows: pd.DataFrame, looks: Looks) -> Optional[Figur
 
 
 def over_size(rows: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Update and total time against the number of moving primitives, with a slope of n to compare with."""
+    """Draws update and total time against the number of moving primitives, with a slope of n for comparison."""
     panels = _time_panels(rows)
     if rows["moving"].nunique() < 2 or not panels:
         return None
@@ -303,7 +304,7 @@ def over_size(rows: pd.DataFrame, looks: Looks) -> Optional[Figure]:
 
 
 def _slope(axes: Axes) -> None:
-    """A thin line of slope n at the lower right, below all others; the panel grows to hold it."""
+    """Draws a thin line of slope n at the lower right, below all others; the panel grows to hold it."""
     (x0, x1), (_, y1) = axes.get_xlim(), axes.get_ylim()
     a, b = x0 * (x1 / x0) ** 0.6, x0 * (x1 / x0) ** 0.9
     lowest = min(
@@ -320,9 +321,9 @@ def _slope(axes: Axes) -> None:
 
 
 def counters(group: pd.DataFrame, over: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Events and written values per frame of event-driven strategies and refits.
+    """Draws events and written values per frame of event-driven strategies and refits.
 
-    Lines over n where `over` has several sizes; else bars for `group`. None without events.
+    Lines over n if `over` has several sizes; else bars for `group`. None without events.
     """
     several = over["moving"].nunique() > 1
     rows = over if several else group
@@ -352,7 +353,7 @@ def counters(group: pd.DataFrame, over: pd.DataFrame, looks: Looks) -> Optional[
 
 
 def draw_counter(axes: Axes, rows: pd.DataFrame, looks: Looks, column: str) -> None:
-    """A bar per contestant from zero, with its number; nothing for those that do not count this."""
+    """Draws a bar per contestant from zero, with its number; no bar for contestants without this counter."""
     for row, (value, contestant) in enumerate(zip(rows[column], rows["contestant"])):
         if not value > 0:
             continue
@@ -368,7 +369,7 @@ def draw_counter(axes: Axes, rows: pd.DataFrame, looks: Looks, column: str) -> N
 
 
 def latency(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Median, 99th percentile and worst frame of each contestant on a log scale."""
+    """Draws median, 99th percentile and worst frame of each contestant on a log scale."""
     rows = thinned(group[(group["p50"] > 0) & (group["worst"] > 0)]).sort_values("worst")
     if rows.empty:
         return None
@@ -395,7 +396,7 @@ def latency(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
 
 
 def memory(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Total time against the bytes that a strategy holds; contestants are numbered by speed."""
+    """Draws total time against the bytes of a strategy; contestants are numbered by speed."""
     rows = thinned(group[(group["bytes"] > 0) & (group["total_motion"] > 0)])
     rows = without_oracles(rows).sort_values("total_motion").reset_index(drop=True) if len(rows) else rows
     if len(rows) < 2:

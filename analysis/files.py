@@ -1,7 +1,8 @@
-"""Files that are read with care and written whole: JSON of any make, and pages that a full disk cannot empty."""
+"""Careful reading and atomic writing of files: JSON from any source, and pages that a full disk cannot truncate."""
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from pathlib import Path
@@ -9,7 +10,8 @@ from typing import Any, Union
 
 
 def parse_json(content: str) -> Any:
-    """The value of a JSON text; raises ValueError for whatever is none, also for NaN, Infinity and endless nesting."""
+    """Returns the value of a JSON text; raises ValueError for invalid JSON, including NaN, Infinity and excessive nesting.
+    """
 
     def refuse(word: str) -> Any:
         raise ValueError(f"{word} is not a number of JSON")
@@ -21,13 +23,20 @@ def parse_json(content: str) -> Any:
 
 
 def read_json(file: Path) -> Any:
-    """The value of a JSON file, a byte order mark before it or not. Raises OSError and ValueError."""
+    """Returns the value of a JSON file, with or without a byte order mark. Raises OSError and ValueError."""
     return parse_json(file.read_bytes().decode("utf-8"))
 
 
+def complaint(error: OSError) -> tuple[str, int]:
+    """Returns a sentence for an error of the system and an exit code: 3 where no input is at fault, 2 otherwise."""
+    if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):
+        return f"{error.strerror}: the limits of this process (ulimit) or machine are too low.", 3
+    return f"{error.filename} cannot be written: {error.strerror}.", 2
+
+
 def write_whole(file: Path, content: Union[str, bytes]) -> None:
-    """Writes a file under another name beside it and renames it: it is as it was until all is on the disk. Raises
-    OSError that names the file.
+    """Writes a file under a temporary name and renames it: the old content stays until all is on disk. Raises OSError that
+    names the file.
     """
     data = content.encode("utf-8") if isinstance(content, str) else content
     temporary = file.with_name(f".{file.name[:100]}.tmp-{os.getpid()}")

@@ -1,4 +1,4 @@
-"""What a study cannot say, computed from its own data."""
+"""The limits of a study's conclusions, computed from its data."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ NOISY = 0.1  #: spread of repetitions from which a run is called noisy
 
 
 def limits(study: Study) -> list[tuple[str, str]]:
-    """Pairs of a heading and one or two sentences."""
+    """Returns pairs of a heading and one or two sentences."""
     runs, timed = study.runs, study.timed
     found = [_noise(timed), _origin(runs), _oracle(runs), _extent(runs), _machine(runs), _hidden(runs), _absent(study)]
     if study.notes:

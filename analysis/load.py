@@ -1,7 +1,7 @@
-"""Reads a folder's results.jsonl, checks it, and hands it on as tables. Never writes to it.
+"""Reads a folder's results.jsonl, checks it, and returns it as tables. Never writes to it.
 
-The schema is documented in experiments/RESULTS.md. A line without what a measurement cannot do without is skipped, with a
-note that names the line and the field; anything else that is missing reads as unknown.
+experiments/RESULTS.md documents the schema. A line that lacks an indispensable field is skipped, with a note that names the
+line and the field; other missing fields read as unknown.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ GUARANTEES = ("exact", "candidate_superset", "approximate")
 
 
 class ResultError(Exception):
-    """A result file that cannot be used; the text is one sentence for the user."""
+    """Reports an unusable result file in one sentence for the user."""
 
 
 def read_json(file: Path, schema: str, error: type[Exception]) -> dict[str, Any]:
-    """The object in a JSON file of this schema; raises `error`, with one sentence, if there is none."""
+    """Returns the object in a JSON file of this schema; raises `error`, with one sentence, if there is none."""
     try:
         found = files.read_json(file)
     except (OSError, ValueError) as problem:
@@ -46,11 +46,11 @@ def read_json(file: Path, schema: str, error: type[Exception]) -> dict[str, Any]
 
 @dataclass
 class Study:
-    """All that a report needs.
+    """The input of a report.
 
-    `runs` has one row per contestant and group (scene, scalar, interpolated frames, machine);
-    `repetitions` has one row per repetition with the mean time per frame of each phase in ms.
-    Both share the column `run`. `notes` are sentences about what was skipped.
+    `runs` has one row per contestant and group (scene, scalar, interpolated frames, machine); `repetitions` has one row per
+    repetition with the mean time per frame of each phase in ms. Both share the column `run`. `notes` are sentences about
+    skipped data.
     """
 
     source: Path
@@ -59,7 +59,7 @@ class Study:
     notes: list[str]
 
     def groups(self) -> list[pd.DataFrame]:
-        """The runs of each group, in the order of a report: scenes as in the file, then size, scalar and l."""
+        """Returns the runs of each group, in the order of a report: scenes as in the file, then size, scalar and l."""
         first = self.runs.groupby("scene")["run"].transform("min")
         ordered = self.runs.assign(first=first, doubles=self.runs["scalar"] != "float").sort_values(
             ["first", "primitives", "doubles", "scalar", "l", "group", "run"], kind="stable"
@@ -68,12 +68,12 @@ class Study:
 
     @property
     def timed(self) -> pd.DataFrame:
-        """Runs with times: verified, not refused."""
+        """Returns runs with times: verified, not refused."""
         return self.runs[self.runs["refused"] == ""]
 
     @property
     def refused(self) -> pd.DataFrame:
-        """Runs without times, each with its reason."""
+        """Returns runs without times, each with its reason."""
         return self.runs[self.runs["refused"] != ""]
 
 
@@ -182,7 +182,7 @@ def load(folder: Path) -> Study:
 
 
 def _row(record: _Record, index: int) -> dict[str, Any]:
-    """One record, flat."""
+    """Flattens one record."""
     counters = record.get("counters", {})
     params = record.get("strategy.params", {})
     builder = record.get("strategy.builder", None)
@@ -284,7 +284,7 @@ def _list(record: _Record, path: str) -> list[Any]:
 
 
 def _over_time(record: _Record) -> list[dict[str, float]]:
-    """Quality of the boxes at some times of the clip, those that can be compared with a rebuilt tree."""
+    """Returns the quality of the boxes at some times of the clip, if it can be compared with a rebuilt tree."""
     samples = []
     for entry in _list(record, "verified.over_time"):
         one = _Record(entry if isinstance(entry, dict) else {}, f"{record.place}, verified.over_time")
@@ -295,20 +295,20 @@ def _over_time(record: _Record) -> list[dict[str, float]]:
 
 
 def _changes(record: _Record) -> str:
-    """The script of plan changes in words; empty without one."""
+    """Describes the script of plan changes; empty without one."""
     steps, changes = record.number("scene.script.steps", 0), record.number("scene.script.changes", 0)
     return f"{changes:.0f} of single vertices, in {steps:.0f} frames" if changes else ""
 
 
 def _moving(bodies: Any) -> float:
-    """Primitives of the bodies that move, as the paper counts; 0 if unknown."""
+    """Counts the primitives of moving bodies, as the paper does; 0 if unknown."""
     listed = [body for body in bodies if isinstance(body, dict)] if isinstance(bodies, list) else []
     counts = [body.get("primitives") for body in listed if body.get("moving") is True]
     return float(sum(count for count in counts if isinstance(count, (int, float))))
 
 
 def _repetitions(record: _Record, index: int, row: dict[str, Any]) -> list[dict[str, float]]:
-    """The repetitions of a record that was not refused."""
+    """Returns the repetitions of a record with times."""
     if row["refused"]:
         return []
     unit = record.text("times.unit", "ms")
@@ -331,12 +331,12 @@ def _repetitions(record: _Record, index: int, row: dict[str, Any]) -> list[dict[
 
 
 def _identity(strategy: str, params: dict[str, Any], builder: Optional[dict[str, Any]]) -> str:
-    """A text that is equal for equal configurations of a strategy."""
+    """Returns a text that is equal for equal configurations of a strategy."""
     return strategy + json.dumps([params, builder], sort_keys=True)
 
 
 def _labels(runs: pd.DataFrame) -> pd.Series:
-    """Titles, followed by what tells configurations of one strategy apart, and by nothing else."""
+    """Returns titles, followed only by the settings that distinguish configurations of one strategy."""
     labels: dict[str, str] = {}
     for _, rows in runs.groupby("id"):
         unique = rows.drop_duplicates("contestant")
@@ -361,14 +361,14 @@ def _facts(params: dict[str, Any], builder: Optional[dict[str, Any]]) -> dict[st
 
 
 def _newest(runs: pd.DataFrame) -> tuple[pd.DataFrame, int]:
-    """One run per configuration, the newest: an older time must not hide a newer failure."""
+    """Keeps one run per configuration, the newest: an older time must not hide a newer failure."""
     newest = runs.drop_duplicates(["group", "contestant"], keep="last")
     return newest.reset_index(drop=True), len(runs) - len(newest)
 
 
 def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Adds medians over repetitions of each phase and of the sums, in ms per frame, their spread, and
-    `middle_` and a phase: that phase in the repetition with the median total.
+    """Adds medians over repetitions of each phase and of the sums, in ms per frame, their spread, and `middle_` and a phase:
+    that phase in the repetition with the median total.
     """
     sums = times.assign(
         query=times["traversal"] + times["triangle_tests"],

@@ -1,4 +1,4 @@
-"""The paper's figures 18, 19, 21 and 22, panel by panel, from whatever a study has of their scenes."""
+"""The paper's figures 18, 19, 21 and 22, panel by panel, from the study's data on their scenes."""
 
 from __future__ import annotations
 
@@ -105,14 +105,14 @@ FIGURES: tuple[PaperFigure, ...] = (
 
 
 def anchor(number: str) -> str:
-    """The fragment of a figure in the page."""
+    """Returns the fragment of a figure in the page."""
     return f"paper-{number}"
 
 
 def drawn(
     table: Table, baselines: list[dict[str, Any]], looks: dict[str, Look], folder: Path
 ) -> list[tuple[PaperFigure, Optional[Picture], list[str]]]:
-    """Every figure with its picture (None without any panel) and sentences on the panels that are missing."""
+    """Returns every figure with its picture (None without any panel) and sentences on missing panels."""
     result = []
     for figure in FIGURES:
         panels: list[tuple[Panel, list[Line], str]] = []
@@ -131,7 +131,7 @@ def drawn(
 
 
 def why_not(table: Table, panel: Panel) -> str:
-    """What a panel without lines lacks."""
+    """Returns the data that a panel without lines lacks."""
     places = table.places(panel.scene)
     if not places:
         return f"there are no timed results of the scene {panel.scene}"
@@ -154,7 +154,7 @@ class Line:
 
 
 def members(panel: Panel, baselines: list[dict[str, Any]], looks: dict[str, Look]) -> list[tuple[str, dict[str, Any]]]:
-    """Names and terms of a panel's lines."""
+    """Returns names and terms of a panel's lines."""
     refits = [(one["short"], one) for one in baselines]
     if panel.who == "kinetic":
         return KINETIC
@@ -166,7 +166,7 @@ def members(panel: Panel, baselines: list[dict[str, Any]], looks: dict[str, Look
 def lines_of(
     table: Table, panel: Panel, baselines: list[dict[str, Any]], looks: dict[str, Look]
 ) -> tuple[list[Line], str]:
-    """The lines of a panel, and at which l or size they are; none where there is nothing to see."""
+    """Returns the lines of a panel, and their l or size; empty if there is nothing to show."""
     places = table.places(panel.scene)
     if not places:
         return [], ""
@@ -207,7 +207,7 @@ def lines_of(
 
 
 def draw(panels: list[tuple[Panel, list[Line], str]]) -> Figure:
-    """Panels side by side, and one key below them."""
+    """Draws panels side by side, and one key below them."""
     entries: dict[str, Look] = {}
     for _, lines, _ in panels:
         for line in lines:
@@ -222,7 +222,7 @@ def draw(panels: list[tuple[Panel, list[Line], str]]) -> Figure:
 
 
 def draw_panel(axes: Axes, panel: Panel, lines: list[Line], where: str) -> None:
-    """One diagram: polygons or l across, both axes logarithmic."""
+    """Draws one diagram: polygons or l on the x axis, both axes logarithmic."""
     fixed_log_axis(axes, "x", [x for line in lines for x in line.x], text.size if panel.x == "polygons" else text.tick)
     log_axis(axes, "y", [y for line in lines for y in line.y])
     for line in lines:

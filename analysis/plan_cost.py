@@ -1,9 +1,9 @@
-"""Roughly how long each study of a plan takes, from costs per frame that were measured once.
+"""Estimates roughly how long each study of a plan takes, from costs per frame that were measured once.
 
 usage: plan_cost.py PLAN.json
 
-For choosing a piece, never for results: the costs are of one machine, grow with the number of polygons alone, and know
-nothing of contact. Only the standard library is needed.
+The estimates serve to choose a piece, not as results: the costs are of one machine, grow with the number of polygons alone,
+and ignore contact. Only the standard library is needed.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ LONGEST = 45  #: minutes that a piece should take at most
 
 
 def listed(value: Any) -> list[Any]:
-    """A value or a list of them as a list."""
+    """Returns a value or a list of values as a list."""
     return value if isinstance(value, list) else [value]
 
 
 def scenes(study: dict[str, Any]) -> Iterator[tuple[float, int, bool]]:
-    """Thousands of polygons and keyframes of each scene, and whether it says itself when its frames are."""
+    """Returns thousands of polygons and keyframes of each scene, and whether it defines its own frames."""
     for scene in listed(study.get("scenes", [])):
         scene = {"builtin": scene} if isinstance(scene, str) else scene
         versions = len(listed(scene.get("seed", 1))) * len(listed(scene.get("order", "given")))
@@ -48,7 +48,7 @@ def scenes(study: dict[str, Any]) -> Iterator[tuple[float, int, bool]]:
 
 
 def configurations(strategy: Any) -> tuple[str, int]:
-    """A strategy's id, and in how many configurations it takes part."""
+    """Returns a strategy's id, and the number of its configurations."""
     if isinstance(strategy, str):
         return strategy, 1
     sweeps = [*strategy.get("params", {}).values(), *strategy.get("builder", {}).values()]
@@ -56,7 +56,7 @@ def configurations(strategy: Any) -> tuple[str, int]:
 
 
 def contestants(study: dict[str, Any]) -> Iterator[tuple[str, int]]:
-    """Ids and configurations of all strategies; a group of them ("default", "family:...") counts as all that are known."""
+    """Returns ids and configurations of all strategies; a group ("default", "family:...") counts as all known ones."""
     asked = [configurations(strategy) for strategy in study.get("strategies", ["default"])]
     groups = [name in ("default", "all") or name.startswith("family:") for name, _ in asked]
     if any(groups):
@@ -65,7 +65,7 @@ def contestants(study: dict[str, Any]) -> Iterator[tuple[str, int]]:
 
 
 def minutes(study: dict[str, Any]) -> float:
-    """The estimate for one study, with the plan's own keys filled in."""
+    """Estimates one study, with the plan's own keys filled in."""
     total = 0.0
     for thousands, keyframes, own in scenes(study):
         for l in [1] if own else listed(study.get("l", 10)):
@@ -82,7 +82,7 @@ def minutes(study: dict[str, Any]) -> float:
 
 
 def pieces(plan: dict[str, Any]) -> dict[str, float]:
-    """Minutes of each study by name; studies of one name are one piece."""
+    """Returns the minutes of each study by name; studies of one name are one piece."""
     common = {name: value for name, value in plan.items() if name != "studies"}
     result: dict[str, float] = {}
     for study in plan.get("studies", [{}]):

@@ -1,4 +1,4 @@
-"""How much faster than the best refit, where lines cross, and who is on the Pareto front."""
+"""Speed relative to the best refit, crossings of lines, and the Pareto front."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ SCOPES: dict[str, tuple[str, ...]] = {
 class Ratio:
     """Reference time over own time: above 1 is faster than the reference.
 
-    `low` and `high` are the extremes over repetitions if `paired` (repetition i against repetition i of
-    the same session, which ran next to each other), else the extremes that any two repetitions could give.
+    `low` and `high` are the extremes over repetitions if `paired` (repetition i against repetition i of the same session,
+    which ran next to each other), else the extremes over any two repetitions.
     """
 
     middle: float
@@ -35,20 +35,20 @@ class Ratio:
 
 
 def times_of(study: Study, run: int, scope: str) -> np.ndarray:
-    """Time per frame in ms of each repetition of a run, over the phases of a scope."""
+    """Returns the time per frame in ms of each repetition of a run, over the phases of a scope."""
     rows = study.repetitions[study.repetitions["run"] == run].sort_values("repetition")
     return rows[list(SCOPES[scope])].sum(axis=1).to_numpy(dtype=float)
 
 
 def best_refit(study: Study, group: pd.DataFrame, scope: str) -> Optional[int]:
-    """The run of the fastest verified baseline of a group, by the median over repetitions; None without one."""
+    """Returns the run of the fastest verified baseline of a group, by the median over repetitions; None without one."""
     refits = group[group["baseline"] & (group["guarantee"] != "approximate") & (group["refused"] == "")]
     medians = {int(run): float(np.median(times_of(study, int(run), scope))) for run in refits["run"]}
     return min(medians, key=lambda run: (medians[run], run)) if medians else None
 
 
 def ratio(study: Study, run: int, reference: int, scope: str) -> Optional[Ratio]:
-    """How many times faster `run` is than `reference`; None where one of them has no time."""
+    """Returns how many times faster `run` is than `reference`; None if one of them has no time."""
     own = times_of(study, run, scope)
     other = times_of(study, reference, scope)
     if not len(own) or not len(other) or own.min() <= 0:
@@ -67,7 +67,7 @@ def ratio(study: Study, run: int, reference: int, scope: str) -> Optional[Ratio]
 
 
 def ratios(study: Study, scope: str) -> dict[int, Ratio]:
-    """Ratios of all timed runs to the best refit of the same group, commit and state of the tree."""
+    """Returns ratios of all timed runs to the best refit of the same group, commit and state of the tree."""
     result: dict[int, Ratio] = {}
     for _, group in study.timed.groupby(["group", "commit", "dirty"]):
         reference = best_refit(study, group, scope)
@@ -81,7 +81,7 @@ def ratios(study: Study, scope: str) -> dict[int, Ratio]:
 
 
 def pareto_front(points: list[tuple[float, float]]) -> list[int]:
-    """Indices of the points that no other beats in both coordinates (smaller is better), by first coordinate.
+    """Returns indices of the points that no other dominates in both coordinates (smaller is better), by first coordinate.
 
     Of equal points, the first is kept; points with a coordinate that is not finite never belong.
     """
@@ -96,7 +96,7 @@ def pareto_front(points: list[tuple[float, float]]) -> list[int]:
 
 
 def fastest_configurations(rows: pd.DataFrame) -> pd.DataFrame:
-    """Of each strategy only the configuration that is the fastest on average, so that lines stay readable."""
+    """Keeps of each strategy only the configuration that is the fastest on average, so that lines stay readable."""
     chosen = []
     for _, same in rows.groupby("id"):
         covered = same.groupby("contestant")["group"].nunique()
@@ -106,7 +106,7 @@ def fastest_configurations(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def best_refit_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Series]:
-    """The smallest time of any baseline at each x."""
+    """Returns the smallest time of any baseline at each x."""
     refits = rows[rows["baseline"] & (rows["guarantee"] != "approximate")]
     best = refits.groupby(x)[column].min()
     best = best[best > 0]
@@ -114,21 +114,21 @@ def best_refit_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Seri
 
 
 def period_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Series]:
-    """The time of the refit as in 2006 at each x."""
+    """Returns the time of the refit of 2006 at each x."""
     period = rows[rows["family"] == "period"].groupby(x)[column].min()
     period = period[period > 0]
     return period if len(period) else None
 
 
 def without_oracles(rows: pd.DataFrame) -> pd.DataFrame:
-    """Without brute force, which would squeeze all others together on a shared axis; unless nothing else is there."""
+    """Removes brute force, which would compress all others on a shared axis, unless nothing else is there."""
     others = rows[rows["family"] != "oracle"]
     return others if len(others) else rows
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where a line meets the reference: at `x`, from then on `faster` or not."""
+    """A crossing of a line with the reference: at `x`; beyond it `faster` or not."""
 
     x: float
     y: float
@@ -136,7 +136,7 @@ class Crossing:
 
 
 def crossings(x: np.ndarray, own: np.ndarray, reference: np.ndarray) -> list[Crossing]:
-    """Break-even points between measured ones, on log-log straight lines; never outside what was measured.
+    """Returns break-even points between measured ones, on log-log straight lines; never outside the measured range.
 
     Measured points where both are equal count only if the sides differ before and after.
     """

@@ -45,7 +45,7 @@ TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 @dataclass
 class Section:
-    """All about one scene."""
+    """The part of the report on one scene."""
 
     title: str
     anchor: str
@@ -62,7 +62,7 @@ class Section:
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
-    """The command; returns its exit code: 0, or 2 for results that cannot be used."""
+    """Runs the command; returns its exit code: 0, or 2 for unusable results."""
     parser = argparse.ArgumentParser(
         prog="report.py",
         description="Turns RESULTS_DIR/results.jsonl into RESULTS_DIR/report.html and RESULTS_DIR/figures/.",
@@ -87,8 +87,9 @@ def main(arguments: Optional[list[str]] = None) -> int:
         print(f"report: {error}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"report: {error.filename} cannot be written: {error.strerror}.", file=sys.stderr)
-        return 2
+        text, code = files.complaint(error)
+        print(f"report: {text}", file=sys.stderr)
+        return code
     for note in study.notes:
         print(f"report: {note}", file=sys.stderr)
     if options.printed:
@@ -102,7 +103,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
 
 
 def plain_groups(study: Study) -> list[tuple[str, tables.Group]]:
-    """Groups with the name of their scene."""
+    """Returns groups with the name of their scene."""
     scenes = [rows["scene_name"].iloc[0] for rows in study.groups()]
     return list(zip(scenes, tables.groups(study, tables.Ratios(study))))
 
@@ -160,7 +161,7 @@ def write(
 
 
 def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:
-    """How many claims have which verdict."""
+    """Counts the claims by verdict."""
     verdicts = (paper_claims.HOLDS, paper_claims.CONDITION, paper_claims.FAILS, paper_claims.OPEN)
     return [(verdict, sum(row.verdict == verdict for row in claims.rows)) for verdict in verdicts]
 
@@ -168,11 +169,11 @@ def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:
 def _break_even(
     study: Study, claims: paper_claims.Claims, all_looks: dict[str, Look], folder: Path, which: str
 ) -> dict[str, object]:
-    """From which l on who is faster: a figure and tables."""
+    """Returns the break-even points: a figure and tables."""
     names, places, single = break_even.places(Table(study, "float"), claims.baselines)
     reading = (
-        "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest l measured. An open arrow "
-        "at the right says that it is slower at every l measured: where the break-even point is beyond them, nobody knows."
+        "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. An open arrow "
+        "marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown."
     )
     made = picture(
         folder, "break-even", "From which l on kinetic contestants are faster", reading,
@@ -184,7 +185,7 @@ def _break_even(
 
 
 def _claim_parts(claims: paper_claims.Claims) -> dict[str, object]:
-    """What claims show and fold out, by id."""
+    """Returns pictures and tables of the claims, by id."""
     return {
         "theory_ids": {row.id for row in claims.rows if not row.looked},
         "several_checks": {row.id: len({corner.check for corner in row.corners}) > 1 for row in claims.rows},
@@ -197,7 +198,7 @@ def _claim_parts(claims: paper_claims.Claims) -> dict[str, object]:
 def _claim_links(
     claims: paper_claims.Claims, study: Study, groups: list[tables.Group], drawn: set[str]
 ) -> dict[str, list[tuple[str, str]]]:
-    """For each claim the fragments of the figures (of those that are there) and tables that show it, with their texts."""
+    """Returns, for each claim, the fragments of its existing figures and tables, with their texts."""
     names = {rows["group"].iloc[0]: (rows["scene"].iloc[0], group) for rows, group in zip(study.groups(), groups)}
     links: dict[str, list[tuple[str, str]]] = {}
     for row in claims.rows:
@@ -215,7 +216,7 @@ def _claim_links(
 
 
 def _theory(folder: Path, which: str) -> list[Picture]:
-    """What theory.json shows, if it is there."""
+    """Returns the figures of theory.json, if it exists."""
     file = folder / "theory.json"
     if which == "none" or not file.exists():
         return []
@@ -230,14 +231,14 @@ def _theory(folder: Path, which: str) -> list[Picture]:
 def _paper(
     study: Study, claims: paper_claims.Claims, all_looks: dict[str, Look], folder: Path, which: str
 ) -> list[tuple[paper_figures.PaperFigure, Optional[Picture], list[str]]]:
-    """The paper's own figures; without any of its panels, or if none are wanted, just what is missing."""
+    """Returns the paper's own figures; without any of their panels, or if none are wanted, only the missing data."""
     if which == "none":
         return []
     return paper_figures.drawn(Table(study, "float"), claims.baselines, all_looks, folder)
 
 
 def render(**values: object) -> str:
-    """The page as a text; everything that comes from results is escaped."""
+    """Renders the page as a text; all content from results is escaped."""
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -291,7 +292,7 @@ def _sections(
 
 
 def headline(timed: pd.DataFrame) -> str:
-    """The group that figures of one group show: the largest, in float if there is one, at the middle l."""
+    """Returns the group for single-group figures: the largest, in float if available, at the middle l."""
     rows = timed[timed["primitives"] == timed["primitives"].max()]
     if (rows["scalar"] == "float").any():
         rows = rows[rows["scalar"] == "float"]
@@ -307,7 +308,7 @@ def _place(row: pd.Series) -> str:
 def _group_pictures(
     group: pd.DataFrame, timed: pd.DataFrame, all_looks: dict[str, Look], folder: Path, slug: str
 ) -> list[Picture]:
-    """Cost split, time against error, counters and latency of one group."""
+    """Draws cost split, time against error, counters and latency of one group."""
     first = group.iloc[0]
     place = _place(first)
     sizes = ratios.fastest_configurations(
@@ -382,7 +383,9 @@ def _left_out(rows: pd.DataFrame) -> str:
 def _trends(
     timed: pd.DataFrame, head: str, all_looks: dict[str, Look], folder: Path, slug: str
 ) -> list[Picture]:
-    """Lines over l and over n: at the size with most l and at the l with most sizes, or else those of the headline group."""
+    """Draws lines over l and over n: at the size with most l and at the l with most sizes, or else those of the headline
+    group.
+    """
     first = timed[timed["group"] == head].iloc[0]
     same = timed[(timed["scalar"] == first["scalar"]) & (timed["machine"] == first["machine"])]
     same = same.drop_duplicates(["contestant", "primitives", "l"], keep="last")
@@ -414,7 +417,9 @@ def _trends(
 
 
 def _most(rows: pd.DataFrame, column: str, counted: str, usual: float) -> float:
-    """The value of a column at which most values of another were measured: the usual one if it has as many, else the largest."""
+    """Returns the value of a column at which most values of another were measured: the usual one if it has as many, else the
+    largest.
+    """
     numbers = rows.groupby(column)[counted].nunique()
     best = numbers[numbers == numbers.max()].index
     return usual if usual in best else float(best.max())
@@ -426,7 +431,7 @@ def _values(column: pd.Series, shorten: Optional[int] = None) -> str:
 
 
 def _machine(study: Study) -> list[tuple[str, str]]:
-    """What the study ran on, as pairs of a name and a value."""
+    """Describes the machine of the study, as pairs of a name and a value."""
     runs = study.runs
     memory = _values(runs["memory_gb"])
     return [
@@ -440,7 +445,7 @@ def _machine(study: Study) -> list[tuple[str, str]]:
 
 
 def _made(study: Study) -> list[tuple[str, str]]:
-    """How the study was made."""
+    """Describes how the study was made."""
     runs, timed = study.runs, study.timed
     when = sorted(value for value in runs["when"].unique() if value)
     dirty = runs[runs["dirty"]]
@@ -463,7 +468,7 @@ def _made(study: Study) -> list[tuple[str, str]]:
 
 
 def _strategies(study: Study) -> list[dict[str, object]]:
-    """What each contestant is, once."""
+    """Describes each contestant, once."""
     unique = study.runs.drop_duplicates("contestant").sort_values(["family", "label"])
     result = []
     for row in unique.itertuples():

@@ -1,4 +1,4 @@
-"""What `kbvh stress` and `kbvh ccd` left in a folder, as tables of the report: stress.json and ccd.json."""
+"""The results of `kbvh stress` and `kbvh ccd` in a folder, as tables of the report: stress.json and ccd.json."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Ccd:
 
 
 def stress(folder: Path) -> Optional[Stress]:
-    """The tables of stress.json, or None if there is no such file. Raises ResultError."""
+    """Returns the tables of stress.json, or None if there is no such file. Raises ResultError."""
     file = folder / STRESS_FILE
     if not file.exists():
         return None
@@ -82,7 +82,7 @@ def _stress(data: dict[str, Any]) -> Stress:
 
 
 def _line(name: str, rows: list[dict[str, Any]]) -> Cells:
-    """Strategy, scenes, frames, protrusion over the scene's size, looseness, missed, extra, events, what failed."""
+    """Formats strategy, scenes, frames, protrusion over the scene's size, looseness, missed, extra, events, failures."""
     total = lambda key: sum(int(row[key]) for row in rows)  # noqa: E731
     known = [row["looseness"] for row in rows if row["looseness"] is not None]
     failed = [text.plural(total(key), word, None if word != "crash" else "crashes") for key, word in FAILURES.items() if total(key)]
@@ -96,7 +96,7 @@ def _line(name: str, rows: list[dict[str, Any]]) -> Cells:
 
 
 def ccd(folder: Path) -> Optional[Ccd]:
-    """The table of ccd.json, or None if there is no such file. Raises ResultError."""
+    """Returns the table of ccd.json, or None if there is no such file. Raises ResultError."""
     file = folder / CCD_FILE
     if not file.exists():
         return None

@@ -1,4 +1,4 @@
-"""What the report says of a scene: its bodies, how it was measured, how violently it moves, and a picture."""
+"""The report's facts about a scene: its bodies, its measurement, its motion, and a picture."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from canvas import Picture
 
 
 def bodies(rows: pd.DataFrame) -> list[dict[str, str]]:
-    """Facts on the bodies of a scene, at its largest size."""
+    """Returns facts on the bodies of a scene, at its largest size."""
     largest = rows.loc[rows["primitives"].idxmax()]
     return [
         {
@@ -31,7 +31,7 @@ def bodies(rows: pd.DataFrame) -> list[dict[str, str]]:
 
 
 def card(rows: pd.DataFrame) -> list[tuple[str, str]]:
-    """Facts on a scene as it was measured: at its largest size, and over its sizes."""
+    """Returns facts on a scene as measured: at its largest size, and over its sizes."""
     largest = rows.loc[rows["primitives"].idxmax()]
     mine = rows[rows["primitives"] == largest["primitives"]]
     sampled = mine[mine["pairs"].notna() & (mine["verified_frames"] > 0)]
@@ -55,7 +55,7 @@ def card(rows: pd.DataFrame) -> list[tuple[str, str]]:
 
 
 def violence(folder: Path) -> list[tuple[str, str]]:
-    """How much the moving bodies of a scene that was written out move, from its card."""
+    """Describes the motion of the moving bodies of a scene, from its card."""
     facts = []
     for body in scene_pictures.card(folder)["bodies"]:
         if body["keyframes"] > 1:
@@ -69,7 +69,7 @@ def violence(folder: Path) -> list[tuple[str, str]]:
 
 
 def view(folder: Path, figures_folder: Path, scene: str) -> Picture:
-    """The scene at a few keyframes."""
+    """Returns the picture of the scene at a few keyframes."""
     # By the folder, whose name ends with the scene's hash: what was drawn of another scene of this name is not shown.
     slug = re.sub(r"[^a-z0-9]+", "-", folder.name.lower()).strip("-") or "scene"
     file = figures_folder / f"{slug}-scene.png"

@@ -1,4 +1,4 @@
-"""Which results are of one scene: names tell scenes apart only as far as their hashes agree."""
+"""Groups results by scene: names identify scenes only if their hashes agree."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pandas as pd
 
 
 def family(name: str, bodies: Any) -> str:
-    """A scene's name without the numbers of primitives in it, so that its sizes belong together.
+    """Removes the numbers of primitives from a scene's name, so that its sizes belong together.
 
     `tablecloth-2048-200` is `tablecloth` if its bodies have 2048 and 200 primitives.
     """
@@ -19,10 +19,10 @@ def family(name: str, bodies: Any) -> str:
 
 
 def told_apart(runs: pd.DataFrame) -> tuple[pd.Series, list[str]]:
-    """The scene of each run, and a sentence for every name that several scenes share.
+    """Returns the scene of each run, and a sentence for every name that several scenes share.
 
-    Of several scenes with one name and size, as of a mesh that was corrected, the one measured last keeps the name; the
-    others have their hash behind it. Scenes from files and shapes have sizes only where their names say so.
+    Of several scenes with one name and size, for example after a correction of a mesh, the one measured last keeps the name;
+    the others have their hash appended. Scenes from files and shapes have sizes only if their names contain them.
     """
     card_of = {row.hash: row.card for row in runs.itertuples() if row.hash and row.card}
     cards = [row.card or card_of.get(row.hash, "") for row in runs.itertuples()]

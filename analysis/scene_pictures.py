@@ -1,5 +1,6 @@
-"""Pictures of a built-in scene: a few keyframes side by side, flat shaded, from the meshes that `kbvh scene
-NAME --out FOLDER` writes (every body as OBJ, and PC2 if it moves).
+"""Draws pictures of a built-in scene: a few keyframes side by side, flat shaded.
+
+The meshes are those that `kbvh scene NAME --out FOLDER` writes (every body as OBJ, and PC2 if it moves).
 
     build/release/kbvh scene dress --triangles 8000 --out /tmp/dress
     /usr/bin/python3 analysis/scene_pictures.py /tmp/dress dress.png --keyframes 0 20 40 59
@@ -34,7 +35,7 @@ class Mesh:
 
 
 def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices [n, 3] and triangles [m, 3] of an OBJ file; polygons are cut into fans."""
+    """Returns vertices [n, 3] and triangles [m, 3] of an OBJ file; polygons are cut into fans."""
     vertices, triangles = [], []
     for line in path.read_text().splitlines():
         words = line.split()
@@ -47,14 +48,14 @@ def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def read_pc2(path: Path) -> np.ndarray:
-    """All samples of a PC2 point cache, [sample, vertex, 3]."""
+    """Returns all samples of a PC2 point cache, [sample, vertex, 3]."""
     data = path.read_bytes()
     _, _, vertices, _, _, samples = struct.unpack("<12siiffi", data[:32])
     return np.frombuffer(data, dtype="<f4", offset=32).reshape(samples, vertices, 3).astype(float)
 
 
 def read_scene(folder: Path) -> list[Mesh]:
-    """Every OBJ of the folder with its PC2, in the order of their names (the body's number comes first)."""
+    """Reads every OBJ of the folder with its PC2, in the order of their names (the body's number comes first)."""
     meshes = []
     for path in sorted(folder.glob("*.obj")):
         vertices, triangles = read_obj(path)
@@ -65,7 +66,7 @@ def read_scene(folder: Path) -> list[Mesh]:
 
 
 def camera(azimuth: float) -> np.ndarray:
-    """Rows: right, up, towards the viewer; degrees from +x, seen a little from above."""
+    """Returns rows: right, up, towards the viewer; degrees from +x, seen slightly from above."""
     a, e = np.radians(azimuth), np.radians(8)
     towards = np.array((np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)))
     right = np.cross((0, 0, 1), towards)
@@ -108,7 +109,7 @@ def draw(image: np.ndarray, depth: np.ndarray, points: np.ndarray, triangles: np
 
 
 def picture(meshes: list[Mesh], keyframes: list[int], azimuth: float, height: int) -> np.ndarray:
-    """The keyframes side by side, all at one scale and around one point, [height, width, 3]."""
+    """Draws the keyframes side by side, all at one scale and around one point, [height, width, 3]."""
     view = camera(azimuth)
     panels = []
     moments = [[m.positions[min(keyframe, len(m.positions) - 1)] for m in meshes] for keyframe in keyframes]
@@ -128,19 +129,19 @@ def picture(meshes: list[Mesh], keyframes: list[int], azimuth: float, height: in
 
 
 class MeshError(Exception):
-    """Meshes of a scene that cannot be read; the text is one clause."""
+    """Reports unreadable meshes of a scene in one clause."""
 
 
 @dataclass
 class WrittenOut:
-    """The folders of a study's scenes, and sentences about those whose cards cannot be read."""
+    """The folders of a study's scenes, and sentences about those with unreadable cards."""
 
     by_hash: dict[str, Path]
     by_name: dict[str, Path]  #: written before scenes had hashes
     notes: list[str]
 
     def of(self, rows: Any) -> Optional[Path]:
-        """The folder of the last of these runs whose scene was written out; None if there is none."""
+        """Returns the folder of the last of these runs whose scene was written; None if there is none."""
         for row in reversed(list(rows.itertuples())):
             found = self.by_hash.get(row.card) if row.card else self.by_name.get(row.scene_name.replace("/", "-"))
             if found is not None:
@@ -149,7 +150,7 @@ class WrittenOut:
 
 
 def written_out(results: Path) -> WrittenOut:
-    """The scenes that `kbvh run --out RESULTS` has written out."""
+    """Returns the scenes that `kbvh run --out RESULTS` has written."""
     found = WrittenOut({}, {}, [])
     for file in sorted((results / "scenes").glob("*/card.json")):
         try:
@@ -168,7 +169,7 @@ CARD_NUMBERS = ("keyframes", "nodes", "sides_changed_per_keyframe", "sides_chang
 
 
 def card(folder: Path) -> dict[str, Any]:
-    """What card.json has. Raises MeshError."""
+    """Returns the content of card.json. Raises MeshError."""
     file = folder / "card.json"
     try:
         found = files.read_json(file)
@@ -179,7 +180,7 @@ def card(folder: Path) -> dict[str, Any]:
 
 
 def write(folder: Path, file: Path, height: int = 420) -> tuple[int, int]:
-    """Draws all keyframes that a folder has, unless the file is newer; returns width and height in pixels."""
+    """Draws all keyframes of a folder, unless the file is newer; returns width and height in pixels."""
     if not (file.exists() and file.stat().st_mtime > (folder / "card.json").stat().st_mtime):
         try:
             meshes = [mesh for mesh in read_scene(folder) if len(mesh.triangles)]

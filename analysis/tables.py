@@ -1,4 +1,4 @@
-"""Tables of the report as rows of finished texts, for the page and for the terminal alike."""
+"""Tables of the report as rows of finished texts, for the page and for the terminal."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GUARANTEE_NAMES = {"exact": "exact", "candidate_superset": "superset", "approxim
 
 @dataclass(frozen=True)
 class Shown:
-    """A ratio as text: the median over repetitions and their range, which is empty for a single one."""
+    """A ratio as text: the median over repetitions and their range, which is empty for a single repetition."""
 
     middle: str
     range: str
@@ -64,7 +64,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Glance:
-    """One group in a line: the best refit, and the fastest contestants that are none."""
+    """One group in a line: the best refit, and the fastest other contestants."""
 
     anchor: str
     scene: str
@@ -92,7 +92,7 @@ class Ratios:
 
 
 def groups(study: Study, all_ratios: Ratios) -> list[Group]:
-    """Every group, by scene, size, scalar and l."""
+    """Returns every group, by scene, size, scalar and l."""
     several_machines = study.runs["machine"].nunique() > 1
     result = []
     for number, rows in enumerate(study.groups()):
@@ -109,7 +109,7 @@ def groups(study: Study, all_ratios: Ratios) -> list[Group]:
 
 
 def anchor(number: int) -> str:
-    """The fragment of a group's table in the page."""
+    """Returns the fragment of a group's table in the page."""
     return f"group-{number + 1}"
 
 
@@ -156,14 +156,14 @@ def _row(row: object, all_ratios: Ratios) -> Row:
 
 
 def _faster(one: Ratio) -> Optional[bool]:
-    """True or False where all repetitions agree; None where they do not."""
+    """Returns True or False if all repetitions agree; None otherwise."""
     if one.low > 1:
         return True
     return False if one.high < 1 else None
 
 
 def shown_ratio(one: Optional[Ratio]) -> Shown:
-    """A ratio with its range over repetitions; ~ where repetitions could not be paired."""
+    """Formats a ratio with its range over repetitions; ~ where repetitions could not be paired."""
     if one is None:
         return Shown(text.MISSING, "")
     low, high = text.factor(one.low), text.factor(one.high)
@@ -196,7 +196,7 @@ def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
 
 
 def glance(study: Study, all_ratios: Ratios, shown: list[Group]) -> list[Glance]:
-    """The whole study, a line per group; groups without a refit are left out."""
+    """Summarises the whole study, a line per group; groups without a refit are left out."""
     result = []
     for group, rows in zip(shown, study.groups()):
         timed = rows[rows["refused"] == ""].sort_values("total_motion")
@@ -241,7 +241,7 @@ PLAIN_COLUMNS = ("strategy", "guarantee", "motion", "update", "query", "total", 
 
 
 def plain(scene: str, group: Group) -> str:
-    """A group as text for a terminal."""
+    """Formats a group as text for a terminal."""
     cells = [PLAIN_COLUMNS] + [
         (row.label, row.guarantee, row.motion, row.update, row.query, row.total, row.ratio, row.ratio_without_motion,
          row.missed, row.extra, row.protrusion, row.looseness, row.memory)

@@ -1,4 +1,4 @@
-"""The targets of a plan and what was measured, from targets.json, as Markdown tables.
+"""The targets of a plan and the measurements, from targets.json, as Markdown tables.
 
 usage: targets_table.py DIR/targets.json [--write README.md]
 """
@@ -24,7 +24,7 @@ VERDICTS = {"reached_aim": "aim reached", "reached": "reached", "missed": "misse
 
 @dataclass(frozen=True)
 class Scene:
-    """A target's ratio on one scene. Ratio, times and labels are missing where there is a reason."""
+    """A target's ratio on one scene. Ratio, times and labels are missing if there is a reason."""
 
     name: str
     order: str
@@ -41,7 +41,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Target:
-    """One row: a ratio that is wanted, and what it came to."""
+    """One row: a target ratio, and its measurement."""
 
     what: str
     measured: Optional[float]
@@ -145,22 +145,22 @@ def _interval(row: dict[str, Any]) -> Optional[tuple[float, float]]:
 
 
 def times(value: Optional[float]) -> str:
-    """A ratio as 45.2x."""
+    """Formats a ratio as 45.2x."""
     return text.MISSING if value is None else f"{text.factor(value)}x"
 
 
 def wanted(value: float) -> str:
-    """What a target asks for, as 60x."""
+    """Formats a target as 60x."""
     return f"{value:g}x"
 
 
 def within(interval: Optional[tuple[float, float]]) -> str:
-    """An interval as [44.1, 46.3], or nothing."""
+    """Formats an interval as [44.1, 46.3], or nothing."""
     return "" if interval is None else f"[{text.factor(interval[0])}, {text.factor(interval[1])}]"
 
 
 def facts(targets: list[Target]) -> str:
-    """On what, of which source and when the targets were measured, in one sentence."""
+    """States machine, source and time of the measurements in one sentence."""
     first = targets[0]
     where = ", ".join(value for value in (first.cpu, first.compiler) if value) or "an unknown machine"
     state = " with uncommitted changes" if first.dirty else ""
@@ -171,12 +171,12 @@ def facts(targets: list[Target]) -> str:
 
 
 def columns(targets: list[Target]) -> list[str]:
-    """The names of all scenes, in the order in which they were measured."""
+    """Returns the names of all scenes, in the order of measurement."""
     return list(dict.fromkeys(scene.name for target in targets for scene in target.scenes))
 
 
 def markdown(targets: list[Target]) -> str:
-    """Both tables: the targets, then every size and order."""
+    """Returns both tables: the targets, then every size and order."""
     if not targets:
         return "No targets.\n"
     lines = [_row(["what", "measured [95 % interval]", "at least", "aim", "verdict"]), _row(["---"] * 5)]
@@ -201,7 +201,7 @@ def _row(cells: list[str]) -> str:
 
 
 def rewrite(page: str, table: str) -> str:
-    """The page with the table between its markers, each on a line of its own. Raises ValueError without them."""
+    """Returns the page with the table between its markers, each on a line of its own. Raises ValueError without them."""
     if page.count(BEGIN) != 1 or page.count(END) != 1 or page.index(BEGIN) > page.index(END):
         raise ValueError(f"{BEGIN} and {END} should be there once, in this order")
     before, rest = page.split(BEGIN)
@@ -210,7 +210,7 @@ def rewrite(page: str, table: str) -> str:
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
-    """The command; returns its exit code: 0, or 2 for a file that cannot be used."""
+    """Runs the command; returns its exit code: 0, or 2 for an unusable file."""
     parser = argparse.ArgumentParser(
         prog="targets_table.py",
         description="Prints the targets of a plan and what was measured as Markdown.",

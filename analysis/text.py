@@ -1,4 +1,4 @@
-"""Numbers as people read them: few significant digits, units, and never a false zero."""
+"""Readable numbers: few significant digits, units, and never a false zero."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ MISSING = "–"
 
 
 def known(value: Optional[float]) -> bool:
-    """True for a finite number; False for None, NaN and infinities."""
+    """Returns True for a finite number; False for None, NaN and infinities."""
     return value is not None and not isinstance(value, str) and math.isfinite(value)
 
 
 def significant(value: Optional[float], digits: int = 3) -> str:
-    """`value` with so many significant digits; an exact 0 is "0", and nothing else is."""
+    """Formats `value` with this many significant digits; an exact 0 is "0", and no other value is."""
     if value is None or not known(value):
         return MISSING
     if value == 0:
@@ -28,14 +28,14 @@ def significant(value: Optional[float], digits: int = 3) -> str:
 
 
 def scientific(value: float, digits: int = 2) -> str:
-    """`value` as 1.2×10⁻⁷."""
+    """Formats `value` as 1.2×10⁻⁷."""
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     superscript = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{mantissa}×10{superscript}"
 
 
 def tick(value: float) -> str:
-    """A number beside an axis: no zeros that say nothing."""
+    """Formats a number for an axis, without redundant zeros."""
     if value == 0 or 1e-4 <= abs(value) < 1e6:
         plain = f"{value:,.4f}".rstrip("0").rstrip(".") if abs(value) < 1e3 else f"{value:,.0f}"
         return plain.replace(",", "\u202f")
@@ -43,31 +43,31 @@ def tick(value: float) -> str:
 
 
 def percent_tick(value: float) -> str:
-    """A share beside an axis, as a percentage."""
+    """Formats a share for an axis, as a percentage."""
     return tick(float(f"{value * 100:.6g}")) + ("" if value == 0 else "\u2009%")
 
 
 def ordinal(number: int) -> str:
-    """`3rd`, `10th`."""
+    """Formats `3rd`, `10th`."""
     if number % 100 in (11, 12, 13):
         return f"{number}th"
     return f"{number}" + {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
 
 
 def milliseconds(value: Optional[float]) -> str:
-    """A time in ms, without the unit, for columns that name it."""
+    """Formats a time in ms, without the unit, for columns that name it."""
     return significant(value, 3)
 
 
 def count(value: Optional[float]) -> str:
-    """A whole number with thin spaces between thousands."""
+    """Formats a whole number with thin spaces between thousands."""
     if value is None or not known(value):
         return MISSING
     return f"{int(value):,}".replace(",", "\u202f")
 
 
 def size(value: Optional[float]) -> str:
-    """A number of primitives as 16k or 1.2M."""
+    """Formats a number of primitives as 16k or 1.2M."""
     if value is None or not known(value):
         return MISSING
     if value >= 999_500:
@@ -80,7 +80,7 @@ def size(value: Optional[float]) -> str:
 
 
 def memory(value: Optional[float]) -> str:
-    """Bytes as B, kB or MB (powers of ten)."""
+    """Formats bytes as B, kB or MB (powers of ten)."""
     if value is None or not known(value):
         return MISSING
     for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
@@ -90,33 +90,33 @@ def memory(value: Optional[float]) -> str:
 
 
 def memory_tick(value: float) -> str:
-    """Bytes beside an axis: no zeros that say nothing."""
+    """Formats bytes for an axis, without redundant zeros."""
     number, unit = memory(value).split("\u00a0")
     return f"{float(number.replace(chr(0x202F), '')):g}\u00a0{unit}"
 
 
 def percent(value: Optional[float]) -> str:
-    """A share (0.012) as 1.2 %."""
+    """Formats a share (0.012) as 1.2 %."""
     if value is None or not known(value):
         return MISSING
     return f"{significant(value * 100, 2)}\u00a0%"
 
 
 def factor(value: Optional[float]) -> str:
-    """A ratio: two decimals around 1, three digits elsewhere."""
+    """Formats a ratio: two decimals around 1, three digits elsewhere."""
     if value is not None and known(value) and 0.1 <= value < 1:
         return f"{value:.2f}"
     return significant(value, 3 if value is None or value >= 1 else 2)
 
 
 def plural(number: int, singular: str, many: Optional[str] = None) -> str:
-    """`1 frame`, `3 frames`."""
+    """Formats `1 frame`, `3 frames`."""
     word = singular if number == 1 else (many or singular + "s")
     return f"{count(number)} {word}"
 
 
 def listing(words: list[str]) -> str:
-    """`a, b and c`."""
+    """Formats `a, b and c`."""
     if len(words) < 2:
         return "".join(words)
     return ", ".join(words[:-1]) + " and " + words[-1]

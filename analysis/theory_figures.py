@@ -1,4 +1,4 @@
-"""Draws what `kbvh theory` measured: FOLDER/theory.json becomes figures in FOLDER/figures/.
+"""Draws the measurements of `kbvh theory`: FOLDER/theory.json becomes figures in FOLDER/figures/.
 
 usage: theory_figures.py FOLDER
 """
@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+import files
 from axes import KeyLines, fixed_log_axis, key, key_size, log_axis
 from canvas import Picture, picture
 from colours import Look, looks
@@ -30,7 +31,7 @@ BOUND = "#999999"  #: colour of bounds and fits
 
 
 class TheoryError(Exception):
-    """A theory.json that cannot be used."""
+    """Reports an unusable theory.json."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def load(file: Path) -> Theory:
 
 
 def growing(counts: pd.DataFrame) -> pd.DataFrame:
-    """The scenes that were measured at several sizes, with events at each."""
+    """Returns the scenes that were measured at several sizes, with events at each."""
     if counts.empty:
         return counts
     by_scene = counts.groupby("scene")
@@ -65,7 +66,7 @@ def growing(counts: pd.DataFrame) -> pd.DataFrame:
 
 
 def _keyed(scenes: Sequence[str], theory: Theory, panels: int, height: float) -> tuple[Figure, list[Axes]]:
-    """Panels side by side and a key of scenes at the right."""
+    """Lays out panels side by side and a key of scenes at the right."""
     side, tall = key_size(scenes)
     figure = Figure(figsize=(WIDTH, max(height, tall)), layout="constrained")
     grid = figure.add_gridspec(1, panels + 1, width_ratios=[(WIDTH - side) / panels] * panels + [side])
@@ -80,12 +81,12 @@ def _line(axes: Axes, x: Sequence[float], y: Sequence[float], look: Look, filled
 
 
 def n_log_n(n: np.ndarray) -> np.ndarray:
-    """n log2 n."""
+    """Returns n log2 n."""
     return n * np.log2(n)
 
 
 def events_over_n(theory: Theory) -> Optional[Figure]:
-    """Events of a clip against vertices with the fit c n log n, and its residuals below one another."""
+    """Draws events of a clip against vertices with the fit c n log n, and the residuals of the fits below each other."""
     rows = growing(theory.counts)
     if rows.empty:
         return None
@@ -99,7 +100,7 @@ def events_over_n(theory: Theory) -> Optional[Figure]:
 
 
 def draw_events(axes: Axes, rows: pd.DataFrame, fits: pd.DataFrame, scene_looks: dict[str, Look]) -> None:
-    """Points joined by lines; the fits are wide and grey behind them."""
+    """Draws points joined by lines; the fits are wide and grey behind them."""
     fixed_log_axis(axes, "x", list(rows["vertices"]), size)
     log_axis(axes, "y", list(rows["events"]))
     for _, fit in fits.iterrows():
@@ -112,7 +113,7 @@ def draw_events(axes: Axes, rows: pd.DataFrame, fits: pd.DataFrame, scene_looks:
 
 
 def draw_residuals(axes: Axes, fits: pd.DataFrame, scene_looks: dict[str, Look]) -> None:
-    """How far events lie from c n log n, in percent; the exponent of each scene beside its last point."""
+    """Draws the deviation of events from c n log n, in percent; the exponent of each scene next to its last point."""
     every = [float(n) for numbers in fits["vertices"] for n in numbers]
     fixed_log_axis(axes, "x", every, size)
     widest = 1.0
@@ -133,7 +134,7 @@ def draw_residuals(axes: Axes, fits: pd.DataFrame, scene_looks: dict[str, Look])
 
 
 def events_over_l(theory: Theory) -> Optional[Figure]:
-    """Changes of the kinetic tree and values of bottom-up against the frames of each keyframe interval."""
+    """Draws changes of the kinetic tree and values of bottom-up against the frames of each keyframe interval."""
     rows = theory.frames
     if rows.empty or rows["l"].nunique() < 2:
         return None
@@ -146,7 +147,8 @@ def events_over_l(theory: Theory) -> Optional[Figure]:
 
 
 def draw_values_over_l(axes: Axes, rows: pd.DataFrame, scene_looks: dict[str, Look]) -> None:
-    """Filled: values the kinetic tree changes in a clip; open and dotted: values bottom-up writes."""
+    """Draws, filled, the values that the kinetic tree changes in a clip; open and dotted, the values that bottom-up writes.
+    """
     fixed_log_axis(axes, "x", list(rows["l"]), lambda value: f"{value:g}")
     log_axis(axes, "y", [*rows["values"], *rows["bottom_up_values"]])
     for scene, line in rows.groupby("scene"):
@@ -165,7 +167,7 @@ def draw_values_over_l(axes: Axes, rows: pd.DataFrame, scene_looks: dict[str, Lo
 
 
 def certificates_per_vertex(theory: Theory) -> Optional[Figure]:
-    """Mean and most certificates that a vertex takes part in, and cost of changing one plan, against n."""
+    """Draws the mean and maximum number of certificates of a vertex, and the cost of changing one plan, against n."""
     rows = theory.counts
     if rows.empty:
         return None
@@ -184,7 +186,7 @@ def certificates_per_vertex(theory: Theory) -> Optional[Figure]:
 def draw_mean_and_most(
     axes: Axes, rows: pd.DataFrame, mean: pd.Series, most: pd.Series, scene_looks: dict[str, Look]
 ) -> None:
-    """Means filled, maxima open, over a logarithmic n: O(log m) is at most a straight line."""
+    """Draws means filled, maxima open, over a logarithmic n: O(log m) is at most a straight line."""
     fixed_log_axis(axes, "x", list(rows["vertices"]), size)
     for scene, line in rows.groupby("scene"):
         look = scene_looks[str(scene)]
@@ -203,7 +205,7 @@ def draw_mean_and_most(
 
 
 def steps_per_event(theory: Theory) -> Optional[Figure]:
-    """Comparisons in the queue and nodes visited per event against polygons, with the bounds."""
+    """Draws comparisons in the queue and nodes visited per event against polygons, with the bounds."""
     rows = growing(theory.counts)
     if rows.empty:
         return None
@@ -219,7 +221,7 @@ def steps_per_event(theory: Theory) -> Optional[Figure]:
 def draw_steps(
     axes: Axes, rows: pd.DataFrame, mean: pd.Series, most: pd.Series, bound: pd.Series, scene_looks: dict[str, Look]
 ) -> None:
-    """Means and maxima over a logarithmic m, both axes logarithmic; the bounds are grey lines."""
+    """Draws means and maxima over a logarithmic m, both axes logarithmic; the bounds are grey lines."""
     fixed_log_axis(axes, "x", list(rows["triangles"]), size)
     log_axis(axes, "y", [value for value in (*mean, *most, *bound) if value > 0], tick)
     for scene, line in rows.groupby("scene"):
@@ -267,7 +269,7 @@ FIGURES = (
 
 
 def pictures(theory: Theory, folder: Path) -> list[Picture]:
-    """Every figure that has something to show, written as PNG and PDF."""
+    """Writes every figure that has content, as PNG and PDF."""
     made = [
         picture(folder, name, title, reading, lambda draw=draw: draw(theory)) for name, title, draw, reading, _ in FIGURES
     ]
@@ -275,12 +277,12 @@ def pictures(theory: Theory, folder: Path) -> list[Picture]:
 
 
 def draw_all(theory: Theory, folder: Path) -> list[str]:
-    """Writes every figure that has something to show; their names."""
+    """Writes every figure that has content; returns their names."""
     return [one.name for one in pictures(theory, folder)]
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
-    """The command; its exit code: 0, or 2 for input that cannot be used."""
+    """Runs the command; returns the exit code: 0, or 2 for unusable input."""
     parser = argparse.ArgumentParser(prog="theory_figures.py", description="Draws FOLDER/theory.json.")
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="folder with theory.json")
     options = parser.parse_args(arguments)
@@ -292,8 +294,9 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     try:
         draw_all(theory, options.folder / "figures")
     except OSError as problem:
-        print(f"theory_figures.py: {problem.filename} cannot be written: {problem.strerror}.", file=sys.stderr)
-        return 2
+        text, code = files.complaint(problem)
+        print(f"theory_figures.py: {text}", file=sys.stderr)
+        return code
     return 0
 
 

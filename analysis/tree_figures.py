@@ -1,4 +1,4 @@
-"""What happens inside the trees: their quality while a clip runs, and where in them events happen."""
+"""The inner state of the trees: their quality over a clip, and the places of their events."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ SAME = 0.005
 
 
 def over_time(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """SAH cost over that of a tree built at the same time, and looseness where there is any, along the clip.
+    """Draws the SAH cost over that of a tree built at the same time, and looseness if available, along the clip.
 
-    Contestants whose two curves agree share one line, named after the first and how many more there are.
+    Contestants whose two curves agree share one line, named after the first and the number of the others.
     """
     rows = without_oracles(thinned(group[group["over_time"].map(len) > 1]))
     if rows.empty:
@@ -84,7 +84,7 @@ def _lines(axes: Axes, shared: list[tuple[pd.Series, pd.DataFrame, int]], looks:
 
 
 def events_by_depth(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Events of bounds per frame, by the depth of the node where they begin."""
+    """Draws events of bounds per frame, by the depth of their node."""
     rows = thinned(group[group["events_at_depth"].map(len) > 0])
     if rows.empty or len(rows) > CROWD:
         return None

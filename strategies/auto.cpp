@@ -1,9 +1,9 @@
-// One strategy that picks among others, by what it can see: how many frames fall into a segment of the flight
-// plans, how far vertices move from frame to frame, whether plans change, how many candidates there are. The
-// choice is made from counts and plans only, never from a clock, so that a run can be repeated.
+// A strategy that chooses among other strategies by observed properties of the scene: the number of frames
+// per segment of the flight plans, the vertex steps per frame, changes of plans, and the number of
+// candidates. The choice depends on counts and plans only, never on a clock, so that a run can be repeated.
 //
-// Each candidate has one instance from the first frame on, with hierarchies of its own: that costs the memory
-// of all of them, and saves making one when it is wanted. Those that are not in use stand still.
+// Each candidate has one instance from the first frame on, with its own hierarchies. This costs the memory of
+// all candidates and saves creating an instance at a change. Inactive instances do not advance.
 
 #include <algorithm>
 #include <cmath>
@@ -14,27 +14,27 @@
 namespace kbvh {
 namespace {
 
-/// What a choice is made from.
+/// The inputs of a choice.
 struct Seen {
-  double frames_per_segment = 1;  // of the present one; infinite if it has no end
-  double changes_per_frame = 0;   // frames with changes of plans, as a share of the last ones
-  double candidates = 0;          // pairs whose boxes overlap in a frame
+  double frames_per_segment = 1;  // of the current segment; infinite if it has no end
+  double changes_per_frame = 0;   // frames with changes of plans, as a share of the last frames
+  double candidates = 0;          // overlapping pairs of boxes in a frame
   double reads = 0;               // vertices that a refit reads
-  double step = 0;                // mean way of a vertex in a frame past another body, in mean leaf sides
-  double slide = 0;               // the same of primitives past those they are candidates with
-  bool many_bodies = false;       // more pairs of bodies than a choice looks at
-  double spread = 1;              // how different these are among a body's vertices, from 0: all the same
+  double step = 0;           // mean step of a vertex per frame relative to another body, in mean leaf sides
+  double slide = 0;          // the same for primitives relative to their candidates
+  bool many_bodies = false;  // more pairs of bodies than a choice examines
+  double spread = 1;         // how different the steps are among a body's vertices; 0: all the same
 };
 
 // Predicted nanoseconds per frame, fitted to the scenes "tuned on" of experiments/plans/auto.json at l = 1 to
-// 30 (Zen 5, float): only their order counts.
+// 30 (Zen 5, float). Only their order matters.
 
 double refit_cost(const Seen& seen) {
   return 0.27 * seen.reads + 28 * seen.candidates;
 }
 
-/// One search serves as many frames as a leaf takes to move by a part of its size. Where bodies deform, more
-/// pairs come near in those frames than a query takes to find.
+/// One search serves the frames in which a leaf moves by a part of its size. Where bodies deform, more pairs
+/// come near in these frames than a query takes to find.
 double drift_cost(const Seen& seen) {
   const double watching = 0.1 * seen.reads;
   if (seen.candidates == 0) return seen.step < 0.2 ? 0.5 * watching : 1.2 * refit_cost(seen);
@@ -45,22 +45,24 @@ double drift_cost(const Seen& seen) {
   return watching + search / frames + 15 * seen.candidates;
 }
 
-/// One join serves a segment; what lies between its ends costs the more, the further primitives move past
-/// each other there. What moves as a whole passes by others; what deforms is held where it touches them.
+/// One join serves a segment. Its cost grows with the distance that primitives move past each other within
+/// the segment. A translating body passes by others; the touching part of a deforming body stays in place.
 double join_cost(const Seen& seen) {
   const double l = seen.frames_per_segment, moves = seen.slide * l;
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
-  // Bodies apart: a box at each end, unless they come to meet; on a long way they may fly through each other.
+  // Bodies apart: one box at each end, unless they come to meet; over a long distance they may pass through
+  // each other.
   if (seen.candidates == 0) return 1.5 / l * (1 + moves * moves) * refit_cost(seen);
   const double alike = 1 - seen.spread;
-  // Small bodies that move past each other meet others on their way, besides those that they touch now.
+  // Small bodies that move past each other meet further bodies on their way, in addition to their current
+  // contacts.
   const double others = seen.many_bodies ? 1 + moves : 1;
   return refit_cost(seen) * (0.08 + 5.5 / (l + 4.6) * (1 + moves) * others + 0.2 * alike * alike * moves);
 }
 
-/// A strategy to choose, the parameters that differ from its defaults, and what it would cost. To offer
-/// another one, add a line: any registered strategy that follows plan changes and knows no more than the next
-/// keyframe will do.
+/// A strategy to choose, its explicitly set parameters, and its predicted cost. To add a candidate, add a
+/// line: any registered strategy that follows plan changes and needs no more foresight than the next keyframe
+/// is suitable.
 struct Candidate {
   const char* id;
   std::map<std::string, std::string> params;
@@ -68,15 +70,15 @@ struct Candidate {
 };
 const std::vector<Candidate>& candidates() {
   static const std::vector<Candidate> list{
-      {"bottom_up", {}, &refit_cost},  // first: it answers until something is known
+      {"bottom_up", {}, &refit_cost},  // first: it answers until observations exist
       {"drift_boxes", {}, &drift_cost},
       {"interval_join", {}, &join_cost},
   };
   return list;
 }
 
-/// Counts nothing of its own: its counters are those of its instances, with the triangle tests of silent
-/// ones, so it is no CountedStrategy.
+/// Counts nothing itself: its counters are those of its instances, with the triangle tests of silent ones, so
+/// it is no CountedStrategy.
 template <class S, class Count>
 class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
  public:
@@ -140,7 +142,7 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
       add(retired_, runner.strategy->counters());
       fetch_all();
       runner.strategy->reset(t);
-      // It knows the plans as they are, but not which bodies are at rest no more.
+      // The instance sees the current plans, but not which bodies no longer rest.
       if (!changed_.empty()) runner.strategy->flight_plans_changed(t, changed_);
     }
     for (Runner& other : runners_) other.fresh = false;
@@ -149,9 +151,9 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
 
   QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*budget*/) override {
     const std::size_t before = out.size();
-    // Not all that it chooses from honour a budget.
+    // Not all candidates honour a budget.
     const QueryStatus status = runners_[active_].strategy->candidates_at(t, out, {});
-    // Other strategies leave out what they know to be apart: they show no more than that bodies meet.
+    // Other strategies drop pairs that are certainly apart: their candidates only show that bodies meet.
     if (runners_[active_].all_positions || seen_.candidates == 0)
       seen_.candidates = double(out.size() - before);
     const std::size_t count = out.size() - before, stride = std::max<std::size_t>(1, count / samples);
@@ -200,7 +202,8 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
   }
 
   std::size_t bytes() const override {
-    std::size_t total = 0;
+    std::size_t total =
+        touching_.capacity() * sizeof(PrimitivePair) + changed_.capacity() * sizeof(PlanChange<S>);
     for (const Runner& runner : runners_) total += runner.strategy->bytes();
     return total;
   }
@@ -219,14 +222,14 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
     const Candidate* candidate;
     bool all_positions;
     std::unique_ptr<Strategy<S>> strategy;
-    bool fresh = false;  ///< as `reset` left it
-    int frames = 0;      ///< that it answered
+    bool fresh = false;  ///< in the state after `reset`
+    int frames = 0;      ///< number of frames that it answered
   };
-  /// Frames after which the choice is thought over within one segment, and if there is a new one: the latter
-  /// twice as many each time that it was confirmed.
+  /// The number of frames after which the choice is reviewed within one segment, and at the start of a new
+  /// one; the latter doubles each time that the choice is confirmed.
   static constexpr int longest_stay = 64, shortest_stay = 8;
   static constexpr std::uint32_t samples = 24;
-  static constexpr std::size_t most_pairs = 1024;  ///< of bodies, that a choice looks at
+  static constexpr std::size_t most_pairs = 1024;  ///< pairs of bodies that a choice examines
 
   static void add(Counters& sum, const Counters& other) {
     for (const Counter peak : {Counter::list_peak, Counter::queue_peak}) {
@@ -235,12 +238,13 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
     }
     const std::uint64_t fetched = sum[Counter::positions_fetched];
     for (std::size_t c = 0; c < sum.values.size(); ++c) sum.values[c] += other.values[c];
-    // All instances read the same positions, and each counts what any of them fetches.
+    // All instances read the same positions, and each counts the fetches of all instances.
     sum[Counter::positions_fetched] = fetched;
     for (const Counters::Named& counter : other.named) sum.add(counter.name, counter.value);
   }
 
-  /// Of a body's hierarchy: the mean side of leaves' boxes at present, and the vertices in its leaves.
+  /// Measures a body's hierarchy: the current mean side of leaf boxes, and the number of vertices in its
+  /// leaves.
   void measure(const Topology& topology, std::uint32_t body) {
     const Primitives& primitives = this->scene_.primitives(body);
     double sum = 0, leaves = 0, reads = 0;
@@ -267,20 +271,21 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) this->sampled_.fetch_all(body);
   }
 
-  /// Looks at the plans, and takes what is predicted to be faster by `gain_` at least than what is in use.
+  /// Reads the plans, and switches to a strategy that is predicted to be faster than the active one by at
+  /// least `gain_`.
   void choose(double t) {
     chosen_at_ = frame_;
     chosen_candidates_ = seen_.candidates;
     double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
-      if (seen_.changes_per_frame == 0) {  // else it takes long to find out, and nobody can rely on it
+      if (seen_.changes_per_frame == 0) {  // otherwise the observation takes too long and is unreliable
         begin = std::max(begin, motion_.lines_begin(body));
         end = std::min(end, motion_.lines_end(body));
       }
       sample(body);
     }
     seen_.step = seen_.spread = 0;
-    // Of many pairs of bodies, some: what moves fastest past another body is seen in others of its kind.
+    // Samples some of many pairs of bodies: similar bodies show similar largest steps.
     const auto pairs = this->scene_.pairs();
     seen_.many_bodies = pairs.size() > most_pairs;
     const std::size_t apart = (pairs.size() + most_pairs - 1) / most_pairs;
@@ -309,7 +314,7 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
     active_ = best;
   }
 
-  /// Velocities of some of a body's vertices, as they move now.
+  /// Samples the current velocities of some of a body's vertices.
   void sample(std::uint32_t body) {
     Velocities& seen = velocities_[body];
     const std::uint32_t count = this->scene_.vertex_count(body);
@@ -317,7 +322,7 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
     if (count == 0 || (!this->scene_.moving(body) && seen_.changes_per_frame == 0)) return;
     seen.count = std::min(samples, count);
     for (std::uint32_t i = 0; i < seen.count; ++i) {
-      // Spread by the golden ratio: even steps may meet the same place in every row of a grid.
+      // Spreads the samples by the golden ratio: even steps may hit the same place in every row of a grid.
       const std::uint32_t share = 0x9e3779b9u * i;  // of 2^32
       const auto vertex = std::uint32_t(std::uint64_t(share) * count >> 32);
       for (int axis = 0; axis < 3; ++axis) {
@@ -332,7 +337,7 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
     return piece.kind == PieceKind::ray ? double(piece.x1)
                                         : (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
   }
-  /// How far primitives move past those they were candidates with in the last frame.
+  /// Returns the step of primitives relative to their candidates in the last frame.
   double slide() const {
     double sum = 0;
     for (const PrimitivePair& pair : touching_) {
@@ -346,8 +351,8 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
     }
     return touching_.empty() ? seen_.step : sum / double(touching_.size());
   }
-  /// How a body's vertices move past another body, which counts as a whole. What goes along with the other is
-  /// no motion: bounds that move contain it.
+  /// Measures how a body's vertices move relative to another body as a whole. Common motion does not count:
+  /// bounds that move contain it.
   void pass(std::uint32_t body, std::uint32_t other) {
     const Velocities &own = velocities_[body], &others = velocities_[other];
     if (own.count == 0 || leaf_size_[body] <= 0) return;
@@ -362,7 +367,7 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
   }
 
   struct Velocities {
-    std::uint32_t count = 0;  ///< none: it rests
+    std::uint32_t count = 0;  ///< none: the body rests
     double of[samples][3] = {}, mean[3] = {};
   };
   SegmentMotion<S> motion_;
@@ -370,16 +375,16 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
   std::vector<Runner> runners_;
   std::vector<double> leaf_size_, reads_;  ///< by body
   std::vector<Velocities> velocities_;     ///< by body, per second
-  Counters retired_;                       ///< of what was counted before an instance started anew
+  Counters retired_;                       ///< counts of instances before their restart
   std::size_t active_ = 0;
   std::uint64_t first_fetch_ = 0;
   int frame_ = 0, chosen_at_ = 0, stay_ = shortest_stay;
   double step_ = 0, segment_end_ = 0;   ///< seconds
-  double chosen_candidates_ = 0;        ///< that were there when the choice was made
-  bool changes_ = false;                ///< of plans, since the last frame
-  std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first one of each body
+  double chosen_candidates_ = 0;        ///< number of candidates at the time of the choice
+  bool changes_ = false;                ///< plans changed since the last frame
+  std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first change of each body
   std::vector<std::uint8_t> body_changed_;
-  PairBuffer touching_;  ///< some candidates of the last frame
+  PairBuffer touching_;  ///< sample of the candidates of the last frame
   Seen seen_;
 };
 
@@ -396,11 +401,10 @@ KBVH_STRATEGY(auto) {
       .tightness = Tightness::conservative,
       .positions = PositionUse::varying,
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {{"gain",
-            "1.1",
-            {},
-            "another strategy is taken if it is predicted to be so many times faster than the one in use",
-            1}},
+      .parameters = {{"gain",
+                      "1.1",
+                      {},
+                      "predicted speed-up from which on another strategy replaces the active one",
+                      1}},
   })};
 }

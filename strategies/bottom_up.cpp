@@ -1,6 +1,6 @@
-// Bottom-up refit, the standard way to keep a hierarchy valid (van den Bergen 1997), as fast as we know how:
-// wide nodes in structure-of-arrays form, over unique vertices in padded lists
-// (core/families/wide/kernels/wide_refit.cpp). Every ratio that is printed is against this one.
+// Bottom-up refit, the standard way to keep a hierarchy valid (van den Bergen 1997), in the fastest form
+// known to us: wide nodes as structure of arrays, over unique vertices in padded lists
+// (core/families/wide/kernels/wide_refit.cpp). It is the usual denominator of the printed ratios.
 
 #include <algorithm>
 
@@ -27,7 +27,7 @@ std::vector<std::string> kernel_words() {
   return words;
 }
 
-/// More would be cut to this number without a word, and a result would say what was not used.
+/// A larger number would be cut to this one silently, and a result would name unused threads.
 double most_threads() {
 #if defined(KBVH_WITH_TBB)
   return double(std::min<std::size_t>(
@@ -112,16 +112,15 @@ KBVH_STRATEGY(bottom_up) {
       .baseline = true,
       .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {{"kernels", "auto", kernel_words(),
-            "instruction set of refit and query; auto: the widest of this machine"},
-           {"threads",
-            "1",
-            {},
-            "threads of the refit (TBB), at most those of this machine; times with more than one are "
-            "reported apart",
-            1,
-            most_threads(),
-            Numbers::whole}},
+      .parameters = {{"kernels", "auto", kernel_words(),
+                      "instruction set of refit and query; auto: the widest that this machine supports"},
+                     {"threads",
+                      "1",
+                      {},
+                      "threads of the refit (TBB), at most those of this machine; times with more than one "
+                      "thread are reported separately",
+                      1,
+                      most_threads(),
+                      Numbers::whole}},
   })};
 }

@@ -1,6 +1,6 @@
-// Bottom-up refit as it is often written: positions interpolated in the scalar's own arithmetic, and boxes
-// kept in fewer digits. Shows what correctly rounded positions and boxes rounded outwards buy (Z&W 2006, s.2,
-// takes both for granted).
+// Bottom-up refit in a common simplified form: positions interpolated in the scalar's own arithmetic, and
+// boxes stored with fewer digits. It shows the benefit of correctly rounded positions and of boxes rounded
+// outwards (Z&W 2006, s.2, takes both for granted).
 
 #include <cmath>
 
@@ -10,7 +10,8 @@
 namespace kbvh {
 namespace {
 
-/// The nearest number of so many binary digits, or the next one below. The range of exponents is double's.
+/// Returns the nearest number of `digits` binary digits, or the next one below. The range of exponents is
+/// double's.
 double with_digits(double x, int digits, bool down) {
   if (x == 0 || !std::isfinite(x)) return x;
   int exponent = 0;
@@ -42,7 +43,7 @@ class BottomUpApproximate final : public FixedPlansHierarchyStrategy<S, Count> {
   }
 
  private:
-  /// Binary digits of a box's sides; 0: those of the scalar.
+  /// Returns the binary digits of a box's sides; 0: those of the scalar.
   static int digits_of(const std::string& word) {
     const int digits = word == "float" ? 24 : word == "bfloat16" ? 8 : 0;
     return digits < std::numeric_limits<S>::digits ? digits : 0;
@@ -62,7 +63,7 @@ class BottomUpApproximate final : public FixedPlansHierarchyStrategy<S, Count> {
     }
   }
 
-  /// x0 + u (x1 - x0) in the scalar's arithmetic.
+  /// Computes x0 + u (x1 - x0) in the scalar's arithmetic.
   const S* plain_positions(std::uint32_t body) {
     const double t = this->time(), begin = motion_.lines_begin(body), end = motion_.lines_end(body);
     if (!std::isfinite(begin) || !std::isfinite(end) || t <= begin) return this->sampled_.positions(body);
@@ -96,16 +97,18 @@ KBVH_STRATEGY(bottom_up_approximate) {
       .tightness = Tightness::none,
       .guarantee = Guarantee::approximate,
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {{"positions",
-            "plain",
-            {"plain", "rounded"},
-            "boxes hold positions interpolated in the scalar's arithmetic, or correctly rounded "
-            "ones, which every query is about"},
-           {"boxes",
-            "scene",
-            {"scene", "float", "bfloat16"},
-            "binary digits of boxes: the scalar's, 24 or 8"},
-           {"rounding", "nearest", {"nearest", "outward"}, "of boxes with fewer digits than positions"}},
+      .parameters = {{"positions",
+                      "plain",
+                      {"plain", "rounded"},
+                      "positions in the boxes: interpolated in the scalar's arithmetic, or correctly rounded "
+                      "as in all queries"},
+                     {"boxes",
+                      "scene",
+                      {"scene", "float", "bfloat16"},
+                      "binary digits of the boxes: the scalar's, 24 or 8"},
+                     {"rounding",
+                      "nearest",
+                      {"nearest", "outward"},
+                      "rounding of boxes with fewer digits than positions"}},
   })};
 }

@@ -1,5 +1,5 @@
-// Bottom-up refit with a query that stops when it has used up its work for the frame: what it has found by
-// then is the answer (the idea of time-critical collision detection; Klein & Zachmann 2003).
+// Bottom-up refit with a query that stops when it has used up its work for the frame: the pairs found by then
+// are the answer (the idea of time-critical collision detection; Klein & Zachmann 2003).
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
@@ -18,7 +18,7 @@ class BottomUpBudget final : public StoredHierarchyStrategy<S, Count> {
       : Base(scene, motion, std::move(topologies), params),
         box_tests_(std::uint64_t(params.number("box_tests"))) {}
 
-  /// What the budget leaves undone is counted in the status.
+  /// The status counts the work that the budget left undone.
   QueryStatus find_candidates(double t, PairBuffer& out, const Budget& budget) override {
     return Base::find_candidates(t, out, {std::min(box_tests_, budget.box_tests)});
   }
@@ -44,7 +44,7 @@ KBVH_STRATEGY(bottom_up_budget) {
       .parameters = {{"box_tests",
                       "1000",
                       {},
-                      "box tests that the query of a frame may take",
+                      "maximum number of box tests in the query of a frame",
                       1,
                       1e15,
                       Numbers::whole}},

@@ -1,7 +1,7 @@
-// The refit as a first implementation writes it: recursion over the nodes, every leaf's box from all corners
-// of all its primitives, boxes extended point by point; a query that recurses over pairs of nodes. It takes
-// any topology, so that its ratio to the best refit shows what code alone is worth, with nothing else changed
-// (`bottom_up_period` links its nodes by pointers besides).
+// The refit of a typical first implementation: recursion over the nodes, every leaf's box from all corners of
+// all its primitives, boxes extended point by point, and a query that recurses over pairs of nodes. It
+// accepts any topology, so its ratio to the best refit shows the effect of the code alone (`bottom_up_period`
+// in addition links its nodes by pointers).
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
@@ -89,8 +89,8 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>, public TakesPl
 
   void refit(Body& body, std::uint32_t id) {
     const TopologyNode node = body.topology.nodes[id];
-    // In place: naive, but not unlucky. GCC 12 copies a local box by vector loads of sides just stored one by
-    // one, which stalls at every node (measured apart: 1.7 times the time).
+    // In place: naive, but not unlucky. GCC 12 copies a local box by vector loads of sides that were just
+    // stored one by one, which stalls at every node (measured separately: 1.7 times the time).
     Box<S>& box = body.boxes[id];
     box = Box<S>{};
     if (node.is_leaf()) {
@@ -109,7 +109,7 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>, public TakesPl
     this->count_.add(Counter::values_written, 6);
   }
 
-  /// Z&W Algorithm 2, for any width, and with the case of a leaf against an inner node that it leaves out.
+  /// Implements Z&W Algorithm 2 for any width, with the missing case of a leaf against an inner node.
   void check(const BodyPair& pair, const Body& a, std::uint32_t id_a, const Body& b, std::uint32_t id_b,
              PairBuffer& out) {
     this->count_.add(Counter::box_tests);
@@ -128,7 +128,7 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>, public TakesPl
     }
   }
 
-  /// All primitives of a leaf against all of another; single ones have been compared as leaves.
+  /// Compares all primitives of one leaf with all of another; single ones have been compared as leaves.
   void compare(const BodyPair& pair, const Body& a, TopologyNode leaf_a, const Body& b, TopologyNode leaf_b,
                PairBuffer& out) {
     const bool single = leaf_a.count() == 1 && leaf_b.count() == 1;

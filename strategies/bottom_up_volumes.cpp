@@ -1,6 +1,6 @@
 // Bottom-up refit of any bounding volume, written once over the concept BoundingVolume
-// (core/geometry/volumes/bounding_volume.hpp): what a kind of volume is worth, with nothing else changed.
-// With boxes it is a plain refit on a stored tree; `bottom_up` is the fast one.
+// (core/geometry/volumes/bounding_volume.hpp): it isolates the effect of the kind of volume. With boxes it is
+// a simple refit on a stored tree; `bottom_up` is the fast one.
 
 #include "core/contract/registry.hpp"
 #include "core/families/volumes/volume_strategy.hpp"

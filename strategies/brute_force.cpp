@@ -1,4 +1,5 @@
-// No hierarchy: the box of every primitive against the box of every other. What any structure has to beat.
+// No hierarchy: compares the box of every primitive with the box of every other. Any structure must be faster
+// than this.
 
 #include "core/contract/registry.hpp"
 #include "core/geometry/lane_box.hpp"

@@ -1,13 +1,13 @@
-// Boxes that drift: positions come frame by frame, with no foresight, and all that is known of a body is how
-// far its vertices have moved, as an interval for each axis, since the frame in which its boxes were made.
-// Old boxes larger by those intervals hold every vertex; two bodies can only meet where the intervals let
-// their old boxes touch. So one traversal, over boxes swept over the motion of some frames, finds the
-// candidates of all these frames, in the order in which the motion lets them meet, and a frame takes the
-// beginning of that list (core/families/drift/near_pairs.hpp). Bodies that cannot meet any other get one box
-// a frame and nothing below it.
+// Drifting boxes: positions come frame by frame, without foresight. The known motion of a body is the
+// interval, per axis, of its vertices' displacements since the frame in which its boxes were made. Old boxes
+// inflated by these intervals contain every vertex; two bodies can only meet where the intervals let their
+// old boxes touch. One traversal, over boxes swept over the motion of several frames, therefore finds the
+// candidates of all these frames, in the order in which the motion lets them meet, and a frame takes a prefix
+// of that list (core/families/drift/near_pairs.hpp). Bodies that cannot meet any other body get one box per
+// frame and no boxes below it.
 //
-// How far vertices have moved is found by reading each of them twice (then and now, in the order of memory),
-// or, in the variant with a bound on steps, by nothing but an addition for each body.
+// The displacements are found by reading each vertex twice (then and now, in memory order), or, in the
+// variant with a bound on steps, by one addition per body.
 
 #include <algorithm>
 #include <cmath>
@@ -61,10 +61,10 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
       measure_leaves(index);
       remember(index);
     }
-    // A body that rests again may have been moved by plans of its own before.
+    // A body that rests again may have been moved by its own plans before.
     for (auto& rows : rows_) rows.positions_changed();
     near_bodies_.start_over();
-    // What meets at this frame, or all where these are few; the next frame asks anew.
+    // The pairs that meet at this frame, or all pairs if there are few; the next frame searches again.
     if (near_bodies_.searches()) {
       take_near([&](std::uint32_t body) { return bodies_[body].box; });
     } else {
@@ -108,7 +108,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
       Body& body = bodies_[change.body];
       body.changed = true;
       if (body.watch != Watch::nothing || hierarchies_[change.body].empty()) continue;
-      body.watch = bounded ? Watch::drift : Watch::box;  // at rest up to now
+      body.watch = bounded ? Watch::drift : Watch::box;  // at rest so far
       body.widened = false;
       plans_changed_ = true;
     }
@@ -134,7 +134,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
   }
 
   std::size_t bytes() const override {
-    std::size_t total = 0;
+    std::size_t total = query_.bytes();
     for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
     for (const auto& body : bodies_) total += body.before.capacity() * sizeof(S);
     for (const auto& lists : lists_of_) total += lists.bytes();
@@ -150,7 +150,8 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     return (this->scene_.moving(index) || bodies_[index].changed) && !hierarchies_[index].empty();
   }
 
-  // ---- What a frame looks at ------------------------------------------------------------------------------
+  // ---- Reads of a frame
+  // ------------------------------------------------------------------------------------
 
   void observe(std::uint32_t index, double last, double t) {
     Body& body = bodies_[index];
@@ -176,7 +177,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     if (body.watch == Watch::nothing || (!body.near && !body.read)) this->count_.add(Counter::bodies_skipped);
   }
 
-  /// The box of all vertices now.
+  /// Computes the box of all current vertices.
   void take_box(std::uint32_t index) {
     this->sampled_.fetch_all(index);
     const VertexRun all{0, this->scene_.vertex_count(index)};
@@ -199,15 +200,16 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     this->count_.add(Counter::vertex_reads, 2 * std::uint64_t(count));
   }
 
-  // ---- What a period of frames has in common --------------------------------------------------------------
+  // ---- Work shared by a period of frames
+  // -------------------------------------------------------------------
 
-  /// Where boxes of then do for this frame, too, nothing is done.
+  /// Does nothing if the old boxes are still valid for this frame.
   void bring_up_to_date() {
     const bool listed = period_ > 0;
     if (listed && !search_due_ && !plans_changed_ && covered()) return;
     plans_changed_ = false;
     if (!listed && --plain_left_ > 0) {
-      // The frame before lists are tried again is remembered, so that there is a motion to judge by.
+      // Remembers the frame before lists are tried again, so that there is a motion to judge by.
       for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
         if (!bodies_[index].near || bodies_[index].watch == Watch::nothing) continue;
         make_boxes(index);
@@ -235,7 +237,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     }
     return false;
   }
-  /// Near are the pairs of bodies whose boxes overlap, as box_of(body) says.
+  /// Finds the near pairs of bodies: those with overlapping boxes, given by box_of(body).
   template <class BoxOf>
   void take_near(const BoxOf& box_of) {
     for (const std::uint32_t i : near_pairs_) pair_is_near_[i] = 0;
@@ -291,7 +293,8 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     search_due_ = period_ > 0;
   }
 
-  /// Of bodies that are near only if they moved as far as they can: where they are. Were there any?
+  /// Computes the actual boxes of bodies that are near only if they moved as far as possible. Returns whether
+  /// there were any.
   bool take_late_boxes() {
     bool any = false;
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
@@ -305,7 +308,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     return any;
   }
 
-  /// The mean way that a side of the gap between two bodies closes in a frame, against the sides of two
+  /// Returns the mean closing per frame of a side of the gap between two bodies, relative to the sides of two
   /// leaves; the largest of all pairs.
   double step() const {
     double largest = 0;
@@ -317,8 +320,8 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
       const double size = a.leaf_size + b.leaf_size;
       return size > 0 ? sum / 6 / size : 0;
     };
-    if (near_bodies_
-            .searches())  // no pair has more than the larger of what its bodies would have with their like
+    if (near_bodies_.searches())  // each pair's value is at most the larger of its bodies' values against an
+                                  // equal body
       for (const Body& body : bodies_) largest = std::max(largest, step_of(body, body));
     else
       for (const BodyPair& pair : this->scene_.pairs())
@@ -332,7 +335,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     body.set_margin(may_move(index) ? 1.0625 * period_ : 0);
   }
 
-  /// Bodies that may meet while they keep to their margins.
+  /// Finds bodies that may meet while they keep to their margins.
   void find_near() {
     take_near([&](std::uint32_t body) { return bodies_[body].swept(); });
     for (Body& body : bodies_) body.near = false;
@@ -368,9 +371,9 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     bodies_[index].widened = !may_move(index);
   }
 
-  /// The candidates of two bodies from their list; returns the box tests made.
+  /// Appends the candidates of two bodies from their list; returns the box tests made.
   std::uint64_t read(const NearPairs<S>& lists, const BodyPair& pair, PairBuffer& out) {
-    // At the frame of the search the list begins with what overlaps, exactly.
+    // At the frame of the search the list begins with exactly the overlapping pairs.
     const double fraction = frames_ == 0 ? 0 : used_reach(bodies_[pair.first], bodies_[pair.second]);
     if (!checks_ || frames_ == 0) {
       lists.read(fraction, out);
@@ -419,7 +422,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin, &rows_[index]};
   }
 
-  /// Mean side of the leaves' boxes.
+  /// Measures the mean side of the leaves' boxes.
   void measure_leaves(std::uint32_t index) {
     const auto& hierarchy = hierarchies_[index];
     double sum = 0, leaves = 0;
@@ -447,8 +450,8 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
   WideQuery<S> query_;
   DriftModel model_;
   int frames_ = 0;      ///< since positions were remembered
-  int period_ = 0;      ///< frames that one search is to last; 0: refits and queries at every frame
-  int plain_left_ = 0;  ///< such frames, until lists are tried again
+  int period_ = 0;      ///< frames that one search lasts; 0: refit and query at every frame
+  int plain_left_ = 0;  ///< number of such frames until lists are tried again
   bool search_due_ = false, plans_changed_ = false;
 };
 
@@ -467,19 +470,20 @@ class DriftBoxesBounded final : public DriftStrategy<S, Count, SteppedMotion<S>>
 };
 
 Info drift_info() {
-  return {
-      .family = "lazy",
-      .citation = "kbvh; lists of neighbours after Verlet 1967",
-      .tightness = Tightness::conservative,
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = {{"lists",
-                      "tuned",
-                      {"tuned", "never"},
-                      "one search for as many frames as counts of work say, or one at every frame"},
-                     {"candidates",
-                      "boxes",
-                      {"boxes", "listed"},
-                      "listed pairs whose boxes overlap at the frame, as of any query; or all that may"}}};
+  return {.family = "lazy",
+          .citation = "kbvh; lists of neighbours after Verlet 1967",
+          .tightness = Tightness::conservative,
+          .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+          .parameters = {
+              {"lists",
+               "tuned",
+               {"tuned", "never"},
+               "one search for several frames, chosen by a cost model of counts, or one search per frame"},
+              {"candidates",
+               "boxes",
+               {"boxes", "listed"},
+               "candidates: listed pairs whose boxes overlap at the frame, as in other queries; or all "
+               "listed pairs that may overlap"}}};
 }
 
 }  // namespace

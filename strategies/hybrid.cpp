@@ -1,6 +1,6 @@
-// Half bottom-up, half top-down (van den Bergen 1998, Larsson & Akenine-Moeller 2001): at every frame the
-// upper levels are refitted, from boxes that the subtrees below get straight from their vertices, in one pass
-// over memory; what lies deeper is made when a query comes there, and not at all where none comes.
+// Half bottom-up, half top-down (van den Bergen 1998, Larsson & Akenine-Moeller 2001). At every frame the
+// upper levels are refitted, from boxes that the subtrees below compute directly from their vertices, in one
+// pass over memory. Deeper boxes are computed when a query visits them, and not at all where no query comes.
 
 #include <algorithm>
 
@@ -11,7 +11,7 @@
 namespace kbvh {
 namespace {
 
-/// How a subtree that a query enters is brought up to date.
+/// The update of a subtree that a query enters.
 enum class Below : std::uint8_t {
   subtree,   ///< refitted as a whole, bottom-up
   top_down,  ///< one node at a time, each child's box from all vertices below it
@@ -33,19 +33,18 @@ struct NodeRange {
   std::uint32_t begin, end;
 };
 
-/// What of one body's hierarchy is made when. Indices are those of wide nodes, which come before their
-/// children.
+/// The schedule of one body's boxes. Indices are those of wide nodes, which come before their children.
 template <class S>
 struct LazyBody {
   std::vector<std::uint32_t> level;    // of each node; the root's is 0
-  std::vector<std::uint32_t> roots;    // of the subtrees that wait for a query
+  std::vector<std::uint32_t> roots;    // roots of the subtrees that wait for a query
   std::vector<std::uint32_t> above;    // all nodes above them, children first
   std::vector<std::uint32_t> root_of;  // of each node at or below the cut
-  Lists<VertexRun> vertices;           // unique vertices below a node, where its box is made from them
-  std::vector<std::uint32_t> reads;    // how many these are
+  Lists<VertexRun> vertices;           // unique vertices below a node, where its box is computed from them
+  std::vector<std::uint32_t> reads;    // number of these vertices
   Lists<NodeRange> below;              // of each root: its descendants, children first
-  std::vector<std::uint8_t> stale;     // 1: the boxes of the node's children are not those of the present
-  std::uint64_t boxes_above = 0, reads_above = 0;  // what refitting `above` costs
+  std::vector<std::uint8_t> stale;     // 1: the boxes of the node's children are not current
+  std::uint64_t boxes_above = 0, reads_above = 0;  // cost of refitting `above`
 };
 
 template <class S, class Count>
@@ -160,12 +159,12 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
     list_descendants(body, nodes);
   }
 
-  /// The vertices below each node whose box is made from them, as runs of consecutive ones.
+  /// Lists the vertices below each node whose box is computed from them, as runs of consecutive ones.
   void list_vertices(std::uint32_t index) {
     auto& hierarchy = this->hierarchies_[index];
     LazyBody<S>& body = bodies_[index];
     const Topology& topology = hierarchy.topology();
-    // Of each wide node, the topology's leaves below it: contiguous, since they are laid out left to right.
+    // The topology's leaves below each wide node: contiguous, because they are laid out left to right.
     std::vector<NodeRange> range(topology.size());
     std::vector<std::uint32_t> source(hierarchy.node_count(), none);
     for (std::uint32_t i = topology.size(); i-- > 0;) {
@@ -241,7 +240,7 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
     this->count_.add(Counter::vertex_reads, body.reads_above);
   }
 
-  /// Makes the boxes of a node's children, and with `Below::subtree` of everything below them.
+  /// Computes the boxes of a node's children, and with `Below::subtree` of everything below them.
   void make_current(std::uint32_t index, std::uint32_t node) {
     auto& hierarchy = this->hierarchies_[index];
     LazyBody<S>& body = bodies_[index];
@@ -286,15 +285,14 @@ KBVH_STRATEGY(hybrid) {
       .baseline = true,
       .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {{"levels",
-            "auto",
-            {"auto", "0", "1", "2", "3", "4", "6", "8", "12", "16"},
-            "levels refitted at every frame, counted from the root; auto: half of them"},
-           {"below",
-            "subtree",
-            {"subtree", "top_down"},
-            "what a query entering a subtree below them makes: all of it, bottom-up, or one node at a "
-            "time, from all vertices below"}},
+      .parameters = {{"levels",
+                      "auto",
+                      {"auto", "0", "1", "2", "3", "4", "6", "8", "12", "16"},
+                      "levels refitted at every frame, counted from the root; auto: half of all levels"},
+                     {"below",
+                      "subtree",
+                      {"subtree", "top_down"},
+                      "work of a query that enters a subtree below them: refit it all, bottom-up, or one "
+                      "node at a time, from all vertices below"}},
   })};
 }

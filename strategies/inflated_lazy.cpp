@@ -1,7 +1,7 @@
-// Inflated boxes, updated lazily (Mezger, Kimmerle & Etzmuss 2003): leaf boxes are larger than their vertices
-// by a margin, and stay as they are until a vertex may have moved through it. With a bound on the motion of a
-// body nothing is looked at before the margin can have been used up, not even positions: most frames cost one
-// addition. Without it every frame reads every vertex to learn which boxes were left.
+// Inflated boxes, updated lazily (Mezger, Kimmerle & Etzmuss 2003): leaf boxes exceed their vertices by a
+// margin, and stay unchanged until a vertex may have moved through it. With a bound on the motion of a body
+// no vertex is read before the margin can have been used up, and no position is evaluated: most frames cost
+// one addition. Without such a bound every frame reads every vertex to find the boxes that vertices left.
 
 #include <algorithm>
 #include <cmath>
@@ -15,26 +15,28 @@ namespace {
 
 enum class MarginKind : std::uint8_t { tuned, absolute, relative };
 
-/// The smallest number above, so that sums of bounds stay bounds.
+/// Returns the next larger number, so that sums of bounds stay bounds.
 double above(double value) {
   return std::nextafter(value, std::numeric_limits<double>::infinity());
 }
 
-/// What is known of one body since its vertices were last looked at.
+/// The state of one body since its vertices were last read.
 template <class S>
 struct InflatedBody {
-  S margin = 0;          // of the boxes made last
+  S margin = 0;          // of the boxes computed last
   double leaf_size = 0;  // mean side of a leaf's box at the reset, before inflation
-  double size = 0;       // the same of the root's box
-  double room = 0;       // every vertex was at least so far inside all boxes above it, at the last look
-  double moved = 0;      // no vertex has moved further since then
-  double rounding = 0;   // a stored position differs from the plan by at most this
-  double step = 0;       // motion from one frame to the next, as a bound or as observed
+  double size = 0;       // the same for the root's box
+  double room =
+      0;  // minimum distance of every vertex from the sides of all boxes above it, at the last check
+  double moved = 0;     // no vertex has moved further since then
+  double rounding = 0;  // a stored position differs from the plan by at most this
+  double step = 0;      // motion from one frame to the next: the bound, or as observed
   std::uint64_t leaves = 0;
-  std::uint64_t tests = 0;       // box tests of the last query that had to do with it
-  bool looked = false;           // at this frame
-  bool query_takes_all = false;  // the last query after a frame without a look evaluated all positions itself
-  bool changed = false;          // plans of its own: it is no body at rest any more
+  std::uint64_t tests = 0;  // box tests of the last query that involved this body
+  bool looked = false;      // the margins were checked at this frame
+  bool query_takes_all =
+      false;             // the last query after a frame without a check evaluated all positions itself
+  bool changed = false;  // vertices have their own plans: the body no longer counts as resting
   std::vector<std::uint8_t> remade;
 };
 
@@ -113,7 +115,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     return status;
   }
 
-  /// The way so far stays bounded; from the stored position on, rounding starts over.
+  /// The displacement so far stays bounded; from the stored position on, rounding errors start anew.
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     for (const PlanChange<S>& change : changes) bodies_[change.body].changed = true;
     for (Body& body : bodies_)
@@ -124,15 +126,15 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
   enum class WhichStay : std::uint8_t { none, inside_margin };
 
   bool may_move(std::uint32_t index) const { return this->scene_.moving(index) || bodies_[index].changed; }
-  void update(std::uint32_t /*body*/) override {}  // `advance` is this strategy's own
+  void update(std::uint32_t /*body*/) override {}  // `advance` is overridden instead
 
   void advance_bounded(std::uint32_t index, double before, double t) {
     Body& body = bodies_[index];
     const double way = stepped_.displacement_bound(index, before, t);
-    if (way == 0) return;  // at rest all the way: every position is what it was
+    if (way == 0) return;  // at rest all the way: no position changed
     body.moved = above(body.moved + way);
-    // The plan is at most `rounding` from the position that was looked at, and `moved` further on now. Boxes
-    // are numbers of the scalar, so that a plan inside rounds to a position inside.
+    // The plan is at most `rounding` from the checked position, and has moved by at most `moved` since. Boxes
+    // are numbers of the scalar, so a plan inside rounds to a position inside.
     const bool inside = above(body.moved + body.rounding) <= body.room;
     body.step = stepped_.speed_bound(index) * (t - before);
     if (inside && !(kind_ == MarginKind::tuned && too_large(index))) return;
@@ -147,7 +149,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     check_margins(index, WhichStay::inside_margin);
   }
 
-  /// Reads all vertices below the leaves; makes boxes anew where the margin is used up.
+  /// Reads all vertices below the leaves; recomputes boxes where the margin is used up.
   void check_margins(std::uint32_t index, WhichStay stay) {
     auto& hierarchy = this->hierarchies_[index];
     if (hierarchy.empty()) return;
@@ -165,16 +167,16 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
                          0,
                          0};
     if (stay == WhichStay::inside_margin) {
-      // Who looks at every frame makes only what was left: all that the margin allows is used. A body that
-      // can skip frames skips more if all have nearly their whole margin; what does not move stays all the
-      // same.
+      // A body that is checked at every frame recomputes only the boxes that vertices left: it uses the full
+      // margin. A body that can skip frames skips more if all boxes have nearly their whole margin; resting
+      // parts stay unchanged in any case.
       const S used = bounded_ ? body.margin / 32 : body.margin;
       state.keep_from = body.margin - used;
       state.keep_to = body.margin + used;
     }
     wide_inflate_kernels<S>(hierarchy.kernels()).of(hierarchy.topology().width)(state);
     if (!bounded_) {
-      // The most that a side came nearer in one frame.
+      // The largest approach of a vertex to a side in one frame.
       const double room_before = double(state.room_before);
       if (stay == WhichStay::inside_margin) body.step = std::max(0.0, body.room - room_before);
     }
@@ -192,7 +194,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
   }
 
-  /// Mean side of the leaves' boxes, which have no margin yet.
+  /// Measures the mean side of the leaves' boxes before inflation.
   void measure_leaves(std::uint32_t index) {
     const auto& hierarchy = this->hierarchies_[index];
     double sum = 0;
@@ -219,20 +221,20 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     if (kind_ == MarginKind::tuned) margin = margin_for(body, best_steps(index));
     return S(std::min(margin, double(admissible_magnitude<S>)));
   }
-  /// So much that it lasts for this many steps, roundings and what `look` leaves as it is included.
+  /// Returns a margin that lasts for `steps` steps, including roundings and the tolerance of `check_margins`.
   static double margin_for(const Body& body, double steps) {
     return steps == 0 ? 0 : (steps * body.step + 4 * body.rounding) * (1 + 1.0 / 16);
   }
 
-  // The tuned margin weighs what a look costs against what larger boxes cost the query, both by counts, so
-  // that it does not depend on a machine or its load. A margin of k steps needs one look in k + 1 frames.
+  // The tuned margin weighs the cost of a check against the query's cost for larger boxes, both by counts, so
+  // that it does not depend on a machine or its load. A margin of k steps needs one check in k + 1 frames.
   // Where surfaces of leaves with mean side a meet, boxes that are larger by m on every side cost about (1 +
-  // m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the rest is leaves that
-  // are opened in vain). Among many small bodies a margin finds other neighbours, besides: as many more as
-  // the body's box gets larger, and who met nobody at the last query may meet somebody then.
+  // m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the rest are leaves
+  // opened in vain). Among many small bodies a margin also adds neighbours, in proportion to the growth of
+  // the body's box, and a body without contact at the last query may then have some.
 
-  /// What a look costs, in box tests. Positions count only if the query would not ask for them all anyhow. A
-  /// look that is due at every frame only costs what it writes.
+  /// Returns the cost of a check, in box tests. Positions count only if the query would not evaluate them all
+  /// anyway. A check that is due at every frame only costs its writes.
   double look_cost(std::uint32_t index) const {
     constexpr double reading = 0.6, evaluating = 1.2, writing = 0.2;  // per vertex
     const double each = !bounded_ ? writing : bodies_[index].query_takes_all ? reading : reading + evaluating;
@@ -260,7 +262,8 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     }
     return best;
   }
-  /// The last query lost more to the present margin, against the best one now, than a look costs.
+  /// Returns whether the last query lost more to the current margin, compared with the best margin, than a
+  /// check costs.
   bool too_large(std::uint32_t index) const {
     const Body& body = bodies_[index];
     if (!(body.leaf_size > 0)) return false;
@@ -289,18 +292,17 @@ KBVH_STRATEGY(inflated_lazy) {
       .positions = PositionUse::fetched,
       .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = {{"margin_is",
-                      "tuned",
-                      {"tuned", "absolute", "relative"},
-                      "what `margin` means: nothing, for it follows from the motion and the last query's "
-                      "work; units of the "
-                      "scene; or a fraction of the mean side of the leaves' boxes at the reset"},
-                     {"margin", "0.1", {}, "by how much leaf boxes are inflated on every side"},
-                     {"bound",
-                      "step",
-                      {"step", "scan"},
-                      "how it knows whether a margin is used up: from the caller's bound on the motion, "
-                      "which skips frames, "
-                      "or by reading every vertex"}},
+      .parameters =
+          {{"margin_is",
+            "tuned",
+            {"tuned", "absolute", "relative"},
+            "unit of `margin`: unused, because the margin follows from the motion and the last query's work; "
+            "units of the scene; or a fraction of the mean side of the leaves' boxes at the reset"},
+           {"margin", "0.1", {}, "inflation of leaf boxes on every side"},
+           {"bound",
+            "step",
+            {"step", "scan"},
+            "test whether a margin is used up: by the caller's bound on the motion, which skips frames, or "
+            "by reading every vertex"}},
   })};
 }

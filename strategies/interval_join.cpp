@@ -1,9 +1,11 @@
-// One time-parametrised traversal for each segment of the flight plans, over boxes that are linear in time,
-// gives the pairs of primitives that come near each other in it and when; frames are read from that.
+// One time-parametrised traversal per segment of the flight plans, over boxes that are linear in time, yields
+// the pairs of primitives that come near each other in the segment, with their times; frames are read from
+// it. Prior art and the differences to it: core/adr/0010-prior-art-of-answering-intervals.md.
 
 #include <algorithm>
 #include <limits>
 
+#include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/linear_bounds.hpp"
@@ -13,8 +15,8 @@
 namespace kbvh {
 namespace {
 
-/// The joins of one segment, and what is known of their pairs of triangles: a join for each pair of bodies,
-/// or, where these are many, two for all of them, with span tests and without.
+/// The joins of one segment, with the verdicts on their pairs of triangles: one join per pair of bodies, or,
+/// with many pairs, two joins for all of them, one with span tests and one without.
 template <class S>
 struct Joins {
   std::vector<IntervalJoin<S>> joins;
@@ -29,20 +31,19 @@ struct Joins {
   }
 };
 
-/// What comes next for the segment ahead, and how much of it was done. All work is in the same unit: what a
-/// box test costs.
+/// The progress of the work on the next segment. All work is in units of the cost of a box test.
 struct WorkAhead {
   enum class Stage : std::uint8_t { nothing, bounds, joins, answers, done };
   Stage stage = Stage::nothing;
   std::size_t join = 0;  ///< the next one
-  bool begun = false;    ///< with that join
+  bool begun = false;    ///< work on that join has begun
   bool joins_begun = false;
-  double since = 0;  ///< time at which it was begun
+  Pacer pacer;
   double done = 0;
 };
 
-/// With foresight of the whole clip the next segment's answer is made during the present one, a part at each
-/// frame; else all of it at the first frame that asks.
+/// With foresight of the whole clip the next segment's answer is computed during the current one, a part at
+/// each frame; otherwise at the first frame of the segment.
 template <class S, class Count, Foresight F>
 class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
                                    public AnswersSelfPairs,
@@ -89,7 +90,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     if constexpr (works_ahead) make_bounds_ahead();
   }
 
-  /// With span tests these are no candidates that are apart for certain, and first those that intersect.
+  /// With span tests the candidates exclude pairs that are certainly apart, and begin with those that
+  /// certainly intersect.
   QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*budget*/) override {
     if (!joined_) join();
     const float fraction = float(bounds_.fraction(t));
@@ -111,7 +113,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     return {};
   }
 
-  /// What is not certain is tested at the frame's positions.
+  /// Undecided pairs are tested at the frame's positions.
   void confirm_candidates(double t, PairBuffer& pairs) override {
     if (!any_by_spans_ || pairs != answered_) return Strategy<S>::confirm_candidates(t, pairs);
     to_test_.clear();
@@ -130,7 +132,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   }
 
   void prepare_sweep(double /*t*/) override {
-    if (plans_changed_) return;  // lines may have no end: the sweep's own ends are known when it is over
+    if (plans_changed_) return;  // lines may have no end: the sweep's own ends are known only when it is over
     bounds_.enter();
     if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
     ahead_ = {};
@@ -140,11 +142,11 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     for (auto& sweep : sweeps_) sweep.keep_neighbours();
   }
 
-  /// All pairs of the segment, whenever their boxes overlap in it.
+  /// Appends all pairs of the segment, at any time of overlap.
   void find_swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) override {
     if (plans_changed_) return sweep_both_ends(before, out);
     if (!(bounds_.begin() <= t0 && t1 <= bounds_.end()))
-      throw std::invalid_argument("contacts are asked for across a knot of a plan");
+      throw std::invalid_argument("contacts were requested across a knot of a plan");
     for (std::size_t i = 0; i < sweeps_.size(); ++i) {
       sweeps_[i].join(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i));
       this->count_.add(Counter::box_tests, sweeps_[i].tests());
@@ -167,7 +169,9 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   }
 
   std::size_t bytes() const override {
-    std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes();
+    std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes() + query_.bytes() +
+                        (answered_.capacity() + to_test_.capacity()) * sizeof(PrimitivePair) +
+                        blocks_.capacity() * sizeof(Block) + joined_bodies_.capacity() * sizeof(BodyPair);
     for (const auto& sweep : sweeps_) total += sweep.bytes();
     return total + (swept_ ? swept_->bytes() : 0);
   }
@@ -183,14 +187,16 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
  private:
   using Stage = WorkAhead::Stage;
-  /// What the parts of the work cost, in box tests of the join: measured once, and only for evenness.
+  /// The costs of the parts of the work, in box tests of the join: measured once, and used only for even
+  /// slices.
   static constexpr double node_cost = 35, answer_cost = 5;
 
-  /// Beyond so many pairs of bodies they are joined together: a join by itself takes some kilobytes.
+  /// More pairs of bodies than this are joined together: a separate join takes some kilobytes.
   static constexpr std::size_t most_joins = 16;
 
   bool is_decidable(const BodyPair& pair) const { return decidable_[pair.first] && decidable_[pair.second]; }
-  /// The pairs of bodies of one join, of those that meet within the segment. Valid until the next call.
+  /// Returns the pairs of bodies of one join, among those that meet within the segment. Valid until the next
+  /// call.
   std::span<const BodyPair> bodies_of_join(const LinearSegment<S>& segment, std::size_t join) {
     const auto all = this->scene_.pairs();
     if (!together_) return all.subspan(join, 1);
@@ -200,7 +206,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     return joined_bodies_;
   }
 
-  /// Once plans have changed: boxes around both ends, as a refit makes them.
+  /// Used after plans have changed: boxes around both ends, as a refit computes them.
   void sweep_both_ends(std::span<const S* const> before, PairBuffer& out) {
     if (!swept_)
       swept_.emplace(
@@ -226,7 +232,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
       joined_ = true;
     }
     ahead_ = {};
-    ahead_.since = this->time();
+    ahead_.pacer = {this->time(), bounds_.end()};
     if constexpr (works_ahead)
       if (bounds_.start_ahead(motion_.from(bounds_.end()))) ahead_.stage = Stage::bounds;
   }
@@ -239,13 +245,11 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     joined_ = true;
   }
 
-  /// The share of the work ahead that is to be done by now: all of it at the last frame before the next
-  /// segment, if frames follow each other at the distance of the last two.
-  double share_due() const {
-    const double next_frame = this->time() + (this->time() - before_);
-    return (next_frame - ahead_.since) / (bounds_.end() - ahead_.since);
-  }
-  /// As if the next segment were like the present one, or, where that has little to do, like many others.
+  /// Returns the share of the work ahead that must be done by now: all of it at the last frame before the
+  /// next segment, if the step between the last two frames repeats.
+  double share_due() const { return ahead_.pacer.share_due(this->time(), this->time() - before_); }
+  /// Estimates the work as if the next segment resembled the current one, or, if that one has little work,
+  /// many others.
   double all_work() const {
     const double boxes = node_cost * double(bounds_.nodes_of_segment());
     double known = 0;
@@ -267,7 +271,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
     ahead_.done += std::clamp(wanted, 0.0, node_cost * double(bounds_.nodes_of_segment()));
   }
-  /// Brings the work on joins and answers ahead to a share of it; all of it from 1 on.
+  /// Brings the work on joins and answers ahead to a share of the whole; from 1 on, to its end.
   void join_ahead(const LinearSegment<S>& segment, double share) {
     constexpr std::size_t leaf_pairs = 128, tests_at_once = 4096, answers_at_once = 256;
     const double wanted = share >= 1 ? std::numeric_limits<double>::infinity() : share * all_work();
@@ -297,19 +301,19 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
   Motion motion_;
   LinearBounds<S> bounds_;
-  bool together_;  ///< pairs of bodies: by_spans_[0] says of those that it can decide, [1] of the others
+  bool together_;  ///< pairs of bodies: by_spans_[0] are the decidable ones, [1] the others
   Joins<S> now_, next_;
   WorkAhead ahead_;
-  double before_ = 0;                         ///< time of the frame before
-  std::vector<IntervalJoin<S>> sweeps_;       ///< the same for contacts, once they are asked for
+  double before_ = 0;                         ///< time of the preceding frame
+  std::vector<IntervalJoin<S>> sweeps_;       ///< the same for contacts, after the first request
   std::optional<SweptHierarchies<S>> swept_;  ///< the same after changes of plans
   WideQuery<S> query_;
   bool plans_changed_ = false;
   std::vector<bool> by_spans_;   ///< by join
-  std::vector<bool> decidable_;  ///< by body: triangles only, and asked for
+  std::vector<bool> decidable_;  ///< by body: triangles only, and the parameter asks for spans
   std::vector<BodyPair> joined_bodies_;
   bool any_by_spans_ = false, joined_ = false;
-  /// What was read from one join.
+  /// The range of pairs read from one join.
   struct Block {
     std::size_t certain, open;
   };
@@ -328,7 +332,7 @@ std::vector<Parameter> join_parameters() {
   list.push_back({"triangle_tests",
                   "spans",
                   {"spans", "frames"},
-                  "decide pairs of triangles for spans of time where that can be proved, or at every frame"});
+                  "decide pairs of triangles for spans of time where a proof exists, or at every frame"});
   return list;
 }
 
@@ -342,7 +346,9 @@ KBVH_STRATEGY(interval_join) {
         .id = id,
         .title = title,
         .family = "linear",
-        .citation = "kbvh",
+        .citation =
+            "kbvh; joins of boxes linear in time as in Saltenis et al. 2000, Tao & Papadias 2002 and Zhang "
+            "et al. 2008 (core/adr/0010)",
         .tightness = Tightness::conservative,
         .positions = PositionUse::fetched,
         .declares = {.continuous = true},
@@ -351,5 +357,5 @@ KBVH_STRATEGY(interval_join) {
     };
   };
   return {make_entry<AtOnce>(info("interval_join", "interval join")),
-          make_entry<MadeAhead>(info("interval_join_ahead", "interval join, made ahead"))};
+          make_entry<MadeAhead>(info("interval_join_ahead", "interval join, computed ahead"))};
 }

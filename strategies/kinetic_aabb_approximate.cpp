@@ -1,6 +1,5 @@
-// The kinetic AABB tree as one would write it without exact arithmetic: times of events are floats or
-// doubles, and a certificate's failure is where two lines meet. Shows what the exact decisions of
-// kinetic_aabb buy.
+// The kinetic AABB tree without exact arithmetic: event times are floats or doubles, and a certificate fails
+// where two lines cross. It shows the benefit of the exact decisions of kinetic_aabb.
 
 #include "core/contract/registry.hpp"
 #include "core/families/events/kinetic_aabb_strategy.hpp"
@@ -46,11 +45,11 @@ KBVH_STRATEGY(kinetic_aabb_approximate) {
       .parameters = {{"event_times",
                       "double",
                       {"double", "float"},
-                      "in what times of events are computed and compared (kinetic_aabb: exactly)"},
+                      "arithmetic of event times and their comparisons (kinetic_aabb: exact)"},
                      {"formula",
                       "textbook",
                       {"textbook", "end_point_rule"},
-                      "a failure is where two lines meet, or where the end of the segment says (as in "
-                      "kinetic_aabb)"}},
+                      "failure test: by the crossing of two lines, or by the values at the end of the "
+                      "segment (as in kinetic_aabb)"}},
   })};
 }

@@ -1,6 +1,5 @@
 // The kinetic BoxTree (Z&W 2006, s.6), with the errata of the reproduction: two planes per inner node, all
-// other sides inherited, valid at every time, updated at events only; parts that have degenerated can be
-// rebuilt.
+// other sides inherited, valid at every time, updated at events only. Degenerated parts can be rebuilt.
 
 #include <numeric>
 #include <variant>
@@ -92,7 +91,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
         const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
         LeafPairs<S, BoxTests> several(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
                                        b.topology(), tests, out);
-        // Inherited boxes of leaves are not tight: primitives have to show that theirs overlap.
+        // Inherited boxes of leaves are not tight, so the boxes of primitives are tested, too.
         const auto leaves = [&](std::uint32_t leaf_a, std::uint32_t leaf_b) {
           const TopologyNode na = a.topology().nodes[leaf_a], nb = b.topology().nodes[leaf_b];
           if (leaf_boxes_ == LeafBoxes::inherited && na.count() == 1 && nb.count() == 1) {
@@ -122,7 +121,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
       forest.geometry_changed(t, this->scene_, this->sampled_, changes);
       for (const BodyChange& own : changes) caches_[own.body].resize(forest.tree(own.body).topology().size());
     });
-    plans_changed_ = true;  // bodies may move that did not
+    plans_changed_ = true;  // resting bodies may move now
     new_frame();
     if (!rebuilds_) return;
     on_forest([&](auto& forest) {
@@ -156,7 +155,8 @@ class KineticBox final : public CountedStrategy<S, Count>,
       const auto& tree = forest.tree(body);
       std::vector<std::uint32_t> order;
       AuditView view{tree.compacted_topology(order), {}, {}};
-      BoxCache<S> cache = caches_[body];  // what a query read counts; the rest is made from it
+      BoxCache<S> cache =
+          caches_[body];  // counts the boxes that a query read; the others are derived from them
       InheritedBoxes<S, std::remove_cvref_t<decltype(tree)>> boxes(tree, this->sampled_, body, cache,
                                                                    leaf_boxes_);
       for (const std::uint32_t node : order) {
@@ -199,7 +199,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
   InheritedBoxes<S, Tree> boxes(const Tree& tree, std::uint32_t body) {
     return {tree, this->sampled_, body, caches_[body], leaf_boxes_};
   }
-  /// The boxes of all nodes; these are in `order_` then, parents before children.
+  /// Returns the boxes of all nodes; afterwards `order_` lists the nodes, parents before children.
   template <class Tree>
   InheritedBoxes<S, Tree> all_boxes(const Tree& tree, std::uint32_t body) {
     if (tree.edited()) {
@@ -212,7 +212,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
     for (const std::uint32_t node : order_) all.ensure(node);
     return all;
   }
-  /// Of the only primitive of a leaf.
+  /// Returns the box of the only primitive of a leaf.
   template <class Tree>
   LaneBox<S> tight_box(const Tree& tree, TopologyNode leaf, std::uint32_t body) const {
     const auto vertices = this->scene_.primitives(body)[tree.topology().primitives[leaf.first()]];

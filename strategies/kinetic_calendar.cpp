@@ -1,5 +1,5 @@
-// The exact tight AABB tree for motion that changes while it runs: a certificate for each side of each box,
-// in a calendar of buckets by time; frames determine anew what may have changed until then, level by level
+// The exact tight AABB tree for motion that changes at run time: a certificate for each side of each box, in
+// a calendar of buckets by time. Frames determine the sides that may have changed, level by level
 // (core/families/envelope/calendar_tree.hpp).
 
 #include "core/contract/registry.hpp"

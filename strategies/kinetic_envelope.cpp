@@ -1,8 +1,9 @@
-// The exact tight AABB tree without a queue, for keyframed motion: at the begin of each segment one pass
-// finds the sides whose realiser will change in it, and the upper envelopes of these few give a list of
-// stores, sorted by time, that frames carry out (core/families/envelope/segment_envelope.hpp). Where the
-// whole clip is known, the frames of a segment can share the pass for the next one among them.
+// The exact tight AABB tree without a queue, for keyframed motion. At the begin of each segment one pass
+// finds the sides whose realiser will change in it. The upper envelopes of these few sides give a list of
+// stores, sorted by time, that frames apply (core/families/envelope/segment_envelope.hpp). If the whole clip
+// is known, the frames of a segment can share the pass for the next one.
 
+#include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/envelope/realiser_strategy.hpp"
 #include "core/families/envelope/segment_envelope.hpp"
@@ -10,26 +11,26 @@
 namespace kbvh {
 namespace {
 
-/// How the realisers of one body are known.
+/// The source of the realisers of one body.
 enum class Known : std::uint8_t {
   nothing,   ///< not yet
-  at_rest,   ///< they stay what they are until the segment ends
-  envelope,  ///< as the envelope of the segment says
-  refitted,  ///< vertices have plans of their own: boxes are refitted at every frame instead
+  at_rest,   ///< unchanged until the segment ends
+  envelope,  ///< the envelope of the segment
+  refitted,  ///< vertices have their own plans: boxes are refitted at every frame instead
 };
 
-/// What is known of the segment after the present one.
+/// The state of the segment after the current one.
 enum class Next : std::uint8_t {
-  nothing,     ///< it will be made when it begins
-  translated,  ///< nobody overtakes anybody
-  envelope,    ///< its envelope is being made
+  nothing,     ///< computed when it begins
+  translated,  ///< no vertex overtakes another
+  envelope,    ///< its envelope is being computed
 };
 
 template <class S, class Count, Foresight F>
 class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChanges<S> {
   using Base = RealiserStrategy<S, Count>;
   static constexpr bool ahead = F == Foresight::whole_clip;
-  static constexpr std::uint32_t slices = 64;  ///< of segments of small bodies
+  static constexpr std::uint32_t slices = 64;  ///< per segment of small bodies
 
  public:
   static constexpr Foresight foresight = F;
@@ -60,7 +61,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
       if (state.known == Known::refitted) {
         refit(body);
       } else if (!(t < state.end)) {
-        // A frame that had to make the whole envelope of its own segment leaves the next one to others.
+        // A frame that built a full envelope does no look-ahead work.
         if (begin_segment(body)) work_ahead(body, step);
       } else if (state.known == Known::envelope) {
         state.envelope.advance(t, this->bodies_[body].realisers);
@@ -106,13 +107,13 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     SegmentEnvelope<S> envelope;
     Known known = Known::nothing;
     double end = 0;          ///< of the segment
-    std::vector<S> room[2];  ///< for positions at its ends that are not stored as they are
+    std::vector<S> room[2];  ///< for positions at its ends that are not stored
     Next next = Next::nothing;
-    double next_since = 0;  ///< when the next segment's envelope was begun
-    WideRealisers at_end;   ///< of the present segment, as far as the next one's envelope is made
+    Pacer pacer;           ///< of the next segment's envelope
+    WideRealisers at_end;  ///< at the end of the current segment, as far as the next envelope is computed
   };
 
-  /// To the last bit: nobody overtakes anybody then.
+  /// Tests for equal steps to the last bit: then no vertex overtakes another.
   static bool translates(const SegmentMotion<S>& motion, std::uint32_t body) {
     const std::optional<Translation<S>> step = motion.translation(body);
     return step && step->exact;
@@ -126,8 +127,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
   }
 
-  /// The present time is in a segment that was not looked at before. False if all its envelope had to be
-  /// made now.
+  /// Enters a new segment at the current time. Returns false if its whole envelope had to be computed now.
   bool begin_segment(std::uint32_t index) {
     State& state = states_[index];
     auto& body = this->bodies_[index];
@@ -143,7 +143,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     const bool rests = motion.at_rest(index);
     const double begin = rests ? t : motion.lines_begin(index);
     const S* first = motion.positions_on_lines(index, begin, state.room[0]);
-    // Who realises a side at the end of one segment does so at the begin of the next.
+    // The realiser of a side at the end of one segment also realises it at the begin of the next.
     const bool goes_on =
         state.known != Known::nothing && (rests ? motion.lines_begin(index) : begin) == state.end;
     if (goes_on && foreseen == Next::envelope) make_next(index, 1);
@@ -164,7 +164,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     if (goes_on && foreseen == Next::envelope) {
       state.envelope.take_next();
     } else if ((goes_on && foreseen == Next::translated) || translates(motion, index)) {
-      // The same is added to all, exactly; and rounding is monotone.
+      // The same vector is added to all positions, exactly; and rounding is monotone.
       state.envelope.make_empty(begin, state.end);
       this->count_.add(Counter::bodies_translated);
     } else {
@@ -181,7 +181,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     return made && goes_on;
   }
 
-  /// Begins with the envelope of the segment after the present one, if there will be work for it.
+  /// Starts the envelope of the next segment if it will need work.
   void foresee(std::uint32_t index) {
     State& state = states_[index];
     if (!(state.end < std::numeric_limits<double>::infinity()) || !view_.as_in_the_scene(index)) return;
@@ -192,20 +192,18 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
       return;
     }
     state.next = Next::envelope;
-    state.next_since = this->time();
+    state.pacer = {this->time(), state.end};
     const double next_end = later.lines_end(index);
-    // These are keyframes, which need no room.
+    // The ends are keyframes, which need no extra memory.
     state.envelope.start_next(this->bodies_[index].hierarchy,
                               later.positions_on_lines(index, state.end, state.room[0]),
                               later.positions_on_lines(index, next_end, state.room[1]), next_end);
   }
-  /// Does as much for the next segment as leaves the same for each frame until then, if they come at equal
+  /// Works on the next segment such that each frame until then gets an equal share, if frames come at equal
   /// steps.
   void work_ahead(std::uint32_t index, double step) {
     const State& state = states_[index];
-    if (state.next == Next::envelope)
-      make_next(index,
-                std::min(1.0, (this->time() + step - state.next_since) / (state.end - state.next_since)));
+    if (state.next == Next::envelope) make_next(index, state.pacer.share_due(this->time(), step));
   }
   void make_next(std::uint32_t index, double share) {
     State& state = states_[index];
@@ -216,7 +214,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
   }
 
   void count_pass(std::uint32_t index) { count_part(index, this->bodies_[index].hierarchy.node_count(), 0); }
-  /// The part of a pass that leaves `after` wide nodes of `before`; parts add up to a pass.
+  /// Counts the part of a pass that leaves `after` of `before` wide nodes; parts add up to a pass.
   void count_part(std::uint32_t index, std::uint32_t before, std::uint32_t after) {
     const auto& hierarchy = this->bodies_[index].hierarchy;
     const auto part = [&](std::uint64_t all) {
@@ -255,6 +253,6 @@ KBVH_STRATEGY(kinetic_envelope) {
   return {
       make_entry<KineticEnvelope>(info_of("kinetic_envelope", "kinetic AABB tree, envelopes")),
       make_entry<KineticEnvelopeAhead>(
-          info_of("kinetic_envelope_ahead", "kinetic AABB tree, envelopes made ahead")),
+          info_of("kinetic_envelope_ahead", "kinetic AABB tree, envelopes computed ahead")),
   };
 }

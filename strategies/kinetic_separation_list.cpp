@@ -1,5 +1,5 @@
 // Kinetic incremental collision detection (Z&W 2006, s.7): two kinetic AABB trees and the separation list of
-// their pairs, all kept at events; a query reads the overlapping leaves and traverses nothing.
+// their pairs, all updated at events. A query reads the overlapping leaves and traverses nothing.
 
 #include <algorithm>
 #include <variant>
@@ -80,7 +80,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     });
   }
 
-  /// All leaves that overlap at some time between. What overlaps twice is found twice.
+  /// Appends all leaves that overlap at some time in between. Leaves that overlap twice are found twice.
   void find_swept_pairs(double t0, double t1, std::span<const S* const> /*before*/,
                         PairBuffer& out) override {
     on_collision([&](auto& collision) {
@@ -166,7 +166,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     return std::visit([&](const auto& collision) -> decltype(auto) { return work(*collision); }, collision_);
   }
 
-  /// Two leaves, and the number of their bodies in the list.
+  /// Two leaves, and the number of their body pair in the list.
   struct SweptLeaves {
     std::uint32_t bodies, a, b;
     auto operator<=>(const SweptLeaves&) const = default;
@@ -179,13 +179,13 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     for (std::uint32_t i = 0; i < list.body_pair_count(); ++i)
       if (list.is_entered(i)) work(i, list.body_pair(i));
   }
-  /// Within one body the list has no leaf with itself.
+  /// Visits leaves with themselves: within one body the list does not contain them.
   template <class System, class Work>
   void for_leaves_with_themselves(const System& collision, const BodyPair& pair, const Work& work) const {
     if (pair.first != pair.second) return;
     const Topology& topology = collision.forest().tree(pair.first).topology();
     if (topology.empty() || topology.leaf_size == 1) return;
-    std::vector<std::uint32_t> nodes{0};  // by way of the root: changes of geometry leave gaps
+    std::vector<std::uint32_t> nodes{0};  // traverses from the root, because changes of geometry leave gaps
     while (!nodes.empty()) {
       const std::uint32_t node = nodes.back();
       nodes.pop_back();
@@ -196,7 +196,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     }
   }
 
-  /// Every primitive pair of two leaves, those that share a vertex included.
+  /// Appends every primitive pair of two leaves, those that share a vertex included.
   template <class System>
   void append_leaves(const System& collision, const BodyPair& pair, std::uint32_t leaf_a,
                      std::uint32_t leaf_b, PairBuffer& out) const {
@@ -212,7 +212,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     out.resize(before + keep_self_pairs(nullptr, leaves, out.data() + before, out.size() - before));
   }
 
-  /// Every primitive pair of two leaves for as long as the leaves overlap.
+  /// Appends every primitive pair of two leaves with the time span in which the leaves overlap.
   template <class System, class LeafPair>
   void append_spans(const System& collision, std::uint32_t body_pair, const LeafPair& leaf, double t0,
                     double end, SpanBuffer& out) const {

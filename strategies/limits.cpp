@@ -1,9 +1,11 @@
-// Not contestants but limits to hold contestants against, in the same run and over the same frames. They
-// answer no query (guarantee: approximate, every pair is missed); only their update time means something.
+// Not contestants but limits to compare contestants with, in the same run and over the same frames. They
+// answer no query (guarantee: approximate, every pair is missed); only their update time has a meaning.
 // - limit_moved_bytes: an update reads and writes the bytes of a wide refit, in order, and computes nothing.
-//   Positions and vertex lists are read once, nodes are written once.
-// - limit_plain_motion: an update interpolates every position in the scene's scalar, however it rounds. The
-//   correctly rounded evaluation (phase "motion") is compared with it.
+//   Positions and
+//   vertex lists are read once, nodes are written once.
+// - limit_plain_motion: an update interpolates every position in the scene's scalar with default rounding.
+//   The correctly
+//   rounded evaluation (phase "motion") is compared with it.
 
 #include "core/families/limits/kernels/limits.hpp"
 #include "core/contract/registry.hpp"
@@ -103,7 +105,7 @@ Info limit(const char* id, const char* title) {
   info.id = id;
   info.title = title;
   info.family = "limit";
-  info.citation = "kbvh: a bound for others, not a contestant";
+  info.citation = "kbvh; a limit for comparison, not a contestant";
   info.tightness = Tightness::none;
   info.guarantee = Guarantee::approximate;
   return info;

@@ -1,5 +1,6 @@
-// Boxes that are linear in time: made where all flight plans are known to be straight until, at the ends of
-// each such segment, and interpolated by the query where it comes. No frame updates anything.
+// Boxes that are linear in time: computed at the ends of each segment in which all flight plans are known to
+// be straight, and interpolated by the query at the nodes that it visits. Frames update nothing. Prior art:
+// core/adr/0010-prior-art-of-answering-intervals.md.
 
 #include "core/families/linear/linear_bounds.hpp"
 
@@ -64,7 +65,7 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>, public Take
   }
 
   std::size_t bytes() const override {
-    std::size_t total = bounds_.bytes();
+    std::size_t total = bounds_.bytes() + query_.bytes();
     for (const auto& marks : stale_) total += marks.size();
     return total;
   }

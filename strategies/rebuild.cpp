@@ -1,5 +1,5 @@
-// A new topology for every frame: the most that an update can cost, and the best boxes a query can get.
-// Building allocates; that is part of what this strategy costs.
+// A new topology for every frame: the highest update cost, and the best boxes for a query. Building
+// allocates; that is part of this strategy's cost.
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
@@ -25,13 +25,13 @@ class Rebuild final : public StoredHierarchyStrategy<S, Count>,
     }
   }
 
-  /// As for any other frame: what was built later is not to be seen.
+  /// Resets as for any other frame: later builds leave no trace.
   void reset_to(double t) override {
     Base::reset_to(t);
     for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) update(body);
   }
 
-  /// A body at rest is built anew, too.
+  /// Rebuilds resting bodies, too.
   void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
     this->plans_changed_ = true;
     for (const BodyChange& own : body_changes(this->scene_, change)) update(own.body);
@@ -64,6 +64,6 @@ KBVH_STRATEGY(rebuild) {
       .citation = "van den Bergen 1997 (as the alternative to refitting)",
       .declares = {.restructures = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = {{"method", "median", {"median", "sah", "morton"}, "how the new topology is built"}},
+      .parameters = {{"method", "median", {"median", "sah", "morton"}, "builder of the new topology"}},
   })};
 }

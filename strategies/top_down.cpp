@@ -1,6 +1,6 @@
-// Top-down refit: every node's box straight from the vertices below it, parents before children. It reads
-// each vertex once per level, which is what makes it the slower refit; it is the building block of refits on
-// demand (van den Bergen 1998, Larsson & Akenine-Moeller 2001).
+// Top-down refit: every node's box directly from the vertices below it, parents before children. It reads
+// each vertex once per level, which makes it the slower refit; it is the building block of refits on demand
+// (van den Bergen 1998, Larsson & Akenine-Moeller 2001).
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
@@ -28,8 +28,8 @@ class TopDown final : public StoredHierarchyStrategy<S, Count>,
   }
 
  private:
-  /// Entries of the topology's primitive list below each node: contiguous, since leaves are laid out left to
-  /// right.
+  /// Entries of the topology's primitive list below each node: contiguous, because leaves are laid out left
+  /// to right.
   struct Range {
     std::uint32_t begin, end;
   };

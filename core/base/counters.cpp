@@ -33,8 +33,8 @@ void Counters::add(std::string_view own, std::uint64_t n) {
     }
   for (std::size_t c = 0; c < values.size(); ++c)
     if (own == name(Counter(c)))
-      throw std::logic_error("a strategy's own counter is called '" + std::string(own) +
-                             "', as one that all strategies share");
+      throw std::logic_error("a strategy's own counter has the name '" + std::string(own) +
+                             "' of a shared counter");
   named.push_back({own, n});
 }
 

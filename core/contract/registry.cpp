@@ -50,7 +50,7 @@ std::string unsuitable_bodies(const Info& info, const Scene<S>& scene) {
         std::find(kinds.begin(), kinds.end(), body.primitives.kind) == kinds.end())
       return std::string("does not take ") + name(body.primitives.kind) + ", as in body '" + body.name + "'";
     if (body.plans.is_handed_in() && info.foresight != Foresight::none)
-      return "has to know the motion beforehand, and the positions of body '" + body.name +
+      return "needs to know the motion in advance, but the positions of body '" + body.name +
              "' are handed in frame by frame";
   }
   return {};

@@ -137,7 +137,7 @@ struct NestedStrategies {
                                   : std::is_base_of_v<SteppedMotion<S>, Motion> ? Foresight::step_bound
                                                                                 : Foresight::none;
     if (entry.info.foresight > offered)
-      throw ConfigError("'" + entry.info.id + "' has to know more of the future than there is to know");
+      throw ConfigError("'" + entry.info.id + "' needs more foresight than the motion provides");
     return kbvh::create(entry, scene, *motion.playback_, std::move(topologies), params, policy);
   }
 };

@@ -68,7 +68,7 @@ Primitives primitives_of(const Connectivity& connectivity) {
   if (connectivity.offsets.empty()) {
     if (indices.size() % 3 != 0)
       throw std::invalid_argument(std::to_string(indices.size()) +
-                                  " indices are no triangles; other primitives need offsets");
+                                  " indices do not make triangles; other primitives need offsets");
     for (std::size_t i = 0; i < indices.size(); i += 3) primitives.add(indices.subspan(i, 3));
     return primitives;
   }
@@ -164,7 +164,7 @@ class TypedWorld final : public detail::WorldImplementation {
     const StrategyEntry& entry = find_strategy(strategy);
     for (const auto& [key, value] : topology)
       if (key != "method" && key != "width" && key != "leaf_size")
-        throw std::invalid_argument("a topology has method, width and leaf_size, and no '" + key + "'");
+        throw std::invalid_argument("a topology has the keys method, width and leaf_size, not '" + key + "'");
     const auto method = topology.find("method");
     const BuilderConfig builder = suitable_builder(
         entry.info, method == topology.end() ? std::nullopt : std::optional(build_method(method->second)),
@@ -368,7 +368,7 @@ class TypedWorld final : public detail::WorldImplementation {
   }
 
   void check_not_started() const {
-    if (session_) throw std::logic_error("the world has started: its scene is fixed");
+    if (session_) throw std::logic_error("the world has started, so its scene is fixed");
   }
   void check_body(std::uint32_t body) const {
     if (body >= scene_.bodies.size())
@@ -376,7 +376,7 @@ class TypedWorld final : public detail::WorldImplementation {
                                   std::to_string(scene_.bodies.size()));
   }
   Session<S>& session() const {
-    if (!session_) throw std::logic_error("the world has not started: no strategy is chosen");
+    if (!session_) throw std::logic_error("the world has not started: call start first");
     return *session_;
   }
   EventSource<S>& events() const {

@@ -130,7 +130,7 @@ Oracle<S>::Oracle(const Scene<S>& scene, std::filesystem::path cache_folder, std
   file_ = cache_folder / file_name;
   std::error_code error;
   if (std::filesystem::exists(file_, error) && !load())
-    problem_ = file_.string() + ": damaged or of another version, true pairs are computed anew";
+    problem_ = file_.string() + ": damaged or of another version; true pairs are recomputed";
 }
 
 template <class S>
@@ -147,7 +147,7 @@ void Oracle<S>::keep() {
     written = save();
   } catch (const std::exception&) {
   }
-  if (!written) problem_ = file_.string() + ": cannot be written, true pairs are not kept";
+  if (!written) problem_ = file_.string() + ": cannot be written; true pairs are not cached";
 }
 
 template <class S>

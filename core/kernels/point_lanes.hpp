@@ -1,5 +1,5 @@
 #pragma once
-// Internal to core/kernels/*.cpp: points of triangles in lanes, one pair of triangles per lane.
+// Internal to kernels: points of triangles in lanes, one pair of triangles per lane.
 #include "core/kernels/lanes.hpp"
 
 #define KBVH_INLINE [[gnu::always_inline]] inline

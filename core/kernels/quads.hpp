@@ -1,5 +1,5 @@
 #pragma once
-// Internal to core/kernels/*.cpp: points in memory order (x, y, z, and one more number) and their
+// Internal to kernels: points in memory order (x, y, z, and one more number) and their
 // transposition into rows of coordinates. A Pack holds one point in four lanes, or two points in eight.
 #include "core/kernels/lanes.hpp"
 

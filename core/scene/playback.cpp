@@ -52,7 +52,7 @@ template <class S>
 void Playback<S>::hand_in(std::uint32_t body, const S* positions) {
   if (body >= bodies_.size() || !bodies_[body].plans.is_handed_in())
     throw std::invalid_argument("positions are handed in for body " + std::to_string(body) +
-                                ", which is none of those that wait for them");
+                                ", which does not accept them");
   bodies_[body].given = positions;
 }
 

@@ -1,5 +1,6 @@
 #include "core/topology/builders.hpp"
 
+#include "core/topology/collapse.hpp"
 #include "core/topology/topology_edit.hpp"
 
 #include <algorithm>
@@ -222,60 +223,17 @@ class BinaryBuilder {
   std::vector<double> right_cost_;
 };
 
-/// Adds `count` children to a node, in one row; returns the first.
-std::uint32_t add_children(Topology& topology, std::uint32_t parent, std::uint32_t count) {
-  const std::uint32_t first = topology.size();
-  topology.nodes.resize(first + count);
-  topology.parents.resize(first + count, parent);
-  topology.depths.resize(first + count, std::uint8_t(std::min(255, topology.depths[parent] + 1)));
-  topology.nodes[parent] = TopologyNode::inner(first, count);
-  return first;
-}
-
-Topology with_root(const BuilderConfig& config) {
-  Topology topology;
-  topology.width = config.width;
-  topology.leaf_size = config.leaf_size;
-  topology.nodes.resize(1);
-  topology.parents.push_back(0);
-  topology.depths.push_back(0);
-  return topology;
-}
-
-/// Collapses the binary tree into wide nodes, depth first: the nodes of a subtree are contiguous.
-Topology collapse(const std::vector<BinaryNode>& binary, const BuilderConfig& config) {
-  Topology topology = with_root(config);
-  struct Open {
-    std::uint32_t node, binary;
-  };
-  std::vector<Open> open{{0, 0}};
-  std::vector<std::uint32_t> children;
-  while (!open.empty()) {
-    const auto [index, source] = open.back();
-    open.pop_back();
-    const BinaryNode& node = binary[source];
-    if (node.left == 0) {
-      topology.nodes[index] = TopologyNode::leaf(node.begin, node.end - node.begin);
-      continue;
-    }
-    children = {node.left, node.right};
-    while (children.size() < config.width) {
-      // Opens the heaviest inner child, the first of equals, in place: leaf order stays left to right.
-      std::size_t heaviest = children.size();
-      for (std::size_t c = 0; c < children.size(); ++c)
-        if (binary[children[c]].left != 0 &&
-            (heaviest == children.size() || binary[children[c]].weight > binary[children[heaviest]].weight))
-          heaviest = c;
-      if (heaviest == children.size()) break;
-      const BinaryNode& opened = binary[children[heaviest]];
-      children[heaviest] = opened.left;
-      children.insert(children.begin() + std::ptrdiff_t(heaviest) + 1, opened.right);
-    }
-    const std::uint32_t first = add_children(topology, index, std::uint32_t(children.size()));
-    for (std::size_t c = children.size(); c-- > 0;) open.push_back({first + std::uint32_t(c), children[c]});
+/// The binary tree of a builder, as `collapse_into` reads it.
+struct BuiltTree {
+  const std::vector<BinaryNode>* nodes;
+  std::pair<std::uint32_t, std::uint32_t> children(std::uint32_t node) const {
+    return {(*nodes)[node].left, (*nodes)[node].right};
   }
-  return topology;
-}
+  double weight(std::uint32_t node) const { return (*nodes)[node].weight; }
+  TopologyNode leaf(std::uint32_t node) const {
+    return TopologyNode::leaf((*nodes)[node].begin, (*nodes)[node].end - (*nodes)[node].begin);
+  }
+};
 
 /// Builds the median tree directly as a wide tree: every leaf except the last holds `leaf_size` primitives,
 /// every node above the leaves except the last has `width` leaves, all leaves lie at one depth if the numbers
@@ -286,7 +244,7 @@ class MedianTree {
   MedianTree(BinaryBuilder<S>& builder, const BuilderConfig& config) : builder_(&builder), config_(config) {}
 
   Topology build(std::uint32_t primitives) {
-    Topology topology = with_root(config_);
+    Topology topology = with_root(config_.width, config_.leaf_size);
     std::uint64_t reach = 1;
     std::uint32_t height = 0;
     for (; reach < units(primitives, block()); reach *= config_.width) ++height;
@@ -362,7 +320,8 @@ Topology build_topology(std::span<const Box<S>> boxes, const BuilderConfig& conf
     topology = MedianTree<S>(builder, config).build(std::uint32_t(boxes.size()));
   } else {
     builder.build();
-    topology = collapse(builder.nodes(), config);
+    topology = with_root(config.width, config.leaf_size);
+    collapse_into(topology, BuiltTree{&builder.nodes()});
   }
   topology.primitives.reserve(boxes.size());
   for (const BuildItem& item : builder.items()) topology.primitives.push_back(item.primitive);

@@ -9,8 +9,8 @@
 
 namespace kbvh::experiments {
 
-/// One subcommand: declared to CLI11, and what it does once the command line is read (its exit code).
-/// `action` is set by the subcommand that was called.
+/// One subcommand: its declaration to CLI11, and its action once the command line is read (returns the exit
+/// code). The called subcommand sets `action`.
 using Action = std::function<int()>;
 
 void add_list(CLI::App& program, Action& action);
@@ -22,12 +22,12 @@ void add_theory(CLI::App& program, Action& action);
 void add_stress(CLI::App& program, Action& action);
 void add_ccd(CLI::App& program, Action& action);
 
-/// Runs a program of PATH, prints what it prints, and waits for it; its exit code. Throws io::InputError if
-/// it cannot be started.
+/// Runs a program of PATH, passes on its output, waits for it and returns its exit code. Throws
+/// io::InputError if it cannot be started.
 int run_and_wait(std::vector<std::string> words);
 
-/// `run` and `bench` as said on the command line. Strings are kept as given, until `plan_of` turns them into
-/// the plan that a file would hold.
+/// The options of `run` and `bench` on the command line. Strings stay as given until `plan_of` turns them
+/// into the equivalent plan.
 struct StudyOptions {
   std::string plan_file, out, scene, name, clip, script;
   std::vector<std::string> bodies, strategies, scalars, params, studies, orders, builders;
@@ -36,13 +36,13 @@ struct StudyOptions {
   bool print_plan = false, self = false, continuous = false;
 };
 
-/// Leaves only the studies of a plan file whose name is among `names` (a study without a name has the
-/// plan's), and takes its targets out, which are about all studies together. Throws io::InputError, beginning
-/// with `place`, for a name that no study has.
+/// Keeps only the studies of a plan file whose name is among `names` (a study without a name has the plan's),
+/// and removes its targets, which concern all studies together. Throws io::InputError, beginning with
+/// `place`, for a name that no study has.
 void keep_studies(nlohmann::json& plan, const std::vector<std::string>& names, const std::string& place);
 
-/// The plan that the options say, as a plan file would (without `plan_file`, which is read by itself).
-/// Throws io::InputError.
+/// Returns the plan that is equivalent to the options (without `plan_file`, which is read separately). Throws
+/// io::InputError.
 nlohmann::json plan_of(const StudyOptions& options);
 
 }  // namespace kbvh::experiments

@@ -147,10 +147,10 @@ void print_text() {
 }  // namespace
 
 void add_list(CLI::App& program, Action& action) {
-  CLI::App* command = program.add_subcommand("list", "strategies, built-in scenes and shapes");
+  CLI::App* command = program.add_subcommand("list", "list strategies, built-in scenes and shapes");
   command->footer(list_examples);
   auto as_json = std::make_shared<bool>(false);
-  command->add_flag("--json", *as_json, "everything, for programs");
+  command->add_flag("--json", *as_json, "print everything as JSON");
   command->callback([&action, as_json] {
     action = [as_json] {
       *as_json ? print_json() : print_text();

@@ -15,14 +15,14 @@ namespace {
   throw CLI::ValidationError(name, what);
 }
 
-/// Complains about a value that is empty, or that is the next option because the value was forgotten.
+/// Rejects an empty value, and a value that is the next option because the value was forgotten.
 const std::string& present(const std::string& value, const std::string& name) {
   if (value.empty()) fail(name, "is empty, but needs a value");
   if (value.starts_with("--")) fail(name, "needs a value, got the option " + io::printable(value));
   return value;
 }
 
-/// The parts of all values between commas.
+/// Returns the comma-separated parts of all values.
 std::vector<std::string> parts_of(const std::vector<std::string>& given, const std::string& name) {
   std::vector<std::string> parts;
   for (const std::string& text : given)
@@ -40,7 +40,7 @@ std::string described(const WholeRange& range) {
                      unlimited ? "2^64 - 1" : std::to_string(range.most));
 }
 
-/// As in plans: values that are given twice count once, where they come first.
+/// As in plans: repeated values count once, at their first place.
 template <class T>
 void add_once(std::vector<T>& list, T value) {
   if (std::find(list.begin(), list.end(), value) == list.end()) list.push_back(std::move(value));
@@ -63,7 +63,7 @@ std::vector<std::uint64_t> whole_numbers(const std::vector<std::string>& given, 
 }
 
 std::string only_one(const std::vector<std::string>& given, const std::string& name) {
-  // CLI11 adds "%%" to "{}", its word for an empty list.
+  // CLI11 adds "%%" to "{}", its notation for an empty list.
   if (given == std::vector<std::string>{"{}", "%%"}) return given[0];
   if (given.empty()) fail(name, "needs a value");
   if (given.size() > 1)
@@ -88,7 +88,7 @@ CLI::Option* add_texts(CLI::App& command, const std::string& name, std::vector<s
     return true;
   };
   CLI::Option* option = command.add_option(name, read, meaning)->take_all()->type_name("TEXT");
-  // An option takes one value each time; a positional argument has nothing that begins the next.
+  // An option takes one value each time; a positional argument has no prefix that begins the next.
   if (name.starts_with("-")) return option->expected(1);
   return option->expected(1, many_values)->allow_extra_args();
 }

@@ -6,41 +6,41 @@
 
 #include "experiments/common/ranges.hpp"
 
-/// Options whose values are read once and strictly. CLI11's own conversions take "-1" for a large number and
-/// "010" for eight, and drop empty parts of lists. Every complaint names the option and the value, and values
+/// Options whose values are read once and strictly. CLI11's own conversions read "-1" as a large number and
+/// "010" as eight, and drop empty parts of lists. Every message names the option and the value, and values
 /// are never empty.
 namespace kbvh::experiments {
 
-/// A text, given once.
+/// Adds a text option, given once.
 CLI::Option* add_text(CLI::App& command, const std::string& name, std::string& target,
                       const std::string& meaning);
 
-/// A text that may be given several times, or several in a row for positional arguments.
+/// Adds a text option that may be given several times, or several in a row for positional arguments.
 CLI::Option* add_texts(CLI::App& command, const std::string& name, std::vector<std::string>& target,
                        const std::string& meaning);
 
-/// Words separated by commas; one that is given twice counts once.
+/// Adds an option of words separated by commas; repeated words count once.
 CLI::Option* add_words(CLI::App& command, const std::string& name, std::vector<std::string>& target,
                        const std::string& meaning);
 
-/// A finite number from `least` to `most`, given once.
+/// Adds an option with a finite number from `least` to `most`, given once.
 CLI::Option* add_number(CLI::App& command, const std::string& name, double& target, double least, double most,
                         const std::string& meaning);
 
-/// The whole number that a text is; throws CLI::ValidationError with `name` and the text.
+/// Parses a whole number; throws CLI::ValidationError with `name` and the text.
 std::uint64_t whole_number(const std::string& text, const std::string& name, const WholeRange& range);
 
-/// The same of all parts of `given`, separated by commas, each once; throws also for empty parts.
+/// Parses all comma-separated parts of `given`, each once; throws also for empty parts.
 std::vector<std::uint64_t> whole_numbers(const std::vector<std::string>& given, const std::string& name,
                                          const WholeRange& range);
 
-/// The only one of `given`; throws for several, for an empty one and for what is another option.
+/// Returns the only value of `given`; throws for several, for an empty one and for another option.
 std::string only_one(const std::vector<std::string>& given, const std::string& name);
 
-/// As many values as there are.
+/// No limit on the number of values.
 inline constexpr int many_values = CLI::detail::expected_max_vector_size;
 
-/// A whole number, given once.
+/// Adds an option with a whole number, given once.
 template <class T>
 CLI::Option* add_whole(CLI::App& command, const std::string& name, T& target, const WholeRange& range,
                        const std::string& meaning) {
@@ -51,7 +51,7 @@ CLI::Option* add_whole(CLI::App& command, const std::string& name, T& target, co
   return command.add_option(name, read, meaning)->expected(1)->take_all()->type_name("UINT");
 }
 
-/// Whole numbers separated by commas; one that is given twice counts once.
+/// Adds an option of whole numbers separated by commas; repeated numbers count once.
 template <class T>
 CLI::Option* add_wholes(CLI::App& command, const std::string& name, std::vector<T>& target,
                         const WholeRange& range, const std::string& meaning) {

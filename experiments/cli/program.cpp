@@ -22,15 +22,15 @@ namespace kbvh::experiments {
 
 namespace {
 
-/// Makes one line of a message, without characters that a terminal obeys. Where a value or a path makes it
-/// long, its middle is left out: both ends say what is wrong.
+/// Makes one line of a message, without control characters. Cuts the middle of overlong values or paths,
+/// because both ends are informative.
 std::string one_line(std::string text) {
   constexpr std::size_t longest = 290, tail = 90;
   for (char& c : text)
     if (const auto byte = static_cast<unsigned char>(c); byte < 32 || byte == 127) c = c == '\n' ? ' ' : '?';
   text.erase(text.find_last_not_of(' ') + 1);
   if (text.size() <= longest) return text;
-  // Not within a character of several bytes.
+  // Does not split a character of several bytes.
   const auto continues = [&](std::size_t at) { return (text[at] & 0xc0) == 0x80; };
   std::size_t head = longest - tail - 5, rest = text.size() - tail;
   while (head > 0 && continues(head)) --head;
@@ -42,7 +42,7 @@ std::string version() {
   return "kbvh, commit " + commit() + (dirty() ? " with changes" : "");
 }
 
-/// The options of a command, as they are written.
+/// Returns the options of a command as they are written.
 std::vector<std::string> options_of(const CLI::App& command) {
   std::vector<std::string> names;
   for (const CLI::Option* option : command.get_options())
@@ -50,7 +50,7 @@ std::vector<std::string> options_of(const CLI::App& command) {
   return names;
 }
 
-/// What to say of words that no option takes.
+/// Composes the message about words that no option takes.
 std::string unexpected(const CLI::App& program) {
   const auto called = program.get_subcommands();
   const CLI::App& command = called.empty() ? program : *called.front();
@@ -69,7 +69,7 @@ std::string unexpected(const CLI::App& program) {
          name + " --help)";
 }
 
-/// CLI11 takes the word after "--out=" for the missing value.
+/// CLI11 uses the word after "--out=" as the missing value.
 std::optional<std::string> option_without_value(int argc, const char* const* argv) {
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
@@ -79,7 +79,7 @@ std::optional<std::string> option_without_value(int argc, const char* const* arg
   return {};
 }
 
-/// The exit code, after a complaint if not everything that was printed has arrived.
+/// Returns the exit code, after a message if some output was not written.
 int finished(int code) {
   const std::string why = output_failure();
   if (why.empty()) return code;
@@ -159,7 +159,7 @@ int run_program(int argc, const char* const* argv) {
   } catch (const ConfigError& problem) {
     return wrong(problem.what());
   } catch (const std::bad_alloc&) {
-    say("out of memory: what was asked for does not fit into this machine, or into a limit (ulimit -v)");
+    say("out of memory: the request exceeds this machine's memory, or a limit (ulimit -v)");
     return internal_error;
   } catch (const std::exception& problem) {
     say(std::string("internal error: ") + one_line(problem.what()));

@@ -1,18 +1,18 @@
 #pragma once
 
-/// The kbvh program: lists, runs, benchmarks and reports. A library, so that a project with strategies of its
+/// The kbvh program: lists, runs, benchmarks and reports. It is a library: a project with strategies of its
 /// own gets the whole program by linking it with its own manifest.
 namespace kbvh::experiments {
 
-/// What the program says to the shell.
+/// The exit codes of the program.
 enum ExitCode : int {
   success = 0,
-  guarantee_broken = 1,  ///< everything ran, but a contestant's declared guarantee or tightness did not hold
+  guarantee_broken = 1,  ///< everything ran, but a contestant violated its declared guarantee or tightness
   wrong_use = 2,         ///< wrong command line, plan, parameter or input file; one sentence on stderr
-  internal_error = 3,    ///< anything else, as standard output on a full disk
+  internal_error = 3,    ///< anything else, for example standard output on a full disk
 };
 
-/// The whole program; `argv` as given to main. Prints results on stdout and everything else on stderr.
+/// Runs the whole program; `argv` as given to main. Prints results on stdout and everything else on stderr.
 int run_program(int argc, const char* const* argv);
 
 }  // namespace kbvh::experiments

@@ -24,8 +24,9 @@ namespace {
 
 constexpr const char* report_examples = R"(Example:
   kbvh report --out results
-writes results/report.html, self-contained, its figures and results/claims.json, from results/results.jsonl and what lies
-beside it: targets.json (bench), theory.json, stress.json, ccd.json. Commands that make those take the same --out.)";
+writes results/report.html, self-contained, its figures and results/claims.json, from results/results.jsonl and the
+files next to it: targets.json (bench), theory.json, stress.json, ccd.json. The commands that write those take the
+same --out.)";
 
 int report(const std::string& out, const std::string& title) {
   const std::filesystem::path results = std::filesystem::path(out) / "results.jsonl";
@@ -40,7 +41,7 @@ int report(const std::string& out, const std::string& title) {
   return code == wrong_use ? wrong_use : internal_error;
 }
 
-/// Prints what is read, until its end.
+/// Prints everything that can be read from a descriptor.
 void pass_on(int descriptor) {
   char bytes[4096];
   for (;;) {
@@ -57,7 +58,7 @@ int run_and_wait(std::vector<std::string> words) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
-  // What the program prints comes through here, so that a full disk is told of in one way.
+  // The program's output passes through here, so that a full disk is reported in one way.
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), "pipe");
   posix_spawn_file_actions_t actions;
@@ -77,11 +78,11 @@ int run_and_wait(std::vector<std::string> words) {
 }
 
 void add_report(CLI::App& program, Action& action) {
-  CLI::App* command = program.add_subcommand("report", "tables and figures of a result folder");
+  CLI::App* command = program.add_subcommand("report", "write tables and figures of a result folder");
   command->footer(report_examples);
   auto out = std::make_shared<std::string>(), title = std::make_shared<std::string>();
   add_text(*command, "--out", *out, "folder with results.jsonl")->required();
-  add_text(*command, "--title", *title, "of the report");
+  add_text(*command, "--title", *title, "title of the report");
   command->callback([&action, out, title] { action = [out, title] { return report(*out, *title); }; });
 }
 

@@ -21,18 +21,18 @@ constexpr const char* run_examples = R"(Examples:
   kbvh run --scene tablecloth --triangles 2000 --l 10
   kbvh run --body cloth.obj,motion=cloth.pc2 --body sphere:triangles=2000,centre=0:0:1,radius=0.4 --out results
   kbvh run --scene waving_sheet --strategies bottom_up,rebuild --leaf-size 1,4 --scalar float,double
-A body is a file (.obj .ply .gltf .glb, or a folder of numbered frames) or a shape, then key=value separated by
-commas: motion clip fps (files), name scale rotate=axis:degrees translate=x:y:z as=triangles|points (all); `kbvh
-list` shows shapes.
-Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input, 3 anything else.)";
+A body is a file (.obj .ply .gltf .glb, or a folder of numbered frames) or a shape, followed by key=value pairs
+separated by commas: motion clip fps (files), name scale rotate=axis:degrees translate=x:y:z as=triangles|points
+(all); `kbvh list` shows the shapes.
+Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input, 3 other error.)";
 
 constexpr const char* bench_examples = R"(Examples:
   kbvh bench --scene tablecloth --triangles 2000,16000 --l 1,10 --repetitions 5 --out results
   kbvh bench --plan experiments/plans/default.json --out results
 One iteration is a whole clip, timed by phases; repetitions are randomly interleaved and all kept, in
-DIR/benchmark.json and DIR/results.jsonl. Whoever breaks its guarantee is refused a time.)";
+DIR/benchmark.json and DIR/results.jsonl. A contestant that breaks its guarantee gets no time.)";
 
-/// Parameters as the plan holds them: "key=a,b" becomes {"key": ["a", "b"]}.
+/// Converts parameters to the form of a plan: "key=a,b" becomes {"key": ["a", "b"]}.
 json params_of(const std::vector<std::string>& assignments) {
   json params = json::object();
   for (const std::string& text : assignments) {
@@ -46,7 +46,7 @@ json params_of(const std::vector<std::string>& assignments) {
   return params;
 }
 
-/// --clip is for every glTF body that does not name a clip of its own.
+/// Applies --clip to every glTF body without a clip of its own.
 void choose_clip(json& scene, const std::string& clip) {
   bool used = false;
   for (json& body : scene["bodies"]) {
@@ -119,35 +119,36 @@ int run_study(const StudyOptions& options, Harness harness) {
         (std::filesystem::path(options.out) / "results.jsonl").string() + " already");
   if (outcome.unfinished > 0)
     say(counted(outcome.unfinished, "configuration") +
-        " for which there was no memory; the next run measures them again");
+        " without enough memory; the next run measures them again");
   if (outcome.refused == 0) return outcome.unfinished == 0 ? success : internal_error;
-  say(counted(outcome.refused, "configuration") + " in which a strategy breaks what it guarantees");
+  say(counted(outcome.refused, "configuration") + " in which a strategy breaks its guarantee");
   return guarantee_broken;
 }
 
 void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
   std::vector<CLI::Option*> said_by_plan{
-      add_text(command, "--scene", o->scene, "built-in scene (default: tablecloth); `kbvh list` shows them"),
+      add_text(command, "--scene", o->scene, "built-in scene (default: tablecloth); `kbvh list` shows all"),
       add_texts(command, "--body", o->bodies, "a body from a file or by formula; repeatable, see below"),
       add_text(command, "--clip", o->clip,
                "animation of glTF bodies: its name or index; also as clip= in --body"),
       add_text(command, "--name", o->name, "name of the scene in results"),
       add_wholes(command, "--triangles", o->triangles, ranges::triangles,
-                 "of the built-in scene's moving body (2000); a list sweeps"),
+                 "triangles of the built-in scene's moving body (2000); a list sweeps"),
       add_whole(command, "--obstacle", o->obstacle, ranges::triangles,
-                "triangles of the body beside it (a table: 2048; else as many, up to 20000)"),
-      add_whole(command, "--keyframes", o->keyframes, ranges::keyframes, "of a built-in scene (60)"),
-      add_wholes(command, "--seed", o->seeds, ranges::any, "of what chance decides (1); a list sweeps"),
-      add_text(command, "--script", o->script,
-               "changes of plans while the scene runs: a file, see RESULTS.md"),
+                "triangles of the other body (a table: 2048; else as many, up to 20000)"),
+      add_whole(command, "--keyframes", o->keyframes, ranges::keyframes,
+                "keyframes of a built-in scene (60)"),
+      add_wholes(command, "--seed", o->seeds, ranges::any, "seed of random choices (1); a list sweeps"),
+      add_text(command, "--script", o->script, "file with changes of plans at run time, see RESULTS.md"),
       command.add_flag(
           "--continuous", o->continuous,
-          "contacts of vertices and faces, and of edges, between keyframes: exact, l does not apply"),
-      command.add_flag("--self", o->self,
-                       "pairs within every body, too, of primitives that share no vertex; of one: self=true"),
+          "find contacts of vertices and faces, and of edges, between keyframes: exact, l does not apply"),
+      command.add_flag(
+          "--self", o->self,
+          "also find pairs within every body, of primitives that share no vertex; of one body: self=true"),
       add_words(command, "--order", o->orders, "vertex order: given, shuffled, renumbered; a list sweeps"),
       add_words(command, "--strategies", o->strategies,
-                "ids, family:NAME, default (all that promise something) or all; !x: but not x"),
+                "ids, family:NAME, default (all with a guarantee) or all; !x: without x"),
       add_texts(command, "--param", o->params, "key=value or strategy.key=value; a list of values sweeps"),
       add_words(command, "--builder", o->builders, "median, sah, morton (each strategy's own best)"),
       add_wholes(command, "--width", o->widths, ranges::width, "children per node: 2, 4, 8"),
@@ -159,15 +160,15 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
   add_whole(command, "--repetitions", o->repetitions, ranges::repetitions,
             "timed clips of each contestant (3)");
   add_whole(command, "--frames-limit", o->frames_limit, ranges::positive,
-            "only so many first frames (intervals with --continuous)");
+            "play only this many first frames (intervals with --continuous)");
   add_whole(command, "--oracle-every", o->oracle_every, ranges::positive,
             "compare only every n-th frame or interval (and the last) with the truth (1)");
-  add_text(command, "--out", o->out, "folder to which results are appended (none: the table only)");
-  CLI::Option* plan = add_text(command, "--plan", o->plan_file, "a study as a file, see RESULTS.md");
+  add_text(command, "--out", o->out, "folder for results, which are appended (none: print the table only)");
+  CLI::Option* plan = add_text(command, "--plan", o->plan_file, "file with a study, see RESULTS.md");
   add_texts(command, "--study", o->studies,
-            "only the studies of this name, without the plan's targets; repeatable")
+            "run only the studies of this name, without the plan's targets; repeatable")
       ->needs(plan);
-  command.add_flag("--print-plan", o->print_plan, "print the plan file that says the same, and stop");
+  command.add_flag("--print-plan", o->print_plan, "print the equivalent plan file, and stop");
   for (CLI::Option* option : said_by_plan) plan->excludes(option);
 }
 
@@ -220,12 +221,12 @@ json plan_of(const StudyOptions& options) {
 }
 
 void add_run(CLI::App& program, Action& action) {
-  add_command(program, action, "run", "verify and time contestants on a scene, and print a table",
-              run_examples, Harness::rounds);
+  add_command(program, action, "run", "verify and time contestants on scenes, and print tables", run_examples,
+              Harness::rounds);
 }
 
 void add_bench(CLI::App& program, Action& action) {
-  add_command(program, action, "bench", "the same under Google Benchmark", bench_examples,
+  add_command(program, action, "bench", "verify and time contestants under Google Benchmark", bench_examples,
               Harness::google_benchmark);
 }
 

@@ -20,9 +20,9 @@ constexpr const char* scene_examples = R"(Examples:
   kbvh scene shirt --triangles 32000
   kbvh scene dress --triangles 8000 --frame 30 --out dress.obj
   kbvh scene dress --triangles 8000 --out folder
-Prints counts and how violently the bodies move: the share of the sides of a binary tree (a triangle per leaf)
-whose realising vertex changes from one keyframe to the next. A folder gets every body as OBJ, with PC2 if it
-moves, and these numbers as card.json; a file ending in .obj holds all bodies at one keyframe, one after the other.)";
+Prints counts and a measure of the motion: the share of the sides of a binary tree (one triangle per leaf) whose
+realising vertex changes from one keyframe to the next. A folder gets every body as OBJ, with PC2 if it moves, and
+these numbers as card.json; a file ending in .obj gets all bodies at one keyframe, one after the other.)";
 
 struct SceneOptions {
   std::string name, out;
@@ -31,7 +31,8 @@ struct SceneOptions {
   bool as_json = false;
 };
 
-/// All bodies as one mesh at one keyframe: bodies at rest, and past their end, as they are last.
+/// Merges all bodies into one mesh at one keyframe: bodies at rest, and bodies past their end, in their last
+/// positions.
 io::AnimatedMesh snapshot(const std::vector<io::AnimatedMesh>& bodies, std::size_t frame) {
   io::AnimatedMesh all;
   all.keyframe_times = {0.0};
@@ -54,7 +55,7 @@ bool is_obj(const SceneOptions& options) {
   return std::filesystem::path(options.out).extension() == ".obj";
 }
 
-/// Complains about a --frame that no file would show.
+/// Rejects a --frame that no file would show.
 void check_frame(const LoadedScene& scene, const SceneOptions& options) {
   if (options.frame == 0) return;
   if (!is_obj(options)) throw io::InputError("--frame: goes with --out FILE.obj, which shows one keyframe");
@@ -112,17 +113,18 @@ int show(const SceneOptions& options) {
 }  // namespace
 
 void add_scene(CLI::App& program, Action& action) {
-  CLI::App* command = program.add_subcommand("scene", "what a built-in scene is, and its meshes as files");
+  CLI::App* command = program.add_subcommand("scene", "describe a built-in scene, and write its meshes");
   command->footer(scene_examples);
   auto o = std::make_shared<SceneOptions>();
   add_text(*command, "name", o->name, "`kbvh list` shows them")->required();
-  add_whole(*command, "--triangles", o->scene.triangles, ranges::triangles, "of the moving body (2000)");
+  add_whole(*command, "--triangles", o->scene.triangles, ranges::triangles,
+            "triangles of the moving body (2000)");
   add_whole(*command, "--obstacle", o->scene.obstacle_triangles, ranges::triangles,
-            "triangles of the body beside it");
+            "triangles of the other body");
   add_whole(*command, "--keyframes", o->scene.keyframes, {1, ranges::keyframes.most}, "(60)");
-  add_whole(*command, "--seed", o->scene.seed, ranges::any, "of what chance decides (1)");
+  add_whole(*command, "--seed", o->scene.seed, ranges::any, "seed of random choices (1)");
   add_whole(*command, "--full-triangles", o->scene.full_triangles, ranges::triangles,
-            "garments: most triangles that are simulated in full; above, a second level refines");
+            "garments: largest number of triangles simulated in full; above it, a second level refines");
   add_whole(*command, "--frame", o->frame, ranges::any, "keyframe of the OBJ file, from 0");
   add_text(*command, "--out", o->out, "OBJ file or folder to write");
   command->add_flag("--json", o->as_json, "for programs");

@@ -26,10 +26,10 @@ constexpr const char* stress_examples = R"(Examples:
   kbvh stress --families near_tangent,spikes --strategies kinetic_aabb,bottom_up --l 7
   kbvh stress --strategies family:approximate --out results/error
   kbvh stress --repro results/stress/repro-spikes-kinetic_aabb-float.json
-Scenes made to break what they are played to, from seeds; each contestant in a process of its own, held against the
-oracle. DIR/stress.json has the table, DIR/repro-*.json what failed, made as small as it could be. With the folder of a
-study for DIR, that study's report has the table, too.
-Exit codes: 0 nothing failed, 1 something did, 2 wrong use, 3 anything else. Errors of approximate contestants are results.)";
+Plays adversarial scenes, generated from seeds, to each contestant in a process of its own, and compares with the
+oracle. DIR/stress.json has the table, DIR/repro-*.json the failures, shrunk as far as possible. If DIR is the folder of
+a study, the study's report includes the table.
+Exit codes: 0 no failure, 1 failure, 2 wrong use, 3 other error. Errors of approximate contestants are results.)";
 
 struct StressArguments {
   std::string out, repro;
@@ -87,10 +87,10 @@ int run_repro(const StressArguments& arguments, bool others) {
   return failed ? guarantee_broken : success;
 }
 
-/// What a run leaves in its folder, written while it runs: what was found is there whenever it ends.
+/// The files of a run in its folder, written during the run, so that an interrupted run keeps its findings.
 class StressFiles {
  public:
-  /// Writes nothing if there is no folder. Throws io::InputError if it cannot be written.
+  /// Writes nothing without a folder. Throws io::InputError if the folder cannot be written.
   StressFiles(std::filesystem::path folder, const stress::StressOptions& options)
       : folder_(std::move(folder)), options_(options) {
     if (folder_.empty()) return;
@@ -98,7 +98,7 @@ class StressFiles {
     if (file_->earlier().is_null()) write_table({});
   }
 
-  /// Failures at once, the table every other second. Problems are kept for `finish`: the run goes on.
+  /// Writes failures at once, the table every other second. Errors are kept for `finish`: the run continues.
   void keep(stress::StressReport& report) {
     if (folder_.empty()) return;
     try {
@@ -113,7 +113,7 @@ class StressFiles {
     }
   }
 
-  /// Throws io::InputError if anything could not be written.
+  /// Throws io::InputError if any file could not be written.
   void finish(const stress::StressReport& report) {
     if (folder_.empty()) return;
     if (!problem_.empty()) throw io::InputError(problem_);
@@ -122,7 +122,7 @@ class StressFiles {
   }
 
  private:
-  /// Leaves the table of an earlier run with the same options until this one has come as far.
+  /// Keeps the table of an earlier run with the same options until this run has progressed as far.
   void write_table(const stress::StressReport& report) {
     if (const nlohmann::json& earlier = file_->earlier();
         !earlier.is_null() && earlier.value("played", nlohmann::json(0)) > nlohmann::json(report.played))
@@ -130,7 +130,7 @@ class StressFiles {
     file_->write(to_json(report, options_));
   }
 
-  /// Writes a failure that is new, or was made smaller since; false if there was nothing to do.
+  /// Writes a failure that is new or was shrunk further; returns false if there was nothing to write.
   bool keep(stress::StressFailure& failure, std::size_t i) {
     std::string text = stress::to_text(failure.repro);
     if (i < texts_.size() && texts_[i] == text) return false;
@@ -144,7 +144,7 @@ class StressFiles {
     return true;
   }
 
-  /// A name that nothing else has: a failure of another run stays, the same one is not kept twice.
+  /// Returns an unused name: a failure of another run stays, and the same failure is not written twice.
   std::string name_for(const stress::Repro& repro, const std::string& text, const std::string& own) const {
     const std::string base = "repro-" + repro.scene.family + "-" + repro.strategy + "-" + repro.scalar;
     std::error_code error;
@@ -161,7 +161,7 @@ class StressFiles {
   std::filesystem::path folder_;
   const stress::StressOptions& options_;
   std::optional<ResultFile> file_;
-  std::vector<std::string> texts_;  ///< of each failure, as written
+  std::vector<std::string> texts_;  ///< text of each failure as written
   std::chrono::steady_clock::time_point written_{};
   std::string problem_;
 };
@@ -214,25 +214,27 @@ int run(const StressArguments& arguments, bool strategies_named) {
 }  // namespace
 
 void add_stress(CLI::App& program, Action& action) {
-  CLI::App* command = program.add_subcommand("stress", "play scenes that are made to break things");
+  CLI::App* command = program.add_subcommand("stress", "play adversarial scenes");
   command->footer(stress_examples);
   auto a = std::make_shared<StressArguments>();
   CLI::Option* strategies =
       add_words(*command, "--strategies", a->strategies, "as for run: ids, family:NAME, default, all, !ID");
-  add_words(*command, "--families", a->families, "of scenes (all)");
-  add_whole(*command, "--scenes", a->scenes, {1, 10000000}, "to be made, in turn of the families (100)");
-  add_whole(*command, "--seed", a->seed, ranges::any, "another one, other scenes (1)");
+  add_words(*command, "--families", a->families, "families of scenes (all)");
+  add_whole(*command, "--scenes", a->scenes, {1, 10000000},
+            "number of scenes, cycling through the families (100)");
+  add_whole(*command, "--seed", a->seed, ranges::any, "seed of the scenes (1)");
   add_words(*command, "--scalars", a->scalars, "float, double (both)");
   add_wholes(*command, "--l", a->l, {1, 100000}, "frames for each keyframe interval (1,7,100)");
   add_texts(*command, "--param", a->params, "key=value or strategy.key=value; a list of values sweeps");
   add_whole(*command, "--many-keyframes", a->many_keyframes, {100, 10000000},
-            "of the longest scene (100000)");
+            "keyframes of the longest scene (100000)");
   add_number(*command, "--seconds", a->seconds, 0.001, 1e6,
-             "processor time of a strategy on a scene; more hangs (100)");
-  command->add_flag("--plain", a->plain, "every strategy in its usual configuration only");
-  command->add_flag("--no-shrink", a->no_shrink, "leave failures as large as they are");
+             "processor time of a strategy on a scene; more counts as a hang (100)");
+  command->add_flag("--plain", a->plain, "play every strategy in its usual configuration only");
+  command->add_flag("--no-shrink", a->no_shrink, "do not shrink failures");
   command->add_flag("--list", a->list, "show the families");
-  add_text(*command, "--repro", a->repro, "play the scene of this file, by whom it names or --strategies");
+  add_text(*command, "--repro", a->repro,
+           "play the scene of this file with the strategy that it names, or with --strategies");
   add_text(*command, "--out", a->out, "folder for stress.json and repro files (none: the table only)");
   command->callback([&action, a, strategies] {
     const bool named = strategies->count() > 0;

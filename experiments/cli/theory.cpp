@@ -23,9 +23,9 @@ constexpr const char* theory_examples = R"(Examples:
   kbvh theory
   kbvh theory --scenes waving_sheet --sizes 500,1000,2000,4000,8000,16000 --out results/theory
   kbvh theory --full --out results/theory
-Holds the claims of Zachmann & Weller 2006 against counts and exact arithmetic; no clock decides anything.
-DIR/theory.json has the table with all numbers, DIR/figures what grows with what, DIR/theory.jsonl each measurement as
-soon as it is made: a run that was stopped goes on where it was. Exit codes: 0 done, whatever the verdicts; 2 wrong use, 3 else.)";
+Checks the claims of Zachmann & Weller 2006 against counts and exact arithmetic, without a clock. DIR/theory.json has
+the table with all numbers, DIR/figures the growth of the counts, DIR/theory.jsonl each measurement as soon as it is
+made: an interrupted run continues from it. Exit codes: 0 done, with any verdicts; 2 wrong use, 3 other error.)";
 
 struct TheoryArguments {
   std::string out;
@@ -68,19 +68,19 @@ int run(const TheoryArguments& arguments) {
 }  // namespace
 
 void add_theory(CLI::App& program, Action& action) {
-  CLI::App* command = program.add_subcommand("theory", "hold the paper's claims against exact counts");
+  CLI::App* command = program.add_subcommand("theory", "check the paper's claims by exact counts");
   command->footer(theory_examples);
   auto a = std::make_shared<TheoryArguments>();
   add_words(*command, "--scenes", a->scenes, "built-in scenes; `kbvh list` shows them");
   add_wholes(*command, "--sizes", a->sizes, {1, 1u << 24},
-             "triangles of each; six or more for a fit (250 to 8000)");
-  add_whole(*command, "--keyframes", a->keyframes, {2, 100000}, "of built-in scenes (30)");
+             "triangles of each scene; a fit needs six or more sizes (250 to 8000)");
+  add_whole(*command, "--keyframes", a->keyframes, {2, 100000}, "keyframes of built-in scenes (30)");
   add_whole(*command, "--exact-limit", a->exact_limit, {1, 1u << 24},
-            "most triangles held against exact envelopes (500)");
-  add_whole(*command, "--instants", a->instants, {1, 1000000}, "audited between keyframes (200)");
+            "largest size checked against exact envelopes (500)");
+  add_whole(*command, "--instants", a->instants, {1, 1000000}, "times audited between keyframes (200)");
   add_text(*command, "--out", a->out, "folder for theory.json and figures (none: the table only)");
-  command->add_flag("--no-figures", a->no_figures, "leave out the figures, which take Python and matplotlib");
-  CLI::Option* quick = command->add_flag("--quick", a->quick, "what CI runs: the default");
+  command->add_flag("--no-figures", a->no_figures, "do not draw figures, which need Python and matplotlib");
+  CLI::Option* quick = command->add_flag("--quick", a->quick, "the extent of CI: the default");
   command->add_flag("--full", a->full, "up to 580k triangles, exact up to 16k, whole sequences: hours")
       ->excludes(quick);
   command->callback([&action, a] { action = [a] { return run(*a); }; });

@@ -35,9 +35,9 @@ fs::path cache_folder() {
       if (fs::is_directory(wanted, error) && ::access(wanted.c_str(), W_OK | X_OK) == 0) return wanted;
     }
     say("warning: " +
-        (wanted.empty() ? "there is no cache folder, for HOME is not set"
+        (wanted.empty() ? "there is no cache folder, because HOME is not set"
                         : "the cache folder '" + wanted.string() + "' cannot be written") +
-        ", so scenes and true pairs are computed anew (KBVH_CACHE names another)");
+        "; scenes and true pairs are recomputed (KBVH_CACHE names another folder)");
     return fs::path();
   }();
   return folder;

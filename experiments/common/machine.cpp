@@ -24,7 +24,7 @@ extern const bool built_dirty;
 
 namespace {
 
-/// The value of the first "key : value" line of /proc/cpuinfo.
+/// Returns the value of the first "key : value" line of /proc/cpuinfo.
 std::string cpuinfo(const std::string& key) {
   std::ifstream file("/proc/cpuinfo");
   for (std::string line; std::getline(file, line);) {
@@ -72,7 +72,7 @@ std::string compiler() {
 #endif
 }
 
-/// The kernels in use; a wrong word in the environment is wrong use of the program.
+/// Returns the kernels in use; a wrong name in the environment is wrong use of the program.
 std::string kernels() {
   try {
     return name(active_kernel_set());

@@ -4,21 +4,21 @@
 
 namespace kbvh::experiments {
 
-/// Where and how this program runs, as results record it: cpu, cores, memory_gb, os, compiler, flags,
-/// build_type, simd, kernels (the set in use). Throws io::InputError if KBVH_KERNELS names none that works
+/// Describes the machine and the build as results record them: cpu, cores, memory_gb, os, compiler, flags,
+/// build_type, simd, kernels (the set in use). Throws io::InputError if KBVH_KERNELS names no set that runs
 /// here.
 nlohmann::json machine();
 
-/// The commit that was built, in full, or "unknown".
+/// Returns the commit that was built, in full, or "unknown".
 std::string commit();
-/// Had tracked files been changed when it was built?
+/// Returns whether tracked files had been changed at the build.
 bool dirty();
 
-/// What stands for the program's code in the keys of results: the commit; where that says too little (changed
-/// files, no repository), a hash of the running executable is added.
+/// Identifies the program's code in the keys of results: the commit; with changed files or without a
+/// repository also a hash of the running executable.
 std::string program_identity();
 
-/// The time now, UTC, as 2025-01-31T12:00:00Z.
+/// Returns the current time in UTC, as 2025-01-31T12:00:00Z.
 std::string now_utc();
 
 }  // namespace kbvh::experiments

@@ -17,7 +17,7 @@ std::size_t utf8_length(std::string_view text, std::size_t at) {
   if (first < 0xC2 || first > 0xF4 || at + length > text.size()) return 0;
   for (std::size_t i = 1; i < length; ++i)
     if ((byte(at + i) & 0xC0) != 0x80) return 0;
-  // Longer than need be, halves of UTF-16 pairs, and beyond the last code point.
+  // Overlong sequences, halves of UTF-16 pairs, and values beyond the last code point.
   const unsigned second = byte(at + 1);
   const bool wrong = (first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
                      (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F);
@@ -59,7 +59,7 @@ void check_name(const std::string& name, const std::string& place) {
 
 namespace {
 
-/// Names that mean devices on Windows, whatever ending they have.
+/// Names that mean devices on Windows, with any extension.
 bool names_a_device(const std::string& name) {
   std::string stem = name.substr(0, name.find('.'));
   for (char& c : stem) c = c >= 'a' && c <= 'z' ? char(c - 'a' + 'A') : c;

@@ -5,25 +5,25 @@
 
 namespace kbvh::experiments {
 
-/// The length of the UTF-8 character that begins at `at`, or 0 if the bytes there are none.
+/// Returns the length of the UTF-8 character that begins at `at`, or 0 if the bytes there are not UTF-8.
 std::size_t utf8_length(std::string_view text, std::size_t at);
 
-/// The text with every byte that is not UTF-8, or a control character, spelt out ("caf\xE9"): file names may
-/// be any bytes, results are JSON, and names are of one line. Other text stays as it is.
+/// Escapes every byte that is not UTF-8 and every control character ("caf\xE9"): file names may be any bytes,
+/// results are JSON, and names have one line. Other text stays unchanged.
 std::string readable(std::string_view bytes);
 
-/// Checks a name that a user gives to a scene or a body; throws io::InputError that begins with `place` if it
-/// is not UTF-8, is longer than 1,000 bytes, has control characters in it, or is "." or "..". Anything else
-/// is a name: `file_name` makes files of it.
+/// Checks a name that a user gives to a scene or a body. Throws io::InputError that begins with `place` if
+/// the name is not UTF-8, is longer than 1,000 bytes, contains control characters, or is "." or "..". All
+/// other texts are names; `file_name` converts them to file names.
 void check_name(const std::string& name, const std::string& place);
 
-/// A name that every file system takes, and that names nothing but an entry of its folder: '/' and other
-/// characters that some system forbids become '-', so do leading dots; names of devices and trailing dots and
-/// blanks get a '-' behind them, and a long name is cut to 100 bytes with its hash at the end.
+/// Converts a name to one that every file system accepts and that names only an entry of its folder: '/' and
+/// other characters that some system forbids become '-', and so do leading dots; names of devices and
+/// trailing dots and blanks get a '-' appended; a long name is cut to 100 bytes with its hash at the end.
 std::string file_name(const std::string& name);
 
-/// What a scene is called that has no name: those of its bodies, joined by '+'; of many, the first ones
-/// ("sphere-20+sphere-20+18 more").
+/// Composes the name of an unnamed scene: the names of its bodies, joined by '+'; of many bodies, the first
+/// ones ("sphere-20+sphere-20+18 more").
 std::string name_of_bodies(const std::vector<std::string>& names);
 
 }  // namespace kbvh::experiments

@@ -19,9 +19,9 @@ int first_error = 0;
 
 void prepare_output() {
   std::signal(SIGPIPE, SIG_IGN);
-  // Where files may not grow any further, writing fails as on a full disk.
+  // Beyond a limit on file sizes, writing fails as on a full disk.
   std::signal(SIGXFSZ, SIG_IGN);
-  // A stream that is closed gets one that cannot be used the wrong way: writing to standard output still
+  // A closed stream is replaced by one that cannot be used the wrong way: writing to standard output still
   // fails.
   const int modes[] = {O_WRONLY, O_RDONLY, O_WRONLY};
   for (int stream = 0; stream < 3; ++stream)

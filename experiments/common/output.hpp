@@ -9,11 +9,11 @@ namespace kbvh::experiments {
 void prepare_output();
 
 /// Prints on standard output, at once. Does not throw, because a table that cannot be shown must not lose
-/// what is still being measured; `output_failure` tells of it at the end.
+/// running measurements; `output_failure` reports the failure at the end.
 void print(std::string_view text);
 
-/// Why something that was printed did not arrive, as "No space left on device". Empty if everything arrived,
-/// or if the reader closed the pipe: it has what it wanted.
+/// Returns why some output was not written, for example "No space left on device". Empty if everything was
+/// written, or if the reader closed the pipe deliberately.
 std::string output_failure();
 
 }  // namespace kbvh::experiments

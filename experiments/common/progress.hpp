@@ -3,8 +3,7 @@
 
 namespace kbvh::experiments {
 
-/// One line on standard error that says what long work is doing; silent unless that is a terminal. There is
-/// one at a time.
+/// A progress line on standard error; silent unless standard error is a terminal. There is one at a time.
 class Progress {
  public:
   Progress();
@@ -13,7 +12,7 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
   /// Replaces the line.
   void show(const std::string& line);
-  /// Removes the line, before anything else is printed.
+  /// Removes the line; call it before any other output.
   void clear();
   /// The text that was shown last and is not cleared, on any standard error; empty if there is none.
   static const std::string& activity();

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <limits>
 
-/// What the numbers of plans, bodies and the command line may be, said once.
+/// The admissible ranges of numbers in plans, bodies and the command line.
 namespace kbvh::experiments {
 
 /// Whole numbers from `least` to `most`.
@@ -17,7 +17,7 @@ inline constexpr WholeRange keyframes{2, 1000000};            ///< of a built-in
 inline constexpr WholeRange frames_per_keyframe{1, 1000000};  ///< l
 inline constexpr WholeRange repetitions{1, 10000};            ///< timed clips
 inline constexpr WholeRange width{2, 8};                      ///< children of a node: 2, 4 or 8
-inline constexpr WholeRange leaf_size{1, 16};                 ///< primitives of a leaf, at most
+inline constexpr WholeRange leaf_size{1, 16};                 ///< maximum number of primitives of a leaf
 }  // namespace ranges
 
 }  // namespace kbvh::experiments

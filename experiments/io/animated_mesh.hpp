@@ -6,15 +6,15 @@
 
 namespace kbvh::io {
 
-/// What the primitives of a mesh are.
+/// The kind of a mesh's primitives.
 enum class MeshKind : std::uint8_t {
   polygons,      ///< of three or more vertices each
   points,        ///< of one vertex
-  control_nets,  ///< control points of one patch of a spline surface each
+  control_nets,  ///< each the control points of one patch of a spline surface
 };
 
-/// A mesh and its keyframes as read from files or made by a generator, before it becomes a body of a scene.
-/// Positions are kept in double so that no file format loses digits here; a scene rounds them once.
+/// A mesh and its keyframes as read from files or generated, before it becomes a body of a scene. Positions
+/// are kept in double so that no file format loses digits here; a scene rounds them once.
 struct AnimatedMesh {
   std::string name;
   MeshKind kind = MeshKind::polygons;
@@ -24,17 +24,17 @@ struct AnimatedMesh {
   std::vector<double> keyframe_times;               ///< seconds, strictly increasing, at least one
   std::vector<double> positions;                    ///< [keyframe][vertex][3]
 
-  // What the reader noticed and kept or mended (printed for the user, never an error).
+  // Findings of the reader that were kept or repaired (printed for the user, never an error).
   std::size_t degenerate_primitives = 0;  ///< zero area or repeated vertex at the first keyframe; kept
   std::size_t merged_keyframes = 0;       ///< equal times with equal positions, merged into one
   std::size_t added_keyframes = 0;        ///< between those of the file, so that chords follow curves
-  std::size_t jumps = 0;                  ///< places that are left within one rounding of time
+  std::size_t jumps = 0;                  ///< positions that change within one rounding of time
 
   std::size_t primitive_count() const { return primitive_offsets.size() - 1; }
   bool moving() const { return keyframe_times.size() > 1; }
 };
 
-/// What is wrong with a file or a request, in one sentence with file, place and value.
+/// Reports an error of a file or a request, in one sentence with file, place and value.
 struct InputError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -41,7 +41,7 @@ void append_mesh(std::string& out, const AnimatedMesh& mesh) {
   as_float ? append_all<float>(out, mesh.positions) : append_all<double>(out, mesh.positions);
 }
 
-/// Reads numbers off the payload; the checksum has been checked, but a file may still lie about its sizes.
+/// Reads numbers from the payload; the checksum has been checked, but the sizes in a file may still be wrong.
 class PayloadReader {
  public:
   PayloadReader(const std::filesystem::path& file, std::string_view bytes) : file_(file), bytes_(bytes) {}
@@ -145,7 +145,7 @@ std::vector<AnimatedMesh> load_cache(const std::filesystem::path& file) {
   if (version != cache_version || reserved != 0) {
     fail(file, "header",
          "version is " + std::to_string(version) + ", only " + std::to_string(cache_version) +
-             " is known; delete the file to have it made anew");
+             " is known; delete the file to recreate it");
   }
   const auto size = load_little_endian<std::uint64_t>(&bytes[16]);
   if (size != bytes.size() - header_bytes) {

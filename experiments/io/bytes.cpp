@@ -74,7 +74,7 @@ void refuse_utf16(std::string_view bytes, const std::string& name) {
   };
   if (begins({0xFF, 0xFE}) || begins({0xFE, 0xFF}) || begins({0, 0, 0xFE, 0xFF}) || begins({-1, 0, -1, 0}) ||
       begins({0, -1, 0, -1}) || begins({-1, 0, 0, 0}) || begins({0, 0, 0, -1}))
-    fail(name, "", "is text in UTF-16 or UTF-32, which is not read; save it as UTF-8");
+    fail(name, "", "is text in UTF-16 or UTF-32, which is not supported; save it as UTF-8");
 }
 
 void unify_line_ends(std::string& text) {
@@ -138,7 +138,7 @@ void write_file_atomically(const fs::path& file, std::string_view bytes) {
     }
     done += static_cast<std::size_t>(n);
   }
-  // Without fsync a crash can leave the new name without content: what the rename is to prevent.
+  // Without fsync a crash can leave the new name without content, which the rename must prevent.
   const int synced = fsync(descriptor) == 0 ? 0 : errno;
   const int closed = close(descriptor) == 0 ? 0 : errno;
   if (synced != 0 || closed != 0) give_up(synced != 0 ? synced : closed);

@@ -121,7 +121,7 @@ AnimatedMesh read_frames(const fs::path& folder, double frames_per_second) {
   const std::vector<fs::path> files = numbered_frames(folder);
   if (frames_per_second == 0) frames_per_second = default_frames_per_second;
   AnimatedMesh all = read_mesh_file(files[0]);
-  finish(all, files[0]);  // each by itself, so that a bad coordinate is reported with its own file
+  finish(all, files[0]);  // each by itself, so that an error in a coordinate names its own file
   all.name = folder.has_filename() ? name_of(folder) : name_of(folder.parent_path());
   for (std::size_t i = 1; i < files.size(); ++i) {
     AnimatedMesh frame = read_mesh_file(files[i]);

@@ -19,7 +19,7 @@ using namespace gltf;
 constexpr std::uint64_t most_baked_numbers = std::uint64_t{1} << 30;  // 8 GiB of doubles
 constexpr std::uint64_t most_keyframes = 1'000'000;
 
-/// Lower and upper corner of the box of points.
+/// Returns the lower and the upper corner of the box of points.
 std::array<double, 6> box_of(const std::vector<double>& points) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   std::array<double, 6> box{infinity, infinity, infinity, -infinity, -infinity, -infinity};
@@ -170,7 +170,7 @@ class Baker {
         }
       }
       if (list.empty()) list.push_back({joint_sets[0][4 * v], sum = 1});
-      // In one order, so that both sides of a seam are summed alike and stay equal to the last bit.
+      // Uses one order, so that the sums on both sides of a seam are equal to the last bit.
       std::sort(list.begin(), list.end(), [](const Influence& a, const Influence& b) {
         return a.joint != b.joint ? a.joint < b.joint : a.weight < b.weight;
       });
@@ -211,7 +211,7 @@ class Baker {
       } else if (i % 2 == 0) {
         push(i - 2, i - 1, i);
       } else {
-        push(i - 1, i - 2, i);  // every second triangle of a strip runs the other way round
+        push(i - 1, i - 2, i);  // every second triangle of a strip has reversed orientation
       }
     }
   }
@@ -231,7 +231,7 @@ class Baker {
     inverse_binds_.push_back(std::move(matrices));
   }
 
-  /// The times of keyframes that follow the animation, and what is to be said about them.
+  /// Returns the times of keyframes that follow the animation, and records notes about them.
   std::vector<double> chosen_times(AnimatedMesh& mesh) {
     const std::vector<Rigid> rigid = rigid_groups();
     CurvedMotion motion{pose_.times(), pose_.jumps(),
@@ -257,9 +257,9 @@ class Baker {
     return std::move(found->times);
   }
 
-  /// Vertices that move with one node or joint: the corners of their box stand for them, since the distance
-  /// of an affine image from another one is largest at a corner. A blend of joints is nowhere further from
-  /// its chord than one of them. Where weights of morph targets change, every vertex stands for itself.
+  /// Vertices that move with one node or joint. The corners of their box stand for them, because the distance
+  /// between two affine images is largest at a corner. A blend of joints is nowhere further from its chord
+  /// than one of them. Where weights of morph targets change, every vertex stands for itself.
   struct Rigid {
     const Part* part;
     Index joint;                  // in the part's skin; none: the part's node
@@ -309,7 +309,8 @@ class Baker {
     }
   }
 
-  /// Bind space for skinned parts, scene space under the file's own pose for the rest.
+  /// Returns positions in bind space for skinned parts, in scene space under the file's own pose for the
+  /// rest.
   std::vector<double> rest_positions() const {
     Pose own(document_, nullptr);
     own.evaluate(0);
@@ -328,7 +329,7 @@ class Baker {
     return rest;
   }
 
-  /// Joint space to scene space, after the inverse bind: [skin][joint].
+  /// Returns the maps from joint space to scene space, after the inverse bind: [skin][joint].
   std::vector<std::vector<Affine>> posed_skins() const {
     std::vector<std::vector<Affine>> skins;
     for (std::size_t s = 0; s < document_.skins.size(); ++s) {

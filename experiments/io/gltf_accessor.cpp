@@ -8,7 +8,7 @@
 namespace kbvh::io::gltf {
 namespace {
 
-/// Accessors without a buffer view cost no bytes in the file; this many zeros are believed (2^24 elements).
+/// Accessors without a buffer view cost no bytes in the file; the limit on their zeros is 2^24 elements.
 constexpr std::uint64_t most_zeros = std::uint64_t{1} << 24;
 
 std::size_t bytes_of(Component component) {
@@ -50,8 +50,8 @@ double decode(const char* at, Component component, bool normalized) {
   return load_little_endian<float>(at);
 }
 
-/// The first byte of `count` elements of `size` bytes in a view, after checking that all of them lie inside
-/// it.
+/// Returns the first byte of `count` elements of `size` bytes in a view, after checking that all of them lie
+/// inside it.
 const char* checked_range(const Document& document, const std::string& place, std::uint32_t view_id,
                           std::uint64_t offset, std::uint64_t count, std::uint64_t size,
                           std::uint64_t stride) {
@@ -61,7 +61,7 @@ const char* checked_range(const Document& document, const std::string& place, st
          "elements of " + std::to_string(size) + " bytes in bufferViews[" + std::to_string(view_id) +
              "] whose byteStride is " + std::to_string(stride));
   }
-  // Written so that nothing can overflow: (count - 1) * stride + size <= length - offset.
+  // Cannot overflow in this form: (count - 1) * stride + size <= length - offset.
   const bool fits = count == 0 || (offset <= view.length && size <= view.length - offset &&
                                    count - 1 <= (view.length - offset - size) / stride);
   if (!fits) {
@@ -116,7 +116,7 @@ void for_each_number(const Document& document, std::uint32_t id, std::uint32_t c
 
 std::size_t checked_size(const Document& document, std::uint32_t id) {
   const Accessor& accessor = document.accessors[id];
-  // With a view, its range bounds the count; this has to be known before anything is allocated.
+  // With a view, its range bounds the count; the check must precede any allocation.
   const std::uint64_t most = accessor.view ? document.views[*accessor.view].length : most_zeros;
   if (accessor.count > most) {
     fail(document.file, "accessors[" + std::to_string(id) + "]",

@@ -86,7 +86,7 @@ Container read_container(const std::filesystem::path& file) {
     }
     if (chunk == 0) {
       if (type != "JSON") complain(place, "its type is " + printable(type) + " instead of 'JSON'");
-      // Some writers fill the chunk up with NUL bytes; glTF 2.0 (GLB, structured JSON content) asks for
+      // Some writers fill the chunk up with NUL bytes; glTF 2.0 (GLB, structured JSON content) requires
       // blanks.
       container.json = bytes.substr(at, size);
       container.json.erase(container.json.find_last_not_of('\0') + 1);

@@ -4,17 +4,18 @@
 
 namespace kbvh::io::gltf {
 
-/// The outer shell of a glTF file: its JSON text and, in a .glb, its binary chunk.
+/// The container of a glTF file: its JSON text and, in a .glb, its binary chunk.
 struct Container {
   std::string json, binary;
   bool has_binary = false;
 };
 
-/// Reads a .gltf (all text) or a .glb (told by its first four bytes, not by its name). Throws InputError.
+/// Reads a .gltf (all text) or a .glb (recognised by its first four bytes, not by its name). Throws
+/// InputError.
 Container read_container(const std::filesystem::path& file);
 
-/// The bytes that a buffer's URI means: base64 data, or a file in or below the folder of `file`. Nothing is
-/// fetched from elsewhere. Throws InputError with `place`.
+/// Returns the bytes of a buffer's URI: base64 data, or a file in or below the folder of `file`. Other
+/// locations are refused. Throws InputError with `place`.
 std::string read_uri(const std::filesystem::path& file, const std::string& place, const std::string& uri);
 
 }  // namespace kbvh::io::gltf

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-/// The part of glTF 2.0 that matters here, as plain data whose cross references have been checked.
+/// The supported part of glTF 2.0 as plain data with checked cross references.
 namespace kbvh::io::gltf {
 
 using Index = std::optional<std::uint32_t>;
 
-/// A run of bytes of a buffer, known to lie inside it.
+/// A range of bytes of a buffer, checked to lie inside it.
 struct BufferView {
   std::uint32_t buffer = 0;
   std::uint64_t offset = 0, length = 0;
@@ -27,7 +27,7 @@ struct Sparse {
   Component index_type = Component::uint16;
 };
 
-/// Typed numbers in a buffer view; the ranges are checked when it is read.
+/// Typed numbers in a buffer view; reading them checks the ranges.
 struct Accessor {
   Index view;  ///< none: all zero
   std::uint64_t offset = 0, count = 0;
@@ -86,7 +86,7 @@ struct Channel {
 
 struct Animation {
   std::string name;
-  std::vector<Channel> channels;  ///< those that move a node
+  std::vector<Channel> channels;  ///< channels that move a node
 };
 
 struct Document {
@@ -106,16 +106,16 @@ struct Document {
 /// Reads and checks a .gltf or .glb with its buffers. Throws InputError with the JSON path and the value.
 Document read_document(const std::filesystem::path& file);
 
-/// All numbers of an accessor, [element][component], integers converted (normalised ones as the specification
-/// says), sparse replacements applied. Throws InputError if it has another number of components, leaves its
-/// buffer view, or holds a number that is not finite.
+/// Returns all numbers of an accessor, [element][component], integers converted (normalised ones as the
+/// specification requires), sparse replacements applied. Throws InputError if it has another number of
+/// components, leaves its buffer view, or holds a number that is not finite.
 std::vector<double> read_numbers(const Document& document, std::uint32_t accessor, std::uint32_t components);
 
-/// All numbers of an accessor of unsigned integers, [element][component].
+/// Returns all numbers of an accessor of unsigned integers, [element][component].
 std::vector<std::uint32_t> read_unsigned(const Document& document, std::uint32_t accessor,
                                          std::uint32_t components);
 
-/// "accessors[i], element e", for messages.
+/// Composes "accessors[i], element e", for messages.
 std::string place_in(std::uint32_t accessor, std::uint64_t element);
 
 }  // namespace kbvh::io::gltf

@@ -18,14 +18,14 @@ void normalize(double* q) {
   for (int i = 0; i < 4; ++i) q[i] /= length;
 }
 
-/// The shorter way round between two unit quaternions (glTF 2.0, appendix C).
+/// Interpolates two unit quaternions along the shorter arc (glTF 2.0, appendix C).
 void slerp(const double* a, const double* b, double u, double* out) {
   double cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
   const double sign = cosine < 0 ? -1 : 1;
   cosine *= sign;
   double left = 1 - u, right = u;
   if (cosine <
-      1 - 1e-12) {  // nearer than that the quotient of sines loses its digits, and the chord is the arc
+      1 - 1e-12) {  // closer than that the quotient of sines loses its digits, and the chord equals the arc
     const double angle = std::acos(cosine), sine = std::sin(angle);
     left = std::sin((1 - u) * angle) / sine;
     right = std::sin(u * angle) / sine;
@@ -137,7 +137,7 @@ std::vector<double> Track::jumps() const {
 void Track::evaluate(double time, double* out) const {
   const auto after = std::upper_bound(times_.begin(), times_.end(), time);
   const std::size_t key = after == times_.begin() ? 0 : static_cast<std::size_t>(after - times_.begin()) - 1;
-  // At a key exactly its value, whatever the interpolation.
+  // At a key exactly its value, for any interpolation.
   if (time <= times_[key] || key + 1 == times_.size() || interpolation_ == Interpolation::step) {
     std::copy(value(key), value(key) + width_, out);
   } else {

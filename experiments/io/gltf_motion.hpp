@@ -21,7 +21,7 @@ struct Affine {
 
 Affine operator*(const Affine& a, const Affine& b);
 
-/// The affine part of a 4x4 matrix stored column by column.
+/// Returns the affine part of a 4x4 matrix stored column by column.
 Affine affine_of(const double* columns);
 
 /// Values over time of one property of one node.
@@ -35,10 +35,10 @@ class Track {
   const std::vector<double>& times() const { return times_; }  ///< strictly increasing
   std::size_t merged() const { return merged_; }               ///< keys that repeated their predecessor
 
-  /// The keys at which a value is replaced by another one without a way between them.
+  /// Returns the keys at which the value jumps.
   std::vector<double> jumps() const;
 
-  /// The value at a time, held constant beyond the ends. `out` has `width` numbers. Rotations come out with
+  /// Computes the value at a time, held constant beyond the ends. `out` has `width` numbers. Rotations have
   /// length one.
   void evaluate(double time, double* out) const;
 
@@ -59,16 +59,16 @@ class Pose {
   /// Checks all channels of `animation` (may be null: the file's own pose).
   Pose(const Document& document, const Animation* animation);
 
-  /// The union of all key times, increasing. Empty without an animation.
+  /// Returns the union of all key times, increasing. Empty without an animation.
   const std::vector<double>& times() const { return times_; }
 
-  /// Those of them at which a property jumps, increasing.
+  /// Returns those of them at which a property jumps, increasing.
   const std::vector<double>& jumps() const { return jumps_; }
 
-  /// Does the animation change the morph weights of a node?
+  /// Returns whether the animation changes the morph weights of a node.
   bool morphs(std::size_t node) const;
 
-  /// Keys of samplers that repeated their predecessor in time and value.
+  /// Returns the number of sampler keys that repeated their predecessor in time and value.
   std::size_t merged_keyframes() const;
 
   /// Moves all nodes to `time`.

@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// A JSON value that knows its path, so that every complaint says where.
+/// A JSON value that knows its path, so that every message names the place.
 class Value {
  public:
   Value(const std::filesystem::path& file, const Json& json, std::string path)
@@ -48,7 +48,7 @@ class Value {
     return out;
   }
 
-  /// The items of a member, none if the member is missing.
+  /// Returns the items of a member; none if the member is missing.
   std::vector<Value> items(const char* key) const {
     const std::optional<Value> value = find(key);
     return value ? value->items() : std::vector<Value>{};
@@ -73,7 +73,7 @@ class Value {
     return value ? value->count() : otherwise;
   }
 
-  /// An index into an array of `size` things.
+  /// Reads an index into an array of `size` items.
   std::uint32_t index(std::size_t size, const char* of) const {
     const std::uint64_t value = count();
     if (value >= size) {
@@ -160,13 +160,13 @@ class Parser {
   }
 
   void check_extensions(const Value& root) const {
-    // Those that change nothing about the shape may be required; others would be read wrongly in silence.
+    // Extensions that do not change the shape may be required; others would silently be read wrongly.
     for (const Value& v : root.items("extensionsRequired")) {
       const std::string name = v.text();
       const bool harmless = name == "KHR_mesh_quantization" || name.starts_with("KHR_materials_") ||
                             name.starts_with("KHR_texture_") || name.starts_with("EXT_texture_") ||
                             name.starts_with("KHR_lights_") || name.starts_with("KHR_xmp");
-      if (!harmless) v.reject("the extension " + printable(name) + " is required, and is not read here");
+      if (!harmless) v.reject("the extension " + printable(name) + " is required, but not supported");
     }
   }
 
@@ -281,7 +281,7 @@ class Parser {
     const std::optional<Value> extensions = v.find("extensions");
     if (extensions && extensions->find("KHR_draco_mesh_compression") && primitive.position &&
         !document_.accessors[*primitive.position].view) {
-      v.reject("its geometry is compressed (KHR_draco_mesh_compression), which is not read here");
+      v.reject("its geometry is compressed (KHR_draco_mesh_compression), which is not supported");
     }
     return primitive;
   }
@@ -365,7 +365,7 @@ class Parser {
       const std::string path = target.at("path").text();
       const std::array<const char*, 4> paths{"translation", "rotation", "scale", "weights"};
       const auto known = std::find(paths.begin(), paths.end(), path);
-      if (!node || known == paths.end()) continue;  // extensions animate other things, such as materials
+      if (!node || known == paths.end()) continue;  // extensions animate other properties, such as materials
       const Value sampler = samplers[c.at("sampler").index(samplers.size(), "samplers")];
       Channel channel;
       channel.place = c.path();

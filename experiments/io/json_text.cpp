@@ -16,22 +16,22 @@ using nlohmann::json;
   fail(name, place_in_text(text, at), what);
 }
 
-/// The position after the string that begins at `at` with its quotation mark.
+/// Returns the position after the string that begins at `at` with its quotation mark.
 std::size_t end_of_string(std::string_view text, std::size_t at) {
   for (++at; at < text.size() && text[at] != '"'; ++at)
     if (text[at] == '\\') ++at;
   return std::min(at + 1, text.size());
 }
 
-/// A key as it is compared: "\u0061" and "a" are the same.
+/// Decodes a key for comparison: "\u0061" and "a" are the same.
 std::string key_of(std::string_view token) {
   if (token.find('\\') == std::string_view::npos) return std::string(token.substr(1, token.size() - 2));
   const json key = json::parse(token, nullptr, false);
   return key.is_string() ? key.get<std::string>() : std::string(token);
 }
 
-/// Refuses what is nested too deep before anything is built of it, and a NUL byte between values: the parser
-/// takes it for the end of the text, and would lose what follows.
+/// Refuses excessive nesting before any value is built, and a NUL byte between values: the parser takes it
+/// for the end of the text and would lose the rest.
 void check_depth_and_end(std::string_view text, const std::string& name) {
   std::size_t depth = 0;
   for (std::size_t at = 0; at < text.size(); ++at) {
@@ -57,7 +57,7 @@ void check_depth_and_end(std::string_view text, const std::string& name) {
   }
 }
 
-/// Refuses a key that its object has already. `text` is JSON.
+/// Refuses a repeated key in an object. `text` is JSON.
 void check_keys(std::string_view text, const std::string& name) {
   struct Level {
     bool is_object;
@@ -108,7 +108,7 @@ json parse_json_text(std::string_view text, const std::string& name) {
   } catch (const json::parse_error& error) {
     std::size_t at = std::min(error.byte > 0 ? error.byte - 1 : 0, text.size());
     const bool is_utf8 = std::string_view(error.what()).find("UTF-8") == std::string_view::npos;
-    // A sequence that breaks off is noticed at the byte behind it.
+    // A truncated sequence is detected at the byte after it.
     while (!is_utf8 && at > 0 && (at == text.size() || static_cast<unsigned char>(text[at]) < 0x80)) --at;
     refuse(
         text, name, at,

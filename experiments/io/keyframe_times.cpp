@@ -26,7 +26,7 @@ class Follower {
           end = std::nextafter(key, -std::numeric_limits<double>::infinity());
           motion_.points(end, arriving);
         }
-        // A jump may follow its predecessor at the next double: then there is nothing between.
+        // A jump may follow its predecessor at the next double; then there is no time in between.
         if (result_.times.back() < end && !pieces(result_.times.back(), before, end, arriving, 0)) return {};
       }
       if (result_.times.empty() || result_.times.back() < key) result_.times.push_back(key);

@@ -6,25 +6,25 @@
 
 namespace kbvh::io {
 
-/// What to load.
+/// The description of a mesh to load.
 struct LoadRequest {
   /// A file .obj, .ply, .gltf or .glb, or a folder of numbered frames (.obj or .ply).
   std::filesystem::path mesh;
   /// Optional: a point cache (.pc2) that moves the vertices of an .obj or .ply.
   std::filesystem::path motion;
-  /// glTF: the animation's name, or else its index from 0. Empty: the only one; an error that names them if
-  /// several.
+  /// glTF: the animation's name, or else its index from 0. Empty: the only one; with several, an error that
+  /// lists them.
   std::string clip;
-  /// For folders of frames and point caches, which know frames but not seconds. 0: 30.
+  /// For folders of frames and point caches, which have frames but no seconds. 0: 30.
   double frames_per_second = 0;
 };
 
-/// Reads a mesh and its motion from files; static ones get a single keyframe at time 0. What is wrong is
-/// said by an InputError of one sentence with file, place (line, sample, vertex, accessor) and value.
-/// Folders: the last number in each name gives the order (frame_2 before frame_10), names differ in nothing
-/// else, the numbers are equally spaced (a gap is a missing frame), all frames have the same faces; frame i
-/// gets time i / frames_per_second. Every result has passed finish() (validate.hpp). No network; glTF buffers
-/// are read from beside the file only. O(bytes); glTF: O(keyframes * vertices * influences).
+/// Reads a mesh and its motion from files; static meshes get a single keyframe at time 0. Throws InputError
+/// of one sentence with file, place (line, sample, vertex, accessor) and value. Folders: the last number in
+/// each name gives the order (frame_2 before frame_10), names differ in nothing else, the numbers are equally
+/// spaced (a gap is a missing frame), all frames have the same faces; frame i gets time i /
+/// frames_per_second. Every result has passed finish() (validate.hpp). No network access; glTF buffers are
+/// read from files next to the mesh only. O(bytes); glTF: O(keyframes * vertices * influences).
 AnimatedMesh load_animated_mesh(const LoadRequest& request);
 
 }  // namespace kbvh::io

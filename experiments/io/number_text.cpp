@@ -27,7 +27,7 @@ std::optional<double> parse_double(std::string_view token) {
   const std::errc error = parse_all(token, value);
   if (error == std::errc{}) return value;
   if (error != std::errc::result_out_of_range) return std::nullopt;
-  // from_chars does not say which end of the range was left; a long double reaches further at both.
+  // from_chars does not tell overflow from underflow; a long double has a larger range in both directions.
   long double wide = 0;
   if (parse_all(token, wide) != std::errc{} || std::abs(wide) > 1) return std::nullopt;
   return static_cast<double>(wide);

@@ -68,8 +68,8 @@ class ObjReader {
     } else if (word == "l") {
       has_lines_ = true;
     } else if (!surfaces_.take(word, line, line_, mesh_.vertex_count)) {
-      // Any other word is skipped, so that vendors' statements do no harm; what is not text at all is not an
-      // OBJ file.
+      // Any other word is skipped, so that vendors' statements do no harm; a word that is not text means that
+      // this is not an OBJ file.
       for (char c : word) {
         if (static_cast<unsigned char>(c) < 32 || c == 127)
           fail(file_, place(), printable(word) + " is not text");
@@ -100,7 +100,7 @@ class ObjReader {
     ++mesh_.vertex_count;
   }
 
-  /// Faces, or surfaces, or nothing but vertices: a cloud of points.
+  /// Sets the primitives: faces, or surfaces, or, without both, a cloud of points.
   void finish_primitives() {
     if (!surfaces_.empty()) {
       if (mesh_.primitive_count() > 0)
@@ -159,7 +159,7 @@ class ObjReader {
   std::filesystem::path file_;
   std::string bytes_;
   std::size_t line_ = 0;
-  std::vector<Forward> forward_;  // indices of vertices not seen yet: legal, checked at the end
+  std::vector<Forward> forward_;  // indices of vertices that follow later: legal, checked at the end
   ObjSurfaces surfaces_;
   bool has_lines_ = false;
   AnimatedMesh mesh_;

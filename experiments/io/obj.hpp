@@ -7,18 +7,18 @@ namespace kbvh::io {
 
 /// Reads a Wavefront OBJ file: its vertices in file order, every `f` as one primitive with all its vertices
 /// (polygons are not cut into triangles), one keyframe at time 0. A file with B-spline or NURBS surfaces
-/// (obj_surfaces.hpp) and no face gives their control nets; one with nothing but vertices a cloud of points.
-/// Texture coordinates, normals, groups, materials, lines, curves and vertex colours are skipped. Indices may
-/// be negative (relative) or point forward. Lines end in '\n', "\r\n" or '\r'.
+/// (obj_surfaces.hpp) and no face gives their control nets; a file with vertices only gives a cloud of
+/// points. Texture coordinates, normals, groups, materials, lines, curves and vertex colours are skipped.
+/// Indices may be negative (relative) or point forward. Lines end in '\n', "\r\n" or '\r'.
 ///
-/// This is a reader of our own, not tinyobjloader, because that one (2.0rc10) reads "nan", a missing or a
-/// misspelt coordinate as 0 without a word, drops faces of two vertices, wraps large indices, and rounds two
-/// thirds of 17-digit coordinates wrongly; here each coordinate is the double nearest to its text.
+/// kbvh does not use tinyobjloader: version 2.0rc10 reads "nan", a missing or a misspelt coordinate as 0
+/// without a warning, drops faces of two vertices, wraps large indices, and rounds two thirds of 17-digit
+/// coordinates wrongly. Here each coordinate is the double nearest to its text.
 ///
 /// Throws InputError with the line. Does not call finish(). O(bytes).
 AnimatedMesh read_obj(const std::filesystem::path& file);
 
-/// Writes the first keyframe as OBJ; coordinates read back as the same doubles. Throws InputError if it
+/// Writes the first keyframe as OBJ; coordinates read back as the same doubles. Throws InputError if the file
 /// cannot be written.
 void save_obj(const AnimatedMesh& mesh, const std::filesystem::path& file);
 

@@ -8,17 +8,18 @@
 
 namespace kbvh::io {
 
-/// The free-form statements of OBJ files as far as they say B-spline or NURBS surfaces: `cstype [rat]
-/// bspline`, `deg`, and `surf ... parm u ... parm v ... end`. Other kinds of surface, trimmed ones, and those
-/// that are pieced together are refused; curves are not surfaces, and skipped. Weights count as control
-/// points' only in that they must be positive: boxes of control nets do not depend on them.
+/// The free-form statements of OBJ files that define B-spline or NURBS surfaces: `cstype [rat] bspline`,
+/// `deg`, and `surf ... parm u ... parm v ... end`. Other kinds of surface, trimmed surfaces and connected
+/// surfaces are refused; curves are skipped. Weights are only checked to be positive: boxes of control nets
+/// do not depend on them.
 class ObjSurfaces {
  public:
   explicit ObjSurfaces(const std::filesystem::path& file) : file_(file) {}
 
-  /// Takes a statement if it is one of these: `words` are what follows `word`. Throws InputError.
+  /// Processes a statement if it is one of these; `words` follow `word`. Throws InputError. Returns whether
+  /// it was one.
   bool take(std::string_view word, std::string_view words, std::size_t line, std::uint32_t vertices_so_far);
-  /// The vertex (by id) has this weight.
+  /// Records that the vertex (by id) has a weight that is not positive.
   void bad_weight(std::uint32_t vertex) { not_positive_.insert(vertex); }
   bool empty() const { return surfaces_.empty(); }
   /// Adds the control nets of all surfaces to a mesh that has all its vertices. Throws InputError.

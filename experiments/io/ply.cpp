@@ -71,7 +71,7 @@ class PlyReader {
     bool has_format = false;
     if (bytes_.starts_with("\xEF\xBB\xBFply")) at_ = 3;  // a byte order mark
     if (at_ == 0 && !bytes_.starts_with("ply")) refuse_utf16(bytes_, file_.string());
-    // The first line says how lines end. The byte after the last one may be any: it is data.
+    // The first line decides the line ends. The byte after the last header line may be any: it is data.
     const std::size_t after = at_ + 3;
     if (after + 1 < bytes_.size() && bytes_[after] == '\r' && bytes_[after + 1] != '\n') line_end_ = '\r';
     for (;;) {
@@ -156,7 +156,7 @@ class PlyReader {
   }
 
   void check_room(const Element& element) const {
-    // Before anything is allocated: as many elements as the header promises cannot be fewer bytes than this.
+    // Checked before any allocation: the elements promised by the header need at least this many bytes.
     std::uint64_t least = 0;
     for (const Property& p : element.properties) {
       least += format_ == Format::ascii
@@ -265,7 +265,7 @@ class PlyReader {
       for (std::size_t k = 0; k < list.size(); ++k) {
         if (list[k] == -1) start = k + 1;
         if (k < start + 2 || list[k] == -1) continue;
-        const bool odd = (k - start) % 2 == 1;  // every second triangle of a strip runs the other way round
+        const bool odd = (k - start) % 2 == 1;  // every second triangle of a strip has reversed orientation
         push_corner(element, i, list[odd ? k - 1 : k - 2]);
         push_corner(element, i, list[odd ? k - 2 : k - 1]);
         push_corner(element, i, list[k]);
@@ -275,7 +275,7 @@ class PlyReader {
   }
 
   void push_corner(const Element& element, std::uint64_t i, std::int64_t index) {
-    // Against the number of vertices at the end: faces may come first.
+    // Compared with the number of vertices at the end: faces may come first.
     if (index < 0 || index > std::numeric_limits<std::uint32_t>::max()) {
       fail(file_, place_of(element, i), "vertex index " + std::to_string(index) + " is out of range");
     }
@@ -301,7 +301,7 @@ class PlyReader {
     }
   }
 
-  /// Refuses data behind the last element: then the header counts too few.
+  /// Refuses data after the last element: then the header's counts are too small.
   void check_end() const {
     const std::string_view blanks(" \t\r\n\v\f\0", 7);
     const std::size_t more = bytes_.find_first_not_of(blanks, at_);
@@ -312,7 +312,7 @@ class PlyReader {
 
   // ---- numbers
 
-  /// In text a vertex or a face is a line: values that are missing or too many would shift all that follow.
+  /// In text a vertex or a face is a line: missing or additional values would shift all following ones.
   void begin_row() {
     last_row_ = row_;
     row_ = 0;
@@ -426,9 +426,9 @@ class PlyReader {
   std::filesystem::path file_;
   std::string bytes_;
   std::size_t at_ = 0;
-  char line_end_ = '\n';                // of "\r\n" the second
+  char line_end_ = '\n';                // of "\r\n" the second character
   std::size_t line_ = 1;                // of ascii bodies
-  std::size_t row_ = 0, last_row_ = 0;  // lines of the element that is read, and of the one before; 0: none
+  std::size_t row_ = 0, last_row_ = 0;  // lines of the current element, and of the preceding one; 0: none
   Format format_ = Format::ascii;
   std::vector<Element> elements_;
   AnimatedMesh mesh_;

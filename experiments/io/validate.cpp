@@ -24,7 +24,7 @@ Exact product(double a, double b) {
   return {hi, std::fma(a, b, -hi)};
 }
 
-/// A sum of doubles without rounding (Shewchuk's growing expansion), for sums whose being zero matters.
+/// A sum of doubles without rounding (Shewchuk's growing expansion), for exact tests against zero.
 class ExactSum {
  public:
   void add(double value) {
@@ -55,7 +55,7 @@ void add_product(ExactSum& sum, Exact a, Exact b, double sign) {
   }
 }
 
-/// Is component (i, j) of (b - a) x (c - a) exactly zero?
+/// Tests whether component (i, j) of (b - a) x (c - a) is exactly zero.
 bool cross_is_zero(const double* a, const double* b, const double* c, int i, int j) {
   const Exact bi = difference(b[i], a[i]), bj = difference(b[j], a[j]);
   const Exact ci = difference(c[i], a[i]), cj = difference(c[j], a[j]);
@@ -91,7 +91,7 @@ void check_structure(const AnimatedMesh& mesh, const std::filesystem::path& file
     if (offsets[p + 1] < offsets[p] || offsets[p + 1] - offsets[p] < least) {
       fail(file, place, polygons ? "has fewer than 3 vertices" : "has no vertex");
     }
-    if (offsets[p + 1] > mesh.primitive_vertices.size()) {  // and a later one would go back
+    if (offsets[p + 1] > mesh.primitive_vertices.size()) {  // and a later offset would decrease
       fail(file, place, "ends beyond the last corner");
     }
     for (std::size_t c = offsets[p]; c < offsets[p + 1]; ++c) {
@@ -190,7 +190,7 @@ void finish(AnimatedMesh& mesh, const std::filesystem::path& file) {
   check_coordinates(mesh, file);
   merge_equal_times(mesh, file);
   mesh.degenerate_primitives = 0;
-  if (mesh.kind != MeshKind::polygons) return;  // they have no area of their own
+  if (mesh.kind != MeshKind::polygons) return;  // other primitives have no area
   for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
     const std::uint32_t begin = mesh.primitive_offsets[p], end = mesh.primitive_offsets[p + 1];
     if (is_degenerate(&mesh.primitive_vertices[begin], end - begin, mesh.positions.data())) {

@@ -5,25 +5,25 @@
 
 namespace kbvh::io {
 
-/// Coordinates beyond this magnitude are refused: 1e30 as a float, so that files of floats and files of text
-/// have one limit. Products of three of them still fit a double.
+/// The largest admissible magnitude of a coordinate: 1e30 as a float, so that files of floats and files of
+/// text have one limit. Products of three such coordinates still fit a double.
 inline constexpr double largest_coordinate = 1e30f;
 
-/// The last step of every reader: checks what they all promise, and mends what may be mended. In place:
-///  - structure: sizes fit together, at least one vertex, primitive and keyframe, every polygon has at
-///    least three vertices and every other primitive at least one, every index is below vertex_count;
-///  - every coordinate is finite and at most `largest_coordinate` in magnitude; a negative zero becomes zero;
-///  - keyframe times are finite and increase; neighbours of equal time are merged if all their positions are
-///  equal,
-///    and are an error if not (`merged_keyframes` counts);
-///  - polygons of zero area or with a repeated vertex at the first keyframe are counted
-///    (`degenerate_primitives`) and kept.
-/// Throws InputError that names `file`, the place and the value. O(size of the mesh), a second only where a
-/// zero area has to be decided exactly.
+/// Performs the last step of every reader: checks the invariants of a mesh, and repairs minor defects in
+/// place: - structure: sizes fit together, at least one vertex, primitive and keyframe, every polygon has at
+/// least three vertices
+///    and every other primitive at least one, every index is below vertex_count;
+/// - every coordinate is finite and at most `largest_coordinate` in magnitude; a negative zero becomes zero;
+///   - keyframe times are finite and increase; neighbours of equal time are merged if all their positions are
+///   equal, and are
+///    an error if not (`merged_keyframes` counts);
+/// - polygons of zero area or with a repeated vertex at the first keyframe are counted
+///   (`degenerate_primitives`) and kept. Throws InputError that names `file`, the place and the value. O(size
+///   of the mesh), and exact arithmetic only for areas near zero.
 void finish(AnimatedMesh& mesh, const std::filesystem::path& file);
 
-/// True if the primitive has a repeated vertex, or if all triangles of its fan have zero area, decided
-/// exactly for coordinates whose products neither overflow nor underflow. `positions` is [vertex][3].
+/// Returns true if the primitive has a repeated vertex, or if all triangles of its fan have zero area,
+/// decided exactly for coordinates whose products neither overflow nor underflow. `positions` is [vertex][3].
 bool is_degenerate(const std::uint32_t* vertices, std::size_t count, const double* positions);
 
 }  // namespace kbvh::io

@@ -9,7 +9,8 @@ namespace {
 
 std::uint64_t mixed(std::uint64_t hash, const double* p) {
   for (int axis = 0; axis < 3; ++axis) {
-    hash = (hash ^ std::bit_cast<std::uint64_t>(p[axis] + 0.0)) * 0x9E3779B97F4A7C15u;  // + 0.0: one zero
+    hash = (hash ^ std::bit_cast<std::uint64_t>(p[axis] + 0.0)) *
+           0x9E3779B97F4A7C15u;  // + 0.0: merges both zeros
     hash ^= hash >> 29;
   }
   return hash;
@@ -55,7 +56,7 @@ void weld(AnimatedMesh& mesh, const std::vector<double>& rest) {
     kept.push_back(v);
   }
   for (std::uint32_t& v : mesh.primitive_vertices) v = new_id[v];
-  // Every vertex moves to the front or stays, so this may be done in place.
+  // Every vertex moves to the front or stays, so this works in place.
   for (std::size_t k = 0, out = 0; k < keyframes; ++k) {
     for (std::uint32_t v : kept) {
       for (std::size_t axis = 0; axis < 3; ++axis) mesh.positions[out++] = at(k, v)[axis];

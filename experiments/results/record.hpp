@@ -13,28 +13,29 @@ namespace kbvh::experiments {
 /// Version of the records; RESULTS.md documents it.
 inline constexpr int results_schema = 1;
 
-/// Words of result files.
+/// Returns the word used in result files.
 const char* word(PrimitiveKind kind);
 const char* word(Harness harness);
 const char* word(SceneOrigin origin);
 
-/// The "scene" of a record: what is played, at which times, and the script that is replayed until the last.
+/// Makes the "scene" of a record: the played scene, its times, and the script that is replayed until the last
+/// time.
 template <class S>
 nlohmann::json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_t per_keyframe,
                             std::span<const double> frames, const PlanScript<S>& script = {});
 
-/// The "script" of a scene whose plans change at run time, as far as it is replayed until `end`.
+/// Makes the "script" of a scene whose plans change at run time, as far as it is replayed until `end`.
 template <class S>
 nlohmann::json script_record(const PlanScript<S>& script, double end);
 
-/// What a configuration is known by: a hash of everything that decides what is measured. `scene` and
+/// Computes the key of a configuration: a hash of everything that affects the measurement. `scene` and
 /// `strategy` are as above; `program` is program_identity().
 std::string configuration_key(Harness harness, const std::string& program, const nlohmann::json& scene,
                               const nlohmann::json& strategy, const Study& study,
                               const nlohmann::json& machine);
 
-/// Why a record that was read cannot stand for its configuration: the field that is missing or wrong, and
-/// how; or "". Whatever tables and targets read is there and of the right kind in a record that passes.
+/// Returns why a record that was read cannot stand for its configuration: the missing or wrong field, and its
+/// defect; or "". A record that passes has all fields that tables and targets read, in the right types.
 std::string unusable(const nlohmann::json& record);
 
 }  // namespace kbvh::experiments

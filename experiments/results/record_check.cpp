@@ -52,7 +52,7 @@ struct Field {
   Kind kind;
 };
 
-/// The first field that is missing or of another kind.
+/// Returns the first field that is missing or of another type.
 std::string wrong(const json& object, const std::string& place, std::initializer_list<Field> fields) {
   for (const Field& field : fields) {
     const auto found = object.find(field.name);
@@ -124,7 +124,7 @@ std::string unusable(const json& record) {
                   {"extra", Kind::whole},
                   {"audited", Kind::truth},
                   {"protrusion", Kind::number}});
-  // Looseness may be negative: boxes that hold nothing have no area.
+  // Looseness may be negative: boxes without content have no area.
   if (what.empty() &&
       (!record.at("verified").contains("looseness") || !record.at("verified").at("looseness").is_number()))
     what = "the field verified.looseness is missing or not a number";

@@ -36,7 +36,7 @@ std::optional<json> content_of(const std::filesystem::path& file) {
 
 namespace {
 
-/// Renames a file to the first of `names` that is free.
+/// Renames a file to the first unused one of `names`.
 template <class Name>
 std::string rename_to_free(const std::filesystem::path& file, const Name& name) {
   std::error_code error;
@@ -47,8 +47,8 @@ std::string rename_to_free(const std::filesystem::path& file, const Name& name) 
   return name(i);
 }
 
-/// Opens and locks a file; -1 if another process has it, or nothing can be locked there (then `refused` is
-/// false).
+/// Opens and locks a file; returns -1 if another process holds the lock, or if locking is not possible there
+/// (then `refused` is false).
 int lock_of(const std::filesystem::path& file, bool& refused) {
   refused = false;
   for (;;) {
@@ -59,7 +59,7 @@ int lock_of(const std::filesystem::path& file, bool& refused) {
       ::close(descriptor);
       return -1;
     }
-    // The process that had it may have removed the file since it was opened here.
+    // The process that held the lock may have removed the file since it was opened here.
     struct stat opened {
     }, named{};
     if (::fstat(descriptor, &opened) == 0 && ::stat(file.c_str(), &named) == 0 &&

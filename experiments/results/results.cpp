@@ -41,8 +41,8 @@ json json_or_nothing(std::string_view text) {
 
 namespace {
 
-/// Removes what killed processes left of files that they were about to replace (FILE.tmp-PROCESS-ATTEMPT), if
-/// no such process runs and nothing was written for an hour: the folder may be shared with another machine.
+/// Removes temporary files of killed processes (FILE.tmp-PROCESS-ATTEMPT), if no such process runs and
+/// nothing was written for an hour: the folder may be shared with another machine.
 void remove_left_overs(const std::filesystem::path& folder) {
   std::error_code error;
   const auto old = std::filesystem::file_time_type::clock::now() - std::chrono::hours(1);
@@ -69,7 +69,7 @@ void prepare_folder(const std::filesystem::path& folder) {
                          (error ? ": " + error.message() : ""));
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
     throw io::InputError("the output folder '" + folder.string() + "' cannot be written");
-  // As much as a record or two: where that has no room, nothing of what is measured would be kept.
+  // The size of a record or two: with less space no measurement could be kept.
   const std::filesystem::path probe = folder / ".kbvh-room";
   try {
     io::write_file_atomically(probe, std::string(4096, ' '));
@@ -87,7 +87,7 @@ ResultStore::ResultStore(const std::filesystem::path& folder)
   prepare_folder(folder);
   std::error_code error;
   if (std::filesystem::exists(file_, error) && !std::filesystem::is_regular_file(file_, error))
-    throw io::InputError(file_.string() + ": is not a file that results can be added to");
+    throw io::InputError(file_.string() + ": is not a file to which results can be appended");
   if (const int descriptor = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC); descriptor >= 0)
     ::close(descriptor);
   else if (errno != ENOENT)
@@ -126,8 +126,8 @@ std::string ResultStore::place(const std::string& key) const {
 }
 
 void ResultStore::append(const json& record) {
-  // One write, so that a reader or a second writer never sees half a line; a half line that an earlier run
-  // left is closed first, and stays where it is.
+  // One write, so that a reader or a second writer never sees half a line; a partial line of an earlier run
+  // is terminated first, and stays in place.
   const std::string line =
       (broken_end_ ? "\n" : "") + record.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
   const auto failed = [&] {

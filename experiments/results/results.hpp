@@ -8,29 +8,29 @@
 
 namespace kbvh::experiments {
 
-/// The value of a text of a file that this program wrote, or a discarded one (`is_discarded`) for what is no
-/// JSON or is nested deeper than anything that it writes: copying such a value would exhaust the stack.
+/// Parses the text of a file that this program wrote. Returns a discarded value (`is_discarded`) if it is not
+/// JSON or is nested deeper than any output of the program: copying such a value would exhaust the stack.
 nlohmann::json json_or_nothing(std::string_view text);
 
-/// Makes a folder that results are to be written to, and writes and removes a small file there: a folder that
-/// is none, cannot be written or is on a full disk is noticed before hours of work. Throws io::InputError.
+/// Makes a folder for results, and writes and removes a small file there: a path that is no folder, is not
+/// writable or is on a full disk is detected before hours of work. Throws io::InputError.
 void prepare_folder(const std::filesystem::path& folder);
 
 /// The append-only result file of a folder, results.jsonl: one JSON object per line, written in one piece.
-/// RESULTS.md documents the records. Lines that cannot be read (of a run that was killed) are skipped and
-/// counted, never mended.
+/// RESULTS.md documents the records. Unreadable lines (of a killed run) are skipped and counted, never
+/// repaired.
 class ResultStore {
  public:
-  /// Creates the folder and reads what is there. Throws io::InputError if it cannot be written.
+  /// Creates the folder and reads existing records. Throws io::InputError if the folder cannot be written.
   explicit ResultStore(const std::filesystem::path& folder);
   ResultStore(const ResultStore&) = delete;
   ResultStore& operator=(const ResultStore&) = delete;
 
-  /// The newest record with this key, or nullptr.
+  /// Returns the newest record with this key, or nullptr.
   const nlohmann::json* find(const std::string& key) const;
-  /// "FILE line N", where that record is, of one that was read from the file; else the file.
+  /// Returns "FILE line N", the place of a record that was read from the file; else the file.
   std::string place(const std::string& key) const;
-  /// Writes the record as one line, flushed to the disk. Throws io::InputError if that fails.
+  /// Writes the record as one line, flushed to disk. Throws io::InputError if that fails.
   void append(const nlohmann::json& record);
 
   const std::filesystem::path& folder() const { return folder_; }

@@ -14,7 +14,7 @@ using nlohmann::json;
 
 namespace {
 
-/// Width in characters, not bytes, of UTF-8 text.
+/// Returns the width in characters, not bytes, of UTF-8 text.
 std::size_t width_of(const std::string& text) {
   return std::size_t(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; }));
 }
@@ -23,6 +23,7 @@ double phase_of(const json& repetition, const std::string& phase) {
   const auto get = [&](const char* name) { return repetition.at(name).get<double>(); };
   const auto changes = [&] { return get("plan_changes") + repetition.value("geometry_changes", 0.0); };
   if (phase == "query") return get("traversal") + get("triangle_tests");
+  if (phase == "upkeep") return get("update") + changes();
   if (phase == "candidates") return get("update") + get("traversal") + changes();
   if (phase == "total") return get("update") + get("traversal") + get("triangle_tests") + changes();
   if (phase == "total_with_motion") return get("motion") + phase_of(repetition, "total");
@@ -33,7 +34,7 @@ std::string milliseconds(double value) {
   return fmt::format("{:.4g}", value);
 }
 
-/// Counters that are the strategy's own and not 0, in words.
+/// Formats the strategy's own counters that are not 0.
 std::string own_counters(const json& record) {
   std::string text;
   const json counters = record.value("counters", json::object());
@@ -77,8 +78,13 @@ bool has_times(const json& record) {
 
 std::vector<double> phase_values(const json& record, const std::string& phase) {
   std::vector<double> values;
+  const bool per_event = phase == "update_per_event";
+  // Counters are of the whole clip, times of a frame.
+  const double events = per_event ? record.at("counters").value("certificates_failed", 0.0) /
+                                        record.at("scene").at("frames").get<double>()
+                                  : 1;
   for (const json& repetition : record.at("times").at("repetitions"))
-    values.push_back(phase_of(repetition, phase));
+    values.push_back(events > 0 ? phase_of(repetition, per_event ? "update" : phase) / events : 0);
   return values;
 }
 
@@ -94,7 +100,7 @@ double median_phase(const json& record, const std::string& phase) {
 
 bool is_baseline(const json& record) {
   const json& strategy = record.at("strategy");
-  // Records from before baselines were declared: the family had to do.
+  // Records from before baselines were declared: the family decides.
   const auto declared = strategy.find("baseline");
   return declared == strategy.end() ? strategy.at("family") == "refit" : declared->get<bool>();
 }
@@ -132,9 +138,8 @@ std::string results_table(const std::vector<json>& records) {
   for (const std::string kind : {"points", "control_nets"})
     if (std::any_of(bodies.begin(), bodies.end(),
                     [&](const json& body) { return body.value("kind", std::string()) == kind; }))
-      text +=
-          fmt::format("  pairs with {} are candidates: boxes that overlap, which says nothing of contact\n",
-                      kind == "points" ? "points" : "control nets");
+      text += fmt::format("  pairs with {} are candidates: overlapping boxes, without a test of contact\n",
+                          kind == "points" ? "points" : "control nets");
   for (const char* column : {"x refit", "with motion", "missed", "extra", "protrusion", "looseness"})
     head.push_back(column);
   std::vector<std::vector<std::string>> rows{head};
@@ -168,8 +173,7 @@ std::string results_table(const std::vector<json>& records) {
   text += columns(rows) + refusals + choices + counted_by;
   std::set<std::string> runs;
   for (const json& record : records) runs.insert(record.value("run", std::string()));
-  if (runs.size() > 1)
-    text += "  (not all of one run: the machine may not have been the same all the time)\n";
+  if (runs.size() > 1) text += "  (from several runs: the machine may have differed)\n";
   return text;
 }
 

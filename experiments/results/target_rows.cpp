@@ -19,7 +19,7 @@ using nlohmann::json;
 
 namespace {
 
-/// What stands for a selector in one table.
+/// The result of a selector in one table.
 struct Side {
   const json* record = nullptr;  ///< of the fastest configuration
   std::vector<double> times;     ///< of its repetitions, ms per frame
@@ -54,8 +54,8 @@ Side side_of(const TargetSelector& selector, const std::vector<json>& records) {
   return side;
 }
 
-/// The bootstrap's chance (Steele, Lea and Flood 2014, "Fast splittable pseudorandom number generators"), the
-/// same on every machine.
+/// A fixed-seed random generator for the bootstrap (Steele, Lea and Flood 2014, "Fast splittable pseudorandom
+/// number generators"), the same on every machine.
 class Chance {
  public:
   std::size_t below(std::size_t count) {
@@ -75,7 +75,8 @@ double resampled_median(const std::vector<double>& values, Chance& chance, std::
   return median(buffer);
 }
 
-/// The middle 95 % of the ratio of medians over repetitions drawn anew; null where a side has but one.
+/// Computes the middle 95 % of the ratio of medians over resampled repetitions; null if a side has a single
+/// repetition.
 json confidence_interval(const Side& numerator, const Side& denominator) {
   if (numerator.times.size() < 2 || denominator.times.size() < 2) return nullptr;
   constexpr std::size_t draws = 4000, left_out = draws / 40;
@@ -100,14 +101,31 @@ json side_json(const Side& side) {
           {"run", record.value("run", std::string())}};
 }
 
+/// Whether the table is of the target's scalar and l.
+bool is_measured_as(const Target& target, const TargetGroup& group) {
+  return group.scene.at("scalar") == target.scalar && group.scene.at("per_keyframe") == target.per_keyframe;
+}
+
 bool is_counted(const Target& target, const std::string& scene) {
   return std::find(target.scenes.begin(), target.scenes.end(), scene) != target.scenes.end();
 }
 
-/// The ratio in one table, or why there is none.
-json scene_row(const Target& target, const TargetGroup& group) {
-  const Side numerator = side_of(target.numerator, group.records);
-  const Side denominator = side_of(target.denominator, group.records);
+/// The table on which a side is measured: `group`, or the first of the selector's own scene.
+Side side_of(const TargetSelector& selector, const Target& target, const TargetGroup& group,
+             const std::vector<TargetGroup>& groups) {
+  if (selector.scene.empty()) return side_of(selector, group.records);
+  for (const TargetGroup& other : groups)
+    if (is_measured_as(target, other) && other.scene.at("name") == selector.scene)
+      return side_of(selector, other.records);
+  Side side;
+  side.missing = "'" + selector.scene + "' was left out";
+  return side;
+}
+
+/// Computes the ratio in one table, or the reason for its absence.
+json scene_row(const Target& target, const TargetGroup& group, const std::vector<TargetGroup>& groups) {
+  const Side numerator = side_of(target.numerator, target, group, groups);
+  const Side denominator = side_of(target.denominator, target, group, groups);
   std::uint64_t triangles = 0;
   for (const json& body : group.scene.at("bodies"))
     if (body.at("moving").get<bool>()) triangles += body.at("primitives").get<std::uint64_t>();
@@ -131,19 +149,20 @@ json scene_row(const Target& target, const TargetGroup& group) {
   return row;
 }
 
-/// Every scene that the target's scalar and l were measured on, once: from the first table with both sides.
+/// Collects every scene on which the target's scalar and l were measured, once: from the first table with
+/// both sides.
 json scene_rows(const Target& target, const std::vector<TargetGroup>& groups) {
   std::vector<std::pair<std::string, json>> rows;  // by hash of the scene
   for (const TargetGroup& group : groups) {
-    if (group.scene.at("scalar") != target.scalar || group.scene.at("per_keyframe") != target.per_keyframe)
-      continue;
+    if (!is_measured_as(target, group)) continue;
     const std::string hash = group.scene.at("hash").get<std::string>();
     const auto known =
         std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == hash; });
     if (known == rows.end())
-      rows.emplace_back(hash, scene_row(target, group));
+      rows.emplace_back(hash, scene_row(target, group, groups));
     else if (known->second.at("ratio").is_null())
-      if (json row = scene_row(target, group); !row.at("ratio").is_null()) known->second = std::move(row);
+      if (json row = scene_row(target, group, groups); !row.at("ratio").is_null())
+        known->second = std::move(row);
   }
   json list = json::array();
   for (auto& [hash, row] : rows)
@@ -166,8 +185,8 @@ json selector_json(const TargetSelector& selector) {
   return {{"strategy", selector.strategy}, {"phase", selector.phase}, {"which", described(selector)}};
 }
 
-/// Geometric means over scenes. Of intervals those of their ends: as if all scenes were as bad, or as good,
-/// as they may be at once, so it is wider than one of 95 %.
+/// Geometric means over scenes. The ends of intervals are averaged in the same way, as if all scenes were at
+/// the same end at once, so the result is wider than a 95 % interval.
 class Mean {
  public:
   void add(const json& scene) {
@@ -213,7 +232,7 @@ json target_row(const Target& target, const std::vector<TargetGroup>& groups) {
   for (const json& one : row["per_scene"]) {
     if (!one.at("counts").get<bool>()) continue;
     if (one.at("ratio").is_null()) {
-      // What was not measured on a scene that counts could be worse than all the others.
+      // An unmeasured scene that counts could be worse than all the others.
       row["reason"] = one.at("scene").get<std::string>() + ": " + one.at("reason").get<std::string>();
       return row;
     }
@@ -246,7 +265,7 @@ json target_rows(const Plan& plan, const std::vector<TargetGroup>& groups) {
   return rows;
 }
 
-// --- shown ----------------------------------------------------------------------------------------------
+// --- printed tables -------------------------------------------------------------------------------------
 
 namespace {
 
@@ -300,7 +319,7 @@ std::string targets_table(const json& rows) {
   }
   std::string text = "Targets: how many times slower the other is, on the scenes that count\n";
   text += columns(summary) + reasons;
-  if (several_runs) text += "  (not all of one run: the machine may not have been the same all the time)\n";
+  if (several_runs) text += "  (from several runs: the machine may have differed)\n";
   return text + "\nAll scenes (* counts)\n" + details;
 }
 
@@ -314,8 +333,8 @@ void write_targets(const std::filesystem::path& folder, const json& rows) {
     for (const json& row : *before)
       if (!row.is_object() || !plans.contains(row.value("plan", ""))) all.push_back(row);
   } else if (before) {
-    say("warning: " + file.string() + " is no list of targets: it is now " + set_aside(file) +
-        ", and a new one is begun");
+    say("warning: " + file.string() + " is not a list of targets: it is now " + set_aside(file) +
+        ", and a new file is started");
   }
   for (const json& row : rows) all.push_back(row);
   io::write_file_atomically(file, all.dump(1, ' ', false, json::error_handler_t::replace) + "\n");

@@ -17,11 +17,11 @@ struct TargetGroup {
   std::vector<nlohmann::json> records;
 };
 
-/// One row per target of the plan, from the records of `groups` (in the order in which they were measured).
-/// Intervals are of 95 %, by a bootstrap over the repetitions whose chance is always the same.
+/// Makes one row per target of the plan, from the records of `groups` (in the order in which they were
+/// measured). Intervals are of 95 %, by a bootstrap over the repetitions with a fixed seed.
 nlohmann::json target_rows(const Plan& plan, const std::vector<TargetGroup>& groups);
 
-/// The tables that `run` and `bench` print for the rows: what counts, then every scene.
+/// Formats the tables that `run` and `bench` print for the rows: the scenes that count, then every scene.
 std::string targets_table(const nlohmann::json& rows);
 
 /// Writes the rows to `folder`/targets.json, in place of those of the same plans; rows of other plans stay. A

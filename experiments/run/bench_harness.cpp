@@ -17,7 +17,7 @@ using nlohmann::json;
 
 namespace {
 
-/// Google Benchmark writes NaN and Infinity (the variation of what is always zero), which JSON does not have.
+/// Google Benchmark writes NaN and Infinity (the variation of constant zeros), which JSON does not have.
 std::string without_nan(std::string text) {
   for (const std::string token : {": NaN", ": -NaN", ": Infinity", ": -Infinity"})
     for (std::size_t at = 0; (at = text.find(token, at)) != std::string::npos;)
@@ -76,8 +76,8 @@ std::string add_to_benchmark_file(const std::filesystem::path& folder, const jso
       (*before)["context"] = runs.at("context");
       all = std::move(*before);
     } else {
-      said = file.string() + " is not what Google Benchmark writes: it is now " + set_aside(file) +
-             ", and a new one is begun";
+      said = file.string() + " is not a file of Google Benchmark: it is now " + set_aside(file) +
+             ", and a new file is started";
     }
   }
   io::write_file_atomically(file, all.dump(1, ' ', false, json::error_handler_t::replace) + "\n");

@@ -29,11 +29,13 @@ using nlohmann::json;
 
 namespace {
 
-/// Primitives up to which a scene's keyframes are written for its picture, and how many keyframes.
+/// The largest scene whose keyframes are written for its picture, in primitives and in bodies (each is a
+/// file), and the number of keyframes.
 constexpr std::uint64_t largest_shown = 150'000;
+constexpr std::size_t most_bodies_shown = 1000;
 constexpr std::size_t keyframes_shown = 4;
 
-/// One run of a plan: what all its groups share.
+/// One run of a plan: the state shared by all its groups.
 class Runner {
  public:
   Runner(Harness harness, const std::filesystem::path& out)
@@ -43,17 +45,17 @@ class Runner {
     std::error_code error;
     for (const char* name : {"benchmark.json", "targets.json"})
       if (const auto file = out / name; std::filesystem::is_directory(file, error))
-        throw io::InputError(file.string() + ": is a folder where a file is to be written");
+        throw io::InputError(file.string() + ": is a folder, but a file must be written there");
     if (store_->unreadable_lines() > 0)
       say("note: " + (out / "results.jsonl").string() + " has " + std::to_string(store_->unreadable_lines()) +
-          " unreadable lines (of a run that was stopped?); they are left as they are");
+          " unreadable lines (of an interrupted run?); they stay unchanged");
   }
 
   void study(const Study& study, const std::vector<ContestantSpec>& contestants) {
     for (const SceneSpec& spec : study.scenes) {
       if (spec.optional) {
         if (const std::string missing = missing_file(spec); !missing.empty()) {
-          note("note: the scene '" + spec.name + "' is left out, there is no " + missing);
+          note("note: the scene '" + spec.name + "' is skipped: there is no " + missing);
           continue;
         }
       }
@@ -69,7 +71,7 @@ class Runner {
     }
   }
 
-  /// Holds what was measured against the plan's targets.
+  /// Compares the measurements with the plan's targets.
   void targets(const Plan& plan) {
     if (plan.targets.empty()) return;
     const json rows = target_rows(plan, groups_);
@@ -85,12 +87,12 @@ class Runner {
     if (said_.insert(text).second) say(text);
   }
 
-  /// What the report shows of a scene: its card, and a few keyframes where it is not too large for a picture.
-  /// Returns the card's hash; "" without a card.
+  /// Writes the report's data on a scene: its card, and a few keyframes if the scene is not too large for a
+  /// picture. Returns the card's hash; "" without a card.
   std::string show_scene(const LoadedScene& loaded) {
     std::uint64_t primitives = 0;
     for (const io::AnimatedMesh& mesh : loaded.meshes) primitives += mesh.primitive_count();
-    if (primitives > largest_shown) return {};
+    if (primitives > largest_shown || loaded.meshes.size() > most_bodies_shown) return {};
     const std::string hash = hexadecimal(card_hash(loaded));
     const std::filesystem::path folder = store_->folder() / "scenes" / folder_name(loaded);
     if (is_card(folder / "card.json", hash)) return hash;
@@ -98,7 +100,7 @@ class Runner {
     try {
       export_scene(loaded, folder, keyframes_shown);
     } catch (const io::InputError& problem) {
-      // Nothing that is measured depends on it.
+      // No measurement depends on it.
       note("warning: the report will have no picture of " + loaded.name + ": " + problem.what());
     }
     progress_.clear();
@@ -113,14 +115,13 @@ class Runner {
     return card.is_object() && card.contains("bodies") && card.contains("hash") && card.at("hash") == hash;
   }
 
-  /// A scene of one body has times, but its query has nothing to find, which is seldom meant.
+  /// Warns of a scene of one body: it has times, but its query has nothing to find, which is seldom intended.
   template <class S>
   void warn_of_no_pairs(const Scene<S>& scene) {
     if (!scene.pairs.empty()) return;
     note("warning: " + scene.name +
-         " has one body, so there are no pairs of bodies, and nothing is found or compared; pairs within it "
-         "are "
-         "asked for by --self (in a plan: \"self\": true)");
+         " has one body, so there are no pairs of bodies, and nothing is found or compared; --self (in a "
+         "plan: \"self\": true) asks for pairs within it");
   }
 
   template <class S>
@@ -137,7 +138,7 @@ class Runner {
     std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
     if (has_own_frames(loaded)) {
       if (per_keyframe != std::vector<std::uint32_t>{1})
-        note("note: " + scene.name + " says itself when its frames are: l does not apply and counts as 1");
+        note("note: " + scene.name + " defines its own frame times: l does not apply and counts as 1");
       per_keyframe = {1};
     }
     for (const std::uint32_t l : per_keyframe) {
@@ -150,7 +151,7 @@ class Runner {
     if (oracle.problem() != before) note("warning: " + oracle.problem());
   }
 
-  /// All contestants on one scene, in one scalar, at one l: what one table shows.
+  /// Measures all contestants on one scene, in one scalar, at one l: the content of one table.
   template <class S>
   void group(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded,
              const Scene<S>& scene, const PlanScript<S>& script, Oracle<S>& oracle, std::uint32_t l,
@@ -166,20 +167,21 @@ class Runner {
                 [&](const Info& info) { return unsuitable(info, scene, script); });
   }
 
-  /// The same for contacts from each keyframe to the next.
+  /// Does the same for contacts from each keyframe to the next.
   template <class S>
   void contact_group(const Study& study, const std::vector<ContestantSpec>& contestants,
                      const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script) {
     if (script.changes_geometry()) {
       note("note: " + scene.name +
-           " is left out: contacts between keyframes know nothing of changes of geometry");
+           " is skipped: contacts between keyframes do not support changes of geometry");
       return;
     }
-    std::vector<double> knots = script.empty() ? overlaid_keyframes(scene)
-                                               : contact_times(frames_of(scene, loaded, script, 1), script);
+    std::vector<double> knots = script.empty()
+                                    ? overlaid_keyframes(scene)
+                                    : contact_times(scene, frames_of(scene, loaded, script, 1), script);
     if (study.frames_limit > 0 && knots.size() > study.frames_limit + 1) knots.resize(study.frames_limit + 1);
     if (knots.size() < 2) {
-      note("note: " + scene.name + " is left out: nothing moves, so there are no contacts between keyframes");
+      note("note: " + scene.name + " is skipped: nothing moves, so there are no contacts between keyframes");
       return;
     }
     progress_.show(scene.name + ": finding the true contacts");
@@ -195,7 +197,7 @@ class Runner {
                 });
   }
 
-  /// Verifies and times the contestants of one table. `M` is a Measurement, or one of contacts.
+  /// Verifies and times the contestants of one table. `M` is a Measurement, or a measurement of contacts.
   template <class M, class Unsuitable>
   void measure_all(const Study& study, const std::vector<ContestantSpec>& contestants,
                    const LoadedScene& loaded, json about_scene, const std::string& title, M& measurement,
@@ -203,7 +205,7 @@ class Runner {
     if (!card_.empty()) about_scene["card"] = card_;
     const std::string scalar = about_scene.at("scalar");
     std::vector<json> records;           // in the order of the contestants
-    std::vector<std::size_t> record_of;  // of each one that is measured
+    std::vector<std::size_t> record_of;  // of each measured contestant
     std::size_t skipped = 0;
     for (std::size_t c = 0; c < contestants.size(); ++c) {
       const ContestantSpec& spec = contestants[c];
@@ -239,7 +241,7 @@ class Runner {
       note(title + ", " + scalar + ": " + std::to_string(skipped) + " of " +
            counted(records.size(), "configuration") + " in the results already, not measured again");
     const json benchmarks = play_all(measurement, study.repetitions, title, scalar);
-    std::string failed;  // the first of what could not be written
+    std::string failed;  // the first file that could not be written
     const auto keep = [&failed](const auto& work) {
       try {
         work();
@@ -247,8 +249,8 @@ class Runner {
         if (failed.empty()) failed = problem.what();
       }
     };
-    // Before the records: a configuration whose record is there is not measured again, so that its table in
-    // benchmark.json would never come.
+    // Written before the records: a configuration with a record is not measured again, so its table in
+    // benchmark.json would never be written.
     if (store_ && !benchmarks.is_null())
       keep([&] {
         if (const std::string said = add_to_benchmark_file(store_->folder(), benchmarks); !said.empty())
@@ -275,7 +277,7 @@ class Runner {
     if (!failed.empty()) throw io::InputError(failed);
   }
 
-  /// The record of a configuration that need not be measured again, or nullptr.
+  /// Returns the record of a configuration that need not be measured again, or nullptr.
   const json* known_record(const std::string& key, const std::string& what) {
     if (!store_) {
       const auto found = of_this_run_.find(key);
@@ -296,7 +298,7 @@ class Runner {
     return known;
   }
 
-  /// Plays the repetitions; Google Benchmark's report, or null.
+  /// Plays the repetitions; returns Google Benchmark's report, or null.
   template <class M>
   json play_all(M& measurement, std::uint32_t repetitions, const std::string& title,
                 const std::string& scalar) {
@@ -306,7 +308,7 @@ class Runner {
     if (timed.empty()) return nullptr;
     std::size_t done = 0;
     const auto play = [&](std::size_t i) -> const ClipTimes* {
-      if (!measurement.timed(i)) return nullptr;  // it has thrown
+      if (!measurement.timed(i)) return nullptr;  // an exception was thrown
       progress_.show(title + ": clip " + std::to_string(++done) + " of " +
                      std::to_string(timed.size() * repetitions) + ", " + measurement[i].spec->label);
       return measurement.play(i);
@@ -347,20 +349,20 @@ class Runner {
   std::string run_;
   std::unique_ptr<ResultStore> store_;
   std::map<std::string, json> of_this_run_;  // by key, where there is no store
-  std::string card_;                         // of the scene that is played
+  std::string card_;                         // of the current scene
   Progress progress_;
   const MakeProgress making_ = [this](const std::string& what, double fraction) {
     progress_.show(what + (fraction > 0 ? ": " + std::to_string(int(100 * fraction)) + " %" : ""));
   };
   std::set<std::string> said_;
   StudyOutcome outcome_;
-  std::vector<TargetGroup> groups_;  // everything that the plan has asked for, for its targets
+  std::vector<TargetGroup> groups_;  // everything that the plan requested, for its targets
 };
 
 }  // namespace
 
 StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::path& out) {
-  // Everything that can be wrong with the contestants is found before the first is measured.
+  // All errors of the contestants are found before the first measurement.
   std::vector<std::vector<ContestantSpec>> contestants;
   std::vector<std::string> notes;
   for (const Study& study : plan.studies)

@@ -7,19 +7,19 @@
 
 namespace kbvh::experiments {
 
-/// What a study came to.
+/// The outcome of a study.
 struct StudyOutcome {
   std::size_t measured = 0;    ///< configurations
-  std::size_t skipped = 0;     ///< were in the results already
-  std::size_t refused = 0;     ///< got no time, because a guarantee was broken (also in earlier runs)
-  std::size_t unfinished = 0;  ///< got no time, because there was no memory; the next run measures them again
+  std::size_t skipped = 0;     ///< already in the results
+  std::size_t refused = 0;     ///< without a time, because a guarantee was broken (also in earlier runs)
+  std::size_t unfinished = 0;  ///< without a time, because memory ran out; the next run measures them again
 };
 
-/// Does all studies of the plan: verifies every contestant, then times those that hold, prints a table for
-/// each scene, scalar and l on stdout, and appends to `out`/results.jsonl (nothing is written if `out` is
-/// empty). A table is printed even if it cannot be written. Configurations that are in the results already
-/// are not measured again. If the plan has targets, their table is printed at the end, and `out`/targets.json
-/// written. Throws io::InputError and ConfigError.
+/// Performs all studies of the plan: verifies every contestant, then times those whose guarantee holds,
+/// prints a table for each scene, scalar and l on stdout, and appends to `out`/results.jsonl (nothing is
+/// written if `out` is empty). A table is printed even if it cannot be written. Configurations that are
+/// already in the results are not measured again. If the plan has targets, their table is printed at the end,
+/// and `out`/targets.json written. Throws io::InputError and ConfigError.
 StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::path& out);
 
 }  // namespace kbvh::experiments

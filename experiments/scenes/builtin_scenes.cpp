@@ -17,8 +17,8 @@ namespace {
 
 using Meshes = std::vector<io::AnimatedMesh>;
 
-/// What was simulated before is read from the cache, else simulate(progress) is called and its result kept.
-/// `what` names it in reports of progress.
+/// Reads an earlier simulation from the cache, else calls simulate(progress) and keeps its result. `what`
+/// names it in reports of progress.
 template <class Config, class Simulate>
 Meshes simulated(const Config& config, Simulate simulate, const std::string& what,
                  const MakeProgress& progress) {
@@ -29,7 +29,7 @@ Meshes simulated(const Config& config, Simulate simulate, const std::string& wha
     try {
       return io::load_cache(file);
     } catch (const io::InputError& problem) {
-      say(std::string("warning: ") + problem.what() + "; the scene is simulated anew");
+      say(std::string("warning: ") + problem.what() + "; the scene is simulated again");
     }
   }
   const auto report = [&](double fraction) {
@@ -41,7 +41,7 @@ Meshes simulated(const Config& config, Simulate simulate, const std::string& wha
     try {
       io::save_cache(meshes, file);
     } catch (const io::InputError& problem) {
-      say(std::string("warning: the simulated scene is not kept: ") + problem.what());
+      say(std::string("warning: the simulated scene is not cached: ") + problem.what());
     }
   }
   return meshes;
@@ -56,7 +56,7 @@ Meshes tablecloth(const BuiltinOptions& options, const MakeProgress& progress) {
   return simulated(config, scenes::simulate_tablecloth, "tablecloth", progress);
 }
 
-/// The obstacle has about as many triangles up to 20 000, which is what the measurements are defined for.
+/// The obstacle has about as many triangles up to 20 000, the size for which the measurements are defined.
 std::uint32_t obstacle_triangles(const BuiltinOptions& options) {
   if (options.obstacle_triangles > 0) return options.obstacle_triangles;
   return options.triangles < 20000 ? options.triangles : 20000;
@@ -92,9 +92,8 @@ Meshes expanding_sphere(const BuiltinOptions& options, const MakeProgress&) {
           scenes::icosphere(obstacle_triangles(options), {0.5, 0.1, -0.05}, 0.4)};
 }
 
-// Two spheres grow towards each other, all vertices at 0.1 m/s until they are told otherwise. Their centres
-// are not mirror images in anything that their triangles are aligned with, so contacts are in general
-// position.
+// Two spheres grow towards each other, all vertices at 0.1 m/s until a plan changes. Their centres are not
+// mirror images with respect to the axes of their triangles, so contacts are in general position.
 constexpr std::array<double, 3> left_centre{-0.52, 0.0, 0.0}, right_centre{0.52, 0.013, -0.007};
 constexpr double first_radius = 0.5, outward_speed = 0.1;
 
@@ -147,11 +146,11 @@ const std::vector<BuiltinScene>& builtin_scenes() {
       {"waving_sheet", "a sheet in crossing waves cuts a sphere at rest", &waving_sheet},
       {"expanding_sphere", "a growing sphere reaches a sphere at rest", &expanding_sphere},
       {"reversing_spheres",
-       "two spheres expand and vertices turn round where triangles meet, at 60 frames per second; keyframes: "
-       "frames",
+       "two spheres expand, and vertices of colliding triangles reverse, at 60 frames per second; keyframes: "
+       "number of frames",
        &reversing_spheres, &reversing_rule},
-      {"passing_spheres", "two spheres fly through each other, without deforming", &passing_spheres},
-      {"turning_box", "a box turns inside a sphere at rest", &turning_box},
+      {"passing_spheres", "two rigid spheres pass through each other", &passing_spheres},
+      {"turning_box", "a box rotates inside a sphere at rest", &turning_box},
       {"random_soups", "two clouds of separate drifting triangles in the same cube", &random_soups},
   };
   return list;

@@ -10,24 +10,24 @@
 
 namespace kbvh::experiments {
 
-/// What every built-in scene can be asked for.
+/// The options common to all built-in scenes.
 struct BuiltinOptions {
-  std::uint32_t triangles = 2000;        ///< of the body that moves; the nearest that its pattern allows
-  std::uint32_t obstacle_triangles = 0;  ///< of the body beside it; 0: what suits the scene
-  std::uint64_t seed = 1;                ///< where chance plays a part
+  std::uint32_t triangles = 2000;        ///< of the moving body; the nearest number that its pattern allows
+  std::uint32_t obstacle_triangles = 0;  ///< of the body next to it; 0: the scene's default
+  std::uint64_t seed = 1;                ///< of random parts
   std::uint32_t keyframes = 60;
-  /// Garments only: how many triangles are simulated in full before a second level refines; 0: the usual
-  /// number.
+  /// Garments only: the number of triangles that is simulated in full before a second level refines; 0: the
+  /// usual number.
   std::uint32_t full_triangles = 0;
 };
 
-/// Told what long work is doing and the finished fraction; may be empty.
+/// Receives the name of long work and the finished fraction; may be empty.
 using MakeProgress = std::function<void(const std::string& what, double fraction)>;
 
-/// How vertices that fly outwards answer contact (Z&W s.9): after every frame's query, each vertex of a
-/// colliding primitive that moves outwards turns round, and each that moves inwards and has come to the
-/// lowest radius turns outwards again, both at the speed they had. So motion goes on for as long as one
-/// likes.
+/// The response of outward-moving vertices to contact (Z&W s.9): after every frame's query, each
+/// outward-moving vertex of a colliding primitive reverses, and each inward-moving vertex that has reached
+/// the lowest radius turns outwards again, both at their previous speed. The motion can therefore continue
+/// indefinitely.
 struct ReversalRule {
   std::vector<std::array<double, 3>> centres;  ///< of every body
   double lowest_radius = 0;
@@ -46,7 +46,7 @@ struct BuiltinScene {
 
 const std::vector<BuiltinScene>& builtin_scenes();
 
-/// Throws io::InputError that lists the known names.
+/// Finds a scene by its name. Throws io::InputError that lists the known names.
 const BuiltinScene& find_builtin_scene(const std::string& name);
 
 }  // namespace kbvh::experiments

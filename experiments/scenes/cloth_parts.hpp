@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-/// What the cloth solvers (tablecloth, garments) share. Everything here is deterministic to the last bit on
-/// every machine with IEEE doubles and -ffp-contract=off.
+/// The shared parts of the cloth solvers (tablecloth, garments). All results are deterministic to the last
+/// bit on every machine with IEEE doubles and -ffp-contract=off.
 namespace kbvh::scenes {
 
-/// Told the finished fraction (0 to 1) after every keyframe; may be empty.
+/// Receives the finished fraction (0 to 1) after every keyframe; may be empty.
 using Progress = std::function<void(double)>;
 
 namespace cloth {
@@ -37,7 +37,8 @@ inline double length(const Vec& a) {
   return std::sqrt(dot(a, a));
 }
 
-/// One XPBD step of the distance between two vertices of equal mass; softness = mass / (stiffness dt^2).
+/// Performs one XPBD step of the distance between two vertices of equal mass; softness = mass / (stiffness
+/// dt^2).
 inline void solve_distance(Vec& a, Vec& b, double rest, double softness) {
   const Vec d = b - a;
   const double now = length(d);
@@ -47,8 +48,8 @@ inline void solve_distance(Vec& a, Vec& b, double rest, double softness) {
   b -= move;
 }
 
-/// One XPBD step of quadratic bending at b between its neighbours a and c along a thread; share = 1 / (6 +
-/// softness), softness = mass spacing^2 / (rigidity dt^2).
+/// Performs one XPBD step of quadratic bending at b between its neighbours a and c along a thread; share = 1
+/// / (6 + softness), softness = mass spacing^2 / (rigidity dt^2).
 inline void solve_bend(Vec& a, Vec& b, Vec& c, double share) {
   const Vec bend = (a + c - b * 2.0) * share;
   a -= bend;
@@ -56,31 +57,32 @@ inline void solve_bend(Vec& a, Vec& b, Vec& c, double share) {
   c -= bend;
 }
 
-/// How much of the velocity a step of quadratic drag along the unit normal takes away, as a speed along the
-/// normal. Implicit, so that drag can stop but never reverse it.
+/// Returns the speed along the unit normal that a step of quadratic drag removes. Implicit, so that drag can
+/// stop but never reverse the motion.
 inline double dragged_speed(double across, double air_drag, double dt) {
   const double kept = 1.0 / (1.0 + dt * air_drag * std::fabs(across));
   return (1.0 - kept) * across;
 }
 
-/// Coulomb's friction after a vertex was pushed out of a solid along n by `push`: takes from its way
-/// `slide` relative to the solid what friction holds.
+/// Applies Coulomb friction after a vertex was pushed out of a solid along n by `push`: removes from its
+/// displacement `slide` relative to the solid the part that friction holds.
 inline void resist_sliding(Vec& x, Vec slide, const Vec& n, double push, double friction) {
   slide -= n * dot(slide, n);
   const double amount = length(slide);
   if (amount > 0.0) x -= slide * std::min(1.0, friction * push / amount);
 }
 
-/// Contact between layers of a cloth: vertices keep a distance from all that are not their neighbours in the
-/// cloth. It keeps layers apart nearly everywhere but is no guarantee: edges may still cut.
+/// Contact between layers of a cloth: vertices keep a distance from all vertices that are not their
+/// neighbours in the cloth. This keeps layers apart nearly everywhere but is no guarantee: edges may still
+/// cut.
 class LayerContacts {
  public:
-  /// `distance` is what is kept, in metres; 0: no contact.
+  /// `distance` is the distance to keep, in metres; 0: no contact.
   explicit LayerContacts(double distance) : distance_(distance) {}
 
-  /// Pushes apart what is too near, with friction on the way since `previous`. `held(p, q)`, p < q, says
-  /// whether two vertices are neighbours in the cloth. O(vertices), and sorting them into cells when one has
-  /// moved by more than a quarter of the distance.
+  /// Pushes vertices apart that are too near, with friction on their displacement since `previous`. `held(p,
+  /// q)`, p < q, returns whether two vertices are neighbours in the cloth. O(vertices), plus a sort into
+  /// cells when one has moved by more than a quarter of the distance.
   template <class Held>
   void solve(std::vector<Vec>& x, const std::vector<Vec>& previous, double friction, Held held) {
     if (!(distance_ > 0.0)) return;
@@ -133,22 +135,22 @@ class LayerContacts {
   }
 
   double distance_;
-  // Candidates: pairs within the reach when they were listed.
+  // Candidates: pairs that were within the reach when they were listed.
   std::vector<Vec> listed_at_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
   std::uint32_t cells_ = 0;
   std::vector<std::uint32_t> cell_start_, cell_of_, sorted_, next_;
 };
 
-/// A hash of a config's values for cache keys. Doubles count by their bits: two configs share a key only if
-/// they are the same.
+/// Hashes a config's values for cache keys. Doubles count by their bits: two configs share a key only if they
+/// are equal.
 class ConfigHash {
  public:
   void add(std::uint64_t value) {
     for (int byte = 0; byte < 8; ++byte) hash_ = (hash_ ^ (value >> (8 * byte) & 0xff)) * 0x100000001b3u;
   }
   void add(double value) { add(std::bit_cast<std::uint64_t>(value)); }
-  /// 16 hexadecimal digits.
+  /// Returns 16 hexadecimal digits.
   std::string digits() const;
 
  private:
@@ -158,8 +160,9 @@ class ConfigHash {
 /// Throws io::InputError "scene: what is ..., must be from ... to ..." unless lowest <= value <= highest.
 void check_range(const char* scene, double value, double lowest, double highest, const char* what);
 
-/// Checks what every cloth has, by these names in its config: density, stiffness, drag, viscosity, friction
-/// and distance of layers. `check(value, lowest, highest, what)` is a `check_range` for the scene.
+/// Checks the parameters that every cloth has, by these names in its config: density, stiffness, drag,
+/// viscosity, friction and distance of layers. `check(value, lowest, highest, what)` is a `check_range` for
+/// the scene.
 template <class Config, class Check>
 void check_cloth(const Config& c, const Check& check) {
   check(c.area_density, 1e-3, 1e3, "the area density");

@@ -12,11 +12,11 @@ namespace {
 
 using cloth::Vec;
 
-/// Part of every cache key: to be raised by every change that can alter a bit of the result.
+/// Part of every cache key: raise it with every change that can alter a bit of the result.
 constexpr int solver_version = 1;
 
 constexpr double cloth_margin = 0.004;  // between cloth and figure at the start
-constexpr std::uint32_t fine_lead = 8;  // keyframes before the first that the second level is given to fold
+constexpr std::uint32_t fine_lead = 8;  // keyframes before the first in which the second level folds
 
 const char* name(GarmentKind kind) {
   return kind == GarmentKind::shirt ? "shirt" : "dress";
@@ -35,7 +35,7 @@ void check(const GarmentConfig& c) {
   check(c.skin_bite, -0.01, 0.01, "the skin's bite");
 }
 
-/// Keyframes are numbered from the first one kept; those of the lead-in are negative.
+/// Keyframes are numbered from the first kept keyframe; those of the lead-in are negative.
 class Timeline {
  public:
   explicit Timeline(const GarmentConfig& c)
@@ -56,8 +56,8 @@ std::uint32_t full_steps(const GarmentConfig& c, const GarmentPattern& pattern) 
   return std::uint32_t(std::max(4.0, std::floor(steps) + 1.0));
 }
 
-/// The whole motion of a garment that is simulated in full: keep(keyframe, positions) from the first of the
-/// lead-in to `last`.
+/// Simulates the whole motion of a garment in full: calls keep(keyframe, positions) from the first keyframe
+/// of the lead-in to `last`.
 template <class Keep>
 void simulate_in_full(const GarmentConfig& config, const GarmentPattern& pattern, std::int64_t last,
                       Keep keep) {
@@ -74,8 +74,8 @@ void simulate_in_full(const GarmentConfig& config, const GarmentPattern& pattern
   }
 }
 
-/// The second level: guided by coarse(keyframe), which is known from the lead-in to the keyframe after
-/// `last`.
+/// Simulates the second level, guided by coarse(keyframe), which is known from the lead-in to the keyframe
+/// after `last`.
 template <class Coarse, class Keep>
 void simulate_guided(const GarmentConfig& config, const GarmentPattern& coarse_pattern,
                      const GarmentPattern& pattern, std::int64_t last, Coarse coarse, Keep keep) {
@@ -111,7 +111,7 @@ void simulate_guided(const GarmentConfig& config, const GarmentPattern& coarse_p
   }
 }
 
-/// Keyframes as the scene has them: rounded to float, with the way that the figure has gone.
+/// Records keyframes as the scene has them: rounded to float, with the figure's displacement.
 class Recorder {
  public:
   Recorder(const GarmentConfig& config, double metres_per_second)
@@ -174,7 +174,7 @@ std::vector<io::AnimatedMesh> simulate_garment(const GarmentConfig& config, cons
   }
   const GarmentPattern coarse =
       sew(shape, garment_counts(shape, config.full_triangles), WalkingFigure(config).walker(), cloth_margin);
-  // Time of either level by its steps and vertices, for the progress only.
+  // The cost of either level by its steps and vertices, for the progress only.
   const double coarse_work = double(coarse.rest.size()) * full_steps(config, coarse);
   const double fine_work = double(pattern.rest.size()) * 2 * config.fine_steps;
   const double share = coarse_work / (coarse_work + fine_work);

@@ -53,12 +53,13 @@ constexpr double shoulder_share = 0.24;  // of the front's columns, under each s
 
 constexpr double pi = 3.14159265358979323846;
 
-/// Length around an ellipse (Ramanujan's first approximation).
+/// Returns the circumference of an ellipse (Ramanujan's first approximation).
 double around(double a, double b) {
   return pi * (3 * (a + b) - std::sqrt((3 * a + b) * (a + 3 * b)));
 }
 
-/// Way up the side of the trunk from the hem to each level: the mean of the slants at the side and in front.
+/// Returns the path length up the side of the trunk from the hem to each level: the mean of the slants at the
+/// side and in front.
 std::vector<double> ways(const GarmentShape& g) {
   std::vector<double> way{0};
   for (std::size_t i = 1; i < g.levels.size(); ++i) {
@@ -138,15 +139,15 @@ class Sewing {
     return {l.front + l.depth * sine_of_turns(turns), l.width * cosine_of_turns(turns), l.z};
   }
 
-  /// Where a column is across the front or back, from 0 to 1. Columns under the shoulders have their share
-  /// of the width whatever their number is, so that patterns of all counts are of one cut.
+  /// Returns the position of a column across the front or back, from 0 to 1. Columns under the shoulders have
+  /// a fixed share of the width for any number of columns, so that patterns of all counts have one cut.
   double across(double column) const {
     const double m = c_.shoulder, n = c_.columns;
     if (column <= m) return shoulder_share * column / m;
     if (column >= n - m) return 1 - shoulder_share * (n - column) / m;
     return shoulder_share + (1 - 2 * shoulder_share) * (column - m) / (n - 2 * m);
   }
-  /// Turns around the trunk, from the left over the front.
+  /// Returns turns around the trunk, from the left over the front.
   double turns(double column) const {
     const double n = c_.columns;
     return column < n ? 0.5 * across(column) : 0.5 + 0.5 * across(column - n);
@@ -184,7 +185,7 @@ class Sewing {
     for (const std::uint32_t mark : trunk.marks) skirt.marks.push_back(2 * mark);
   }
 
-  /// The seams around the front (0) or back (1) panel, u and v from 0 to 1.
+  /// Returns points on the seams around the front (0) or back (1) panel, u and v from 0 to 1.
   Vec armhole_edge(std::uint32_t back, double y_sign, double v) const {
     const double lower_y = g_.levels.back().width, lower_z = g_.levels.back().z;
     const double c = 0.5 * (1 - cosine_of_turns(0.5 * v));
@@ -227,7 +228,7 @@ class Sewing {
           panel.ids.push_back(p_.pieces[2].at(panel.rows, panel.columns - i));  // the shoulder seam
           continue;
         }
-        // Coons' patch through its four edges.
+        // Coons patch through its four edges.
         const double u = across(double(i)), v = double(j) / double(panel.rows);
         const Vec l = armhole_edge(back, left, v), r = armhole_edge(back, -left, v);
         const Vec b = bottom(u), t = top_edge(back, double(i));
@@ -316,7 +317,7 @@ class Sewing {
     const Piece& piece = p_.pieces[which];
     if (piece.rows == 0) return;
     const std::uint32_t stride = piece.stride();
-    const bool gathers = which == 1 && c_.doubled > 0;  // the lowest row hangs on twice as many columns
+    const bool gathers = which == 1 && c_.doubled > 0;  // the lowest row has twice as many columns below it
     for (std::uint32_t j = 0; j <= piece.rows; ++j)
       for (std::uint32_t i = 0; i < stride; ++i) {
         const std::uint32_t v = piece.at(j, i);
@@ -360,7 +361,7 @@ class Sewing {
     p_.triangles.insert(p_.triangles.end(), {a, b, c});
   }
 
-  /// Threads along seams are found twice.
+  /// Removes duplicates: threads along seams are found twice.
   static void finish(std::vector<GarmentPattern::Distance>& list) {
     std::stable_sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end(),
@@ -401,7 +402,7 @@ class Sewing {
 std::uint64_t GarmentCounts::triangles() const {
   const std::uint64_t round = 2ull * columns;
   std::uint64_t count = 2 * round * (rows - doubled + armhole) + 8ull * armhole * sleeve;
-  if (doubled > 0) count += 4 * round * doubled + round;  // and the row that gathers has three to a column
+  if (doubled > 0) count += 4 * round * doubled + round;  // and the gathering row has three to a column
   return count;
 }
 
@@ -410,7 +411,7 @@ GarmentCounts garment_counts(const GarmentShape& shape, std::uint32_t triangles)
   const double area = around(top.width, top.depth) * (ways(shape).back() + armhole_height(shape)) +
                       2 * shape.sleeve * 2.2 * armhole_height(shape);
   double edge = std::sqrt(2 * area / double(std::max(1u, triangles)));
-  // The estimate is set right by what it gives, then all lengths around it are tried.
+  // Corrects the estimate by its result, then tries all lengths around it.
   for (int i = 0; i < 4; ++i)
     edge = edge * std::sqrt(double(counts_at(shape, edge, 0).triangles()) / double(std::max(1u, triangles)));
   GarmentCounts best;

@@ -7,8 +7,8 @@
 #include "experiments/scenes/cloth_parts.hpp"
 #include "experiments/scenes/walker.hpp"
 
-/// How a garment is cut and sewn: pieces of cloth, each a grid of threads, that share vertices along their
-/// seams, and where they lie around the figure's rest pose.
+/// The pattern of a garment: pieces of cloth, each a grid of threads, that share vertices along their seams,
+/// and their placement around the figure's rest pose.
 namespace kbvh::scenes {
 
 enum class GarmentKind : std::uint8_t { shirt, dress };
@@ -30,7 +30,7 @@ struct GarmentShape {
 };
 GarmentShape garment_shape(GarmentKind kind);
 
-/// Numbers of grid squares.
+/// The numbers of grid squares.
 struct GarmentCounts {
   std::uint32_t columns = 4;   ///< across the front, and across the back
   std::uint32_t shoulder = 1;  ///< of them under each shoulder seam
@@ -40,12 +40,12 @@ struct GarmentCounts {
   std::uint32_t sleeve = 0;    ///< rows from armhole to cuff
   std::uint64_t triangles() const;
 };
-/// The counts with nearly square grid squares whose triangles are nearest to the request.
+/// Returns the counts with nearly square grid squares whose number of triangles is nearest to the request.
 GarmentCounts garment_counts(const GarmentShape& shape, std::uint32_t triangles);
 
 /// The sewn garment at rest.
 struct GarmentPattern {
-  /// A grid of (rows + 1) x columns vertices that closes around, or x (columns + 1) that does not.
+  /// A grid of (rows + 1) x columns vertices if it closes around, or of (rows + 1) x (columns + 1) if not.
   struct Piece {
     std::uint32_t rows = 0, columns = 0;
     bool closed = false;
@@ -71,16 +71,18 @@ struct GarmentPattern {
   GarmentCounts counts;
   std::vector<Piece> pieces;  ///< skirt (doubled rows; may have no rows), trunk, front, back, sleeves
   std::vector<cloth::Vec> rest;
-  std::vector<Place> places;                             ///< of each vertex, in the first piece that has it
-  std::vector<std::array<std::uint32_t, 4>> neighbours;  ///< left, right, below, above; itself where none is
-  std::vector<std::uint32_t> triangles;                  ///< three vertex ids each, facing outwards
-  /// In the order in which they are solved: groups that share no vertex, one after the other.
+  std::vector<Place> places;  ///< of each vertex, in the first piece that contains it
+  std::vector<std::array<std::uint32_t, 4>>
+      neighbours;                        ///< left, right, below, above; the vertex itself where none exists
+  std::vector<std::uint32_t> triangles;  ///< three vertex ids each, facing outwards
+  /// In solving order: groups without a common vertex, one after the other.
   std::vector<Distance> threads, diagonals;
   std::vector<Bend> bends;
   double spacing = 0;  ///< mean length of a thread between two vertices
 };
 
-/// Cuts and sews. `walker` is in the rest pose; the cloth is laid out at least `margin` off its solid.
+/// Cuts and sews the garment. `walker` is in the rest pose; the cloth is laid out at least `margin` off its
+/// solid.
 GarmentPattern sew(const GarmentShape& shape, const GarmentCounts& counts, const Walker& walker,
                    double margin);
 

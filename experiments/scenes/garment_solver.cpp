@@ -73,7 +73,7 @@ Guide::Guide(const GarmentPattern& coarse, const GarmentPattern& fine)
 
 void Guide::interpolate(const std::vector<Vec>& coarse, std::vector<Vec>& fine) const {
   const auto spline = [](const std::array<Vec, 4>& p, double t) {
-    // Catmull and Rom's.
+    // Catmull-Rom.
     const double t2 = t * t, t3 = t2 * t;
     return p[0] * (0.5 * (-t3 + 2 * t2 - t)) + p[1] * (0.5 * (3 * t3 - 5 * t2 + 2)) +
            p[2] * (0.5 * (-3 * t3 + 4 * t2 + t)) + p[3] * (0.5 * (t3 - t2));
@@ -139,7 +139,7 @@ void GarmentSolver::step(WalkingFigure& figure, double t, double dt, std::uint32
     solve_bending(dt);
     solve_threads(dt);
   }
-  // What lies near each other in the pattern is held by threads and bending.
+  // Vertices that are near each other in the pattern are held by threads and bending.
   const double near = 1.6 * layer_distance_;
   layers_.solve(x_, previous_, config_.friction, [&](std::uint32_t p, std::uint32_t q) {
     const Vec d = pattern_.rest[q] - pattern_.rest[p];
@@ -158,7 +158,7 @@ void GarmentSolver::apply_forces(double dt, double wind) {
     const Vec n = cloth::cross(x_[right] - x_[left], x_[above] - x_[below]);
     const double square = dot(n, n);
     if (!(square > 0.0)) continue;
-    // The figure walks on the spot: the air comes towards it.
+    // The figure walks on the spot, so the air moves towards it.
     const double across = (dot(v, n) + wind * n.x) / std::sqrt(square);
     v -= n * (cloth::dragged_speed(across, config_.air_drag, dt) / std::sqrt(square));
   }
@@ -203,7 +203,7 @@ void GarmentSolver::solve_figure(const Walker& walker) {
     if (near.distance < 0.0) {
       x -= near.normal * near.distance;
       cloth::resist_sliding(x, x - previous_[p] - near.moved, near.normal, -near.distance, config_.friction);
-      // Where the surface is curved, or one part of the figure meets another, once is not enough.
+      // One projection does not suffice on curved surfaces or where two parts of the figure meet.
       for (int again = 0; again < 3; ++again) {
         near = walker.nearest(x, reach);
         if (!(near.distance < 0.0)) break;

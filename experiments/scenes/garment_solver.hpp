@@ -16,9 +16,9 @@ class WalkingFigure {
   const FigureShape& shape() const { return shape_; }
   const Walker& walker() const { return walker_; }
   double metres_per_second() const { return gait_.metres_per_second; }
-  /// Remembers the present pose and takes that of time t.
+  /// Stores the current pose and takes that of time t.
   void move_to(double t);
-  /// From 0 in the rest pose to 1 in the gait.
+  /// Returns the blend from the rest pose (0) to the gait (1).
   static double walking(double t);
 
  private:
@@ -27,20 +27,20 @@ class WalkingFigure {
   Walker walker_;
 };
 
-/// Positions between the keyframes of a coarser simulation of the same garment, for every vertex of a finer
-/// one.
+/// Interpolates positions between the keyframes of a coarser simulation of the same garment, for every vertex
+/// of a finer one.
 class Guide {
  public:
   Guide(const GarmentPattern& coarse, const GarmentPattern& fine);
 
-  /// All fine vertices on the smooth surface through the coarse ones.
+  /// Places all fine vertices on the smooth surface through the coarse ones.
   void interpolate(const std::vector<cloth::Vec>& coarse, std::vector<cloth::Vec>& fine) const;
-  /// Removes from x - wanted, and so from x, what is left after averaging over the coarse squares.
+  /// Removes from x - wanted, and so from x, the part that remains after averaging over the coarse squares.
   void hold(std::vector<cloth::Vec>& x, const std::vector<cloth::Vec>& wanted);
 
  private:
   struct Vertex {
-    std::array<std::uint32_t, 4> corners;  // of the coarse square that it lies in
+    std::array<std::uint32_t, 4> corners;  // of the coarse square that contains it
     std::array<double, 4> weights;
     std::uint32_t piece, row, column;
     double u, v;  // in the square
@@ -51,7 +51,7 @@ class Guide {
   std::vector<double> weight_;
 };
 
-/// Cloth on the figure.
+/// Simulates cloth on the figure.
 class GarmentSolver {
  public:
   /// Starts at rest. `layers`: whether layers of cloth repel each other.
@@ -63,8 +63,8 @@ class GarmentSolver {
     x_ = x;
     v_ = v;
   }
-  /// Takes the figure and the cloth from t to t + dt, in `sweeps` sweeps over all constraints. With a guide,
-  /// averages are held to `wanted`, which is where it wants vertices at t + dt.
+  /// Advances the figure and the cloth from t to t + dt, in `sweeps` sweeps over all constraints. With a
+  /// guide, averages are constrained to `wanted`, the guide's positions at t + dt.
   void step(WalkingFigure& figure, double t, double dt, std::uint32_t sweeps, Guide* guide = nullptr,
             const std::vector<cloth::Vec>& wanted = {});
 
@@ -80,8 +80,8 @@ class GarmentSolver {
   double mass_, layer_distance_;
   std::vector<cloth::Vec> x_, previous_, v_, smooth_;
   cloth::LayerContacts layers_;
-  // What is known of each vertex's distance to the figure: at least `distance` when it and the figure, which
-  // had travelled that far, were asked.
+  // A lower bound on each vertex's distance to the figure: at least `distance` when it was measured, at that
+  // travel of the figure.
   struct Clearance {
     cloth::Vec at;
     double distance = -1, travel = 0;

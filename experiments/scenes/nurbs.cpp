@@ -5,7 +5,7 @@
 namespace kbvh::scenes {
 namespace {
 
-/// Knots of n spans, from 0 to n where the surface is defined.
+/// Returns the knots of n spans, from 0 to n where the surface is defined.
 std::vector<double> knots_of(std::uint32_t spans, std::uint32_t degree, KnotSpacing spacing) {
   std::vector<double> knots;
   for (std::uint32_t i = 0; i < spans + 2 * degree + 1; ++i) {
@@ -42,8 +42,8 @@ NurbsSurface nurbs_surface(const NurbsConfig& config) {
   mesh.name = "nurbs-" + std::to_string(mesh.primitive_count());
   mesh.keyframe_times = keyframe_times(config.keyframes, config.keyframes_per_second);
   mesh.positions.reserve(std::size_t{3} * mesh.vertex_count * config.keyframes);
-  // A control point lies where the knots that it is governed by have their mean (Greville), so that the
-  // surface without its waves would be the square itself, each knot at its place.
+  // A control point lies at the mean of its knots (Greville), so that the surface without its waves would be
+  // the square itself, with each knot at its place.
   std::vector<double> along(row);
   for (std::uint32_t i = 0; i < row; ++i) {
     double sum = 0;

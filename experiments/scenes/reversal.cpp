@@ -17,11 +17,11 @@ std::vector<double> frames_of(const ReversalRule& rule) {
 
 namespace {
 
-/// What is known of one body while its vertices turn round.
+/// The state of one body while its vertices reverse.
 template <class S>
 struct TurningBody {
   std::vector<S> outward;             ///< velocities [vertex][3]
-  std::vector<std::uint8_t> inwards;  ///< has the vertex been reversed?
+  std::vector<std::uint8_t> inwards;  ///< whether the vertex has been reversed
   std::vector<std::uint8_t> touched;  ///< by a colliding primitive in this frame
 };
 
@@ -101,7 +101,7 @@ PlanScript<S> record_reversals(const Scene<S>& scene, const ReversalRule& rule,
 
 namespace {
 
-constexpr std::string_view magic = "KBVHSCR1";  // change with the layout, the rule or the test of the oracle
+constexpr std::string_view magic = "KBVHSCR1";  // change it with the layout, the rule or the oracle's test
 
 template <class S>
 std::string bytes_of(const PlanScript<S>& script) {
@@ -120,7 +120,7 @@ std::string bytes_of(const PlanScript<S>& script) {
   return out;
 }
 
-/// Throws io::InputError if the file is not what bytes_of wrote.
+/// Throws io::InputError if the file was not written by bytes_of.
 template <class S>
 PlanScript<S> read_script(const std::filesystem::path& file) {
   const std::string bytes = io::read_file(file);
@@ -134,7 +134,7 @@ PlanScript<S> read_script(const std::filesystem::path& file) {
     at += sizeof value;
   };
   room(1, magic.size());
-  if (!bytes.starts_with(magic)) io::fail(file, "", "is no recorded script of this version");
+  if (!bytes.starts_with(magic)) io::fail(file, "", "is not a recorded script of this version");
   at = magic.size();
   std::uint64_t expected = 0, steps = 0, changes = 0;
   take(expected);
@@ -181,14 +181,14 @@ PlanScript<S> recorded_reversals(const Scene<S>& scene, const ReversalRule& rule
     try {
       return read_script<S>(file);
     } catch (const io::InputError& problem) {
-      say(std::string("warning: ") + problem.what() + "; the script is recorded anew");
+      say(std::string("warning: ") + problem.what() + "; the script is recorded again");
     }
   }
   PlanScript<S> script = record_reversals(scene, rule, progress);
   try {
     io::write_file_atomically(file, bytes_of(script));
   } catch (const io::InputError& problem) {
-    say(std::string("warning: the recorded script is not kept: ") + problem.what());
+    say(std::string("warning: the recorded script is not cached: ") + problem.what());
   }
   return script;
 }

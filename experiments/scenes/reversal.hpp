@@ -7,18 +7,18 @@
 
 namespace kbvh::experiments {
 
-/// Times of the frames that a rule is recorded at.
+/// Returns the times of the frames at which a rule is recorded.
 std::vector<double> frames_of(const ReversalRule& rule);
 
-/// Runs the scene frame by frame with the oracle (`sweep_pairs`) and writes down what the rule does after
-/// each frame. Of each vertex the plan at the start is its velocity, to be negated and restored: its first
+/// Runs the scene frame by frame with the oracle (`sweep_pairs`) and records the plan changes of the rule
+/// after each frame. The initial plan of a vertex is its velocity, to be negated and restored: from its first
 /// keyframe to its second, rounded to the scalar once. The last frame changes nothing. Deterministic.
 template <class S>
 PlanScript<S> record_reversals(const Scene<S>& scene, const ReversalRule& rule,
                                const MakeProgress& progress = {});
 
-/// The same from `folder`, if it was recorded before, or recorded now and kept there; an empty folder keeps
-/// nothing. Damaged files and those of other versions are made anew.
+/// Returns the same script from `folder`, if it was recorded before, or records it now and keeps it there; an
+/// empty folder keeps nothing. Damaged files and those of other versions are recorded anew.
 template <class S>
 PlanScript<S> recorded_reversals(const Scene<S>& scene, const ReversalRule& rule,
                                  const std::filesystem::path& folder, const MakeProgress& progress = {});

@@ -15,13 +15,13 @@ namespace kbvh::experiments {
 
 namespace {
 
-/// The vertices that realise the sides of every node, from keyframe to keyframe.
+/// Tracks the vertices that realise the sides of every node, from keyframe to keyframe.
 class Realisers {
  public:
   Realisers(const Topology& topology, const LeafVertices& leaves)
       : topology_(topology), leaves_(leaves), of_(std::size_t(6) * topology.size(), 0) {}
 
-  /// Finds them at a keyframe; the number of sides that have another one than before.
+  /// Finds the realisers at a keyframe; returns the number of sides whose realiser changed.
   std::size_t update(const float* x) {
     std::size_t changed = 0;
     for (std::uint32_t node = topology_.size(); node-- > 0;)
@@ -141,7 +141,7 @@ nlohmann::json as_json(const std::string& scene, const std::vector<BodyCard>& li
 
 namespace {
 
-/// Some of the keyframes, a second apart: pictures need no times.
+/// Returns a subset of the keyframes, a second apart: pictures need no times.
 io::AnimatedMesh thinned(const io::AnimatedMesh& mesh, std::size_t most_keyframes) {
   const std::size_t all = mesh.keyframe_times.size();
   if (most_keyframes == 0 || all <= 1) return mesh;

@@ -30,7 +30,7 @@ double number_of(const std::string& text, const std::string& where) {
   return *value;
 }
 
-/// "z:90" or "1:1:0:45".
+/// Parses "z:90" or "1:1:0:45".
 Placement::Rotation rotation_of(const std::string& text, const std::string& where) {
   const auto parts = split(text, ':');
   Placement::Rotation rotation{{0, 0, 0}, 0};
@@ -47,7 +47,7 @@ Placement::Rotation rotation_of(const std::string& text, const std::string& wher
   return rotation;
 }
 
-/// JSON as text. What is not UTF-8 in it, such as the name of a file, is spelt out.
+/// Formats JSON as text. Bytes that are not UTF-8, for example in file names, are escaped.
 std::string text_of(json value) {
   const std::function<void(json&)> mend = [&](json& part) {
     if (part.is_string()) part = readable(part.get_ref<const std::string&>());
@@ -96,7 +96,7 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
     body.shape = object;
     for (const char* common : {"name", "scale", "rotate", "translate", "as", "self"})
       body.shape.erase(common);
-    // Made once for its complaints where the sizes are small, so that a wrong key shows before hours of work.
+    // Made once in a small size for its error messages, so that a wrong key is reported before hours of work.
     json probe = body.shape;
     const auto& name = probe["shape"];
     const std::string size = name.is_string() ? shape_kind(name, place).size_key : "triangles";
@@ -120,7 +120,7 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
   return body;
 }
 
-/// A word that is neither a file nor the beginning of one's name was meant for a shape.
+/// Rejects a word that is neither a file nor the beginning of a file name: it was meant as a shape.
 void check_is_a_file(const BodySpec& body) {
   std::error_code error;
   const std::string word = body.file.filename().string();
@@ -136,7 +136,7 @@ VertexOrder order_of(const std::string& word, const JsonReader& keys) {
   keys.fail("order", "expected given, shuffled or renumbered, got '" + word + "'");
 }
 
-/// What an order adds to the name of a scene.
+/// Returns the suffix that an order adds to the name of a scene.
 std::string suffix(VertexOrder order) {
   return order == VertexOrder::given ? "" : std::string("-") + word(order);
 }
@@ -168,7 +168,7 @@ json body_from_text(const std::string& text) {
   auto parts = split(text, ',');
   const std::size_t colon = parts[0].find(':');
   const std::string head = parts[0].substr(0, colon);
-  // "name:key=value" is a shape, also if there is no shape of that name.
+  // "name:key=value" is a shape, even if there is no shape of that name.
   const bool means_a_shape = colon != std::string::npos && head.find_first_of("./\\") == std::string::npos &&
                              head != "data" && parse_assignment(parts[0].substr(colon + 1));
   if (is_shape(head) || means_a_shape) {
@@ -210,7 +210,7 @@ json body_from_text(const std::string& text) {
       if (numbers.size() != 3) throw io::InputError(at + ": expected x:y:z, got '" + value + "'");
       body[key] = numbers;
     } else {
-      // Unknown keys are refused by whoever reads the object; a number or a word, that is for it to say.
+      // The reader of the object refuses unknown keys, and decides between numbers and words.
       const auto number = parse_number(value);
       body[key] = number ? json(*number) : json(value);
     }
@@ -294,7 +294,7 @@ Matrix product(const Matrix& a, const Matrix& b) {
   return c;
 }
 
-/// Rodrigues' formula; sines of our own, so that every machine puts a body in the same place.
+/// Rodrigues' formula with our own sines, so that every machine computes the same rotation.
 Matrix matrix_of(const Placement::Rotation& rotation) {
   const double turns = rotation.degrees / 360.0;
   double sine = scenes::sine_of_turns(turns), cosine = scenes::cosine_of_turns(turns);
@@ -302,7 +302,7 @@ Matrix matrix_of(const Placement::Rotation& rotation) {
     sine = std::round(sine);
     cosine = std::round(cosine);
   }
-  // Scaled first: squares of the user's numbers could overflow, or vanish.
+  // Scaled first: squares of the user's numbers could overflow or underflow.
   const double largest =
       std::max({std::abs(rotation.axis[0]), std::abs(rotation.axis[1]), std::abs(rotation.axis[2])});
   const double a[3] = {rotation.axis[0] / largest, rotation.axis[1] / largest, rotation.axis[2] / largest};

@@ -75,7 +75,7 @@ ScriptSpec::Step read_step(const json& value, const std::string& place) {
   return step;
 }
 
-/// The text of a script's file; throws io::InputError that begins with `place` if it cannot be read.
+/// Returns the text of a script's file; throws io::InputError that begins with `place` if it cannot be read.
 std::string text_of(const std::filesystem::path& file, const std::string& place) {
   try {
     return io::read_file(file);
@@ -110,7 +110,7 @@ ScriptSpec read_script_spec(const json& value, const std::string& place,
     script.steps.push_back(read_step(steps[i], place + ": steps[" + std::to_string(i) + "]"));
     if (i > 0 && !(script.steps[i - 1].time < script.steps[i].time))
       throw io::InputError(script.steps[i].place + ": time " + io::text_of(script.steps[i].time) +
-                           " does not follow that of the step before, " +
+                           " is not later than that of the preceding step, " +
                            io::text_of(script.steps[i - 1].time));
   }
   return script;

@@ -16,7 +16,7 @@ struct LoadedScene;
 struct ScriptSpec {
   struct Change {
     std::string place;  ///< for messages
-    std::string body;   ///< a name; empty: by number
+    std::string body;   ///< a name; empty: use the number
     PlanChange<double> plan;
   };
   struct Step {
@@ -25,31 +25,31 @@ struct ScriptSpec {
     std::vector<Change> changes;
   };
   std::vector<Step> steps;   ///< ascending times
-  std::uint32_t frames = 0;  ///< of the scene, `rate` per second; 0: as keyframes and l say
+  std::uint32_t frames = 0;  ///< of the scene, `rate` per second; 0: from keyframes and l
   double rate = 0;
 };
 
 /// Reads a script: an object with `steps` (and, both or none, `frames` and `rate`), or the list of steps
-/// alone, or a text, the name of a file that holds either, relative to `folder`. Throws io::InputError that
-/// begins with `place`, or the file's name: on unknown keys, numbers that are not finite, times that do not
+/// alone, or a text, the name of a file with either one, relative to `folder`. Throws io::InputError that
+/// begins with `place` or the file's name: on unknown keys, numbers that are not finite, times that do not
 /// ascend.
 ScriptSpec read_script_spec(const nlohmann::json& value, const std::string& place,
                             const std::filesystem::path& folder);
 
-/// The plan changes that a scene is played with; empty for most. Those of a user are tried out once: throws
-/// io::InputError with the place of the change and what is wrong with it (unknown body or vertex, values
-/// beyond the scalar's admissible range, a time before the first frame). Those of a rule are recorded, or
-/// taken from the cache folder.
+/// Returns the plan changes of a scene; empty for most scenes. User-defined changes are applied once as a
+/// test: throws io::InputError with the place and the error of a change (unknown body or vertex, values
+/// beyond the scalar's admissible range, a time before the first frame). Changes of a rule are recorded, or
+/// read from the cache folder.
 template <class S>
 PlanScript<S> script_of(const Scene<S>& scene, const LoadedScene& loaded, const MakeProgress& progress = {});
 
-/// Does the scene say itself when its frames are, so that l does not apply?
+/// Returns whether the scene defines its own frames, so that l does not apply.
 bool has_own_frames(const LoadedScene& loaded);
 
-/// The frames of a scene: its own, or l for each keyframe interval; every time of the script is one of them.
-/// Only the first `most` of them are made. Throws io::InputError with vertex, time and value if the scene
-/// leaves the admissible range until the last one (core/motion/admissible.hpp): before any contestant sees
-/// it.
+/// Returns the frames of a scene: its own, or l per keyframe interval; every time of the script is one of
+/// them. Computes only the first `most` frames. Throws io::InputError with vertex, time and value if the
+/// scene leaves the admissible range until the last frame (core/motion/admissible.hpp), before any contestant
+/// plays it.
 template <class S>
 std::vector<double> frames_of(const Scene<S>& scene, const LoadedScene& loaded, const PlanScript<S>& script,
                               std::uint32_t per_keyframe,

@@ -35,7 +35,7 @@ double rate(JsonReader& keys) {
   return positive(keys, "rate", 30.0);
 }
 
-/// Gives a shape that rests a motion, if the keys ask for one.
+/// Gives a resting shape a motion, if the keys ask for one.
 io::AnimatedMesh moved(JsonReader& keys, const io::AnimatedMesh& mesh, const Point& centre) {
   const bool step = keys.find("step") != nullptr, turns = keys.find("turns") != nullptr;
   const std::uint32_t count = keyframes(keys, step || turns ? 60 : 1);

@@ -21,7 +21,7 @@ void check_length(double value, const char* what) {
     throw io::InputError(std::string(what) + " is " + std::to_string(value) + ", must be in (0, 1e6)");
 }
 
-/// The f >= 1 for which per_square * f^2 is nearest to the request.
+/// Returns the f >= 1 for which per_square * f^2 is nearest to the request.
 std::uint32_t nearest_frequency(std::uint32_t triangles, std::uint32_t per_square) {
   const double ideal = double(triangles) / double(per_square);
   const auto f = std::uint64_t(std::sqrt(ideal));
@@ -45,8 +45,8 @@ io::AnimatedMesh triangle_mesh(const std::string& shape, std::vector<std::uint32
   return mesh;
 }
 
-/// Corners named by 64-bit keys become vertex ids; returns the distinct keys in rising order. Sorting instead
-/// of hashing keeps the order of the vertices the same everywhere.
+/// Maps corners named by 64-bit keys to vertex ids; returns the distinct keys in rising order. Sorting
+/// instead of hashing gives the same order of vertices on every platform.
 std::vector<std::uint64_t> weld(const std::vector<std::uint64_t>& corner_keys,
                                 std::vector<std::uint32_t>& corners) {
   std::vector<std::uint64_t> keys = corner_keys;
@@ -62,8 +62,8 @@ struct ProfilePoint {
   double r, z;
 };
 
-/// Turns a profile (from the upper to the lower pole; both poles lie on the axis and are given apart) around
-/// the vertical axis through (x, y): one ring of `segments` vertices per profile point.
+/// Revolves a profile (from the upper to the lower pole; both poles lie on the axis and are given separately)
+/// around the vertical axis through (x, y): one ring of `segments` vertices per profile point.
 io::AnimatedMesh revolve(const std::string& shape, double x, double y, double top_z, double bottom_z,
                          const std::vector<ProfilePoint>& profile, std::uint32_t segments) {
   const auto rings = std::uint32_t(profile.size());
@@ -95,8 +95,8 @@ io::AnimatedMesh revolve(const std::string& shape, double x, double y, double to
   return triangle_mesh(shape, std::move(corners), std::move(positions));
 }
 
-/// Rings between the poles and segments around, whose 2 s r triangles are nearest to the request with r as
-/// given by the shape's proportions.
+/// Returns the rings between the poles and the segments around whose 2 s r triangles are nearest to the
+/// request, with the ratio given by the shape's proportions.
 std::pair<std::uint32_t, std::uint32_t> rings_and_segments(std::uint32_t triangles, double segments_per_ring,
                                                            std::uint32_t least_rings) {
   const double ideal = std::sqrt(double(triangles) / (2.0 * segments_per_ring));
@@ -131,7 +131,7 @@ double sine_of_turns(double turns) {
   if (r < -0.25) r = -0.5 - r;
   const double a = 2.0 * std::numbers::pi * r;
   const double square = a * a;
-  // Taylor series by Horner's rule; the first term left out is below 2e-18 at a quarter turn.
+  // Taylor series by Horner's rule; the first omitted term is below 2e-18 at a quarter turn.
   double sum = 1.0;
   for (int n = 20; n >= 2; n -= 2) sum = 1.0 - square / double(n * (n + 1)) * sum;
   return a * sum;
@@ -139,13 +139,13 @@ double sine_of_turns(double turns) {
 
 double rounded_to_float(double value) {
   // GCC 12.2's superword vectoriser drops conversions to float and back (at -O2 and -O3: values keep their
-  // double digits); what is volatile it must store. Adding zero makes a negative zero positive.
+  // double digits); it must store volatile values. Adding zero makes a negative zero positive.
   const volatile float single = float(value);
   return double(single) + 0.0;
 }
 
 double cosine_of_turns(double turns) {
-  // Reduced before the quarter is added, so that no digits are lost for large arguments.
+  // Reduced before the quarter is added, so that large arguments lose no digits.
   return sine_of_turns(turns - std::floor(turns) + 0.25);
 }
 
@@ -171,8 +171,8 @@ io::AnimatedMesh icosphere(std::uint32_t triangles, const Point& centre, double 
                                        {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
                                        {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
                                        {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
-  // A point of a face is named by its integer weights on the icosahedron's vertices, in the order of the
-  // vertices and without zero weights: points on shared edges get the same name from both faces.
+  // The key of a point of a face consists of its integer weights on the icosahedron's vertices, in the order
+  // of the vertices and without zero weights: points on shared edges get the same key from both faces.
   const auto key = [&](const int(&face)[3], std::uint64_t u, std::uint64_t v) {
     std::pair<std::uint64_t, std::uint64_t> terms[3] = {
         {std::uint64_t(face[0]), f - u - v}, {std::uint64_t(face[1]), u}, {std::uint64_t(face[2]), v}};
@@ -303,7 +303,7 @@ io::AnimatedMesh round_table(std::uint32_t triangles, const RoundTableShape& sha
     throw io::InputError("round_table: the pedestal does not fit under the table");
 
   const auto [rings, segments] = rings_and_segments(triangles, 4.0, pedestal ? 12 : 6);
-  // Rings go where the cloth is: top and rim get most of them, what is underneath only needs its outline.
+  // Top and rim, where the cloth lies, get most rings; the underside only needs its outline.
   const std::uint32_t under = pedestal ? std::max(4u, rings / 4) : 1;
   const std::uint32_t rim = std::max(4u, rings / 3);
   const std::uint32_t flat = rings - under - rim;
@@ -389,7 +389,7 @@ io::AnimatedMesh waving_sheet(std::uint32_t triangles, std::uint32_t keyframes, 
     double kx, ky, turns_per_second, height, sideways;  // kx, ky in waves per metre
   };
   // From one wave per sheet to one per eight squares, at equal steepness (height x frequency): fine waves are
-  // lower, and as visible to a bounding box of their size as coarse ones to theirs.
+  // lower, and affect bounding boxes of their size as much as coarse waves affect theirs.
   Wave waves[5];
   const double directions[5][2] = {{0.8, 0.6}, {-0.6, 0.8}, {0.28, -0.96}, {-0.96, -0.28}, {0.96, -0.28}};
   double frequency = 0.5;
@@ -417,8 +417,7 @@ io::AnimatedMesh random_soup(std::uint32_t triangles, std::uint64_t seed, std::u
   check_triangles(triangles, "random_soup");
   const std::uint32_t count = std::max(1u, triangles);
   const SeededNoise noise(seed);
-  // The edge of the cube that holds one triangle, by bisection: the cube root of libm is not the same
-  // everywhere.
+  // The edge of the cube that holds one triangle, by bisection: libm's cube root differs between platforms.
   double low = 0.0, high = 1.0;
   for (int i = 0; i < 40; ++i) {
     const double middle = 0.5 * (low + high);

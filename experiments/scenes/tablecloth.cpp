@@ -6,14 +6,14 @@
 namespace kbvh::scenes {
 namespace {
 
-/// Part of every cache key: to be raised by every change that can alter a bit of the result.
+/// Part of every cache key: raise it with every change that can alter a bit of the result.
 constexpr int solver_version = 3;
 
 using cloth::dot;
 using cloth::length;
 using cloth::Vec;
 
-/// Signed distance to the solid that stops the cloth, and its outward unit normal.
+/// The signed distance to the solid that stops the cloth, and its outward unit normal.
 class TableSolid {
  public:
   explicit TableSolid(const TableclothConfig& config)
@@ -46,7 +46,7 @@ class TableSolid {
     return d - rim_radius_;
   }
 
-  /// Nothing farther than this from the solid's axis or height can touch it.
+  /// Returns false for points that are too far from the solid's axis or height to touch it.
   bool may_touch(const Vec& point) const {
     const double reach = inner_radius_ + rim_radius_;
     const double dx = point.x - centre_.x, dy = point.y - centre_.y;
@@ -115,7 +115,7 @@ class ClothSolver {
   cloth::LayerContacts layers_;
 };
 
-/// The start: flat, a little turned, tilted, shifted and uneven, as drawn from the seed.
+/// Sets the start: flat, slightly rotated, tilted, shifted and uneven, drawn from the seed.
 void ClothSolver::place() {
   const SeededNoise noise(config_.seed);
   std::uint64_t draws = 0;
@@ -148,7 +148,7 @@ void ClothSolver::place() {
       x_[at(i, j)] = {config_.table.centre_x + shift_x + x, config_.table.centre_y + shift_y + y,
                       config_.table.top + config_.drop_height + slope_x * x + slope_y * y + uneven};
     }
-  // Keyframes hold floats; the simulation starts from what they say.
+  // Keyframes hold floats; the simulation starts from these values.
   for (Vec& p : x_) p = {rounded_to_float(p.x), rounded_to_float(p.y), rounded_to_float(p.z)};
 }
 
@@ -200,13 +200,13 @@ void ClothSolver::smooth_velocities(double dt) {
 }
 
 void ClothSolver::solve_threads(double dt) {
-  // Every vertex has the mass of a full square: along the hem that is a seam of double thickness.
+  // Every vertex has the mass of a full square, which makes the hem a seam of double thickness.
   const double mass = config_.area_density * spacing_ * spacing_;
   const double thread = mass / (config_.stretch_stiffness * dt * dt);
   const double diagonal = mass / (config_.shear_stiffness * dt * dt);
   const double diagonal_rest = spacing_ * std::sqrt(2.0);
-  // Diagonals first and threads last: the stiffest constraints get the last word. Constraints go by colours
-  // of independent ones, so that no sweep drags the cloth towards one side.
+  // Diagonals first and threads last, so that the stiffest constraints are corrected last. Constraints are
+  // processed by colours of independent ones, so that no sweep drags the cloth towards one side.
   for (std::uint32_t colour = 0; colour < 2; ++colour)
     for (std::uint32_t j = colour; j < squares_; j += 2)
       for (std::uint32_t i = 0; i < squares_; ++i) {

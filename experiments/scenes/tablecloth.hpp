@@ -9,13 +9,13 @@
 
 namespace kbvh::scenes {
 
-/// What is simulated: a square cloth dropped flat, slightly askew, on a round table. Metres, seconds,
-/// kilograms.
+/// The parameters of the simulation: a square cloth dropped flat, slightly askew, on a round table. Metres,
+/// seconds, kilograms.
 struct TableclothConfig {
   /// Triangles of the cloth; the nearest grid of 2 f^2 is simulated, and its number is part of the cloth's
   /// name.
   std::uint32_t triangles = 2048;
-  /// Perturbs the start: yaw, tilt, offset and unevenness. The same seed is the same cloth at every
+  /// Perturbs the start: yaw, tilt, offset and unevenness. The same seed gives the same cloth at every
   /// resolution.
   std::uint64_t seed = 1;
   std::uint32_t keyframes = 60;
@@ -32,9 +32,9 @@ struct TableclothConfig {
   double friction = 0.5;              ///< Coulomb's coefficient, cloth on table and cloth on itself
   double layer_distance = 0.75;       ///< kept between layers, in grid squares; 0: the cloth may cut itself
 
-  /// The solid that stops the cloth is not quite the table that is drawn: higher by rest_gap and narrower by
-  /// rim_bite. So the cloth lies just above the table top and cuts the drawn rim all around, and collision
-  /// queries have answers.
+  /// The solid that stops the cloth differs from the drawn table: it is higher by rest_gap and narrower by
+  /// rim_bite. The cloth therefore lies just above the table top and cuts the drawn rim all around, so that
+  /// collision queries have answers.
   double rest_gap = 0.001;
   double rim_bite = 0.002;  ///< see rest_gap
 
@@ -54,18 +54,18 @@ struct TableclothConfig {
 /// drag, inner viscosity, contact with Coulomb friction against the exact rounded disc, and vertices that
 /// repel vertices of other layers within layer_distance. Self-contact is between vertices only: it keeps
 /// layers apart nearly everywhere but is no guarantee, and the cloth may cut itself in places. Every
-/// resolution is simulated as it is, nothing is interpolated.
+/// resolution is simulated directly, without interpolation.
 ///
 /// The result depends on the config alone, to the last bit, on every machine with IEEE doubles and
-/// -ffp-contract=off: no threads, no random order, no function of libm but sqrt, floor and fabs.
-/// 99 of 100 edges stretch by less than 3%, the worst of a clip by 7 to 12% for an instant. Time
-/// O(triangles^1.5 x simulated seconds): about 0.3 s for 2k, 6 s for 16k and a minute for 65k triangles over
-/// 2 seconds of cloth. Throws io::InputError on values out of range.
+/// -ffp-contract=off: no threads, no random order, no function of libm but sqrt, floor and fabs. 99 of 100
+/// edges stretch by less than 3%, the worst of a clip by 7 to 12% for an instant. Time O(triangles^1.5 x
+/// simulated seconds): about 0.3 s for 2k, 6 s for 16k and a minute for 65k triangles over 2 seconds of
+/// cloth. Throws io::InputError on values out of range.
 std::vector<io::AnimatedMesh> simulate_tablecloth(const TableclothConfig& config,
                                                   const Progress& progress = {});
 
-/// Names the result of simulate_tablecloth(config): readable, fit for a file name, different whenever any
-/// value of the config or the solver's version differs.
+/// Returns a name for the result of simulate_tablecloth(config): readable, usable as a file name, different
+/// whenever any value of the config or the solver's version differs.
 std::string cache_key(const TableclothConfig& config);
 
 }  // namespace kbvh::scenes

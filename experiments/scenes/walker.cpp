@@ -15,13 +15,13 @@ using cloth::Vec;
 namespace {
 
 enum BoneId : std::size_t { pelvis, abdomen, chest, head, thigh, shin, foot, upper_arm, forearm };
-/// The right limbs' bones follow the left ones.
+/// Returns the bone index; the right limbs' bones follow the left ones.
 std::size_t limb(BoneId bone, std::size_t side) {
   return std::size_t(bone) + side * 5;
 }
 enum PartId : std::size_t { trunk, legs, feet = 3, arms = 5 };
 
-/// Cones of the trunk melt into each other where their distances differ by less than this.
+/// Cones of the trunk blend where their distances differ by less than this.
 constexpr double melting = 0.06;
 
 using Matrix = std::array<Vec, 3>;
@@ -35,7 +35,7 @@ Matrix times(const Matrix& a, const Matrix& b) {
     out[row] = {dot(a[row], columns[0]), dot(a[row], columns[1]), dot(a[row], columns[2])};
   return out;
 }
-/// About an axis of unit length (Rodrigues).
+/// Returns the rotation about an axis of unit length (Rodrigues).
 Matrix turn(const Vec& n, double degrees) {
   const double c = cosine_of_turns(degrees / 360), s = sine_of_turns(degrees / 360), d = 1 - c;
   return {Vec{c + n.x * n.x * d, n.x * n.y * d - n.z * s, n.x * n.z * d + n.y * s},
@@ -43,15 +43,15 @@ Matrix turn(const Vec& n, double degrees) {
           {n.z * n.x * d - n.y * s, n.z * n.y * d + n.x * s, c + n.z * n.z * d}};
 }
 Vec mirrored(Vec v, std::size_t side) {
-  // GCC 12.2 fuses products with sums and differences that alternate (vfmsubadd) where the hardware can, even
-  // under -ffp-contract=off: it must not see that this is a change of sign.
+  // GCC 12.2 fuses products with alternating sums and differences (vfmsubadd) where the hardware can, even
+  // under -ffp-contract=off; the sign change must be hidden from it.
   const volatile double sign = side == 0 ? 1.0 : -1.0;
   v.y *= sign;
   return v;
 }
 constexpr Vec x_axis{1, 0, 0}, y_axis{0, 1, 0}, z_axis{0, 0, 1};
 
-/// Along the arm in the rest pose, and the axis about which its elbow bends.
+/// Returns the direction along the arm in the rest pose, and the axis about which its elbow bends.
 Vec arm_direction(std::size_t side) {
   return mirrored({0, sine_of_turns(rest_arm_degrees / 360), -cosine_of_turns(rest_arm_degrees / 360)}, side);
 }
@@ -220,7 +220,7 @@ Walker::Hit Walker::hit(const Cone& c, const Vec& p) {
   const double y = dot(d, c.along);
   const Vec outward = d - c.along * y;
   const double q = length(outward);
-  // The surface point lies where the normal through p meets the axis.
+  // The nearest surface point lies where the normal through p meets the axis.
   const double foot = y - q * c.sine / c.cosine;
   const auto sphere = [&](const Vec& from, double radius, double share) -> Hit {
     const double r = length(from);
@@ -258,7 +258,7 @@ Walker::Contact Walker::nearest(const Vec& point, double reach) const {
   Contact best{reach, z_axis, {}};
   std::size_t part = bone_count;
   for (const Cone& c : cones_) {
-    if (c.part == part) continue;  // that part was asked already
+    if (c.part == part) continue;  // that part was tested already
     const Vec d = point - c.centre;
     // A smooth minimum of seven lies below the least by at most about `melting`.
     const double far = c.reach + std::max(best.distance, 0.0) + melting;

@@ -11,13 +11,13 @@
 /// +y.
 namespace kbvh::scenes {
 
-/// Where joints are in the rest pose (arms spread, legs straight) and how thick the figure is there. Left
-/// side; the right is its mirror image.
+/// The joints in the rest pose (arms spread, legs straight) and the thickness of the figure there. Left side;
+/// the right side is its mirror image.
 struct FigureShape {
   cloth::Vec hip{0, 0.09, 0.92}, knee{0, 0.095, 0.50}, ankle{-0.02, 0.095, 0.085}, toe{0.15, 0.105, 0.035};
   cloth::Vec shoulder{0, 0.185, 1.41};
   double upper_arm = 0.29, forearm = 0.34;  ///< lengths; the forearm's includes the hand
-  /// Bars across the trunk: height, half length, radius, and how far in front of the spine.
+  /// Bars across the trunk: height, half length, radius, and distance in front of the spine.
   struct Bar {
     double z, half, radius, front;
   };
@@ -30,7 +30,7 @@ struct FigureShape {
 FigureShape man();
 FigureShape woman();
 
-/// How it walks.
+/// The gait.
 struct Gait {
   double cycles_per_second = 0.9;
   double metres_per_second = 1.2;
@@ -47,27 +47,27 @@ class Walker {
   Walker(const FigureShape& shape, const Gait& gait);
 
   /// Takes the pose of time t; `walking` blends from the rest pose (0) to the gait (1). The figure walks on
-  /// the spot: adding metres_per_second x t is left to the caller.
+  /// the spot: the caller adds metres_per_second x t.
   void pose(double t, double walking);
 
-  /// Remembers the present pose: `moved` of later contacts is since then.
+  /// Stores the current pose: `moved` of later contacts is relative to it.
   void mark();
-  /// No point of the solid has moved further than this since mark().
+  /// Returns an upper bound on the displacement of any point of the solid since mark().
   double travel() const { return travel_; }
 
   struct Contact {
     double distance;    ///< signed, to the surface of the solid; exact or too small
     cloth::Vec normal;  ///< outward, of unit length
-    cloth::Vec moved;   ///< way of the nearest surface since mark()
+    cloth::Vec moved;   ///< displacement of the nearest surface since mark()
   };
-  /// The nearest surface of the solid, if it is nearer than `reach`; else distance = reach. The trunk's cones
-  /// melt into each other (polynomial smooth minimum), limbs are joined to it as they are.
+  /// Returns the nearest surface of the solid, if it is nearer than `reach`; else distance = reach. The
+  /// trunk's cones blend (polynomial smooth minimum); limbs are joined without blending.
   Contact nearest(const cloth::Vec& point, double reach) const;
 
   /// Bones, for skinning: pelvis, abdomen, chest, head, then left and right thigh, shin, foot, upper arm,
   /// forearm.
   static constexpr std::size_t bone_count = 14;
-  /// Where a point that is fixed to a bone is now, given its place in the rest pose.
+  /// Returns the current position of a point that is fixed to a bone, given its position in the rest pose.
   cloth::Vec carried(std::size_t bone, const cloth::Vec& rest) const;
 
  private:
@@ -75,13 +75,13 @@ class Walker {
   using Matrix = std::array<cloth::Vec, 3>;  // rows
   struct Bone {
     Matrix turn{};           // since the rest pose
-    cloth::Vec joint, rest;  // where the joint is, and was in the rest pose
+    cloth::Vec joint, rest;  // position of the joint now, and in the rest pose
   };
   struct Cone {
     std::size_t bone_a, bone_b, part;
     cloth::Vec rest_a, rest_b;
     double ra, rb;
-    // Of the present pose:
+    // Of the current pose:
     cloth::Vec a, b, marked_a, marked_b, along, centre;
     double size, sine, cosine, reach;
   };
@@ -105,18 +105,18 @@ class Walker {
 };
 
 /// The drawn surface: one closed mesh each for trunk with head, two legs, two feet and two arms, which cut
-/// each other where they are joined. Vertices are carried by one or two bones (linear blend skinning) and
-/// then put onto their part of the solid: 1 mm below its surface, but in patches above it by up to
-/// `bite`. So cloth lies on the figure, and cuts it at the rims of the patches that it rests on.
+/// each other at their joints. One or two bones move each vertex (linear blend skinning); it is then
+/// projected onto its part of the solid: 1 mm below the surface, but in patches above it by up to `bite`.
+/// Cloth therefore lies on the figure, and cuts it at the rims of the patches that it rests on.
 class Skin {
  public:
   /// The number of triangles is the nearest that the pattern allows, at least 7 x 24. `walker` must be in the
   /// rest pose. Throws io::InputError above 2^22 triangles.
   Skin(const Walker& walker, const FigureShape& shape, std::uint32_t triangles, double bite);
 
-  /// Mesh without keyframes: triangles only.
+  /// Returns the mesh without keyframes: triangles only.
   const io::AnimatedMesh& mesh() const { return mesh_; }
-  /// Positions of all vertices in the walker's present pose.
+  /// Computes the positions of all vertices in the walker's current pose.
   void positions(const Walker& walker, std::vector<cloth::Vec>& out) const;
 
  private:

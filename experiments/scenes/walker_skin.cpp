@@ -20,8 +20,8 @@ double smooth_step(double x) {
   return t * t * (3 - 2 * t);
 }
 
-/// One closed mesh around a straight axis: rings of `segments` vertices around the axis, whose rays leave
-/// its ends like the meridians of a capsule.
+/// One closed mesh around a straight axis: rings of `segments` vertices around the axis, whose rays leave its
+/// ends like the meridians of a capsule.
 struct PartPlan {
   std::size_t part;
   Vec from, to, side;  // axis and one direction across it
@@ -36,7 +36,7 @@ struct PartPlan {
 
 }  // namespace
 
-/// Sees the inside of a walker to make the parts of its skin.
+/// Has access to the internals of a walker to make the parts of its skin.
 class SkinPart {
  public:
   static std::vector<PartPlan> plans(const Walker& w, const FigureShape& f) {
@@ -68,7 +68,7 @@ class SkinPart {
     Skin::Vertex v{};
     v.part = plan.part;
     double far = 0.5;
-    // From outside inwards: every part is star-shaped as seen from its axis.
+    // From outside inwards: every part is star-shaped with respect to its axis.
     for (int i = 0; i < 200; ++i) {
       const double d = w.nearest_of_part(origin + ray * far, plan.part).distance;
       far = std::max(0.0, far - 0.8 * d);
@@ -103,7 +103,7 @@ struct Counts {
   std::uint32_t segments, rings;
 };
 
-/// Rings and segments of every part for one length of edges.
+/// Returns rings and segments of every part for one length of edges.
 std::vector<Counts> counts_at(const std::vector<PartPlan>& plans, double edge, std::uint64_t& triangles) {
   std::vector<Counts> counts;
   triangles = 0;

@@ -59,7 +59,7 @@ StressScene mixed(const FamilySetting& setting) {
   return scene;
 }
 
-/// Steps of the coordinates' own last place, far from the origin.
+/// Steps of one unit in the last place of the coordinates, far from the origin.
 StressScene far_away(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene;
@@ -102,7 +102,7 @@ StressScene signed_zeros(const FamilySetting& setting) {
   return scene;
 }
 
-/// Across the whole admissible range from keyframe to keyframe, or by the smallest step there is.
+/// Motion across the whole admissible range from keyframe to keyframe, or by the smallest possible step.
 StressScene largest(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene = two_soups(random, 10, keyframes_for(setting));
@@ -118,7 +118,7 @@ StressScene largest(const FamilySetting& setting) {
   return scene;
 }
 
-/// Coordinates on both sides of the limit: such a scene may be refused, never misjudged.
+/// Coordinates on both sides of the limit: such a scene may be refused, never answered wrongly.
 StressScene beyond_range(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene = two_soups(random, 8, keyframes_for(setting));
@@ -128,7 +128,7 @@ StressScene beyond_range(const FamilySetting& setting) {
 
 // --- trajectories ---------------------------------------------------------------------------------------
 
-/// Vertices that fly side by side with slopes that differ in the last places only.
+/// Vertices that move side by side with slopes that differ in the last places only.
 StressScene near_parallel(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene;
@@ -136,10 +136,10 @@ StressScene near_parallel(const FamilySetting& setting) {
   for (int b = 0; b < 2; ++b) {
     scene.bodies.push_back(soup_of(
         20 + random.below(16), keyframes_for(setting), [&](std::uint32_t k, std::uint32_t v, int axis) {
-          // Draws that nothing depends on any more but the seeds of scenes that are on record.
+          // These draws have no effect; they preserve the seeds of recorded scenes.
           if (v % 6 == 0 && axis == 0 && k == 0)
             for (int i = 0; i < 3; ++i) random.unit();
-          // In the same places at every keyframe but for some ulps, and much further on each time.
+          // The same positions at every keyframe up to some ulps, and much further along each time.
           const double place = 1 + 0.0625 * double((v * 7 + std::uint32_t(axis) * 3) % 5);
           return place + 0.25 * k + ulp * 4 * double(random.below(7)) - ulp * 12;
         }));
@@ -147,8 +147,8 @@ StressScene near_parallel(const FamilySetting& setting) {
   return scene;
 }
 
-/// Vertices that come back at every other keyframe to the same height, give or take one ulp: their paths
-/// touch the highest, or nearly.
+/// Vertices that return at every other keyframe to the same height, up to one ulp: their paths touch the
+/// highest one, or nearly.
 StressScene near_tangent(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene;
@@ -180,7 +180,7 @@ StressScene all_cross_at_once(const FamilySetting& setting) {
   return scene;
 }
 
-/// Every triangle has a twin that flies with it, apart only in some of the segments.
+/// Every triangle has a twin that moves with it, separate only in some of the segments.
 StressScene coincident(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene = two_soups(random, 30, std::max(3u, keyframes_for(setting)));
@@ -193,7 +193,7 @@ StressScene coincident(const FamilySetting& setting) {
   return scene;
 }
 
-/// Whole numbers, so that ties are exact; later every vertex goes its own way.
+/// Whole numbers, so that ties are exact; later every vertex moves differently.
 StressScene ties_that_separate(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene;
@@ -208,7 +208,7 @@ StressScene ties_that_separate(const FamilySetting& setting) {
   return scene;
 }
 
-/// One vertex flies far out and comes back.
+/// One vertex moves far out and returns.
 StressScene spikes(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene = two_soups(random, 30, std::max(3u, keyframes_for(setting)));
@@ -239,7 +239,7 @@ StressScene uneven_keyframes(const FamilySetting& setting) {
   return scene;
 }
 
-/// So many keyframes that whatever drifts has drifted; few triangles.
+/// Many keyframes, so that any drift becomes visible; few triangles.
 StressScene many_keyframes(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene;
@@ -267,7 +267,7 @@ StressScene many_keyframes(const FamilySetting& setting) {
 }
 
 /// The same scene forward in steps of every size: within an ulp, over many keyframes, from before the first
-/// to behind the last, and twice to the same time.
+/// to after the last, and twice to the same time.
 StressScene odd_steps(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene = two_soups(random, 30, 10);
@@ -318,7 +318,7 @@ StressScene::Step changes_at(Random& random, const StressScene& scene, double t,
   return step;
 }
 
-/// Many of them of the same vertices: the last one counts.
+/// Many changes of the same vertices: the last one counts.
 StressScene changes_at_once(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene = two_soups(random, 40, keyframes_for(setting));
@@ -327,7 +327,7 @@ StressScene changes_at_once(const FamilySetting& setting) {
   return scene;
 }
 
-/// At the instants at which many certificates fail: halfway between keyframes between which the scene is
+/// Changes at instants at which many certificates fail: halfway between keyframes between which the scene is
 /// mirrored, so that times are exact.
 StressScene changes_at_events(const FamilySetting& setting) {
   StressScene scene = all_cross_at_once(setting);
@@ -344,7 +344,7 @@ StressScene changes_at_keyframes(const FamilySetting& setting) {
   const auto& times = scene.bodies[0].times;
   for (std::size_t k = 0; k < times.size(); ++k)
     scene.steps.push_back(changes_at(random, scene, times[k], 1 + random.below(30)));
-  // Nobody can know that a body with one keyframe will move.
+  // No strategy can know in advance that a body with one keyframe will move.
   if (random.one_in(3)) {
     StressBody& still = scene.bodies[1];
     still.times.resize(1);
@@ -367,7 +367,7 @@ StressScene with_triangles(const FamilySetting& setting,
 
 StressScene slivers(const FamilySetting& setting) {
   return with_triangles(setting, [&](Random& random, double* corners) {
-    // The third corner lies beside the line through the others, or beside one of them.
+    // The third corner lies near the line through the others, or near one of them.
     const double u = random.among({0.0, 0.5, 1.0, std::abs(random.unit())});
     const double width = random.among({0.0, setting.limits.epsilon, 1e-7, 1e-3});
     for (int i = 0; i < 3; ++i)
@@ -386,7 +386,7 @@ StressScene zero_area(const FamilySetting& setting) {
   });
 }
 
-/// The same triangles many times over: copies of vertices, of lists of vertices, and across the bodies.
+/// The same triangles many times: copies of vertices, of lists of vertices, and across the bodies.
 StressScene duplicates(const FamilySetting& setting) {
   Random random(setting.seed);
   StressScene scene;
@@ -405,7 +405,7 @@ StressScene duplicates(const FamilySetting& setting) {
         auto ids = primitive;
         for (std::uint32_t& v : ids) v += c % 2 == 0 ? c * one.vertex_count : 0;
         body.primitives.push_back(ids);
-        // A corner that comes twice.
+        // A repeated corner.
         if (random.one_in(4)) body.primitives.push_back({ids[0], ids[1], ids[1]});
       }
     scene.bodies.push_back(std::move(body));
@@ -420,7 +420,7 @@ StressScene one_or_none(const FamilySetting& setting) {
   for (std::uint32_t b = 0; b < bodies; ++b) {
     const std::uint32_t kind = random.below(4);
     if (kind == 0)
-      scene.bodies.push_back(unmoved(random.below(3)));  // vertices at most
+      scene.bodies.push_back(unmoved(random.below(3)));  // number of unused vertices
     else
       scene.bodies.push_back(soup(random, kind == 3 ? 20 : 1, random.among({1u, keyframes_for(setting)})));
   }
@@ -442,14 +442,14 @@ const std::vector<Family>& families() {
       {"denormals", "coordinates between zero and the smallest normal number", denormals},
       {"signed_zeros", "zeros of both signs", signed_zeros},
       {"near_parallel", "trajectories whose slopes differ in the last places", near_parallel},
-      {"near_tangent", "trajectories that touch the highest, give or take an ulp", near_tangent},
+      {"near_tangent", "trajectories that touch the highest one, up to one ulp", near_tangent},
       {"all_cross_at_once", "all vertices cross at one instant", all_cross_at_once},
       {"coincident", "vertices that coincide for whole segments", coincident},
-      {"ties_that_separate", "exact ties that part later", ties_that_separate},
-      {"spikes", "single vertices fly far out and back", spikes},
-      {"uneven_keyframes", "keyframes a millionth apart beside long ones", uneven_keyframes},
+      {"ties_that_separate", "exact ties that separate later", ties_that_separate},
+      {"spikes", "single vertices move far out and back", spikes},
+      {"uneven_keyframes", "segments of a millionth of a second next to long ones", uneven_keyframes},
       {"many_keyframes", "up to 1e5 keyframes of a few triangles", many_keyframes},
-      {"odd_steps", "a clip played forward in odd steps", odd_steps},
+      {"odd_steps", "a clip played forward in irregular steps", odd_steps},
       {"changes_at_once", "thousands of changes of plans at one instant", changes_at_once},
       {"changes_at_events", "changes of plans at times of events", changes_at_events},
       {"changes_at_keyframes", "changes of plans at keyframes", changes_at_keyframes},
@@ -487,7 +487,7 @@ StressScene make_scene(const Family& family, const FamilySetting& setting) {
   for (const StressScene::Step& step : scene.steps) scene.frames.push_back(step.time);
   std::sort(scene.frames.begin(), scene.frames.end());
   scene.frames.erase(std::unique(scene.frames.begin(), scene.frames.end()), scene.frames.end());
-  // At the uneven ends of keyframes of several bodies there are more segments than l was meant for.
+  // The keyframes of several bodies, overlaid, give more segments than l was chosen for.
   if (scene.frames.size() > 200) scene.compare_every = scene.frames.size() / 100;
   return scene;
 }

@@ -7,7 +7,7 @@
 
 namespace kbvh::experiments::stress {
 
-/// What a family is told of the scalar that its scene will be in, so that it can aim at its limits.
+/// The limits of the scalar that a scene will be played in, so that a family can aim at them.
 struct ScalarLimits {
   double largest;   ///< admissible coordinate or velocity
   double smallest;  ///< above zero: denormal
@@ -17,16 +17,16 @@ struct ScalarLimits {
 template <class S>
 ScalarLimits scalar_limits();
 
-/// What a scene is made for.
+/// The parameters of a scene.
 struct FamilySetting {
   std::uint64_t seed = 1;
   std::uint32_t l = 7;  ///< frames for each segment of the overlaid keyframes
   ScalarLimits limits{};
-  /// Keyframes of the family that is about many of them.
+  /// Number of keyframes of the family `many_keyframes`.
   std::uint32_t many_keyframes = 2000;
 };
 
-/// A family of adversarial scenes: everything in a scene follows from the setting.
+/// A family of adversarial scenes: the setting determines everything in a scene.
 struct Family {
   std::string name;
   std::string meaning;  ///< in a few words
@@ -35,10 +35,10 @@ struct Family {
 
 const std::vector<Family>& families();
 
-/// Throws io::InputError that lists the known names.
+/// Finds a family. Throws io::InputError that lists the known names.
 const Family& find_family(const std::string& name);
 
-/// The scene of a family, its frames included: l for each segment, and the times of all steps.
+/// Makes the scene of a family with its frames: l per segment, and the times of all steps.
 StressScene make_scene(const Family& family, const FamilySetting& setting);
 
 }  // namespace kbvh::experiments::stress

@@ -7,7 +7,7 @@
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/stress/families.hpp"
 
-/// What the families are put together from (families.cpp).
+/// The building blocks of the families (families.cpp).
 namespace kbvh::experiments::stress {
 
 /// A seeded stream that is the same on every platform.
@@ -27,7 +27,7 @@ class Random {
   std::uint64_t next_ = 0;
 };
 
-/// Fewer keyframes where each segment has many frames: all l cost about the same.
+/// Returns fewer keyframes where each segment has many frames: all l cost about the same.
 inline std::uint32_t keyframes_for(const FamilySetting& setting) {
   return setting.l >= 50 ? 2 : setting.l >= 5 ? 4 : 8;
 }
@@ -39,7 +39,7 @@ inline StressBody unmoved(std::uint32_t vertices) {
   return body;
 }
 
-/// A body of `triangles` triangles without common vertices whose points are what `at` says.
+/// Makes a body of `triangles` triangles without common vertices, with the points given by `at`.
 using Point = std::function<double(std::uint32_t keyframe, std::uint32_t vertex, int axis)>;
 inline StressBody soup_of(std::uint32_t triangles, std::uint32_t keyframes, const Point& at) {
   StressBody body;
@@ -54,7 +54,7 @@ inline StressBody soup_of(std::uint32_t triangles, std::uint32_t keyframes, cons
   return body;
 }
 
-/// Triangles of a size scattered in [-1, 1]^3, every vertex on a random walk.
+/// Makes triangles of one size scattered in [-1, 1]^3, every vertex on a random walk.
 inline StressBody soup(Random& random, std::uint32_t triangles, std::uint32_t keyframes, double size = 0.4,
                        double travel = 0.3) {
   std::vector<double> last(std::size_t(9) * triangles);
@@ -71,7 +71,7 @@ inline StressBody soup(Random& random, std::uint32_t triangles, std::uint32_t ke
   });
 }
 
-/// A connected sheet of 2 (n - 1)^2 triangles.
+/// Makes a connected sheet of 2 (n - 1)^2 triangles.
 using SheetPoint = std::function<double(std::uint32_t x, std::uint32_t y, std::uint32_t k, int axis)>;
 inline StressBody sheet(std::uint32_t n, std::uint32_t keyframes, const SheetPoint& at) {
   StressBody body;
@@ -104,7 +104,7 @@ inline void for_coordinates(StressScene& scene, const std::function<void(double&
     for (double& x : body.positions) change(x);
 }
 
-/// Scales so that the largest coordinate is `largest`.
+/// Scales the scene so that its largest coordinate is `largest`.
 inline void scale_to(StressScene& scene, double largest) {
   double most = 0;
   for_coordinates(scene, [&](double& x) { most = std::max(most, std::abs(x)); });

@@ -23,7 +23,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// A process that waits instead of working gets this many times its processor time.
+/// A process that waits instead of working may take this many times its processor time.
 constexpr double patience = 30;
 
 void write_all(int file, const void* data, std::size_t size) {
@@ -31,7 +31,7 @@ void write_all(int file, const void* data, std::size_t size) {
   while (size > 0) {
     const ssize_t written = ::write(file, at, size);
     if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) ::_exit(3);  // nobody listens any more
+    if (written <= 0) ::_exit(3);  // the parent has gone
     at += written;
     size -= std::size_t(written);
   }
@@ -40,7 +40,7 @@ void write_all(int file, const void* data, std::size_t size) {
 [[noreturn]] void be_child([[maybe_unused]] pid_t parent, int file, std::size_t first, std::size_t jobs,
                            const std::function<std::string(std::size_t)>& work, Stderr standard_error) {
 #if defined(__linux__)
-  // A child outlives no parent, however that ends.
+  // No child outlives its parent, however the parent ends.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(5);
 #endif
@@ -55,7 +55,7 @@ void write_all(int file, const void* data, std::size_t size) {
     try {
       said = work(i);
     } catch (...) {
-      ::_exit(4);  // work is to report its own exceptions
+      ::_exit(4);  // the job must report its own exceptions
     }
     const std::uint64_t size = said.size();
     write_all(file, &size, sizeof size);
@@ -64,7 +64,7 @@ void write_all(int file, const void* data, std::size_t size) {
   ::_exit(0);  // no destructors, and no buffers of the parent written twice
 }
 
-/// Processor seconds of a process, or nothing good: 0.
+/// Returns the processor seconds of a process; 0 if unknown.
 double processor_seconds(pid_t child) {
   clockid_t clock{};
   timespec time{};

@@ -36,7 +36,7 @@ const std::vector<std::string> head{"family",    "strategy", "scenes", "protrusi
                                     "looseness", "missed",   "extra",  "events",     "hangs",
                                     "crashes",   "broken",   "refused"};
 
-/// One line for each strategy over all families.
+/// Sums the rows of each strategy over all families.
 std::vector<StressRow> over_families(const std::vector<StressRow>& rows) {
   std::vector<StressRow> sums;
   for (const StressRow& row : rows) {

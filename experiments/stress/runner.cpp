@@ -42,7 +42,7 @@ bool CaseResult::failed() const {
 
 namespace {
 
-/// Results travel from child to parent as text.
+/// Packs a result as text for the way from child to parent.
 std::string packed(const CaseResult& r) {
   return json{int(r.outcome), r.what,       r.frames, r.pairs,     r.missed,  r.extra,
               r.events,       r.protrusion, r.extent, r.looseness, r.audited, r.seconds}
@@ -58,7 +58,7 @@ CaseResult unpacked(const std::string& text) {
   r.what = list[1].get<std::string>();
   std::uint64_t* counts[] = {&r.frames, &r.pairs, &r.missed, &r.extra, &r.events};
   for (std::size_t i = 0; i < std::size(counts); ++i) *counts[i] = list[2 + i].get<std::uint64_t>();
-  // JSON has no infinity: a box that holds nothing is as far off as can be.
+  // JSON has no infinity: an empty box counts as the largest protrusion.
   r.protrusion = finite_or(list[7], std::numeric_limits<double>::max());
   r.extent = finite_or(list[8], 0);
   r.looseness = finite_or(list[9], std::numeric_limits<double>::max());
@@ -101,7 +101,7 @@ CaseResult run_here(const Playable<S>& stress, Oracle<S>& oracle, const Contesta
     result.looseness = seen.audit.looseness();
     result.audited = seen.audited;
     result.what = seen.first_violation;
-    // Whoever is measured by its errors may have them; any other may not, whatever it declares.
+    // Only approximate contestants may have errors; any other contestant may not, whatever it declares.
     if (result.what.empty() && spec.entry->info.guarantee != Guarantee::approximate && result.protrusion != 0)
       result.what = "protrusion " + std::to_string(result.protrusion);
     if (!result.what.empty()) result.outcome = Outcome::broken;
@@ -135,7 +135,7 @@ std::vector<CaseResult> run_as(const StressScene& scene, const std::vector<Conte
     else
       results[i].outcome = Outcome::unsuitable;
   }
-  // Made by the child that first needs it, and kept for all contestants that it lives to see.
+  // Created by the child that first needs it, and kept for all contestants that this child plays.
   std::optional<Oracle<S>> oracle;
   const std::uint64_t script = stress.script.empty() ? 0 : hash(stress.script);
   const auto work = [&](std::size_t job) {
@@ -193,7 +193,7 @@ void StressRow::add(const CaseResult& result) {
       one.relative_protrusion = result.protrusion / result.extent;
     if (result.audited) {
       one.audited = 1;
-      // Boxes that hold nothing have an area of zero, and a looseness of minus one.
+      // Empty boxes have an area of zero, and a looseness of minus one.
       one.log_looseness = std::log1p(std::max(result.looseness, -0.999999));
       one.looseness_worst = result.looseness;
     }
@@ -298,7 +298,7 @@ StressReport run_stress(const StressOptions& options, const std::function<void(c
     setting.seed = hash_of(family.name + " " + std::to_string(instance), options.seed);
     setting.many_keyframes = instance == 0 ? options.many_keyframes : options.many_keyframes / 50;
     std::vector<ContestantSpec> specs = options.contestants;
-    // The approximate ones are compared with each other: in the configuration that their labels say.
+    // Approximate contestants are compared with each other, in the configuration that their labels state.
     if (options.vary && instance > 0)
       for (std::size_t c = 0; c < contestants; ++c)
         if (specs[c].entry->info.guarantee != Guarantee::approximate)
@@ -323,11 +323,11 @@ StressReport run_stress(const StressOptions& options, const std::function<void(c
           failure.size_before = scene.size();
           failure.repro = repro_for(scene, specs[c], scalar, results[c]);
           report.failures.push_back(std::move(failure));
-          // Making it smaller can take long, and the run may be ended before.
+          // Shrinking can take long, and the run may be ended before.
           if (keep) keep(report);
           if (options.shrink) {
             CaseResult last = results[c];
-            told("shrinking what fails " + specs[c].label + " in " + family.name);
+            told("shrinking a failure of " + specs[c].label + " in " + family.name);
             RunLimits limits = options.limits;
             limits.silent = true;
             const auto fails = [&](const StressScene& candidate) {

@@ -11,40 +11,41 @@
 
 namespace kbvh::experiments::stress {
 
-/// How one contestant fared on one scene.
+/// The outcome of one contestant on one scene.
 enum class Outcome : std::uint8_t {
-  held,        ///< its guarantee, tightness and boxes; an approximate one: it came to the end
-  broken,      ///< a guarantee that it declares, or a box that does not hold its vertices
-  threw,       ///< an exception that the contract does not know
+  held,        ///< guarantee, tightness and boxes held; an approximate contestant: it finished
+  broken,      ///< a declared guarantee was violated, or a box does not contain its vertices
+  threw,       ///< an exception outside the contract
   crashed,     ///< the process ended
   hung,        ///< had to be stopped
-  unsuitable,  ///< does not take part: no such scalar, cannot take changes of plans, too large
-  refused,     ///< the scene is none, by contract
+  unsuitable,  ///< does not take part: no such scalar, no support for changes of plans, scene too large
+  refused,     ///< the scene is inadmissible, by contract
 };
 const char* name(Outcome outcome);
 
-/// One contestant on one scene in one scalar.
+/// The result of one contestant on one scene in one scalar.
 struct CaseResult {
   Outcome outcome = Outcome::held;
-  std::string what;  ///< of a failure, a refusal or an unsuitable contestant: in one sentence
+  std::string what;  ///< a failure, a refusal or the reason for not taking part, in one sentence
   std::uint64_t frames = 0, pairs = 0, missed = 0, extra = 0;
   std::uint64_t events = 0;  ///< certificates that failed, and events of separation lists
-  double protrusion = 0;     ///< furthest out of a box, in units of the scene
-  double extent = 0;         ///< largest coordinate of the scene, to hold it against
+  double protrusion = 0;     ///< largest protrusion from a box, in units of the scene
+  double extent = 0;         ///< largest coordinate of the scene, for comparison
   double looseness = 0;      ///< of all audited frames
   bool audited = false;
-  double seconds = 0;  ///< processor time; 0 if it did not come to the end
+  double seconds = 0;  ///< processor time; 0 if it did not finish
 
-  /// Held, unsuitable and refused are none.
+  /// Returns whether the outcome is a failure: held, unsuitable and refused are none.
   bool failed() const;
 };
 
 struct RunLimits {
   double seconds = 100;  ///< processor time of one contestant on one scene; more is a hang
-  bool silent = false;   ///< drop what child processes print
+  bool silent = false;   ///< drop the output of child processes on standard error
 };
 
-/// All contestants on one scene, each in a process that may crash or hang; `scalar` is "float" or "double".
+/// Plays one scene to all contestants, each in a process that may crash or hang; `scalar` is "float" or
+/// "double".
 std::vector<CaseResult> run_scene(const StressScene& scene, const std::string& scalar,
                                   const std::vector<ContestantSpec>& contestants, const RunLimits& limits);
 
@@ -64,10 +65,11 @@ struct StressRow {
   double seconds = 0;  ///< processor time
 
   void add(const CaseResult& result);
-  /// What was counted for another row; names stay.
+  /// Adds the counts of another row; names stay.
   void add(const StressRow& other);
   std::uint64_t failures() const { return broken + threw + crashes + hangs; }
-  /// Geometric mean over scenes, of the factor that it stands for: scales differ too much for any other.
+  /// Returns the geometric mean over scenes of the corresponding factor; the scales differ too much for an
+  /// arithmetic mean.
   double looseness() const { return audited > 0 ? std::expm1(log_looseness / double(audited)) : 0; }
 };
 
@@ -76,7 +78,7 @@ struct StressFailure {
   Repro repro;
   std::uint64_t seed = 0;
   std::uint32_t l = 0;
-  std::string file;  ///< where the repro was written, or empty
+  std::string file;  ///< path of the repro file, or empty
   std::size_t triangles_before = 0, size_before = 0;
 };
 
@@ -90,34 +92,33 @@ struct StressOptions {
   bool vary = true;  ///< draw builder and parameters for all but the first scene of a family
   bool shrink = true;
   std::size_t most_repros = 20;  ///< failures of one family and strategy beyond the first are only counted
-  std::uint32_t many_keyframes = 100000;  ///< of the first such scene; of others a fiftieth
+  std::uint32_t many_keyframes = 100000;  ///< of the first such scene; the others have a fiftieth
   RunLimits limits{};
 };
 
 struct StressReport {
   std::vector<StressRow> rows;  ///< by family, then by strategy
   std::vector<StressFailure> failures;
-  std::uint64_t scenes = 0, played = 0;  ///< asked for, and played so far
+  std::uint64_t scenes = 0, played = 0;  ///< requested, and played so far
 };
 
-/// Runs the suite. `told` hears what is being done. `keep`, if there is one, is given the report as far as it
-/// is after every scene, at every failure before it is made smaller, and after that. Same options, same
-/// scenes.
+/// Runs the suite. `told` receives progress messages. `keep`, if given, receives the current report after
+/// every scene, at every failure before it is shrunk, and after shrinking. Same options, same scenes.
 StressReport run_stress(const StressOptions& options, const std::function<void(const std::string&)>& told,
                         const std::function<void(StressReport&)>& keep = {});
 
-/// The contestant in another configuration that it declares, drawn at random from the seed: builder, and
-/// every parameter that is a choice of words.
+/// Returns the contestant in another valid configuration, drawn at random from the seed: builder, and every
+/// parameter with a choice of words.
 ContestantSpec varied(const ContestantSpec& spec, std::uint64_t seed);
 
-/// "median/2/1", and back; throws io::InputError.
+/// Converts to "median/2/1", and back; throws io::InputError.
 std::string builder_text(const BuilderConfig& builder);
 BuilderConfig builder_of(const std::string& text);
 
-/// The table that the program prints, and what is written as stress.json (RESULTS.md).
+/// Formats the table that the program prints, and the content of stress.json (RESULTS.md).
 std::string stress_table(const StressReport& report);
 nlohmann::json to_json(const StressReport& report, const StressOptions& options);
-/// The member "options" of stress.json: all that decides what is played.
+/// Makes the member "options" of stress.json: everything that affects the played scenes.
 nlohmann::json options_record(const StressOptions& options);
 
 }  // namespace kbvh::experiments::stress

@@ -77,7 +77,7 @@ Playable<S> playable(const StressScene& stress) {
       }
       result.script.steps.push_back(std::move(own));
     }
-    // Played once without any contestant: who throws later throws of its own accord.
+    // Played once without any contestant: later exceptions are then the contestant's.
     Playback<S> playback(result.scene);
     ScriptCursor<S> cursor(&result.script);
     for (const double t : result.frames) {

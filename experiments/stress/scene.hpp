@@ -11,8 +11,8 @@
 
 namespace kbvh::experiments::stress {
 
-/// One body of a stress scene, in double; a scene's scalar rounds every coordinate once. Anything may be in
-/// it, also what the program refuses.
+/// One body of a stress scene, in double; a scene's scalar rounds every coordinate once. Its content is
+/// unchecked and may be inadmissible.
 struct StressBody {
   std::uint32_t vertex_count = 0;
   std::vector<std::vector<std::uint32_t>> primitives;  ///< vertex ids of each
@@ -27,29 +27,30 @@ struct StressBody {
   }
 };
 
-/// A scene with everything that decides what happens: its bodies, the frames at which it is looked at, and
-/// the changes of plans in between. Small enough to be written out in full.
+/// A scene with everything that affects its result: its bodies, its frames, and the changes of plans in
+/// between. Small enough to be written out in full.
 struct StressScene {
   std::string family;
   std::vector<StressBody> bodies;
-  std::vector<double> frames;  ///< seconds, ascending, not empty; a time may come twice
+  std::vector<double> frames;  ///< seconds, ascending, not empty; a time may occur twice
   struct Step {
     double time;  ///< of a frame
     std::vector<PlanChange<double>> changes;
   };
-  std::vector<Step> steps;          ///< ascending times
-  std::uint64_t compare_every = 1;  ///< frames compared with the oracle and audited; the last always is
+  std::vector<Step> steps;  ///< ascending times
+  std::uint64_t compare_every =
+      1;  ///< distance of frames compared with the oracle and audited; the last always is
 
   std::size_t triangles() const;
   std::size_t vertices() const;
-  /// The longest list of keyframes.
+  /// Returns the length of the longest list of keyframes.
   std::size_t keyframes() const;
-  /// Numbers that are neither 0 nor 1, and everything else that could be fewer: what shrinking makes smaller.
+  /// Returns the size that shrinking reduces: numbers that are neither 0 nor 1, plus all removable items.
   std::size_t size() const;
 };
 
-/// The program does not take such a scene, by contract: a coordinate beyond the admissible range of the
-/// scalar, or a change of plans that a vertex cannot take there.
+/// The scene is inadmissible by contract: a coordinate beyond the admissible range of the scalar, or a change
+/// of plans that a vertex cannot take at that time.
 struct Refused : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -63,20 +64,20 @@ struct Playable {
   std::uint64_t compare_every = 1;
 };
 
-/// Throws Refused.
+/// Converts a stress scene to one scalar. Throws Refused.
 template <class S>
 Playable<S> playable(const StressScene& stress);
 
-/// A scene, and who failed on it how: all that a repro file holds.
+/// The content of a repro file: a scene, the contestant that failed on it, and the failure.
 struct Repro {
   StressScene scene;
   std::string strategy, scalar;
   std::map<std::string, std::string> params;
   std::string builder;  ///< "method/width/leaf size", or empty: the strategy's own
-  std::string failure;  ///< in words, as it was seen
+  std::string failure;  ///< in words, as observed
 };
 
-/// Text of a repro file (RESULTS.md): every number reads back as the same double.
+/// Writes the text of a repro file (RESULTS.md): every number reads back as the same double.
 std::string to_text(const Repro& repro);
 
 /// Reads a repro file's text. Throws io::InputError that begins with `name`.

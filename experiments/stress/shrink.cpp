@@ -46,7 +46,7 @@ class Shrinker {
     return true;
   }
 
-  /// Takes out runs of elements, halves first; `remove(scene, begin, end)` takes [begin, end) out.
+  /// Removes runs of elements, halves first; `remove(scene, begin, end)` removes [begin, end).
   template <class Count, class Remove>
   bool remove_runs(Count&& count, std::size_t least, Remove&& remove) {
     bool any = false;
@@ -131,7 +131,7 @@ class Shrinker {
                          });
     return any;
   }
-  /// Vertices of no primitive, all at once; changes of their plans go with them.
+  /// Removes all unused vertices at once, with the changes of their plans.
   bool fewer_vertices() {
     StressScene candidate = best_;
     bool any = false;
@@ -166,7 +166,7 @@ class Shrinker {
     return any && attempt(std::move(candidate));
   }
 
-  /// All numbers that may become rounder, in one list.
+  /// Lists all numbers that may be rounded.
   static std::vector<double*> numbers(StressScene& scene) {
     std::vector<double*> all;
     for (StressBody& body : scene.bodies)
@@ -178,7 +178,7 @@ class Shrinker {
       }
     return all;
   }
-  /// A number with at most `bits` binary digits.
+  /// Rounds a number to at most `bits` binary digits.
   static double rounded(double x, int bits) {
     if (x == 0 || !std::isfinite(x)) return 0;
     int exponent = 0;

@@ -5,16 +5,16 @@
 
 namespace kbvh::experiments::stress {
 
-/// How much may be tried.
+/// The limits of shrinking.
 struct ShrinkBudget {
   std::size_t tries = 3000;
-  double seconds = 60;  ///< of time; looked at between tries
+  double seconds = 60;  ///< checked between attempts
 };
 
-/// Makes a scene smaller as long as `fails` says that it still fails: fewer bodies, steps, changes,
-/// keyframes, frames, primitives and vertices (halves first, then quarters, down to single ones), then zeros
-/// and rounder numbers. `fails(scene)` holds at the beginning, and of what is returned. Ends when nothing
-/// more goes, or the budget is used up.
+/// Shrinks a scene while `fails` still returns true: fewer bodies, steps, changes, keyframes, frames,
+/// primitives and vertices (halves first, then quarters, down to single ones), then zeros and rounder
+/// numbers. `fails(scene)` must hold at the start and holds for the result. Ends when no reduction is left,
+/// or the budget is used up.
 StressScene shrink(StressScene scene, const std::function<bool(const StressScene&)>& fails,
                    const ShrinkBudget& budget = {});
 

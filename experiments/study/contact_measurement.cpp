@@ -39,18 +39,24 @@ void compare(const ContactBuffer& found, const ContactBuffer& truth, std::size_t
 }  // namespace
 
 template <class S>
-std::vector<double> contact_times(std::vector<double> frames, const PlanScript<S>& script) {
-  const double last = frames.back();
+std::vector<double> contact_times(const Scene<S>& scene, std::vector<double> frames,
+                                  const PlanScript<S>& script) {
+  const double first = frames.front(), last = frames.back();
+  const auto add = [&](double t) {
+    if (t > first && t < last) frames.push_back(t);
+  };
+  for (const double t : overlaid_keyframes(scene)) add(t);
   for (const auto& step : script.steps)
     for (const PlanChange<S>& change : step.changes)
-      for (const double t : change.times)
-        if (t < last) frames.push_back(t);
+      for (const double t : change.times) add(t);
   std::sort(frames.begin(), frames.end());
   frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
   return frames;
 }
-template std::vector<double> contact_times(std::vector<double>, const PlanScript<float>&);
-template std::vector<double> contact_times(std::vector<double>, const PlanScript<double>&);
+template std::vector<double> contact_times(const Scene<float>&, std::vector<double>,
+                                           const PlanScript<float>&);
+template std::vector<double> contact_times(const Scene<double>&, std::vector<double>,
+                                           const PlanScript<double>&);
 
 template <class S>
 ContactMeasurement<S>::ContactMeasurement(const Scene<S>& scene, std::vector<double> knots,
@@ -105,7 +111,7 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
       const auto begin = std::chrono::steady_clock::now();
       entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
       measured.build_seconds = seconds_since(begin);
-      // Warm: buffers grow, and hierarchies for sweeps are made when they are first asked for.
+      // Warm-up: buffers grow, and hierarchies for sweeps are created at their first use.
       PhaseTimes ignored;
       ScriptCursor<S> cursor(script_);
       entrant.session->reset(knots_[0]);

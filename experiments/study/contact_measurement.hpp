@@ -7,18 +7,18 @@
 
 namespace kbvh::experiments {
 
-/// The times between which contacts are found where plans change: the frames, and in between every knot that
-/// a changed plan may have.
+/// Returns the times between which contacts are found where plans change: the frames, and in between every
+/// keyframe of a body and every possible knot of a changed plan.
 template <class S>
-std::vector<double> contact_times(std::vector<double> frames, const PlanScript<S>& script);
+std::vector<double> contact_times(const Scene<S>& scene, std::vector<double> frames,
+                                  const PlanScript<S>& script);
 
-/// As Measurement, for the contacts of features while vertices move from one time of `knots` to the next.
+/// Like Measurement, for the contacts of features while vertices move from one time of `knots` to the next.
 template <class S>
 class ContactMeasurement {
  public:
-  /// Finds the true contacts, by sorting and sweeping. The script changes plans at some of the knots, and
-  /// nothing else; null: there is none. Throws io::InputError unless all bodies that are in pairs consist of
-  /// triangles.
+  /// Finds the true contacts by sort-and-sweep. The script changes plans at some of the knots, and nothing
+  /// else; null: no script. Throws io::InputError unless all bodies in pairs consist of triangles.
   ContactMeasurement(const Scene<S>& scene, std::vector<double> knots, const PlanScript<S>* script);
 
   /// Verifies a contestant, comparing every n-th interval and the last.

@@ -20,7 +20,7 @@ bool has_parameter(const Info& info, const std::string& key) {
 
 constexpr std::string_view family_prefix = "family:";
 
-/// Is it the id of one strategy, and no word for several?
+/// Returns whether the word is the id of one strategy, and not a word for several.
 bool is_id(const std::string& id) {
   return id != "all" && id != "default" && !id.starts_with(family_prefix);
 }
@@ -48,7 +48,7 @@ std::vector<Selected> selected(const std::string& id) {
   return list;
 }
 
-/// The common parameters that are meant for this strategy; what was used is removed from `unused`.
+/// Selects the common parameters that apply to this strategy; removes used ones from `unused`.
 Sweep params_for(const Info& info, const Sweep& common, std::set<std::string>& unused) {
   Sweep params;
   for (const auto& [name, values] : common) {
@@ -57,7 +57,7 @@ Sweep params_for(const Info& info, const Sweep& common, std::set<std::string>& u
     if (named && name.substr(0, dot) != info.id) continue;
     const std::string key = named ? name.substr(dot + 1) : name;
     if (!named && !has_parameter(info, key)) continue;
-    // "strategy.key" is the more exact one, whichever of the two comes first.
+    // "strategy.key" is more specific and wins in either order.
     if (named || !params.contains(key)) params[key] = values;
     unused.erase(name);
   }
@@ -108,7 +108,7 @@ std::string label_of(const ContestantSpec& spec) {
                     (known.empty() ? "none" : joined(known)) + suggestion(key, known));
 }
 
-/// Complains about a common parameter that no strategy of the list has.
+/// Rejects a common parameter that no strategy of the list has.
 [[noreturn]] void refuse_common_parameter(const std::vector<ContestantSpec>& list, const std::string& name) {
   const bool qualified = name.find('.') != std::string::npos;
   std::vector<std::string> known;
@@ -119,15 +119,15 @@ std::string label_of(const ContestantSpec& spec) {
                     suggestion(name, known));
 }
 
-/// The values as records have them: of a number its default's text, or the shortest that reads back as it, so
-/// that 2 and 2.0 are one configuration.
+/// Normalises the values for records: a number becomes its default's text, or the shortest text that reads
+/// back as it, so that 2 and 2.0 are one configuration.
 std::map<std::string, std::string> in_one_spelling(const Info& info,
                                                    std::map<std::string, std::string> given) {
   for (const Parameter& parameter : info.parameters) {
     const auto found = given.find(parameter.name);
     if (found == given.end() || !parameter.allowed.empty()) continue;
     const auto value = parse_number(found->second), usual = parse_number(parameter.default_value);
-    if (!value) continue;  // Params complains
+    if (!value) continue;  // Params reports the error
     char text[40];
     const bool whole = *value == std::trunc(*value) && std::abs(*value) < 1e15;
     const auto end = whole ? std::to_chars(text, text + sizeof text, std::int64_t(*value)).ptr
@@ -185,7 +185,7 @@ const StrategyEntry& strategy_named(const std::string& id) {
 
 namespace {
 
-/// Two bodies of one triangle each, one of which moves.
+/// Makes two bodies of one triangle each, one of which moves.
 template <class S>
 Scene<S> two_triangles() {
   Scene<S> scene;

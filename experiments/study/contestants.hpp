@@ -20,43 +20,43 @@ struct BuilderRequest {
   bool empty() const { return methods.empty() && widths.empty() && leaf_sizes.empty(); }
 };
 
-/// Strategies as a plan asks for them: an id, "family:NAME", "default" (all that promise something) or "all",
-/// with parameters of their own; or "!" and one of these, which takes them out again.
+/// Strategies as a plan requests them: an id, "family:NAME", "default" (all with a guarantee) or "all", with
+/// their own parameters; or "!" and one of these, which removes them again.
 struct StrategyRequest {
   std::string id;
   Sweep params;
   BuilderRequest builder;
-  bool optional = false;  ///< left out, with a note, if this program was built without it
+  bool optional = false;  ///< skipped, with a note, if this program was built without it
 };
 
 /// One strategy in one configuration.
 struct ContestantSpec {
   const StrategyEntry* entry = nullptr;
-  std::map<std::string, std::string> given;   ///< parameters that differ from nothing said
+  std::map<std::string, std::string> given;   ///< explicitly set parameters
   std::map<std::string, std::string> params;  ///< all, defaults included
-  BuilderConfig builder;                      ///< meaningless if the strategy builds its own
-  std::string label;                          ///< id, and what is not as it is by default
+  BuilderConfig builder;                      ///< unused if the strategy builds its own
+  std::string label;                          ///< id and non-default settings
   Contestant contestant() const { return {entry, given, builder}; }
 };
 
-/// The entry of a strategy, or nullptr if this program has none of that id.
+/// Returns the entry of a strategy, or nullptr if this program has none of that id.
 const StrategyEntry* known_strategy(const std::string& id);
 
-/// The entry of a strategy. Throws ConfigError with the nearest id if there is none.
+/// Returns the entry of a strategy. Throws ConfigError with the nearest id if there is none.
 const StrategyEntry& strategy_named(const std::string& id);
 
-/// Makes each contestant with parameters of its own once, on two triangles. Throws ConfigError for a value
+/// Creates each contestant with its own parameters once, on two triangles. Throws ConfigError for a value
 /// that only the strategy itself can refuse.
 void try_parameters(const std::vector<ContestantSpec>& list);
 
-/// Everything the requests stand for, in order, each configuration once. `common` parameters are "key" (for
-/// every strategy that has it) or "strategy.key"; `builder` is for every request without one of its own.
-/// What "all", "default" and "family:" bring along is left out, with a sentence in `notes`, if it cannot take
-/// the builder; strategies named by id throw ConfigError then, as does whatever applies to nothing.
+/// Expands the requests, in order, each configuration once. `common` parameters are "key" (for every strategy
+/// that has it) or "strategy.key"; `builder` applies to every request without its own builder. Members of
+/// "all", "default" and "family:" that cannot take the builder are left out, with a sentence in `notes`;
+/// strategies named by id throw ConfigError in this case, and so does a setting that applies to no strategy.
 std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests, const Sweep& common,
                                    const BuilderRequest& builder, std::vector<std::string>& notes);
 
-/// Why the strategy cannot take part in the scene, in one clause; or "". `script`: the changes that are to be
+/// Returns why the strategy cannot take part in the scene, in one clause; or "". `script`: the changes to be
 /// replayed, empty for most scenes.
 template <class S>
 std::string unsuitable(const Info& info, const Scene<S>& scene, const PlanScript<S>& script = {});

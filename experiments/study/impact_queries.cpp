@@ -18,7 +18,7 @@ using boost::multiprecision::cpp_int;
 namespace {
 
 std::optional<Contact::Kind> kind_named(const std::string& name) {
-  // A word of the name, not letters within one: sheets and knees are no edges.
+  // Matches a whole word of the name, not letters within one: sheets and knees are no edges.
   const auto has = [&](const std::string& word) {
     const auto letter = [&](std::size_t at) {
       return at < name.size() && std::isalpha(static_cast<unsigned char>(name[at])) != 0;
@@ -43,10 +43,10 @@ bool is_integer(const std::string& text) {
                      [](char c) { return c >= '0' && c <= '9'; });
 }
 
-/// A quotient that is a double, exactly; nothing if it is none.
+/// Returns a quotient that is exactly a double; nothing otherwise.
 std::optional<double> exact_quotient(const std::string& top, const std::string& bottom) {
   if (!is_integer(top) || !is_integer(bottom)) return {};
-  // A number that begins with a zero would be read as an octal one.
+  // A number that begins with a zero would be read as octal.
   const auto decimal = [](const std::string& text) {
     const bool negative = text.starts_with('-');
     const std::size_t first = std::min(text.find_first_not_of('0', negative ? 1 : 0), text.size() - 1);
@@ -78,7 +78,7 @@ std::vector<fs::path> files_in(const fs::path& folder, const std::string& extens
   return files;
 }
 
-/// The file of a kind, by the part of its name before `suffix`.
+/// Returns the file of a kind, by the part of its name before `suffix`.
 fs::path file_of_kind(const fs::path& folder, const std::string& ending) {
   for (const fs::path& file : files_in(folder, ".json"))
     if (file.filename().string().ends_with(ending)) return file;
@@ -90,7 +90,8 @@ fs::path file_of_kind(const fs::path& folder, const std::string& ending) {
 ImpactQueries read_impact_queries(const fs::path& file) {
   std::optional<Contact::Kind> kind = kind_named(file.parent_path().filename().string());
   if (const auto own = kind_named(file.stem().string())) kind = own;
-  if (!kind) io::fail(file, "", "neither its name nor its folder's says vertex-face (vf) or edge-edge (ee)");
+  if (!kind)
+    io::fail(file, "", "neither its name nor its folder's name contains vertex-face (vf) or edge-edge (ee)");
   ImpactQueries result{readable(file.stem().string()), {}};
   const std::string text = io::read_text(file);
   std::uint64_t rows = 0, line = 0;
@@ -115,7 +116,7 @@ ImpactQueries read_impact_queries(const fs::path& file) {
       if (!value)
         io::fail(
             file, place,
-            io::printable(cells[2 * axis]) + " / " + io::printable(cells[2 * axis + 1]) + " is no double");
+            io::printable(cells[2 * axis]) + " / " + io::printable(cells[2 * axis + 1]) + " is not a double");
       query.points[rows % 8 / 4][rows % 4][axis] = *value;
     }
     if (cells.size() == 7) {
@@ -126,7 +127,8 @@ ImpactQueries read_impact_queries(const fs::path& file) {
     }
     ++rows;
   }
-  if (rows % 8 != 0) io::fail(file, "", "has " + std::to_string(rows) + " rows, which is no multiple of 8");
+  if (rows % 8 != 0)
+    io::fail(file, "", "has " + std::to_string(rows) + " rows, which is not a multiple of 8");
   return result;
 }
 
@@ -147,7 +149,7 @@ FramePair read_frame_pair(const fs::path& folder) {
     for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
       const std::size_t first = mesh.primitive_offsets[p];
       if (mesh.primitive_offsets[p + 1] != first + 3)
-        io::fail(frames[0], "", "has a face that is no triangle");
+        io::fail(frames[0], "", "has a face that is not a triangle");
       pair.faces.push_back({mesh.primitive_vertices[first], mesh.primitive_vertices[first + 1],
                             mesh.primitive_vertices[first + 2]});
     }
@@ -171,12 +173,12 @@ FramePair read_frame_pair(const fs::path& folder) {
     const auto ids = parse_json(io::read_file(boxes), boxes.string());
     const auto touch = parse_json(io::read_file(verdicts), verdicts.string());
     if (!ids.is_array() || !touch.is_array() || ids.size() != touch.size())
-      io::fail(boxes, "", "is no list of as many pairs as " + verdicts.string() + " has verdicts");
+      io::fail(boxes, "", "is not a list with as many pairs as " + verdicts.string() + " has verdicts");
     for (std::size_t i = 0; i < ids.size(); ++i) {
       const std::string place = "pair " + std::to_string(i);
       if (!ids[i].is_array() || ids[i].size() != 2 || !ids[i][0].is_number_unsigned() ||
           !ids[i][1].is_number_unsigned() || !touch[i].is_boolean())
-        io::fail(boxes, place, "is no pair of ids with a verdict");
+        io::fail(boxes, place, "is not a pair of ids with a verdict");
       const std::uint64_t a = ids[i][0].get<std::uint64_t>(), b = ids[i][1].get<std::uint64_t>();
       const std::uint64_t offset_a = faces ? 0 : vertices, offset_b = faces ? vertices + edges : vertices;
       const std::uint64_t count_a = faces ? vertices : edges, count_b = faces ? pair.faces.size() : edges;
@@ -209,8 +211,8 @@ ImpactQuery FramePair::query(const Listed& pair) const {
 
 namespace {
 
-/// As `find_impact_queries`; `above` are the folders that `path` is in, so that a link to one of them ends
-/// nothing.
+/// Like `find_impact_queries`; `above` are the folders that contain `path`, so that a link to one of them
+/// does not recurse.
 std::vector<ImpactQueries> find_below(const fs::path& path, std::vector<fs::path>& above) {
   std::vector<ImpactQueries> found;
   std::error_code problem;
@@ -225,7 +227,7 @@ std::vector<ImpactQueries> find_below(const fs::path& path, std::vector<fs::path
         if (listed.kind == kind) found.back().queries.push_back(pair.query(listed));
     }
   } else if (fs::is_directory(status)) {
-    std::error_code error;  // of a link that leads nowhere, which is no folder
+    std::error_code error;  // of a dangling link, which is not a folder
     std::vector<fs::path> inside;
     for (const auto& entry : fs::directory_iterator(path))
       if (entry.is_directory(error) || entry.path().extension() == ".csv") inside.push_back(entry.path());

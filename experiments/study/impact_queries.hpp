@@ -9,7 +9,7 @@
 
 namespace kbvh::experiments {
 
-/// One question of continuous collision detection, and the answer if it is known.
+/// One query of continuous collision detection, with its answer if it is known.
 struct ImpactQuery {
   Contact::Kind kind = Contact::Kind::vertex_face;
   double points[2][4][3] = {};  ///< [t = 0, t = 1][point]
@@ -27,13 +27,13 @@ struct ImpactQueries {
   std::vector<ImpactQuery> queries;
 };
 
-/// Reads a file of queries as those of Wang et al. 2021 (NYU CCD benchmark): 8 rows for each, 4 points at t =
-/// 0 and 4 at t = 1, of x, y, z as numerator,denominator and, optionally, 0 or 1 for the verdict. The kind is
-/// said by the name of the file or of its folder: "vf", "vertex-face", "ee", "edge-edge". Throws
-/// io::InputError with the line, also for a number that is no double: nothing is rounded.
+/// Reads a file of queries in the format of Wang et al. 2021 (NYU CCD benchmark): 8 rows each, 4 points at t
+/// = 0 and 4 at t = 1, of x, y, z as numerator,denominator and, optionally, 0 or 1 for the verdict. The name
+/// of the file or of its folder gives the kind: "vf", "vertex-face", "ee", "edge-edge". Throws io::InputError
+/// with the line, also for a number that is not exactly a double: no number is rounded.
 ImpactQueries read_impact_queries(const std::filesystem::path& file);
 
-/// Two consecutive frames of a mesh, and which pairs of features are known to touch between them (ground
+/// Two consecutive frames of a mesh, with the pairs of features that are known to touch between them (ground
 /// truth of the same benchmark): frames/*.ply, boxes/*vf.json and *ee.json with pairs of ids, mma_bool/* with
 /// their verdicts. Ids: vertices, then edges, then faces; edges are the unique undirected ones, sorted by
 /// larger and then by smaller vertex.
@@ -51,12 +51,12 @@ struct FramePair {
 
   ImpactQuery query(const Listed& pair) const;
 };
-/// Throws io::InputError.
+/// Reads a frame pair. Throws io::InputError.
 FramePair read_frame_pair(const std::filesystem::path& folder);
-/// Has the folder the layout of a frame pair?
+/// Returns whether the folder has the layout of a frame pair.
 bool is_frame_pair(const std::filesystem::path& folder);
 
-/// All queries below a path: a file, a frame pair, or a folder of either. Sorted by name. Throws
+/// Returns all queries below a path: a file, a frame pair, or a folder of either. Sorted by name. Throws
 /// io::InputError if there are none.
 std::vector<ImpactQueries> find_impact_queries(const std::filesystem::path& path);
 

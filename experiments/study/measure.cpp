@@ -16,10 +16,10 @@ using nlohmann::json;
 
 namespace {
 
-/// A contestant is warm when its buffers have grown; so long, or one clip, is enough for that.
+/// The warm-up time, in which a contestant's buffers grow; this long, or one clip, suffices.
 constexpr double warm_up_seconds = 0.05;
 
-/// Frames at which the quality of a contestant's boxes is recorded.
+/// The number of frames at which the quality of a contestant's boxes is recorded.
 constexpr std::uint64_t quality_samples = 16;
 
 template <class S>
@@ -32,8 +32,8 @@ ClipTimes play_clip(Session<S>& session, std::span<const double> frames, const P
   session.reset(frames[0]);
   times.reset_seconds = seconds_since(begin);
   if (frames.size() > 1) {
-    // The first frame belongs to the reset, which has no update to be compared; its query is made all the
-    // same, since lazy strategies work there.
+    // The first frame belongs to the reset, which has no update to compare; its query runs anyway, because
+    // lazy strategies work there.
     PhaseTimes ignored;
     session.query(pairs, ignored);
     follow(session, cursor.at(frames[0]), ignored);
@@ -62,7 +62,7 @@ void warm_up(Session<S>& session, std::span<const double> frames, const PlanScri
   }
 }
 
-/// Counters over every frame: the verifying instance confirms only the frames that it compares.
+/// Counts over every frame: the verifying instance confirms only the frames that it compares.
 template <class S>
 Counters count_clip(const Scene<S>& scene, const Contestant& contestant, std::span<const double> frames,
                     const PlanScript<S>* script) {
@@ -184,7 +184,7 @@ json times_record(const Measured& measured) {
 }
 
 namespace {
-/// JSON has no infinity: a box that holds nothing is as far off as can be.
+/// JSON has no infinity: an empty box counts as the largest protrusion.
 double finite(double value) {
   return std::isfinite(value) ? value : std::numeric_limits<double>::max();
 }

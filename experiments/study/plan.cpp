@@ -11,13 +11,13 @@ using nlohmann::json;
 
 namespace {
 
-/// Values that are given twice count once, where they come first.
+/// Repeated values count once, at their first place.
 template <class T>
 void add_once(std::vector<T>& list, T value) {
   if (std::find(list.begin(), list.end(), value) == list.end()) list.push_back(std::move(value));
 }
 
-/// The text of a parameter's value, as Params takes it.
+/// Returns the text of a parameter's value, as Params takes it.
 std::string value_text(const json& value, const std::string& where) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_number()) return value.dump();
@@ -75,7 +75,7 @@ StrategyRequest read_strategy(const json& value, const std::string& place) {
   return request;
 }
 
-/// Reads the keys of a study over what `study` holds already.
+/// Reads the keys of a study over the current content of `study`.
 void read_study(JsonReader& keys, Study& study, const std::filesystem::path& folder) {
   const std::string& place = keys.place();
   if (const auto scenes = keys.list("scenes"); !scenes.empty()) {

@@ -11,19 +11,19 @@
 
 namespace kbvh::experiments {
 
-/// How the repetitions are made.
+/// The order of the repetitions.
 enum class Harness : std::uint8_t {
   rounds,            ///< `kbvh run`: the first repetition of all contestants, then the second of all, ...
   google_benchmark,  ///< `kbvh bench`: under Google Benchmark, randomly interleaved
 };
 
-/// Every scene with every contestant, l and scalar.
+/// A study: every scene with every contestant, l and scalar.
 struct Study {
   std::string name;
   std::vector<SceneSpec> scenes;
   std::vector<StrategyRequest> strategies{{"default", {}, {}}};
   Sweep params;                                 ///< for all strategies that have them, or "strategy.key"
-  BuilderRequest builder;                       ///< for all strategies without one of their own
+  BuilderRequest builder;                       ///< for all strategies without their own builder
   std::vector<std::uint32_t> per_keyframe{10};  ///< l: frames for each keyframe interval
   std::vector<std::string> scalars{"float"};
   std::uint32_t repetitions = 3;
@@ -32,20 +32,20 @@ struct Study {
   bool continuous = false;         ///< contacts between keyframes instead of pairs at frames
 };
 
-/// A plan is one or more studies, done one after the other into the same results.
+/// A plan: one or more studies, run one after the other into the same results.
 struct Plan {
   std::string name, description;
   std::vector<Study> studies;
-  std::vector<Target> targets;  ///< what its times are held against
+  std::vector<Target> targets;  ///< targets of its times
 };
 
-/// Reads a plan. Its keys are those of a study, which are then the defaults of those listed in "studies";
-/// with no such list the plan is one study. RESULTS.md shows them all. `place` begins every message (the
-/// file's name), `folder` is where relative file names start. Throws io::InputError on unknown keys and wrong
-/// values; ConfigError is left to `expand`.
+/// Reads a plan. Its keys are those of a study and serve as defaults of the studies listed in "studies";
+/// without this list the plan is one study. RESULTS.md documents them all. `place` begins every message (the
+/// file's name), `folder` is the start of relative file names. Throws io::InputError on unknown keys and
+/// wrong values; ConfigError is left to `expand`.
 Plan read_plan(const nlohmann::json& plan, const std::string& place, const std::filesystem::path& folder);
 
-/// Reads "params" and "builder" wherever they stand. Throw io::InputError that begins with `place`.
+/// Read "params" and "builder" at any level of a plan. Throw io::InputError that begins with `place`.
 Sweep read_params(const nlohmann::json& object, const std::string& place);
 BuilderRequest read_builder(const nlohmann::json& object, const std::string& place);
 

@@ -5,12 +5,12 @@
 
 namespace kbvh::experiments {
 
-/// Words of result files.
+/// Returns the word used in result files.
 const char* word(Tightness tightness);
 const char* word(Guarantee guarantee);
 const char* word(Foresight foresight);
 
-/// The "strategy" of a record.
+/// Makes the "strategy" of a record.
 nlohmann::json strategy_record(const ContestantSpec& spec);
 
 }  // namespace kbvh::experiments

@@ -18,8 +18,8 @@ using nlohmann::json;
 
 namespace {
 
-const std::vector<std::string> phases{"motion", "update",     "traversal", "triangle_tests",
-                                      "query",  "candidates", "total"};
+const std::vector<std::string> phases{"motion",     "update", "traversal", "triangle_tests",  "query",
+                                      "candidates", "total",  "upkeep",    "update_per_event"};
 
 template <class T>
 bool has(const std::vector<T>& list, const T& value) {
@@ -49,6 +49,7 @@ TargetSelector read_selector(JsonReader& target, const std::string& key) {
   selector.phase = needed_word(keys, "phase");
   if (!has(phases, selector.phase))
     keys.fail("phase", "expected one of " + joined(phases) + ", got '" + selector.phase + "'");
+  if (keys.has("scene")) selector.scene = needed_word(keys, "scene");
   if (const json* params = keys.find("params")) selector.params = read_params(*params, place + ": params");
   if (const json* builder = keys.find("builder"))
     selector.builder = read_builder(*builder, place + ": builder");
@@ -84,7 +85,7 @@ Target read_target(const json& value, const std::string& place) {
   return target;
 }
 
-/// Does the study measure in this scalar and l?
+/// Returns whether the study measures in this scalar and l.
 bool measures(const Study& study, const Target& target) {
   return has(study.scalars, target.scalar) && has(study.per_keyframe, target.per_keyframe);
 }
@@ -109,7 +110,10 @@ void check_target_scenes(const Plan& plan) {
     const auto fail = [&](const std::string& what) {
       throw io::InputError(target.place + ": scenes: " + what);
     };
-    for (const std::string& scene : target.scenes) {
+    std::vector<std::string> scenes = target.scenes;
+    for (const TargetSelector* side : {&target.numerator, &target.denominator})
+      if (!side->scene.empty()) scenes.push_back(side->scene);
+    for (const std::string& scene : scenes) {
       meanings.clear();
       for (const Study& study : plan.studies) {
         if (!measures(study, target)) continue;
@@ -122,7 +126,7 @@ void check_target_scenes(const Plan& plan) {
       if (meanings.empty())
         fail("no study has a scene of the name '" + scene + "' " + conditions(target) +
              (known.empty() ? "; there are none with a name" : "; there are " + joined(known)));
-      if (meanings.size() > 1) fail("'" + scene + "' is the name of several scenes, which counts?");
+      if (meanings.size() > 1) fail("'" + scene + "' is the name of several scenes");
     }
   }
 }
@@ -208,20 +212,32 @@ void check_target_contestants(const Plan& plan, const std::vector<std::vector<Co
       all_here = all_here && known_strategy(side->strategy) != nullptr;
     }
     if (!all_here) continue;
-    for (const std::string& scene : target.scenes) {
-      bool together = false;
-      for (std::size_t s = 0; s < plan.studies.size() && !together; ++s) {
+    /// Whether a study of the plan measures the sides on one scene.
+    const auto measured_on = [&](const std::string& scene, const std::vector<const TargetSelector*>& wanted) {
+      for (std::size_t s = 0; s < plan.studies.size(); ++s) {
         const Study& study = plan.studies[s];
         const bool has_scene = std::any_of(study.scenes.begin(), study.scenes.end(),
                                            [&](const SceneSpec& spec) { return given_name(spec) == scene; });
-        together = has_scene && measures(study, target) &&
-                   std::all_of(std::begin(sides), std::end(sides), [&](const TargetSelector* side) {
-                     return std::any_of(
-                         contestants[s].begin(), contestants[s].end(),
-                         [&](const ContestantSpec& spec) { return matches(*side, strategy_record(spec)); });
-                   });
+        if (has_scene && measures(study, target) &&
+            std::all_of(wanted.begin(), wanted.end(), [&](const TargetSelector* side) {
+              return std::any_of(
+                  contestants[s].begin(), contestants[s].end(),
+                  [&](const ContestantSpec& spec) { return matches(*side, strategy_record(spec)); });
+            }))
+          return true;
       }
-      if (!together)
+      return false;
+    };
+    std::vector<const TargetSelector*> anywhere;
+    for (const TargetSelector* side : sides) {
+      if (side->scene.empty())
+        anywhere.push_back(side);
+      else if (!measured_on(side->scene, {side}))
+        throw io::InputError(target.place + ": no study has " + described(*side) + " on '" + side->scene +
+                             "' " + conditions(target));
+    }
+    for (const std::string& scene : target.scenes) {
+      if (!measured_on(scene, anywhere))
         throw io::InputError(target.place + ": no study has both " + described(target.numerator) + " and " +
                              described(target.denominator) + " on '" + scene + "' " + conditions(target));
     }

@@ -10,17 +10,19 @@ namespace kbvh::experiments {
 
 struct Plan;
 
-/// Contestants by what is said of them, and the phase whose time counts. Several may match (say, several leaf
-/// sizes): the one with the smallest median stands for them all.
+/// Selects contestants by their description, and the phase whose time counts. Several may match (for example
+/// several leaf sizes): the one with the smallest median stands for them all.
 struct TargetSelector {
   std::string strategy;              ///< id
-  std::vector<std::string> or_else;  ///< ids of others that may stand there as well
-  std::string phase;  ///< "motion", "update", "traversal", "triangle_tests", "query", "candidates", "total"
-  BuilderRequest builder;  ///< any of these values; empty: whatever was measured
+  std::vector<std::string> or_else;  ///< ids of alternative strategies
+  std::string phase;  ///< "motion", "update", "traversal", "triangle_tests", "query", "candidates", "total",
+                      ///< "upkeep", "update_per_event"
+  std::string scene;  ///< empty, or the named scene that this side is measured on, whatever the target's
+  BuilderRequest builder;  ///< any of these values; empty: all measured ones
   Sweep params;            ///< likewise
 };
 
-/// A ratio of two times that a plan wants to reach: how many times slower the numerator is.
+/// A ratio of two times that a plan should reach: the factor by which the numerator is slower.
 struct Target {
   std::string what, note;
   TargetSelector numerator, denominator;
@@ -35,18 +37,18 @@ struct Target {
 /// Reads the list "targets" of a plan. Throws io::InputError that begins with `place`.
 std::vector<Target> read_targets(const std::vector<nlohmann::json>& list, const std::string& place);
 
-/// Complains, by io::InputError, about scenes that no study of the plan measures in the target's scalar and
-/// l, or that are not told apart by their names.
+/// Throws io::InputError for scenes that no study of the plan measures in the target's scalar and l, or that
+/// share a name.
 void check_target_scenes(const Plan& plan);
 
-/// Complains, by io::InputError, about strategies that do not exist (unless the plan has them as optional),
-/// and about targets whose two sides are never measured together. `contestants` are those of each study.
+/// Throws io::InputError for strategies that do not exist (unless optional in the plan), and for targets
+/// whose two sides are never measured together. `contestants` are those of each study.
 void check_target_contestants(const Plan& plan, const std::vector<std::vector<ContestantSpec>>& contestants);
 
-/// Is the contestant, as "strategy" of a record has it, one that the selector means?
+/// Returns whether the selector matches the contestant, given as the "strategy" of a record.
 bool matches(const TargetSelector& selector, const nlohmann::json& strategy);
 
-/// "bottom_up with width 8, leaf_size 1 or 4": what the selector asks of a contestant.
+/// Describes a selector: "bottom_up with width 8, leaf_size 1 or 4".
 std::string described(const TargetSelector& selector);
 
 }  // namespace kbvh::experiments

@@ -18,7 +18,8 @@ const char* symbol(Relation relation) {
   return relation == Relation::at_most ? "<=" : relation == Relation::equal ? "==" : ">=";
 }
 
-/// A label and a text beside it, in lines of at most `columns` characters; further lines start where it did.
+/// Formats a label and a text next to it, in lines of at most `columns` characters; continuation lines are
+/// indented to the text.
 std::string labelled(const std::string& label, const std::string& text) {
   constexpr std::size_t indent = 15;
   std::string result, line = "     " + label;

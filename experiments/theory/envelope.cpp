@@ -23,7 +23,7 @@ int sign(const Rational& x) {
   return x.sign();
 }
 
-/// Four doubles as integers in one unit, a power of two: differences then need no common denominators.
+/// Four doubles as integers in one unit, a power of two, so that differences need no common denominators.
 struct Integers {
   Integers(double a, double b, double c, double d) {
     const double numbers[4] = {a, b, c, d};
@@ -45,7 +45,7 @@ struct Integers {
   cpp_int values[4];
 };
 
-/// Where one vertex is on its plan.
+/// Returns the position of one vertex on its plan.
 Rational value_at(const StoredPlans& plans, std::uint32_t vertex, int axis, double t) {
   const auto lerp = [t](double t0, double t1, double x0, double x1) -> Rational {
     if (x0 == x1) return exact(x0);
@@ -152,7 +152,7 @@ void ExactMotion::difference(std::size_t row, std::size_t a, std::size_t b, doub
 int ExactMotion::compare(std::size_t row, int axis, std::uint32_t a, std::uint32_t b) const {
   const std::size_t first = std::size_t(axis) * vertex_count_;
   const Row& r = rows_[row];
-  // Subtraction of doubles has the right sign; conversions to double are off by less than this.
+  // A difference of doubles has the correct sign; conversions to double are off by less than this.
   const double x = r.rounded[first + a], y = r.rounded[first + b], d = x - y;
   if (r.values.empty() || std::abs(d) > 4 * epsilon * (std::abs(x) + std::abs(y)) + smallest) return sign(d);
   return sign(Rational(r.values[first + a] - r.values[first + b]));
@@ -190,8 +190,8 @@ int ExactMotion::compare_meetings(std::size_t row, int axis, std::uint32_t r, st
     double p, q, ep, eq;
     difference(row, first + r, first + who[i], p, ep);
     difference(row + 1, first + who[i], first + r, q, eq);
-    // Differences of one sign: the quotient's error is at most the larger of theirs over their sum, doubled
-    // for all that is of second order.
+    // Differences of one sign: the quotient's error is at most the larger of their errors over their sum,
+    // doubled to cover second-order terms.
     const double sum = std::abs(p + q);
     u[i] = p / (p + q);
     error[i] = sum > 16 * (ep + eq) + smallest ? 2 * (ep + eq) / sum + 8 * epsilon
@@ -334,7 +334,8 @@ class BoundCheck {
     return true;
   }
 
-  /// The log as a piecewise linear function: right at both ends of every piece, and each entry a gain.
+  /// Checks the log as a piecewise linear function: correct at both ends of every piece, and each entry a
+  /// gain.
   bool prove(std::uint32_t realiser, std::span<const BoundChange* const> log, std::uint32_t end) {
     net_.clear();
     std::size_t next = 0;
@@ -354,7 +355,7 @@ class BoundCheck {
                    false;
           if (!is_below(change.new_vertex))
             return fail("passes to " + std::to_string(change.new_vertex) + ", not below", when), false;
-          // Right after the instant means: further out at the next row, for they meet here and only here.
+          // Right after the instant means: further out at the next row, because the two lines meet only here.
           if (ahead(when, change.new_vertex, realiser) != 0 ||
               ahead(row + 1, change.new_vertex, realiser) <= 0)
             return fail("gains nothing by " + std::to_string(change.new_vertex) + " for " +
@@ -368,7 +369,7 @@ class BoundCheck {
         if (realiser != before) net_.push_back({when, realiser});
         if (when.u != 0 && !outermost(realiser, when)) return false;
       }
-      // What is left over lies later, or out of order.
+      // Remaining entries lie later, or out of order.
       if (next < log.size() && log[next]->when.row <= row)
         return fail("has an entry out of order or past the end", log[next]->when), false;
     }
@@ -380,8 +381,9 @@ class BoundCheck {
     return true;
   }
 
-  /// The envelope anew: from the realiser to whoever strictly overtakes it first, and of these the one that
-  /// is furthest out afterwards. Among equals the guide's next choice, else the smallest id.
+  /// Computes the envelope independently: from the realiser to the first vertex that strictly overtakes it;
+  /// among several, the one that is furthest out afterwards. Among equals the guide's next choice, else the
+  /// smallest id.
   std::vector<Step> wrap(std::uint32_t realiser, std::span<const Step> guide, std::uint64_t& choices) {
     std::vector<Step> steps;
     for (std::size_t row = 0; row <= motion_->last_row(); ++row)

@@ -9,19 +9,20 @@
 
 namespace kbvh::theory {
 
-/// Exact envelopes of flight plans, computed apart from the kinetic tree that is to be proved by them: from
-/// the stored numbers, in rationals, with no code of core/families/events or core/motion.
+/// Exact envelopes of flight plans, computed independently of the kinetic tree under test: from the stored
+/// numbers, in rationals, without code of core/families/events or core/motion.
 using Rational = boost::multiprecision::cpp_rational;
 
-/// The rational that a finite double is.
+/// Converts a finite double to a rational.
 Rational exact(double x);
 
-/// Where in [0, 1] two coordinates meet that go from a0 to a1 and from b0 to b1: (a0 - b0) / (a0 - b0 + b1 -
-/// a1). Throws std::invalid_argument if they do not, or coincide.
+/// Returns the time in [0, 1] at which two coordinates meet that move from a0 to a1 and from b0 to b1: (a0 -
+/// b0) / (a0 - b0 + b1
+/// - a1). Throws std::invalid_argument if they do not meet, or coincide.
 Rational meeting_fraction(double a0, double a1, double b0, double b1);
 
-/// A vertex's plan of its own: straight lines through the knots, the first of which is
-/// the change itself, then a velocity for ever.
+/// A vertex's own plan: straight lines through the knots, the first of which is the change itself, then a
+/// velocity for ever.
 struct OwnKnots {
   std::vector<double> times;      ///< seconds, strictly increasing
   std::vector<double> positions;  ///< [knot][3]
@@ -52,25 +53,25 @@ struct ExactLine {
 };
 
 /// All coordinates of one body over [begin, until] and one linear step beyond: rows of exact values at every
-/// time where any vertex may bend, every coordinate linear in between. Doubles filter, rationals decide.
+/// possible bend of any vertex, every coordinate linear in between. Doubles filter, rationals decide.
 class ExactMotion {
  public:
-  /// Bends at keyframes and knots; a body rests before its first and after its last keyframe.
+  /// Bends are at keyframes and knots; a body rests before its first and after its last keyframe.
   ExactMotion(const StoredPlans& plans, double begin, double until);
 
   std::size_t last_row() const { return last_row_; }  ///< the row at `until`
   const std::vector<double>& times() const { return times_; }
   std::uint32_t vertex_count() const { return vertex_count_; }
 
-  /// Sign of a - b on an axis at a row.
+  /// Returns the sign of a - b on an axis at a row.
   int compare(std::size_t row, int axis, std::uint32_t a, std::uint32_t b) const;
-  /// The same at any time.
+  /// Returns the same at any time.
   int compare(const When& when, int axis, std::uint32_t a, std::uint32_t b) const;
-  /// Sign of (time when c meets r) - (time when d meets r), both between `row` and the next, where each is
-  /// apart from r in the same direction.
+  /// Returns the sign of (time when c meets r) - (time when d meets r), both between `row` and the next,
+  /// where each is apart from r in the same direction.
   int compare_meetings(std::size_t row, int axis, std::uint32_t r, std::uint32_t c, std::uint32_t d) const;
   When meeting(std::size_t row, int axis, std::uint32_t r, std::uint32_t c) const;
-  /// The time as a place between rows. Throws std::out_of_range if it lies outside of them.
+  /// Converts a time to a place between rows. Throws std::out_of_range if it lies outside them.
   When locate(const Rational& time) const;
 
  private:
@@ -82,7 +83,7 @@ class ExactMotion {
     const Row& r = rows_[row];
     return r.values.empty() ? exact(r.rounded[at]) : r.values[at];
   }
-  /// a - b in double, and how far off it may be.
+  /// Computes a - b in double with its error bound.
   void difference(std::size_t row, std::size_t a, std::size_t b, double& d, double& error) const;
 
   std::uint32_t vertex_count_;
@@ -91,53 +92,53 @@ class ExactMotion {
   std::vector<Row> rows_;
 };
 
-/// The time at which two different lines meet. Throws std::invalid_argument if they are parallel.
+/// Returns the time at which two different lines meet. Throws std::invalid_argument if they are parallel.
 Rational meeting_time(const ExactLine& a, const ExactLine& b);
 
-/// One entry of the log: at `when` the bound of (node, side) passed from one vertex to another.
-/// Sides are 2 * axis + (0 lower, 1 upper).
+/// One entry of the log: at `when` the bound of (node, side) passed from one vertex to another. Sides are 2 *
+/// axis + (0 lower, 1 upper).
 struct BoundChange {
   std::uint32_t node = 0, side = 0;
   std::uint32_t old_vertex = 0, new_vertex = 0;
   When when;
 };
 
-/// What a comparison of a log with the envelopes found.
+/// The result of comparing a log with the envelopes.
 struct EnvelopeReport {
   std::string violation;            ///< the first, empty if the log is right
   std::uint64_t bounds = 0;         ///< (node, side) pairs proved
   std::uint64_t logged = 0;         ///< entries
   std::uint64_t net = 0;            ///< net changes per node, side and instant
-  std::uint64_t envelope = 0;       ///< forced changes when ties are resolved as the log does
-  std::uint64_t canonical = 0;      ///< the same when they are resolved by the smallest vertex id
+  std::uint64_t envelope = 0;       ///< forced changes if ties are resolved as in the log
+  std::uint64_t canonical = 0;      ///< the same if ties are resolved by the smallest vertex id
   std::uint64_t several_steps = 0;  ///< entries beyond one per net change: several vertices met at one point
   std::uint64_t choices = 0;        ///< forced changes with more than one best successor (coincident lines)
-  /// Of every bound over every row: breakpoints of the envelope against the longest Davenport-Schinzel
+  /// For every bound over every row: breakpoints of the envelope against the longest Davenport-Schinzel
   /// sequence of lines, lambda_1(n) - 1 = n - 1 for n vertices below.
   std::uint64_t pieces = 0;            ///< (bound, row) pairs
   std::uint64_t over_lambda = 0;       ///< of these, with more than n - 1 breakpoints
   std::uint64_t most_breakpoints = 0;  ///< of one bound in one row
-  double fullest = 0;                  ///< largest share of n - 1 that was used, over n >= 8
+  double fullest = 0;                  ///< largest used share of n - 1, over n >= 8
 
   bool holds() const { return violation.empty(); }
   bool general_position() const { return several_steps == 0 && choices == 0; }
   void add(const EnvelopeReport& other);
 };
 
-/// In place of a realiser: nobody realises this bound, nor need it be proved.
+/// Marks a bound without a realiser, which is not checked.
 inline constexpr std::uint32_t no_bound = 0xffffffff;
 
 /// Vertices below every node, ascending.
 using VerticesBelow = std::vector<std::vector<std::uint32_t>>;
 
-/// Proves that, from the first row of the motion to its last, the realisers that start as `start`
-/// ([node][6]) and pass on as the log says are the envelope of the vertices below at every time (claims T1),
-/// that they change only where they must (T8), and that they end as `end`. Between two neighbouring rows or
-/// changes all coordinates are linear, so a realiser that nobody exceeds at both ends is exceeded nowhere in
-/// between. Apart from that, the envelope is computed anew by gift wrapping, from `start` alone, staying with
-/// a vertex until it is strictly beaten; its breakpoints must be the log's, at equal rational times.
-/// `log` is in the order of happening. O(vertices below) per row and change. A bound that starts as
-/// `no_bound` does not exist (BoxTrees store but one per node): it may not change.
+/// Proves that, from the first row of the motion to its last, the realisers that start as `start` ([node][6])
+/// and change as in the log are the envelope of the vertices below at every time (claim T1), that they change
+/// only where they must (T8), and that they end as `end`. Between two neighbouring rows or changes all
+/// coordinates are linear, so a realiser that no vertex exceeds at both ends is exceeded nowhere in between.
+/// In addition the envelope is computed independently by gift wrapping, from `start` alone, staying with a
+/// vertex until it is strictly exceeded; its breakpoints must equal the log's, at equal rational times. `log`
+/// is in order of time. O(vertices below) per row and change. A bound that starts as `no_bound` does not
+/// exist (BoxTrees store only one per node) and must not change.
 EnvelopeReport check_envelopes(const ExactMotion& motion, const VerticesBelow& below,
                                std::span<const std::uint32_t> start, std::span<const BoundChange> log,
                                std::span<const std::uint32_t> end);

@@ -11,8 +11,8 @@ struct PowerFit {
   std::vector<double> residuals;  ///< of each point: y / fit - 1
 };
 
-/// Throws std::invalid_argument on fewer than three points, lists of unlike length, values that are not
-/// positive, or points that all have one x.
+/// Fits a power law. Throws std::invalid_argument on fewer than three points, lists of unlike length, values
+/// that are not positive, or points with a single x.
 PowerFit fit_power(const std::vector<double>& x, const std::vector<double>& y);
 
 /// y = c x with the c that minimises the squares of y / (c x) - 1.
@@ -22,13 +22,15 @@ struct ProportionalFit {
   std::vector<double> residuals;  ///< of each point: y / (c x) - 1
 };
 
-/// Throws std::invalid_argument on lists of unlike length, empty lists, and values that are not positive.
+/// Fits a proportionality. Throws std::invalid_argument on lists of unlike length, empty lists, and values
+/// that are not positive.
 ProportionalFit fit_proportional(const std::vector<double>& x, const std::vector<double>& y);
 
-/// The two-sided 95% quantile of Student's t with so many degrees of freedom (at least 1), to four digits.
+/// Returns the two-sided 95% quantile of Student's t with this many degrees of freedom (at least 1), to four
+/// digits.
 double student_t95(std::size_t degrees);
 
-/// n log2 n.
+/// Returns n log2 n.
 double n_log_n(double n);
 
 }  // namespace kbvh::theory

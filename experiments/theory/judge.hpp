@@ -4,7 +4,7 @@
 #include "experiments/theory/claim.hpp"
 #include "experiments/theory/measurements.hpp"
 
-/// Verdicts: pure functions of what was measured. Each returns "not decided here" if it is given nothing.
+/// Verdicts: pure functions of the measurements. Each returns "not decided here" for empty input.
 namespace kbvh::theory {
 
 Claim judge_valid_at_all_times(const std::vector<ExactRun>& exact);                              // T1
@@ -16,7 +16,8 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
                              const std::vector<GrowthFit>& fits);                             // T6
 Claim judge_independent_of_frames(const std::vector<FrameRun>& frames);                       // T7
 Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseRun>& loose);  // T8
-/// `constructed` are the frames of scenes made to refute the claim, `frames` those of the others.
+/// `constructed` are the frames of scenes that were constructed to refute the claim, `frames` those of the
+/// others.
 Claim judge_never_more_updates(const std::vector<FrameRun>& frames,
                                const std::vector<FrameRun>& constructed);  // T9
 Claim judge_translation(const std::vector<TranslationRun>& translations);  // T10
@@ -28,14 +29,15 @@ Claim judge_list_size(const std::vector<ListSizeRun>& sizes);                // 
 Claim judge_plan_changes(const std::vector<PlanRun>& plans);                 // T15
 Claim judge_lower_bound(const std::vector<LooseRun>& loose);                 // T16
 
-/// A claim that nothing here can decide, and why.
+/// Makes a claim that cannot be decided here, with the reason.
 Claim undecided(Claim claim, const std::string& why);
 
-/// Fits the growth of each scene that has at least `fewest` sizes, all with events.
+/// Fits the growth of each scene with at least `fewest` sizes, all with events.
 std::vector<GrowthFit> fit_growth(const std::vector<CountRun>& counts, std::size_t fewest);
 
-/// Comparisons that one event may cost the AVL queue: on each node of its path one insertion, which compares
-/// once per level and once more, in a tree of at most 1.4405 log2(entries + 2) levels (Knuth, 6.2.3).
+/// Returns the comparisons that one event may cost the AVL queue: on each node of its path one insertion,
+/// which compares once per level and once more, in a tree of at most 1.4405 log2(entries + 2) levels (Knuth,
+/// 6.2.3).
 double queue_steps_bound(const CountRun& run);
 
 }  // namespace kbvh::theory

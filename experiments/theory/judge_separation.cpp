@@ -104,7 +104,7 @@ Claim judge_list_size(const std::vector<ListSizeRun>& sizes) {
     std::vector<double> m, list;
     for (const ListSizeRun* run : runs) {
       most = std::max(most, double(run->list) / double(run->polygons));
-      // Requests below a shape's smallest size make the same scene, which is one point; none has no
+      // Requests below a shape's smallest size make the same scene, which is one point; zero has no
       // logarithm.
       if (run->list == 0 || (!m.empty() && m.back() == double(run->polygons))) continue;
       m.push_back(double(run->polygons));
@@ -112,7 +112,7 @@ Claim judge_list_size(const std::vector<ListSizeRun>& sizes) {
     }
     if (m.size() < 4) continue;
     const PowerFit fit = fit_power(m, list);
-    // "Practical cases" are scenes: one that grows faster is a condition, and all are a refutation.
+    // "Practical cases" are scenes: one that grows faster is a condition, all together are a refutation.
     claim.criteria.push_back({"lower end of the exponent's 95% interval, " + scene, fit.low,
                               Relation::at_most, 1, tolerance, as_stated});
     exponents.push_back(fmt::format("{} {:.2f} ({:.2f} to {:.2f})", scene, fit.exponent, fit.low, fit.high));

@@ -1,4 +1,4 @@
-// T1 to T5: what a kinetic data structure is judged by.
+// T1 to T5: the quality criteria of a kinetic data structure.
 #include <fmt/format.h>
 
 #include <algorithm>

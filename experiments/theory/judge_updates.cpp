@@ -1,4 +1,4 @@
-// T6 to T10, T15, T16: how many updates there are, and whether there have to be.
+// T6 to T10, T15, T16: the number of updates, and its lower bounds.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -367,7 +367,7 @@ Claim judge_lower_bound(const std::vector<LooseRun>& loose) {
   std::size_t clips = 0;
   std::set<std::uint64_t> ls;
   for (const LooseRun& run : loose) {
-    // Only hierarchies that do contain everything can refute the claim, and only where there are events.
+    // Only valid hierarchies can refute the claim, and only where there are events.
     if (run.linear_outside != 0 || run.swept_outside != 0 || run.kinetic_events == 0) continue;
     claim.criteria.push_back(
         {"updates between keyframes of a hierarchy that contains everything, " + place(run),

@@ -13,18 +13,18 @@
 
 namespace kbvh::theory {
 
-/// A change of a bound as an event source told it.
+/// A change of a bound as reported by an event source.
 template <class S>
 struct Notice : BoundNotice<S> {
-  std::uint64_t event = 0;  ///< how many events were handled before this one; not part of what is compared
+  std::uint64_t event = 0;  ///< number of earlier events; not part of comparisons
 
   bool operator==(const Notice& other) const {
     return static_cast<const BoundNotice<S>&>(*this) == static_cast<const BoundNotice<S>&>(other);
   }
 };
 
-/// What happened between two changes of plans (or the ends of the clip): the plans that held, the notices of
-/// the change that led here, and the log of events.
+/// The record between two changes of plans (or the ends of the clip): the valid plans, the notices of the
+/// change at its start, and the log of events.
 template <class S>
 struct Epoch {
   double begin = 0, until = 0;
@@ -60,17 +60,17 @@ StoredPlans stored_plans(const FlightPlans<S>& plans) {
   return stored;
 }
 
-/// Which part of a clip is played, and how.
+/// The played part of a clip, and its stops.
 struct Play {
   BuilderConfig builder;
   std::uint32_t frames_per_keyframe = 1;
-  double start_after = 0;          ///< fraction of the clip that is skipped
+  double start_after = 0;          ///< skipped fraction of the clip
   std::vector<double> instants{};  ///< further times to stop at
-  std::vector<double> frames{};    ///< ascending; empty: as frames_per_keyframe says
+  std::vector<double> frames{};    ///< ascending; empty: from frames_per_keyframe
 };
 
-/// Told what a strategy does while it is recorded: `event` after each event, with its description, and `stop`
-/// at each time that the strategy was brought to (frames, instants).
+/// Observes a strategy while it is recorded: `event` after each event, with its description, and `stop` at
+/// each time that the strategy was brought to (frames, instants).
 struct NoWatcher {
   template <class S>
   void event(const EventSource<S>&, const EventDescription<S>&) {}
@@ -78,9 +78,9 @@ struct NoWatcher {
   void stop(const EventSource<S>&, double) {}
 };
 
-/// Plays a scene, with plan changes if there are any, through a strategy that is an event source, event by
-/// event, and keeps every change of a bound. `make(view, playback, topologies)` makes the strategy. Throws
-/// std::bad_alloc where the log does not fit: 100 bytes and more per change.
+/// Plays a scene, with plan changes if given, through a strategy that is an event source, event by event, and
+/// records every change of a bound. `make(view, playback, topologies)` makes the strategy. Throws
+/// std::bad_alloc if the log does not fit: at least 100 bytes per change.
 template <class S, class Make, class Watcher>
 Recording<S> record_events(const Scene<S>& scene, const PlanScript<S>& script, const Play& play, Make&& make,
                            Watcher&& watcher) {
@@ -99,7 +99,8 @@ Recording<S> record_events(const Scene<S>& scene, const PlanScript<S>& script, c
   recording.topologies = build_topologies(view, playback, play.builder);
   const std::unique_ptr<Strategy<S>> strategy = make(view, playback, recording.topologies);
   EventSource<S>* const source = strategy->events();
-  if (source == nullptr) throw std::logic_error("what is to be recorded event by event has no events");
+  if (source == nullptr)
+    throw std::logic_error("a strategy without events cannot be recorded event by event");
   strategy->reset(first);
   std::vector<BoundNotice<S>> told;
   source->watch_bounds(&told);
@@ -172,7 +173,7 @@ Recording<S> record_events(const Scene<S>& scene, const PlanScript<S>& script, c
     log.clear();
     epoch.start = realisers();
   }
-  // Past the last keyframe bodies rest; plans of their own go on.
+  // Past the last keyframe bodies rest; vertices' own plans continue.
   last += script.steps.empty() ? 1.0 : 3.0;
   playback.seek(last);
   advance(last);
@@ -183,7 +184,7 @@ Recording<S> record_events(const Scene<S>& scene, const PlanScript<S>& script, c
   return recording;
 }
 
-/// Records kinetic AABB trees on an event queue of one's own choice.
+/// Records kinetic AABB trees on a given event queue.
 template <class S, template <class> class Queue, class Watcher = NoWatcher>
 Recording<S> record(const Scene<S>& scene, const PlanScript<S>& script, const Play& play,
                     Watcher&& watcher = {}) {
@@ -235,7 +236,7 @@ ExactLine exact_line(const Piece<S>& piece) {
   return {t0, x0, (x1 - x0) / (exact(piece.t1) - t0)};
 }
 
-/// Where the crossing of an event's pieces lies.
+/// Locates the crossing of an event's pieces.
 template <class S>
 When when_of(const Crossing<S>& crossing, const ExactMotion& motion) {
   const Piece<S>&w = crossing.winner, &l = crossing.loser;
@@ -253,13 +254,13 @@ When when_of(const Crossing<S>& crossing, const ExactMotion& motion) {
   return motion.locate(meeting_time(exact_line(w), exact_line(l)));
 }
 
-/// Everything the check of one body in one epoch takes; seeded faults spoil a copy of `log`.
+/// The input of the check of one body in one epoch; seeded faults alter a copy of `log`.
 struct Case {
   ExactMotion motion;
   VerticesBelow below;
   std::vector<std::uint32_t> start, end;
   std::vector<BoundChange> log;
-  std::vector<std::uint64_t> events;  ///< of each entry: which event it belongs to
+  std::vector<std::uint64_t> events;  ///< of each entry: the number of its event
 
   EnvelopeReport check() const { return check_envelopes(motion, below, start, log, end); }
 };
@@ -288,7 +289,8 @@ Case make_case(const Scene<S>& scene, const Recording<S>& recording, const Epoch
   return result;
 }
 
-/// The notices at a change of plans: from the state before to the state after, each a gain in value at once.
+/// Checks the notices at a change of plans: from the state before to the state after, each an immediate gain
+/// in value.
 template <class S>
 std::string check_change(const Epoch<S>& epoch, std::uint32_t body, const Case& now) {
   std::vector<std::uint32_t> state = epoch.before[body];
@@ -298,7 +300,7 @@ std::string check_change(const Epoch<S>& epoch, std::uint32_t body, const Case& 
                              std::to_string(notice.node) + " side " + std::to_string(notice.side);
     std::uint32_t& realiser = state[6 * std::size_t(notice.node) + notice.side];
     if (notice.at_event || notice.begin != epoch.begin) return name + ": not at the change's own time";
-    if (realiser != notice.old_vertex) return name + ": passes on what it does not have";
+    if (realiser != notice.old_vertex) return name + ": passes on a bound that it does not have";
     const int order = now.motion.compare(std::size_t(0), int(notice.side / 2), notice.new_vertex, realiser);
     if ((notice.side % 2 == 1 ? order : -order) <= 0) return name + ": gains nothing";
     realiser = notice.new_vertex;
@@ -319,7 +321,7 @@ EnvelopeReport check(const Scene<S>& scene, const Recording<S>& recording) {
         report = one.check();
         if (report.holds()) report.violation = check_change(epoch, body, one);
       } catch (const std::logic_error& error) {
-        // An event whose pieces do not meet, or not in the clip.
+        // An event whose pieces do not meet, or not within the clip.
         report.violation = error.what();
       }
       if (!report.violation.empty())

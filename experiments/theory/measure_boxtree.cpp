@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "core/contract/registry.hpp"
 #include "core/families/boxtree/kinetic_boxtree.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "experiments/theory/measure_counts.hpp"
@@ -12,7 +13,7 @@ namespace kbvh::theory {
 
 namespace {
 
-/// Counts notices, and keeps them where they are to be proved.
+/// Counts notices, and keeps those that are to be proved.
 struct BoxTreeObserver {
   std::uint64_t* notices;
   std::vector<Notice<float>>* log;
@@ -29,7 +30,7 @@ struct BoxTreeObserver {
 
 using Forest = KineticBoxForest<float, AvlQueue<float>, Counting, BoxTreeObserver>;
 
-/// The realisers of all bounds a tree stores, [6 * node + side]; `no_bound` elsewhere.
+/// Returns the realisers of all bounds that a tree stores, [6 * node + side]; `no_bound` elsewhere.
 std::vector<std::uint32_t> stored_bounds(const Forest::Tree& tree) {
   std::vector<std::uint32_t> bounds(std::size_t(6) * tree.topology().size(), no_bound);
   for (std::uint32_t node = 0; node < tree.topology().size(); ++node)
@@ -39,8 +40,8 @@ std::vector<std::uint32_t> stored_bounds(const Forest::Tree& tree) {
   return bounds;
 }
 
-/// Upper bounds of the certificates of every vertex: per leaf it is a candidate of one certificate per side;
-/// for each bound that it realises it is the winner of one, and a candidate of the one above.
+/// Counts upper bounds of the certificates of every vertex: per leaf it is a candidate of one certificate per
+/// side; for each bound that it realises it is the winner of one, and a candidate of the one above.
 void count_vertex_certificates(const Forest::Tree& tree, const Primitives& primitives, std::uint32_t vertices,
                                BoxTreeRun& run) {
   std::vector<std::uint64_t> certificates(vertices, 0), leaves(vertices, 0);
@@ -58,7 +59,7 @@ void count_vertex_certificates(const Forest::Tree& tree, const Primitives& primi
   }
 }
 
-/// Events scheduled for the two planes of an inner node, at most.
+/// Returns the largest number of events scheduled for the two planes of an inner node.
 std::uint64_t most_events_of_planes(const Forest& forest, const Forest::Tree& tree) {
   std::uint64_t most = 0;
   for (const TopologyNode n : tree.topology().nodes) {
@@ -69,6 +70,18 @@ std::uint64_t most_events_of_planes(const Forest& forest, const Forest::Tree& tr
     most = std::max(most, scheduled);
   }
   return most;
+}
+
+/// What the strategy holds, as its AABB tree's bytes are counted (CountRun).
+std::uint64_t bytes_of_strategy(const SceneView<float>& view, Playback<float>& playback,
+                                const Topologies& topologies, double t) {
+  const StrategyEntry& entry = find_strategy("kinetic_boxtree");
+  const auto strategy =
+      create(entry, view, playback, topologies,
+             Params(entry.info.id, entry.info.parameters, {{"queue", "avl"}}), CountingPolicy::silent);
+  playback.seek(t);
+  strategy->reset(t);
+  return strategy->bytes();
 }
 
 std::vector<BoundChange> changes_of(const std::vector<Notice<float>>& log, const ExactMotion& motion,
@@ -124,7 +137,7 @@ BoxTreeRun measure_boxtree(const Scene<float>& scene, const CountRun& counts, Pr
       run.most_of_planes = std::max(run.most_of_planes, most_events_of_planes(forest, forest.tree(body)));
   }
   run.values = notices;
-  run.bytes = forest.bytes();
+  run.bytes = bytes_of_strategy(view, playback, topologies, keyframes.front());
   for (std::uint32_t body = 0; body < view.body_count(); ++body) {
     const SearchCost& cost = forest.tree(body).search_cost();
     run.searches += cost.searches, run.searched += cost.nodes;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/families/events/kinetic_forest.hpp"
+#include "core/contract/registry.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 
@@ -10,58 +10,72 @@ namespace kbvh::theory {
 
 namespace {
 
-struct CountNotices {
-  std::uint64_t* notices;
-  template <class S>
-  void realiser_changed(std::uint32_t, std::uint32_t, Side, std::uint32_t, std::uint32_t, const Instant<S>&) {
-    ++*notices;
-  }
-  void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
-};
-
-using Forest = KineticForest<float, AvlQueue<float>, Counting, CountNotices>;
-using Tree = Forest::Tree;
-
-/// A sum and a maximum of differences of a counter that only grows.
-class Difference {
+/// The paper's kinetic AABB tree on its own queue, as the program runs it, event by event.
+class PaperTree {
  public:
-  void start(std::uint64_t value) { last_ = value; }
-  void stop(std::uint64_t value) {
-    sum += value - last_;
-    most = std::max(most, value - last_);
+  PaperTree(const SceneView<float>& view, Playback<float>& playback, const Topologies& topologies, double t) {
+    const StrategyEntry& entry = find_strategy("kinetic_aabb");
+    strategy_ =
+        create(entry, view, playback, topologies,
+               Params(entry.info.id, entry.info.parameters, {{"queue", "avl"}}), CountingPolicy::counting);
+    strategy_->reset(t);
+    source().watch_bounds(&notices_);
   }
-  std::uint64_t sum = 0, most = 0;
+  Strategy<float>& strategy() { return *strategy_; }
+  EventSource<float>& source() { return *strategy_->events(); }
+  std::uint64_t counted(Counter counter) const { return strategy_->counters()[counter]; }
+  /// Performs the next event until t, if there is one.
+  bool step(double t) {
+    notices_.clear();
+    return strategy_->step_event(t, done_);
+  }
+  /// Number of bounds that the last event changed.
+  std::uint64_t touched() const { return notices_.size(); }
 
  private:
-  std::uint64_t last_ = 0;
+  std::unique_ptr<Strategy<float>> strategy_;
+  std::vector<BoundNotice<float>> notices_;
+  EventDescription<float> done_;
 };
 
-/// Calls `part(node, side, vertex)` for every vertex of every certificate: the winner and all candidates.
+/// A sum and a maximum of differences of a counter that only grows.
+struct Difference {
+  std::uint64_t sum = 0, most = 0;
+  void add(const Counters& before, const Counters& after, Counter counter) {
+    const std::uint64_t grown = after[counter] - before[counter];
+    sum += grown;
+    most = std::max(most, grown);
+  }
+};
+
+/// Calls `part(vertex)` for every vertex of every certificate of a body: the winner and all candidates.
 template <class Part>
-void for_all_certificates(const Tree& tree, Part part) {
-  const Topology& topology = tree.topology();
+void for_all_certificates(const EventSource<float>& source, const LeafVertices& leaves, std::uint32_t body,
+                          Part part) {
+  const Topology& topology = source.tree(body);
   std::vector<std::uint32_t> members;
   for (std::uint32_t node = 0; node < topology.size(); ++node)
     for (Side side = 0; side < 6; ++side) {
       members.clear();
       const TopologyNode n = topology.nodes[node];
       if (n.is_leaf())
-        members.assign(tree.leaf_vertices(node).begin(), tree.leaf_vertices(node).end());
+        members.assign(leaves[node].begin(), leaves[node].end());
       else
         for (std::uint32_t child = n.first(); child < n.first() + n.count(); ++child)
-          members.push_back(tree.realiser(child, side));
+          members.push_back(source.realiser(body, child, side));
       std::sort(members.begin(), members.end());
       members.erase(std::unique(members.begin(), members.end()), members.end());
       for (const std::uint32_t v : members) part(v);
     }
 }
 
-void count_vertex_certificates(const Forest& forest, std::uint32_t bodies, const SceneView<float>& view,
+void count_vertex_certificates(const EventSource<float>& source, const SceneView<float>& view,
                                CountRun& run) {
   std::uint64_t total = 0;
-  for (std::uint32_t body = 0; body < bodies; ++body) {
+  for (std::uint32_t body = 0; body < view.body_count(); ++body) {
     std::vector<std::uint64_t> certificates(view.vertex_count(body), 0);
-    for_all_certificates(forest.tree(body), [&](std::uint32_t v) { ++certificates[v]; });
+    const LeafVertices leaves = unique_leaf_vertices(source.tree(body), view.primitives(body));
+    for_all_certificates(source, leaves, body, [&](std::uint32_t v) { ++certificates[v]; });
     for (const std::uint64_t n : certificates) {
       total += n;
       run.max_vertex_certificates = std::max(run.max_vertex_certificates, n);
@@ -70,20 +84,19 @@ void count_vertex_certificates(const Forest& forest, std::uint32_t bodies, const
   run.mean_vertex_certificates = double(total) / double(run.vertices);
 }
 
-std::uint64_t most_events_of_a_node(const Forest& forest, std::uint32_t bodies) {
+std::uint64_t most_events_of_a_node(const EventSource<float>& source, std::uint32_t bodies) {
+  std::vector<ScheduledEvent<float>> events;
+  source.scheduled_events(events);
   std::uint64_t most = 0;
   for (std::uint32_t body = 0; body < bodies; ++body) {
-    const Tree& tree = forest.tree(body);
-    for (std::uint32_t node = 0; node < tree.topology().size(); ++node) {
-      std::uint64_t scheduled = 0;
-      for (Side side = 0; side < 6; ++side) scheduled += forest.queue().scheduled(tree.slot(node, side));
-      most = std::max(most, scheduled);
-    }
+    std::vector<std::uint64_t> scheduled(source.tree(body).size(), 0);
+    for (const ScheduledEvent<float>& event : events)
+      if (event.body == body) most = std::max(most, ++scheduled[event.node]);
   }
   return most;
 }
 
-/// Leaves by vertex, from connectivity alone.
+/// Returns the leaves of each vertex, from connectivity alone.
 std::vector<std::vector<std::uint32_t>> leaves_of_vertices(const Topology& topology,
                                                            const Primitives& primitives,
                                                            std::uint32_t vertices) {
@@ -98,21 +111,20 @@ std::vector<std::vector<std::uint32_t>> leaves_of_vertices(const Topology& topol
   return leaves;
 }
 
-/// Changes one plan after the other at the first keyframe: 200 vertices by chance and the one of most leaves.
+/// Changes one plan after the other at the first keyframe: 200 random vertices and the one with the most
+/// leaves.
 void measure_updates(const Scene<float>& scene, const Topologies& topologies, CountRun& run) {
   const SceneView<float> view(scene);
   Playback<float> playback(scene);
   const double first = overlaid_keyframes(scene).front();
   playback.seek(first);
-  Counting count;
-  std::uint64_t notices = 0;
-  Forest forest(view, ClipMotion<float>(playback), topologies, count, CountNotices{&notices});
-  forest.reset(first);
+  PaperTree paper(view, playback, topologies, first);
   const scenes::SeededNoise noise(4);
   std::uint64_t index = 0;
   Difference certificates, steps;
   for (std::uint32_t body = 0; body < view.body_count(); ++body) {
     const Topology& topology = topologies[body];
+    const LeafVertices vertices = unique_leaf_vertices(topology, view.primitives(body));
     const auto leaves = leaves_of_vertices(topology, view.primitives(body), view.vertex_count(body));
     std::vector<std::uint32_t> chosen;
     std::uint32_t hub = 0;
@@ -123,7 +135,8 @@ void measure_updates(const Scene<float>& scene, const Topologies& topologies, Co
     for (int i = 0; i < 200; ++i) chosen.push_back(std::uint32_t(noise.bits(index++) % leaves.size()));
     for (const std::uint32_t v : chosen) {
       if (leaves[v].empty()) continue;
-      // All that an update may look at, from the tree alone: the candidates of every node above the vertex.
+      // The largest set that an update may visit, from the tree alone: the candidates of every node above the
+      // vertex.
       std::vector<std::uint32_t> above;
       for (std::uint32_t node : leaves[v])
         for (;; node = topology.parents[node]) {
@@ -134,21 +147,21 @@ void measure_updates(const Scene<float>& scene, const Topologies& topologies, Co
       above.erase(std::unique(above.begin(), above.end()), above.end());
       double candidates = 0;
       for (const std::uint32_t node : above)
-        candidates += topology.nodes[node].is_leaf() ? double(forest.tree(body).leaf_vertices(node).size())
+        candidates += topology.nodes[node].is_leaf() ? double(vertices[node].size())
                                                      : double(topology.nodes[node].count());
       PlanChange<float> change;
       change.body = body;
       change.vertex = v;
       for (float& x : change.velocity) x = float(noise.signed_unit(index++));
       playback.change_plans(first, {&change, 1});
-      const std::uint64_t before = count.table[Counter::certificates_made];
-      certificates.start(before);
-      steps.start(forest.queue().steps());
-      forest.tree(body).plans_changed(first, {&v, 1});
-      certificates.stop(count.table[Counter::certificates_made]);
-      steps.stop(forest.queue().steps());
-      run.update_share = std::max(
-          run.update_share, double(count.table[Counter::certificates_made] - before) / (6 * candidates));
+      const Counters before = paper.strategy().counters();
+      paper.strategy().flight_plans_changed(first, {&change, 1});
+      const Counters after = paper.strategy().counters();
+      Difference made;
+      made.add(before, after, Counter::certificates_made);
+      certificates.add(before, after, Counter::certificates_made);
+      steps.add(before, after, Counter::queue_steps);
+      run.update_share = std::max(run.update_share, double(made.sum) / (6 * candidates));
       ++run.updates;
     }
   }
@@ -182,36 +195,30 @@ CountRun measure_counts(const Scene<float>& scene) {
   }
   measure_updates(scene, topologies, run);
 
-  Counting count;
-  std::uint64_t notices = 0;
-  Forest forest(view, ClipMotion<float>(playback), topologies, count, CountNotices{&notices});
-  forest.reset(keyframes.front());
-  count.table = {};
-  run.queue_peak = forest.queue().size();
+  PaperTree paper(view, playback, topologies, keyframes.front());
   Difference visited, steps, operations, certificates;
   for (std::size_t k = 0; k < keyframes.size(); ++k) {
-    while (forest.due(keyframes[k])) {
-      visited.start(count.table[Counter::nodes_visited]);
-      operations.start(count.table[Counter::queue_operations]);
-      certificates.start(count.table[Counter::certificates_made]);
-      steps.start(forest.queue().steps());
-      const std::uint64_t before = notices;
-      forest.handle_next();
-      visited.stop(count.table[Counter::nodes_visited]);
-      operations.stop(count.table[Counter::queue_operations]);
-      certificates.stop(count.table[Counter::certificates_made]);
-      steps.stop(forest.queue().steps());
-      run.silent_events += notices == before;
-      run.queue_peak = std::max<std::uint64_t>(run.queue_peak, forest.queue().size());
+    playback.seek(keyframes[k]);
+    for (;;) {
+      const Counters before = paper.strategy().counters();
+      if (!paper.step(keyframes[k])) break;
+      const Counters after = paper.strategy().counters();
+      visited.add(before, after, Counter::nodes_visited);
+      operations.add(before, after, Counter::queue_operations);
+      certificates.add(before, after, Counter::certificates_made);
+      steps.add(before, after, Counter::queue_steps);
+      run.values += paper.touched();
+      run.silent_events += paper.touched() == 0;
       ++run.events;
     }
+    paper.strategy().advance(keyframes[k]);
     if (k == 0 || k == keyframes.size() / 2 || k + 1 == keyframes.size()) {
-      count_vertex_certificates(forest, view.body_count(), view, run);
-      run.most_of_node = std::max(run.most_of_node, most_events_of_a_node(forest, view.body_count()));
+      count_vertex_certificates(paper.source(), view, run);
+      run.most_of_node = std::max(run.most_of_node, most_events_of_a_node(paper.source(), view.body_count()));
     }
   }
-  run.values = notices;
-  run.bytes = forest.bytes();
+  run.queue_peak = paper.counted(Counter::queue_peak);
+  run.bytes = paper.strategy().bytes();
   run.sum_visited = visited.sum, run.max_visited = visited.most;
   run.sum_steps = steps.sum, run.max_steps = steps.most;
   run.sum_operations = operations.sum, run.max_operations = operations.most;

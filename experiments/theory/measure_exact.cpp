@@ -10,7 +10,7 @@ namespace kbvh::theory {
 
 namespace {
 
-/// Is `vertex` further out than `realiser`?
+/// Returns whether `vertex` is further out than `realiser`.
 template <class Where>
 bool ahead(const ExactMotion& motion, const Where& where, Side side, std::uint32_t vertex,
            std::uint32_t realiser) {
@@ -19,8 +19,9 @@ bool ahead(const ExactMotion& motion, const Where& where, Side side, std::uint32
   return (is_upper(side) ? sign : -sign) > 0;
 }
 
-/// Candidates of a bound that are further out than its realiser, or 1 if that is not a candidate itself. None
-/// at any node: by induction from the leaves every realiser is an extremum of all vertices below.
+/// Counts candidates of a bound that are further out than its realiser, or returns 1 if the realiser is not a
+/// candidate itself. If the count is zero at every node, every realiser is an extremum of all vertices below,
+/// by induction from the leaves.
 template <class Where>
 std::uint64_t exceeded(const EventSource<float>& source, const LeafVertices& leaves,
                        const ExactMotion& motion, const Where& where, std::uint32_t body, std::uint32_t node,
@@ -42,7 +43,7 @@ std::uint64_t exceeded(const EventSource<float>& source, const LeafVertices& lea
   return faults + !known;
 }
 
-/// Audits while a clip is recorded: everything at each stop, its path after each event.
+/// Audits while a clip is recorded: all bounds at each stop, the touched path after each event.
 class Auditor {
  public:
   Auditor(const Scene<float>& scene, ExactRun& run) : scene_(&scene), run_(&run) {
@@ -91,7 +92,7 @@ class Auditor {
   std::vector<LeafVertices> leaves_;  ///< [body]
 };
 
-/// Events all of whose changes last for no time: the next change of the same bound has the same instant.
+/// Counts events whose changes all last for no time: the next change of the same bound has the same instant.
 std::uint64_t momentary(const Case& one, std::size_t bounds) {
   std::vector<std::size_t> next_of_bound(bounds, one.log.size());
   std::vector<std::uint64_t> lasting;
@@ -166,7 +167,7 @@ std::uint64_t exceeded_anywhere(const ExactMotion& motion, const When& when, con
   return faults;
 }
 
-/// Counts stops at which a tree is not the one that was built.
+/// Counts stops at which a tree differs from the built tree.
 struct SameNodes {
   const Topologies* built;
   std::uint64_t* changes;

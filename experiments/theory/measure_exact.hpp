@@ -5,9 +5,9 @@
 
 namespace kbvh::theory {
 
-/// Records the clip and holds it against exact envelopes; stops at keyframes and at `instants` times in
-/// between for full audits, and checks at every event the path that it touched. Everything in exact
-/// arithmetic. O(vertices below all nodes x keyframes + changes x vertices below).
+/// Records the clip and checks it against exact envelopes; stops at keyframes and at `instants` times in
+/// between for full audits, and checks the touched path at every event. All in exact arithmetic. O(vertices
+/// below all nodes x keyframes + changes x vertices below).
 ExactRun measure_exact(const Scene<float>& scene, std::uint32_t instants);
 
 /// Plays a clip with changes of plans; audits before and after each, and the envelopes in between.

@@ -10,7 +10,7 @@ namespace kbvh::theory {
 
 namespace {
 
-/// Values written by a registered strategy over frames after the first, on the paper's topology.
+/// Returns the values written by a registered strategy over frames after the first, on the paper's topology.
 std::uint64_t values_written(const Scene<float>& scene, const char* id, std::span<const double> frames) {
   Contestant contestant;
   contestant.entry = &find_strategy(id);
@@ -42,7 +42,7 @@ struct FrameCount {
     most = 0;
   }
 };
-/// Frame by frame against bottom-up, which writes every bound of every body that moves in every frame.
+/// Compares frame by frame with bottom-up, which writes every bound of every moving body in every frame.
 void compare_frames(const Scene<float>& scene, std::span<const double> frames, FrameRun& run) {
   const SceneView<float> view(scene);
   Playback<float> playback(scene);
@@ -75,7 +75,7 @@ void compare_frames(const Scene<float>& scene, std::span<const double> frames, F
   }
 }
 
-/// Were winner and loser at one place when the segment of their event began?
+/// Classifies whether winner and loser coincided at the begin of the segment of their event.
 struct Classify {
   TranslationRun* run;
   const Scene<float>* scene;
@@ -132,9 +132,9 @@ TranslationRun measure_translation(const Scene<float>& scene, std::uint64_t roun
 
 namespace {
 
-/// A box per node over all keyframes, and boxes at keyframes as flight plans: lower corner of node i is
-/// vertex 2 i, upper corner 2 i + 1. Straight lines between them contain the node's vertices at all times in
-/// between, because a maximum of lines lies below the chord of its ends.
+/// A box per node over all keyframes, and boxes at keyframes as flight plans: the lower corner of node i is
+/// vertex 2 i, the upper corner 2 i + 1. Straight lines between them contain the node's vertices at all times
+/// in between, because a maximum of lines lies below the chord of its ends.
 struct LooseBoxes {
   std::vector<Box<double>> swept;
   FlightPlans<float> linear;

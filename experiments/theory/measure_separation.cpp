@@ -15,7 +15,7 @@ namespace {
 
 using Collision = KineticCollision<float, AvlEventQueue, Counting>;
 
-/// A side of a box at t, widened as the list does it: at the knots of its piece.
+/// Computes a side of a box at t, widened as in the list: at the knots of its piece.
 Rational side_at(const FlightPlans<float>& plans, std::uint32_t vertex, int axis, Widening widening,
                  double t) {
   Piece<float> piece = plans.piece_after(vertex, axis, t);
@@ -28,13 +28,13 @@ Rational side_at(const FlightPlans<float>& plans, std::uint32_t vertex, int axis
   return line.x0 + line.slope * (exact(t) - line.t0);
 }
 
-/// Compares the list with what a simultaneous traversal finds at one time.
+/// Compares the list with the result of a simultaneous traversal at one time.
 class ListAudit {
  public:
   ListAudit(const Collision& collision, const SceneView<float>& view, double t)
       : collision_(&collision), view_(view), t_(t) {}
 
-  /// Entries that are in one and not in the other.
+  /// Counts entries that are in only one of the two.
   std::uint64_t differences(std::uint64_t& entries) {
     std::uint64_t wrong = 0;
     for (std::uint32_t i = 0; i < view_.pairs().size(); ++i) {
@@ -56,7 +56,8 @@ class ListAudit {
   }
 
  private:
-  using Entry = std::tuple<std::uint32_t, std::uint32_t, bool>;  // nodes, overlapping leaves?
+  using Entry =
+      std::tuple<std::uint32_t, std::uint32_t, bool>;  // nodes, and whether they are overlapping leaves
 
   void descend(const BodyPair& bodies, std::uint32_t a, std::uint32_t b) {
     const TopologyNode na = tree(bodies.first).topology().nodes[a],

@@ -5,10 +5,10 @@
 namespace kbvh::theory {
 
 /// Plays the clip through kinetic incremental collision detection, event by event, and at `instants` times
-/// between events compares the list with a traversal from scratch in rational arithmetic.
+/// between events compares the list with a new traversal in rational arithmetic.
 SeparationRun measure_separation(const Scene<float>& scene, std::uint32_t instants);
 
-/// Sizes of the list at the first, a middle and the last keyframe, each from a fresh start.
+/// Measures the sizes of the list at the first, a middle and the last keyframe, each from a fresh start.
 ListSizeRun measure_list_size(const Scene<float>& scene);
 
 }  // namespace kbvh::theory

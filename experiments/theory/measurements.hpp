@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-/// What is counted for the checks, as plain numbers: verdicts are functions of these alone.
+/// The measurements of the checks as plain numbers: verdicts are functions of these alone.
 namespace kbvh::theory {
 
 /// One clip through the kinetic AABB tree (AVL queue, binary, one primitive per leaf), event by event. Sums
@@ -15,8 +15,8 @@ struct CountRun {
   std::uint64_t depth = 0;     ///< of the deepest leaf; the root has 0
   std::uint64_t segments = 0;  ///< of the flight plans: keyframes - 1
   std::uint64_t events = 0, values = 0;
-  std::uint64_t silent_events = 0;  ///< that changed no realiser at all
-  /// Segments x sum over nodes and sides of (vertices below - 1): no envelopes of lines have more
+  std::uint64_t silent_events = 0;  ///< without any change of a realiser
+  /// Segments x sum over nodes and sides of (vertices below - 1): envelopes of lines have no more
   /// breakpoints.
   double breakpoint_bound = 0;
   std::uint64_t queue_peak = 0;                          ///< most events scheduled at once
@@ -25,15 +25,15 @@ struct CountRun {
   std::uint64_t sum_visited = 0, max_visited = 0;        ///< nodes of the path upwards
   std::uint64_t sum_steps = 0, max_steps = 0;            ///< comparisons in the queue
   std::uint64_t sum_operations = 0, max_operations = 0;  ///< on the queue
-  std::uint64_t sum_certificates = 0, max_certificates = 0;  ///< candidate pairs that were looked at
-  /// Certificates (of a node and side) that a vertex takes part in, as winner or as one of those that may
-  /// become loser; over the first, a middle and the last keyframe.
+  std::uint64_t sum_certificates = 0, max_certificates = 0;  ///< examined candidate pairs
+  /// Certificates (of a node and side) that involve one vertex, as winner or as possible loser; over the
+  /// first, a middle and the last keyframe.
   std::uint64_t max_vertex_certificates = 0;
   double mean_vertex_certificates = 0;
   std::uint64_t max_leaves_of_vertex = 0;
-  /// Plans of single vertices changed at the first keyframe: candidate pairs looked at, queue comparisons.
+  /// Changes of single vertices' plans at the first keyframe: examined candidate pairs, queue comparisons.
   std::uint64_t updates = 0, sum_update_certificates = 0, max_update_certificates = 0, max_update_steps = 0;
-  /// Largest share that an update took of 6 x the candidates of all nodes above the vertex.
+  /// Largest share that an update needed of 6 x the candidates of all nodes above the vertex.
   double update_share = 0;
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CountRun, scene, triangles, vertices, nodes, depth, segments, events,
@@ -44,22 +44,24 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CountRun, scene, triangles, vertices, nodes, 
                                    updates, sum_update_certificates, max_update_certificates,
                                    max_update_steps, update_share)
 
-/// The same clip with the log of every change, held against exact envelopes computed apart (envelope.hpp).
+/// The same clip with the log of every change, checked against independently computed exact envelopes
+/// (envelope.hpp).
 struct ExactRun {
   std::string scene;
   std::uint64_t triangles = 0, vertices = 0, keyframes = 0;
-  std::string violation;                            ///< the first, empty if the log is right
-  std::uint64_t bounds = 0;                         ///< (node, side) pairs proved over the whole clip
-  std::uint64_t events = 0, logged = 0, net = 0;    ///< events; changes; net changes per bound and instant
-  std::uint64_t envelope = 0, canonical = 0;        ///< breakpoints; with ties resolved by smallest id
-  std::uint64_t several_steps = 0, choices = 0;     ///< ties: changes beyond the net ones, equal successors
-  std::uint64_t momentary_events = 0;               ///< all of whose changes last for no time
-  std::uint64_t pieces = 0, over_lambda = 0;        ///< bounds x segments; with too many breakpoints
-  std::uint64_t most_breakpoints = 0;               ///< of one bound in one segment
-  double fullest = 0;                               ///< share of lambda_1(n) - 1, n >= 8
+  std::string violation;                          ///< the first, empty if the log is right
+  std::uint64_t bounds = 0;                       ///< (node, side) pairs proved over the whole clip
+  std::uint64_t events = 0, logged = 0, net = 0;  ///< events; changes; net changes per bound and instant
+  std::uint64_t envelope = 0, canonical = 0;      ///< breakpoints; with ties resolved by smallest id
+  std::uint64_t several_steps = 0,
+                choices = 0;                  ///< ties: changes in addition to the net ones, equal successors
+  std::uint64_t momentary_events = 0;         ///< all their changes last for no time
+  std::uint64_t pieces = 0, over_lambda = 0;  ///< bounds x segments; with too many breakpoints
+  std::uint64_t most_breakpoints = 0;         ///< of one bound in one segment
+  double fullest = 0;                         ///< share of lambda_1(n) - 1, n >= 8
   std::uint64_t audited_instants = 0, audited = 0;  ///< between events and at keyframes; realisers compared
   std::uint64_t faults = 0;                         ///< of these, exceeded by a vertex
-  std::uint64_t path_bounds = 0, path_faults = 0;   ///< on the paths that events touched, at their instants
+  std::uint64_t path_bounds = 0, path_faults = 0;   ///< on the paths touched by events, at their instants
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ExactRun, scene, triangles, vertices, keyframes, violation, bounds, events,
                                    logged, net, envelope, canonical, several_steps, choices, momentary_events,
@@ -71,10 +73,10 @@ struct FrameRun {
   std::string scene;
   std::uint64_t triangles = 0, l = 0, frames = 0;  ///< frames after the first
   std::uint64_t events = 0, values = 0;            ///< of the kinetic tree
-  std::uint64_t same_log = 0;                      ///< 1: every change is the one of the smallest l, in order
-  std::uint64_t bottom_up_values = 0;              ///< of the strategy bottom_up on the same topology
-  /// Frame by frame: those in which the kinetic tree writes more values than bottom-up, those in which some
-  /// bound changes hands more than once, and those of the former that are not of the latter.
+  std::uint64_t same_log = 0;          ///< 1: every change equals that of the smallest l, in order
+  std::uint64_t bottom_up_values = 0;  ///< of the strategy bottom_up on the same topology
+  /// Frames in which the kinetic tree writes more values than bottom-up; frames in which the realiser of some
+  /// bound changes more than once; and the former without the latter.
   std::uint64_t worse_frames = 0, repeated_frames = 0, worse_without_repeat = 0;
   std::uint64_t most_of_bound = 0;  ///< changes of one bound in one frame
   double worst_share = 0;           ///< of kinetic values over bottom-up's in one frame
@@ -83,14 +85,15 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FrameRun, scene, triangles, l, frames, events
                                    bottom_up_values, worse_frames, repeated_frames, worse_without_repeat,
                                    most_of_bound, worst_share)
 
-/// All vertices moved by the same step per keyframe.
+/// All vertices translated by the same step per keyframe.
 struct TranslationRun {
   std::string scene;
   std::uint64_t exact = 0;  ///< 1: no coordinate was rounded
   std::uint64_t triangles = 0, vertices = 0, keyframes = 0;
-  std::uint64_t rounded = 0;  ///< keyframe coordinates that are not where the translation takes them
+  std::uint64_t rounded = 0;  ///< keyframe coordinates that differ from the exact translation
   std::uint64_t events = 0;
-  std::uint64_t separated_ties = 0;  ///< events of vertices that had one coordinate when their segment began
+  std::uint64_t separated_ties =
+      0;  ///< events of vertices with equal coordinates at the begin of their segment
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TranslationRun, scene, exact, triangles, vertices, keyframes, rounded,
                                    events, separated_ties)
@@ -109,7 +112,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PlanRun, scene, triangles, updates, updates_a
                                    topology_changes, invalid_before, invalid_after, moved_at_keyframes,
                                    moved_between, violation)
 
-/// Hierarchies that contain everything without being tight, beside the kinetic tree of the same topology.
+/// Valid but not tight hierarchies, for comparison with the kinetic tree of the same topology.
 struct LooseRun {
   std::string scene;
   std::uint64_t triangles = 0, bounds = 0, l = 0, frames = 0, segments = 0;
@@ -126,17 +129,18 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LooseRun, scene, triangles, bounds, l, frames
                                    swept_updates, linear_values, linear_updates, kinetic_events,
                                    kinetic_values, bottom_up_values)
 
-/// The kinetic BoxTree of the same topology beside the AABB tree.
+/// The kinetic BoxTree of the same topology, for comparison with the AABB tree.
 struct BoxTreeRun {
   std::string scene;
   std::uint64_t triangles = 0, trees = 0, nodes = 0, inner_nodes = 0, depth = 0;
   std::uint64_t certificates = 0;  ///< places for events: two per inner node, and the roots' own
-  std::uint64_t most_of_planes = 0, queue_peak = 0;  ///< events alive: of one inner node's planes; in all
+  std::uint64_t most_of_planes = 0,
+                queue_peak = 0;  ///< scheduled events: for one inner node's planes; in total
   std::uint64_t events = 0, values = 0, silent_events = 0, bytes = 0;
   std::uint64_t aabb_events = 0, aabb_values = 0, aabb_bytes = 0;
-  std::uint64_t searches = 0, searched = 0, most_searched = 0;  ///< nodes looked at by certificate searches
+  std::uint64_t searches = 0, searched = 0, most_searched = 0;  ///< nodes visited by certificate searches
   std::uint64_t max_vertex_certificates = 0, max_leaves_of_vertex = 0;
-  std::uint64_t proved = 0;  ///< bounds held against exact envelopes
+  std::uint64_t proved = 0;  ///< bounds checked against exact envelopes
   std::string violation;     ///< the first, empty if there is none
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(BoxTreeRun, scene, triangles, trees, nodes, inner_nodes, depth,
@@ -145,7 +149,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(BoxTreeRun, scene, triangles, trees, nodes, i
                                    most_searched, max_vertex_certificates, max_leaves_of_vertex, proved,
                                    violation)
 
-/// What certificate searches cost in BoxTrees with forced axes.
+/// The cost of certificate searches in BoxTrees with forced axes.
 struct SearchRun {
   std::string tree;
   std::uint64_t leaves = 0, events = 0;
@@ -157,7 +161,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SearchRun, tree, leaves, events, searches, se
 
 /// Kinetic incremental collision detection on a clip, event by event.
 struct SeparationRun {
-  /// Events of one kind: how many pairs they touch, what the queues cost.
+  /// Events of one kind: affected pairs, and cost of the queues.
   struct Kind {
     std::uint64_t events = 0, pairs = 0, most_pairs = 0, steps = 0, operations = 0;
     double most_steps_per_operation = 0;  ///< comparisons per operation on the queue, mean of one event
@@ -166,7 +170,7 @@ struct SeparationRun {
   std::uint64_t polygons = 0;  ///< of all bodies
   Kind overlap, fathers, leaves, changes;
   std::uint64_t list_peak = 0, queue_peak = 0, bytes = 0;
-  std::uint64_t most_of_box = 0;  ///< most pairs that a box takes part in, at keyframes
+  std::uint64_t most_of_box = 0;  ///< largest number of pairs with one box, at keyframes
   std::uint64_t audits = 0, entries = 0, differences = 0;  ///< list against traversals between events
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SeparationRun::Kind, events, pairs, most_pairs, steps, operations,
@@ -174,14 +178,14 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SeparationRun::Kind, events, pairs, most_pair
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SeparationRun, scene, polygons, overlap, fathers, leaves, changes,
                                    list_peak, queue_peak, bytes, most_of_box, audits, entries, differences)
 
-/// Sizes of the separation list at keyframes, at most.
+/// The largest sizes of the separation list at keyframes.
 struct ListSizeRun {
   std::string scene;
   std::uint64_t polygons = 0, list = 0, overlapping = 0;  ///< all pairs of the list; overlapping leaves
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ListSizeRun, scene, polygons, list, overlapping)
 
-/// How the number of events of a family of scenes grows with its vertices.
+/// The growth of the number of events of a family of scenes with its vertices.
 struct GrowthFit {
   std::string scene;
   std::vector<std::uint64_t> triangles, vertices, events;

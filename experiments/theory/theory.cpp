@@ -41,14 +41,14 @@ MeasurementStore::MeasurementStore(std::filesystem::path file, std::string progr
   if (file_.empty()) return;
   std::ifstream in(file_);
   for (std::string line; std::getline(in, line);) {
-    // The last line of a run that was stopped may be incomplete.
+    // The last line of an interrupted run may be incomplete.
     const json record = experiments::json_or_nothing(line);
     if (!record.is_object() || !record.contains("value")) continue;
     const auto made_by = record.find("program"), key = record.find("key");
     if (made_by != record.end() && key != record.end() && *made_by == json(program_) && key->is_string())
       kept_[key->get<std::string>()] = record["value"];
   }
-  // What follows must not be glued to a half line.
+  // Terminates an incomplete line before appending.
   std::ofstream out(file_, std::ios::app);
   out << "\n" << std::flush;
   if (!out) throw io::InputError("cannot write " + file_.string());
@@ -71,7 +71,7 @@ namespace {
 
 constexpr std::uint32_t ls[] = {1, 3, 10, 30, 100};
 
-/// Makes a scene once, and only if something is to be measured on it.
+/// Makes a scene once, and only if a measurement needs it.
 class LazyScene {
  public:
   explicit LazyScene(std::function<Scene<float>()> make) : make_(std::move(make)) {}
@@ -113,7 +113,8 @@ class Runner {
   }
 
  private:
-  /// Which size is used where one is enough: the smallest from `wanted` on, else the largest.
+  /// Returns whether this size is the one used where one suffices: the smallest from `wanted` on, else the
+  /// largest.
   bool chosen(std::uint32_t size, std::uint32_t wanted) const {
     std::uint32_t best = 0, largest = 0;
     for (const std::uint32_t s : options_->sizes) {
@@ -182,7 +183,7 @@ class Runner {
           [&] { return measure_separation(scene(), options_->list_audits); }));
   }
 
-  /// The largest size that is held against exact envelopes.
+  /// Returns the largest size that is checked against exact envelopes.
   std::uint32_t exact_size() const {
     std::uint32_t largest = 0;
     for (const std::uint32_t s : options_->sizes)

@@ -39,9 +39,10 @@ Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, st
   spec.builtin = family;
   spec.options.triangles = triangles;
   spec.options.keyframes = keyframes;
-  // Bodies at rest are left out: as few triangles of them as possible, but for clouds, which come in pairs.
+  // Bodies at rest are left out: as few triangles of them as possible, except for clouds, which come in
+  // pairs.
   if (family != "random_soups" && family != "passing_spheres") spec.options.obstacle_triangles = 20;
-  // The cloth's table decides what the cloth does; it has its usual number.
+  // The cloth's motion depends on its table, which keeps its usual number of triangles.
   if (family == "tablecloth") spec.options.obstacle_triangles = 0;
   experiments::find_builtin_scene(family);
   return only_moving(experiments::assemble<float>(experiments::load(spec, progress)));
@@ -71,7 +72,7 @@ std::optional<Scene<float>> data_scene(const std::string& name, std::size_t keyf
 
 Scene<float> tangents_scene(std::uint32_t vertices) {
   // The tangent of x = c s^2 at s = a, over s from 0 to 1, goes from -c a^2 to c (2 a - a^2). With a = i / 16
-  // and c = 256 that is from -i^2 to 32 i - i^2: whole numbers. It is the highest for s around a.
+  // and c = 256 that is from -i^2 to 32 i - i^2: whole numbers. It is the highest tangent for s around a.
   const float scale = 32.0f;
   std::vector<float> positions;
   for (int k = 0; k < 2; ++k)

@@ -9,24 +9,25 @@
 
 namespace kbvh::theory {
 
-/// The bodies of a built-in scene that move: those at rest have no events. Throws io::InputError.
+/// Returns the moving bodies of a built-in scene: resting bodies have no events. Throws io::InputError.
 Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes,
                           const experiments::MakeProgress& progress = {});
 
-/// The whole of a built-in scene, with as many triangles in the body beside the one that moves.
+/// Returns a whole built-in scene, with as many triangles in the body next to the moving one.
 Scene<float> colliding_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes);
 
-/// A sequence of the data folder, with at most so many keyframes (0: all); nothing if it is not there.
+/// Returns a sequence of the data folder, with at most this many keyframes (0: all); nothing if it does not
+/// exist.
 std::optional<Scene<float>> data_scene(const std::string& name, std::size_t keyframes);
 
-/// One polygon of `vertices` vertices whose x are tangents to a parabola: over one segment, of one second,
-/// its upper x bound passes through all of them (claim T9). All coordinates are exact in float.
+/// Makes one polygon of `vertices` vertices whose x are tangents to a parabola: over one segment, of one
+/// second, its upper x bound passes through all of them (claim T9). All coordinates are exact in float.
 Scene<float> tangents_scene(std::uint32_t vertices);
 
-/// A fan: `triangles` around one vertex, at rest. Its hub takes part in every leaf's certificates (T4).
+/// Makes a fan: `triangles` around one vertex, at rest. Its hub takes part in every leaf's certificates (T4).
 Scene<float> fan_scene(std::uint32_t triangles);
 
-/// Points that jump about at random on the first `axes` axes, four keyframes; other coordinates are 0.
+/// Makes points that move randomly on the first `axes` axes, four keyframes; other coordinates are 0.
 Scene<float> wandering_points(std::uint32_t count, std::size_t axes);
 
 /// A sphere's vertices on a lattice, moved by lattice steps: a translation that float holds exactly, near the
@@ -38,8 +39,8 @@ struct Translation {
 Translation near_translation(std::uint32_t triangles, std::uint32_t keyframes);
 Translation far_translation(std::uint32_t triangles, std::uint32_t keyframes);
 
-/// Velocities that change at run time: at every fourth keyframe, and in the middle of every fourth interval,
-/// up to `changed` vertices get a plan of their own. Deterministic.
+/// Makes a script of velocities that change at run time: at every fourth keyframe, and in the middle of every
+/// fourth interval, up to `changed` vertices get their own plans. Deterministic.
 PlanScript<float> velocity_script(const Scene<float>& scene, std::uint32_t frames_per_keyframe,
                                   std::uint32_t changed);
 

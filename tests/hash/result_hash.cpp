@@ -87,6 +87,13 @@ bool print(const StrategyEntry& entry, const std::vector<std::string>& scenes, c
     use_kernel_set(set);
     expect({}, name(set));
   }
+  use_kernel_set(KernelSet::portable);
+  for (const Parameter& parameter : entry.info.parameters)
+    for (const std::string& word : parameter.allowed)
+      if (word != parameter.default_value)
+        std::printf("%-24s %-6s %016" PRIx64 " %s=%s\n", entry.info.id.c_str(), scalar,
+                    hash_of<S>(entry, scenes, {{parameter.name, word}}), parameter.name.c_str(),
+                    word.c_str());
   for (const Parameter& parameter : entry.info.parameters)
     if (parameter.name == "threads" && std::thread::hardware_concurrency() > 1)
       expect({{"threads", "2"}}, "2 threads");

@@ -47,23 +47,38 @@ foreach(file IN LISTS package_files)
   endforeach()
 endforeach()
 
+# The strategy that README.md shows is one of the consumer's.
+file(READ ${SOURCE_DIR}/README.md readme)
+if(NOT readme MATCHES "\n## Adding a strategy\n.*")
+  message(FATAL_ERROR "README.md has no part 'Adding a strategy'")
+endif()
+if(NOT CMAKE_MATCH_0 MATCHES "\n```cpp\n(.*)\n```\n\n```cmake\n")
+  message(FATAL_ERROR "README.md shows no strategy under 'Adding a strategy'")
+endif()
+file(WRITE ${WORK_DIR}/my_refit.cpp "${CMAKE_MATCH_1}\n")
+
 # The compiler's flags as kbvh had them, because sanitizers must agree on both sides.
 string(TOUPPER "${BUILD_TYPE}" build_type)
 step("configure" ${CMAKE_COMMAND} -S ${CONSUMER_DIR} -B ${build} -G ${GENERATOR}
   -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_CXX_COMPILER=${COMPILER} "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}"
   -DCMAKE_BUILD_TYPE=${BUILD_TYPE} "-DCMAKE_CXX_FLAGS=${FLAGS}" "-DCMAKE_CXX_FLAGS_${build_type}=${TYPE_FLAGS}"
-  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON)
+  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DFROM_README=${WORK_DIR}/my_refit.cpp)
 refuse("configure" "${errors}" "Warning")
 
 file(READ ${build}/compile_commands.json commands)
 expect("flags that decide results reach consumers" "${commands}" "-ffp-contract=off")
+if(COMPILER_ID STREQUAL "GNU")
+  expect("flags that decide results reach consumers" "${commands}" "-fno-tree-slp-vectorize")
+endif()
 refuse("warnings stay in kbvh" "${commands}" " -W[a-z][^ \"]*")
 # The prefix lies in a build folder, and that may lie in the source folder.
 refuse("consumers see the installed tree only" "${commands}" "-(I|isystem )${SOURCE_DIR}/?(core|experiments|tests)?[ \"]")
 
 step("build" ${CMAKE_COMMAND} --build ${build} --parallel 2)
 step("conformance" ${CMAKE_CTEST_COMMAND} --test-dir ${build} -j 2 --output-on-failure --no-tests=error)
-expect("conformance covers the strategy" "${output}" "my_kbvh\\.Registry/Conformance[^\n]*sparse_refit")
+foreach(id sparse_refit my_refit)
+  expect("conformance covers the strategy" "${output}" "my_kbvh\\.Registry/Conformance[^\n]*${id}")
+endforeach()
 refuse("conformance covers nothing else" "${output}" "bottom_up")
 string(REGEX MATCH "[0-9]+% tests passed[^\n]*" line "${output}")
 message(STATUS "  ${line}")
@@ -87,13 +102,13 @@ if(NOT EXISTS ${prefix}/bin/kbvh)
 endif()
 
 step("list" ${build}/my_kbvh list --json)
-foreach(id sparse_refit bottom_up)
+foreach(id sparse_refit my_refit bottom_up)
   expect("list" "${output}" "\"id\": \"${id}\"")
 endforeach()
 step("list of the installed program" ${prefix}/bin/kbvh list --json)
 refuse("list of the installed program" "${output}" "sparse_refit")
 
-set(scene --scene tablecloth --triangles 500 --keyframes 6 --l 3 --strategies sparse_refit,bottom_up)
+set(scene --scene tablecloth --triangles 500 --keyframes 6 --l 3 --strategies sparse_refit,my_refit,bottom_up)
 step("run" ${build}/my_kbvh run ${scene} --repetitions 2)
 expect("run" "${output}" "sparse_refit")
 step("bench" ${build}/my_kbvh bench ${scene} --repetitions 2 --out ${WORK_DIR}/results)

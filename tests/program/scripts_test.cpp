@@ -84,7 +84,7 @@ TEST(Scripts, SayWhatIsWrongAndWhere) {
       {R"([{"time": 1}])", "steps[0]: changes: is missing"},
       {R"([{"time": "now", "changes": [{"vertex": 1}]}])", "time: expected a finite number"},
       {R"([{"time": 1, "changes": [{"vertex": 1}]}, {"time": 1, "changes": [{"vertex": 1}]}])",
-       "steps[1]: time 1 does not follow that of the step before, 1"},
+       "steps[1]: time 1 is not later than that of the preceding step, 1"},
       {in_steps + R"({"velocity": [0, 0, 0]})" + end, "changes[0]: vertex: is missing"},
       {in_steps + R"({"vertex": -1})" + end, "vertex: expected a whole number"},
       {in_steps + R"({"vertex": 1, "velocity": [0, 0]})" + end,

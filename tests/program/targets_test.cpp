@@ -75,11 +75,11 @@ TEST(Targets, ErrorsNameFileTargetAndKey) {
             "numerator, over, scalar, scenes, what");
   EXPECT_EQ(with("/numerator/extra", 1),
             "p.json: targets[0]: numerator: there is no key 'extra'; known are builder, or, params, phase, "
-            "strategy");
+            "scene, strategy");
   EXPECT_EQ(
       with("/denominator/phase", "lunch"),
       "p.json: targets[0]: denominator: phase: expected one of motion, update, traversal, triangle_tests, "
-      "query, candidates, total, got 'lunch'");
+      "query, candidates, total, upkeep, update_per_event, got 'lunch'");
   EXPECT_EQ(with("/over", "all"), "p.json: targets[0]: over: expected worst or geometric_mean, got 'all'");
   EXPECT_EQ(with("/numerator", "bottom_up"),
             "p.json: targets[0]: numerator: expected an object with named members, got \"bottom_up\"");
@@ -106,8 +106,7 @@ TEST(Targets, ScenesMustBeMeasuredAndToldApart) {
   EXPECT_EQ(with("/scalar", "double"), none + "'sheet' in double at l = 2; there are none with a name");
   json plan = example_plan();
   plan["scenes"][0]["triangles"] = {50, 98};
-  EXPECT_EQ(start_complaint(plan),
-            "p.json: targets[0]: scenes: 'sheet' is the name of several scenes, which counts?");
+  EXPECT_EQ(start_complaint(plan), "p.json: targets[0]: scenes: 'sheet' is the name of several scenes");
   plan = example_plan();
   plan["studies"] = {{{"name", "a"}}, {{"name", "b"}, {"repetitions", 5}}};
   EXPECT_EQ(start_complaint(plan), "nothing was thrown") << "the same scene in two studies";
@@ -231,6 +230,36 @@ TEST(Targets, CandidatesAreUpdateTraversalAndPlanChanges) {
   plan["targets"][0]["numerator"]["phase"] = "candidates";
   plan["targets"][0]["denominator"]["phase"] = "query";
   EXPECT_EQ(row_of(plan, example_groups()).at("measured"), 14.0 / 3.0);
+}
+
+TEST(Targets, ASideMayBeMeasuredOnAnotherScene) {
+  json plan = example_plan();
+  plan["targets"][0]["scenes"] = "sheet";
+  plan["targets"][0]["numerator"]["scene"] = "soup";
+  EXPECT_EQ(start_complaint(plan), "nothing was thrown");
+  EXPECT_EQ(row_of(plan, example_groups()).at("measured"), 10.0 / 3.0);
+  auto groups = example_groups();
+  groups.erase(groups.begin() + 1);
+  EXPECT_EQ(row_of(plan, groups).at("reason"), "sheet: 'soup' was left out");
+  plan["targets"][0]["numerator"]["scene"] = "nowhere";
+  EXPECT_NE(start_complaint(plan).find("no study has a scene of the name 'nowhere'"), std::string::npos);
+  plan["targets"][0]["numerator"] = {{"strategy", "rebuild"}, {"phase", "update"}, {"scene", "soup"}};
+  EXPECT_EQ(start_complaint(plan), "p.json: targets[0]: no study has rebuild on 'soup' in float at l = 2");
+}
+
+TEST(Targets, UpkeepHasChangesAndEventsDivideTheUpdate) {
+  json plan = example_plan();
+  plan["targets"][0]["scenes"] = "sheet";
+  plan["targets"][0]["numerator"]["phase"] = "upkeep";
+  EXPECT_EQ(row_of(plan, example_groups()).at("measured"), 13.0 / 3.0);
+  for (const char* side : {"numerator", "denominator"})
+    plan["targets"][0][side]["phase"] = "update_per_event";
+  auto groups = example_groups();
+  for (auto& record : groups[0].records) {
+    record["scene"]["frames"] = 10;
+    record["counters"]["certificates_failed"] = record.at("strategy").at("id") == "bottom_up" ? 20 : 30;
+  }
+  EXPECT_DOUBLE_EQ(row_of(plan, groups).at("measured").get<double>(), (9.0 / 3) / (3.0 / 2));
 }
 
 TEST(Targets, Verdicts) {

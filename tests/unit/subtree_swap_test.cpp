@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/topology/builders.hpp"
+#include "core/topology/collapse.hpp"
 #include "core/topology/subtree_swap.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
@@ -209,6 +210,69 @@ TEST(SubtreeSwap, RefusesWhatIsNoExchange) {
   EXPECT_TRUE(topology == before);
   Topology wide = random_tree(40, BuildMethod::median, random, 4);
   EXPECT_THROW(swapping.swap(wide, 1, 2, edit), std::invalid_argument);
+}
+
+TEST(Collapse, EditedTreesBecomeWideOnes) {
+  Random random(11);
+  SubtreeSwap swapping;
+  TopologyEdit edit;
+  for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
+    for (const std::uint32_t primitives : {1u, 2u, 3u, 9u, 200u}) {
+      Topology binary = random_tree(primitives, method, random);
+      for (int i = 0; binary.size() > 5 && i < 100; ++i) {
+        const auto [a, b] = two_places(binary, random);
+        swapping.swap(binary, a, b, edit);
+      }
+      std::vector<double> weights(binary.size());
+      for (double& weight : weights) weight = random.unit();
+      const auto below = primitives_below(binary);
+      for (const std::uint32_t width : {4u, 8u}) {
+        const Topology wide = collapsed(binary, width, weights);
+        ASSERT_EQ(check_topology(wide, primitives), "") << name(method) << ", " << primitives;
+        std::uint32_t narrow = 0;
+        for (const auto& own : primitives_below(wide))
+          ASSERT_TRUE(std::find(below.begin(), below.end(), own) != below.end());
+        // A node has room left only if all its children are leaves.
+        for (const TopologyNode node : wide.nodes) {
+          if (node.is_leaf() || node.count() == width) continue;
+          ++narrow;
+          for (std::uint32_t c = node.first(); c < node.first() + node.count(); ++c)
+            ASSERT_TRUE(wide.nodes[c].is_leaf());
+        }
+        if (primitives == 200) {
+          EXPECT_GT(narrow, 0u);
+        }
+      }
+    }
+}
+
+TEST(Collapse, OpensTheHeaviestChild) {
+  // Chains to the left: only the weights say which pair of grandchildren comes up.
+  Random random(2);
+  const Topology binary = random_tree(64, BuildMethod::median, random);
+  std::vector<double> weights(binary.size(), 0);
+  const TopologyNode root = binary.nodes[0];
+  const std::uint32_t heavy = root.first() + 1;
+  weights[heavy] = 2;
+  weights[binary.nodes[heavy].first()] = 1;
+  const Topology wide = collapsed(binary, 4, weights);
+  ASSERT_EQ(wide.nodes[0].count(), 4u);
+  const auto below = primitives_below(binary), found = primitives_below(wide);
+  const std::uint32_t opened = binary.nodes[heavy].first();
+  const std::uint32_t expected[4] = {root.first(), binary.nodes[opened].first(),
+                                     binary.nodes[opened].first() + 1, opened + 1};
+  for (std::uint32_t c = 0; c < 4; ++c) EXPECT_EQ(found[wide.nodes[0].first() + c], below[expected[c]]) << c;
+}
+
+TEST(Collapse, RefusesWhatItCannotDo) {
+  Random random(3);
+  const Topology binary = random_tree(20, BuildMethod::sah, random);
+  const std::vector<double> weights(binary.size(), 1), few(3, 1);
+  EXPECT_THROW(collapsed(binary, 2, weights), std::invalid_argument);
+  EXPECT_THROW(collapsed(binary, 8, few), std::invalid_argument);
+  const Topology wide = random_tree(20, BuildMethod::sah, random, 4);
+  EXPECT_THROW(collapsed(wide, 8, std::vector<double>(wide.size(), 1)), std::invalid_argument);
+  EXPECT_TRUE(collapsed(Topology{}, 8, {}).empty());
 }
 
 }  // namespace

@@ -84,7 +84,7 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
   }
 
   std::size_t bytes() const override {
-    std::size_t total = near_bodies_.bytes();
+    std::size_t total = near_bodies_.bytes() + query_.bytes();
     for (const Body& body : bodies_)
       total += body.hierarchy.bytes() +
                (body.realisers.size() + body.visited.capacity()) * sizeof(std::uint32_t) + body.stale.size();

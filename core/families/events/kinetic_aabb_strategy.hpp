@@ -94,7 +94,7 @@ class KineticAabbStrategy : public CountedStrategy<S, Count> {
   std::size_t bytes() const override {
     std::size_t total = on_forest([](auto& forest) { return forest.bytes(); });
     for (const auto& cache : caches_) total += cache.bytes();
-    return total + near_bodies_.bytes();
+    return total + near_bodies_.bytes() + stack_.capacity() * sizeof(NodePair);
   }
 
  protected:

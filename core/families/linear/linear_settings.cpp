@@ -3,27 +3,26 @@
 namespace kbvh {
 
 std::vector<Parameter> linear_parameters() {
-  return {
-      {"pieces",
-       "1",
-       {},
-       "each segment between keyframes is cut into so many, for tighter boxes",
-       1,
-       SegmentCuts::most,
-       Numbers::whole},
-      {"max_looseness",
-       "0",
-       {},
-       "a segment is cut into twice as many pieces while boxes in the middle of its first have more surface "
-       "than tight ones by this share; 0: nobody looks",
-       0},
-      {"remember_mb",
-       "0",
-       {},
-       "megabytes for boxes at ends of segments that are used again when the clip plays again; a study plays "
-       "it again for each repetition, so that its times are then those of a loop and not of a first time",
-       0,
-       1e6}};
+  return {{"pieces",
+           "1",
+           {},
+           "number of pieces into which each segment between keyframes is cut, for tighter boxes",
+           1,
+           SegmentCuts::most,
+           Numbers::whole},
+          {"max_looseness",
+           "0",
+           {},
+           "the number of pieces doubles while the boxes in the middle of the first piece exceed the surface "
+           "of tight boxes by this share; 0: not measured",
+           0},
+          {"remember_mb",
+           "0",
+           {},
+           "megabytes for boxes at segment ends that are reused when the clip plays again; a study replays "
+           "the clip for each repetition, so its times are then those of a loop, not of a first play",
+           0,
+           1e6}};
 }
 
 LinearSettings linear_settings(const Params& params) {

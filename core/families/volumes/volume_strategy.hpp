@@ -12,7 +12,7 @@ namespace kbvh {
 
 /// A simple strategy over bounding volumes of any kind: it recomputes every volume of a moving body at each
 /// frame, leaves first, and compares volumes by the template traversal (core/topology/traversal.hpp).
-/// `Volumes` are the kinds of which an instance uses one. Nothing is specialised for speed; the wide
+/// `Volumes` lists the kinds; an instance uses one. Nothing is specialised for speed; the wide
 /// hierarchies of boxes are the fast special case.
 ///
 /// Within one body the traversal meets each two leaves in both orders; one order is dropped.
@@ -117,7 +117,7 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
 
   std::size_t bytes() const override {
     return on_bodies([&](const auto& bodies) {
-      std::size_t total = near_bodies_.bytes();
+      std::size_t total = near_bodies_.bytes() + stack_.capacity() * sizeof(NodePair);
       for (const auto& body : bodies) total += body.bytes();
       return total;
     });

@@ -77,7 +77,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
   std::size_t bytes() const override {
     std::size_t total = 0;
     for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
-    return total + near_bodies_.bytes() + (swept_ ? swept_->bytes() : 0);
+    return total + near_bodies_.bytes() + query_.bytes() + (swept_ ? swept_->bytes() : 0);
   }
 
  protected:

@@ -207,6 +207,12 @@ class WideQuery {
   /// Returns the work that the budget left undone, once `step` waits for nothing.
   QueryStatus lazy_status() const { return {lazy_.depth}; }
 
+  /// Returns the memory of the buffers in bytes.
+  std::size_t bytes() const {
+    return stack_.capacity() * sizeof(WidePair) + leaf_pairs_.capacity() * sizeof(LeafSlot) +
+           chunk_.capacity() * sizeof(FoundPair) + to_fetch_.capacity() * sizeof(std::uint32_t);
+  }
+
  private:
   /// Returns an empty traversal in this query's buffers.
   WideTraversal fresh_traversal(const Budget& budget);

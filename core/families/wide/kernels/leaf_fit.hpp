@@ -1,5 +1,5 @@
 #pragma once
-// Internal to core/kernels/*.cpp: the boxes of a leaf's primitives.
+// Internal to kernels: the boxes of a leaf's primitives.
 #include "core/families/wide/kernels/wide_overlap.hpp"
 #include "core/kernels/quads.hpp"
 

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to core/kernels/*.cpp: the boxes of one wide node, from the vertices of its leaves and the boxes
+// Internal to kernels: the boxes of one wide node, from the vertices of its leaves and the boxes
 // of its children.
 #include "core/families/wide/kernels/wide_layout.hpp"
 #include "core/kernels/quads.hpp"

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to core/kernels/*.cpp: the simultaneous traversal of two wide hierarchies, for any view of their
+// Internal to kernels: the simultaneous traversal of two wide hierarchies, for any view of their
 // boxes: stored, computed at the visit, or linear in time.
 #include "core/families/wide/kernels/wide_overlap.hpp"
 #include "core/kernels/quads.hpp"

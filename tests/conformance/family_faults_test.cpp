@@ -1,0 +1,366 @@
+// The suite can fail for the families beyond refits: linear bounds, the interval join with its span filter,
+// near pairs and sweeps, each in its simplest form, sound and with one seeded fault. (faults_test.cpp: the
+// others.)
+
+#include <gtest/gtest.h>
+
+#include "core/families/drift/near_pairs.hpp"
+#include "core/families/linear/interval_join.hpp"
+#include "core/families/linear/linear_bounds.hpp"
+#include "core/families/linear/triangle_span_filter.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
+#include "tests/conformance/check.hpp"
+
+namespace kbvh::test {
+namespace {
+
+enum class Fault : std::uint8_t {
+  none,
+  stale_segment,    // every second segment is not made: the one before is used on
+  reversed_time,    // the ends of a segment are exchanged
+  small_margin,     // boxes are smaller than they should be by a thousandth
+  plans_forgotten,  // changes of plans are not followed
+  late_begin,       // pairs are reported a twentieth of the segment after they begin
+  early_end,        // and a twentieth before they end
+  overdue_verdict,  // what was proved of a pair at the segment's begin is reported throughout
+  small_closing,    // bodies are taken to close in by a tenth of what they can
+  stale_rows,       // a search reads the leaves of the search before
+  ends_only,        // a sweep looks at where the motion ends
+};
+
+/// Boxes linear in time, one query a frame.
+template <class S, class Count, Fault fault>
+class Linear : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+ public:
+  static constexpr Foresight foresight = Foresight::next_keyframe;
+  Linear(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params&)
+      : CountedStrategy<S, Count>(scene, motion),
+        bounds_(scene, motion, std::move(topologies), active_kernel_set(), {}),
+        stale_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      stale_[body].resize(bounds_.hierarchy(body).node_count());
+  }
+  void reset_to(double /*t*/) override {
+    bounds_.start();
+    new_frame();
+  }
+  void advance_to(double t) override {
+    if (fault == Fault::stale_segment && t > bounds_.end() && ++ends_ % 8 != 0) return new_frame();
+    bounds_.advance();
+    new_frame();
+  }
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+    if (fault != Fault::plans_forgotten) bounds_.plans_changed();
+    new_frame();
+  }
+  QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*none*/) override {
+    std::uint64_t tests = 0;
+    for (const std::uint32_t i : bounds_.segment().near_pairs) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      query_.run_at(bounds_.hierarchy(pair.first), moment(pair.first, t), pair.first,
+                    bounds_.hierarchy(pair.second), moment(pair.second, t), pair.second, this->scene_,
+                    this->sampled_, {}, out, tests);
+    }
+    return {};
+  }
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    if (fault == Fault::reversed_time) return {};  // the pairs must tell
+    AuditView view = bounds_.audit_view(body, this->time());
+    if (fault == Fault::small_margin)
+      for (Box<double>& box : view.boxes)
+        for (int axis = 0; axis < 3; ++axis) box.upper[axis] -= 1e-3 * (box.upper[axis] - box.lower[axis]);
+    return view;
+  }
+  std::size_t bytes() const override { return bounds_.bytes(); }
+
+ private:
+  void new_frame() {
+    for (std::uint32_t body = 0; body < bounds_.body_count(); ++body) {
+      bounds_.hierarchy(body).positions_changed();
+      std::fill(stale_[body].begin(), stale_[body].end(), 1);
+    }
+  }
+  WideMoment<S> moment(std::uint32_t body, double t) {
+    const S fraction = bounds_.fraction(t);
+    return {bounds_.hierarchy(body).arrays(), bounds_.side(body).ends(), stale_[body].data(),
+            fault == Fault::reversed_time ? 1 - fraction : fraction};
+  }
+  LinearBounds<S> bounds_;
+  WideQuery<S> query_;
+  std::vector<std::vector<std::uint8_t>> stale_;
+  std::uint64_t ends_ = 0;
+};
+
+/// One join for each segment, from which frames are read; with span tests where all bodies are triangles.
+template <class S, class Count, Fault fault>
+class Join : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+ public:
+  static constexpr Foresight foresight = Foresight::next_keyframe;
+  Join(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params&)
+      : CountedStrategy<S, Count>(scene, motion),
+        bounds_(scene, motion, std::move(topologies), active_kernel_set(), {}) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      triangles_ = triangles_ && all_triangles(scene.primitives(body));
+  }
+  void reset_to(double /*t*/) override {
+    bounds_.start();
+    join();
+  }
+  void advance_to(double t) override {
+    if (fault == Fault::stale_segment && t > bounds_.end() && ++ends_ % 8 != 0) return;
+    if (bounds_.advance()) join();
+  }
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+    if (fault == Fault::plans_forgotten) return;
+    bounds_.plans_changed();
+    join();
+  }
+  QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*none*/) override {
+    float fraction = float(bounds_.fraction(t));
+    if (fault == Fault::late_begin) fraction = std::max(0.f, fraction - 0.05f);
+    if (fault == Fault::early_end) fraction = std::min(1.f, fraction + 0.05f);
+    if (fault == Fault::overdue_verdict) fraction = 0;
+    certain_ = 0;
+    if (!triangles_) {
+      join_.read(fraction, out);
+      return {};
+    }
+    const std::size_t before = out.size();
+    const std::size_t open = filter_.read(bounds_.segment(), this->scene_, join_, fraction, out);
+    certain_ = out.size() - before - open;
+    return {};
+  }
+  void confirm_candidates(double t, PairBuffer& pairs) override {
+    open_.assign(pairs.begin() + std::ptrdiff_t(certain_), pairs.end());
+    Strategy<S>::confirm_candidates(t, open_);
+    pairs.resize(certain_);
+    pairs.insert(pairs.end(), open_.begin(), open_.end());
+  }
+  std::size_t bytes() const override { return bounds_.bytes() + join_.bytes() + filter_.bytes(); }
+
+ private:
+  void join() {
+    join_.join(bounds_.segment(), this->scene_, this->scene_.pairs());
+    if (triangles_) filter_.start(join_);
+  }
+  LinearBounds<S> bounds_;
+  IntervalJoin<S> join_;
+  TriangleSpanFilter<S> filter_;
+  PairBuffer open_;
+  bool triangles_ = true;
+  std::size_t certain_ = 0;
+  std::uint64_t ends_ = 0;
+};
+
+/// One list of near pairs for all frames that the motion's bound allows.
+template <class S, class Count, Fault fault>
+class Near : public StoredHierarchyStrategy<S, Count> {
+  using Base = StoredHierarchyStrategy<S, Count>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::step_bound;
+  Near(const SceneView<S>& scene, const SteppedMotion<S>& motion, Topologies topologies, const Params& params)
+      : Base(scene, motion, std::move(topologies), params),
+        motion_(motion),
+        lists_(scene.pairs().size()),
+        rows_(scene.body_count()) {}
+  void reset_to(double /*t*/) override { search(); }
+  void advance_to(double t) override {
+    for (std::uint32_t body = 0; body < rows_.size(); ++body) {
+      const double way = motion_.displacement_bound(body, this->previous_time(), t);
+      moved_[body] += fault == Fault::small_closing ? way / 10 : way;
+    }
+    if (*std::max_element(moved_.begin(), moved_.end()) > 0.999 * double(margin)) search();
+  }
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+    for (std::size_t i = 0; i < lists_.size(); ++i) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      lists_[i].read(std::min(1.0, (moved_[pair.first] + moved_[pair.second] + 1e-5) / double(2 * margin)),
+                     out);
+    }
+    return {};
+  }
+  std::optional<AuditView> audit_view(std::uint32_t /*body*/) const override { return {}; }
+
+ private:
+  static constexpr S margin = S(0.25);
+  void update(std::uint32_t /*body*/) override {}
+  void search() {
+    moved_.assign(rows_.size(), 0);
+    constexpr S margins[6] = {margin, margin, margin, margin, margin, margin};
+    constexpr S reach[6] = {2 * margin, 2 * margin, 2 * margin, 2 * margin, 2 * margin, 2 * margin};
+    for (std::uint32_t body = 0; body < rows_.size(); ++body) {
+      auto& hierarchy = this->hierarchies_[body];
+      hierarchy.positions_changed();
+      this->sampled_.fetch_all(body);
+      this->refit(body);
+      for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
+        Box<S> box = hierarchy.box(node);
+        for (int axis = 0; axis < 3; ++axis) {
+          box.lower[axis] -= margin;
+          box.upper[axis] += margin;
+        }
+        hierarchy.set_box(node, box);
+      }
+      if (fault != Fault::stale_rows) rows_[body].positions_changed();
+    }
+    std::uint64_t tests = 0;
+    for (std::size_t i = 0; i < lists_.size(); ++i) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      lists_[i].clear();
+      if (this->hierarchies_[pair.first].empty() || this->hierarchies_[pair.second].empty()) continue;
+      const auto side = [&](std::uint32_t body) -> NearSide<S> {
+        return {&this->hierarchies_[body], this->sampled_.positions(body), margins, &rows_[body]};
+      };
+      lists_[i].build(side(pair.first), side(pair.second), pair.first, pair.second, reach, work_, tests);
+    }
+  }
+  SteppedMotion<S> motion_;
+  std::vector<NearPairs<S>> lists_;
+  std::vector<NearLeafRows<S>> rows_;
+  NearWork<S> work_;
+  std::vector<double> moved_;
+};
+
+/// A refit that answers sweeps by boxes over both ends of the motion.
+template <class S, class Count, Fault fault>
+class Sweep : public StoredHierarchyStrategy<S, Count>, public AnswersSweeps<S> {
+  using Base = StoredHierarchyStrategy<S, Count>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  using Base::Base;
+
+ private:
+  void update(std::uint32_t body) override { this->refit(body); }
+  void find_swept_pairs(double /*t0*/, double /*t1*/, std::span<const S* const> before,
+                        PairBuffer& out) override {
+    std::vector<const S*> from(before.begin(), before.end());
+    if (fault == Fault::ends_only)
+      for (std::uint32_t body = 0; body < from.size(); ++body) from[body] = this->sampled_.positions(body);
+    this->sweep(from, out);
+  }
+};
+
+template <template <class, class, Fault> class Family, Fault fault>
+struct With {
+  template <class S, class Count>
+  using Strategy = Family<S, Count, fault>;
+};
+
+template <template <class, class, Fault> class Family, Fault fault>
+StrategyEntry entry_of() {
+  Info info;
+  info.id = "faulty";
+  info.tightness = Tightness::conservative;
+  info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
+  return make_entry<With<Family, fault>::template Strategy>(info);
+}
+
+/// The first violation in float and in double.
+template <template <class, class, Fault> class Family, Fault fault>
+std::pair<std::string, std::string> violations(const char* scene, std::uint32_t l = 7) {
+  const StrategyEntry entry = entry_of<Family, fault>();
+  const BuilderConfig& builder = entry.info.topology.preferred;
+  return {check(entry, synthetic_scene<float>(scene, l), l, {}, builder),
+          check(entry, synthetic_scene<double>(scene, l), l, {}, builder)};
+}
+template <template <class, class, Fault> class Family>
+void expect_sound(std::initializer_list<const char*> scenes) {
+  for (const char* const scene : scenes) {
+    const auto [in_float, in_double] = violations<Family, Fault::none>(scene);
+    EXPECT_EQ(in_float, "") << scene;
+    EXPECT_EQ(in_double, "") << scene;
+  }
+}
+template <template <class, class, Fault> class Family, Fault fault>
+void expect_caught(const char* scene, const std::string& expected) {
+  const auto [in_float, in_double] = violations<Family, fault>(scene);
+  EXPECT_NE(in_float.find(expected), std::string::npos) << "in float: " << in_float;
+  EXPECT_NE(in_double.find(expected), std::string::npos) << "in double: " << in_double;
+}
+
+TEST(FamilyFaults, SoundLinearBoundsPass) {
+  expect_sound<Linear>({"soups", "sheets", "plan_changes", "four_bodies_own_keyframes"});
+}
+TEST(FamilyFaults, ASegmentThatIsNotMade) {
+  expect_caught<Linear, Fault::stale_segment>("soups", "protrudes");
+}
+TEST(FamilyFaults, EndsExchanged) {
+  expect_caught<Linear, Fault::reversed_time>("soups", "not among the candidates");
+}
+TEST(FamilyFaults, LinearBoxesTooSmall) {
+  expect_caught<Linear, Fault::small_margin>("soups", "protrudes");
+}
+TEST(FamilyFaults, PlansForgottenByLinearBounds) {
+  expect_caught<Linear, Fault::plans_forgotten>("plan_changes", "protrudes");
+}
+
+TEST(FamilyFaults, SoundJoinPasses) {
+  expect_sound<Join>({"soups", "sheets", "plan_changes", "four_bodies_own_keyframes"});
+}
+TEST(FamilyFaults, ASegmentThatIsNotJoined) {
+  expect_caught<Join, Fault::stale_segment>("soups", "t = ");
+}
+TEST(FamilyFaults, PairsThatBeginLate) {
+  expect_caught<Join, Fault::late_begin>("soups", "t = ");
+}
+TEST(FamilyFaults, PairsThatEndEarly) {
+  expect_caught<Join, Fault::early_end>("soups", "t = ");
+}
+TEST(FamilyFaults, VerdictsBeyondTheirProof) {
+  expect_caught<Join, Fault::overdue_verdict>("soups", "t = ");
+}
+TEST(FamilyFaults, PlansForgottenByTheJoin) {
+  expect_caught<Join, Fault::plans_forgotten>("plan_changes", "t = ");
+}
+
+TEST(FamilyFaults, SoundNearPairsPass) {
+  expect_sound<Near>({"soups", "sheets", "four_bodies_own_keyframes"});
+}
+TEST(FamilyFaults, ClosingTakenForLess) {
+  expect_caught<Near, Fault::small_closing>("soups", "not among the candidates");
+}
+TEST(FamilyFaults, RowsOfTheSearchBefore) {
+  expect_caught<Near, Fault::stale_rows>("soups", "not among the candidates");
+}
+
+/// Contacts that a strategy's sweeps miss on a scene.
+template <class S, Fault fault>
+std::size_t missed_contacts(const char* name) {
+  const auto test = synthetic_scene<S>(name);
+  const StrategyEntry entry = entry_of<Sweep, fault>();
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+  ContactFinder<S> finder(test.scene);
+  Playback<S> playback(test.scene);
+  const std::vector<double> knots = overlaid_keyframes(test.scene);
+  PhaseTimes ignored;
+  std::size_t missed = 0;
+  session.reset(knots[0]);
+  for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+    playback.seek(knots[k]);
+    playback.evaluate_all();
+    finder.start(playback);
+    playback.seek(knots[k + 1]);
+    playback.evaluate_all();
+    ContactBuffer truth, found;
+    finder.find_all(playback, truth);
+    session.contacts(knots[k + 1], found, ignored);
+    std::sort(truth.begin(), truth.end());
+    std::sort(found.begin(), found.end());
+    for (const Contact& contact : truth)
+      missed += std::binary_search(found.begin(), found.end(), contact) ? 0 : 1;
+  }
+  return missed;
+}
+TEST(FamilyFaults, SoundSweepsPass) {
+  EXPECT_EQ((missed_contacts<float, Fault::none>("soups")), 0u);
+  EXPECT_EQ((missed_contacts<double, Fault::none>("soups")), 0u);
+}
+TEST(FamilyFaults, SweepsOfTheEndOnly) {
+  EXPECT_GT((missed_contacts<float, Fault::ends_only>("soups")), 0u);
+  EXPECT_GT((missed_contacts<double, Fault::ends_only>("soups")), 0u);
+}
+
+}  // namespace
+}  // namespace kbvh::test
