@@ -318,7 +318,7 @@ def plain(claims: Claims) -> str:
             lines.append(f"     {NOT_MEASURED}: {'; '.join(row.unmeasured)}")
         for one in row.apart:
             lines.append(f"     on {text.listing(one.scenes)}: {one.verdict}")
-        lines.append(f"     {row.why}")
+        lines.append(f"     {row.brief}")
     return "\n".join(lines)
 
 

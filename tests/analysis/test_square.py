@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import re
 import tempfile
 import unittest
@@ -18,6 +19,7 @@ import claim_pictures
 import claim_words
 import claims
 import load
+import plan_cost
 import report
 
 STRUCTURES = ("kinetic_aabb", "kinetic_boxtree", "kinetic_separation_list")
@@ -181,6 +183,31 @@ class TestClips(Case):
         self.assertEqual(row.verdict, claims.FAILS)
         without = self.row("E15", [one for one in lines if not named("rebuild")(one)])
         self.assertEqual((without.verdict, without.unmeasured), (claims.HOLDS, ["the best rebuild"]))
+
+
+class TestPlans(unittest.TestCase):
+    def plan(self, name: str) -> dict[str, Any]:
+        file = Path(claims.FILE).parents[1] / "experiments" / "plans" / name
+        return json.loads(file.read_text(encoding="utf-8"))
+
+    def test_have_the_contestants_of_2006(self) -> None:
+        wanted = [corner["denominator"] for square in claims.read_claims()["squares"].values() for corner in square
+                  if "params" in corner.get("denominator", {})]  # fmt: skip
+        self.assertEqual({term["strategy"] for term in wanted}, set(STRUCTURES))
+        for name, studies in (("default.json", 2), ("paper.json", 9)):
+            for term in wanted:
+                with self.subTest(name, term=term):
+                    listed = [
+                        study for study in self.plan(name)["studies"]
+                        for one in study.get("strategies", [])
+                        if isinstance(one, dict) and one["id"] == term["strategy"]
+                        and one.get("params", {}).get("queue") == "avl"
+                        and all(term["params"].get(key, value) == value for key, value in one["params"].items())
+                    ]  # fmt: skip
+                    self.assertGreaterEqual(len(listed), studies)
+
+    def test_the_default_study_stays_short(self) -> None:
+        self.assertLess(sum(plan_cost.pieces(self.plan("default.json")).values()), 12)
 
 
 class Articles(HTMLParser):
