@@ -9,7 +9,7 @@ from typing import Any, Optional
 import numpy as np
 
 import text
-from load import Study
+from load import PHASES, Study
 
 #: Phases that make up a time, in the names of claims.json.
 TIMES: dict[str, tuple[str, ...]] = {
@@ -52,7 +52,7 @@ class Value:
 class Point:
     """A check's value at one place."""
 
-    baseline: str  #: id of the baseline, or "" where the check has none
+    corner: str  #: id of the corner or baseline, or "" where the check has none
     quantity: str
     scene: str
     size: float
@@ -65,13 +65,35 @@ class Point:
     close: bool  #: do repetitions disagree on whether the check is met?
 
 
+@dataclass(frozen=True)
+class Corner:
+    """The two sides of a check: a corner of its square, a baseline in turn, or the check's own terms."""
+
+    id: str  #: "" where the check has only one
+    name: str  #: in a sentence
+    who: str  #: the side that is judged, without what it is compared with
+    short: str  #: beside a picture
+    above: dict[str, Any]  #: the numerator, or the only term
+    below: Optional[dict[str, Any]]
+    optional: bool  #: its absence leaves the claim decided
+    needs: Optional[dict[str, Any]]  #: tables without a run of this term do not count
+
+
 @dataclass
 class Looked:
     """All points of one check, and the missing data."""
 
     check: dict[str, Any]
+    corners: list[Corner] = field(default_factory=list)
     points: list[Point] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
+    gaps: dict[str, list[str]] = field(default_factory=dict)  #: by optional corner: the missing data
+
+    def unmeasured(self) -> list[Corner]:
+        """Returns the corners without points; none if the check is required and has no points at all."""
+        known = {point.corner for point in self.points}
+        counts = self.points or all(one.optional for one in self.corners)
+        return [one for one in self.corners if counts and one.id not in known]
 
 
 def met(check: dict[str, Any], value: float) -> bool:
@@ -106,7 +128,7 @@ class Table:
         self.rows["size"] = self.rows["size"].where(self.rows["size"] > 0, self.rows["primitives"])
         self._row: dict[int, dict[str, Any]] = {int(row["run"]): row for row in self.rows.to_dict("records")}
         repetitions = study.repetitions.sort_values(["run", "repetition"])
-        self._times = {int(run): times for run, times in repetitions.groupby("run")}
+        self._times = {int(run): times[list(PHASES)].to_numpy(dtype=float) for run, times in repetitions.groupby("run")}
         self._places: dict[str, list[Place]] = {}
 
     def places(self, scene: str) -> list[Place]:
@@ -126,7 +148,7 @@ class Table:
         row = self._row[run]
         scale = row["l"] if quantity.endswith("per keyframe") else 1.0
         if quantity in TIMES:
-            return self._times[run][list(TIMES[quantity])].to_numpy(dtype=float).sum(axis=1) * scale
+            return self._times[run][:, [PHASES.index(name) for name in TIMES[quantity]]].sum(axis=1) * scale
         if quantity == "values per event":
             events = row["certificates_failed_per_frame"]
             known = [row["values_written_per_frame"] / events] if events > 0 else []
@@ -158,7 +180,11 @@ class Table:
 
 def _fits(row: dict[str, Any], term: dict[str, Any], quantity: str) -> bool:
     """Returns whether a run matches the term."""
+    if "one_of" in term:
+        return any(_fits(row, one, quantity) for one in term["one_of"])
     if any(row[column] != term[name] for column, name in NAMED.items() if name in term):
+        return False
+    if row["id"] in term.get("except", []):
         return False
     if row["guarantee"] == "approximate" or row["id"] in term.get("not_for", {}).get(quantity, []):
         return False
@@ -196,6 +222,8 @@ def quotient(table: Table, above: int, below: int, quantity: str) -> Optional[Va
 
 def words_of(term: dict[str, Any]) -> str:
     """Describes a term in words, for messages about missing data."""
+    if "one_of" in term:
+        return " or ".join(words_of(one) for one in term["one_of"])
     settings = {**term.get("builder", {}), **term.get("params", {})}
     told = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in settings.items())
     who = term.get("strategy") or ("any baseline" if "baseline" in term else f"any {term['family']}")
@@ -205,49 +233,75 @@ def words_of(term: dict[str, Any]) -> str:
 class Looker:
     """Evaluates checks on one study."""
 
-    def __init__(self, table: Table, baselines: list[dict[str, Any]]) -> None:
+    def __init__(
+        self, table: Table, baselines: list[dict[str, Any]], squares: Optional[dict[str, list[dict[str, Any]]]] = None
+    ) -> None:
         self.table = table
-        self.baselines = baselines
+        self.baselines = {one["id"]: one for one in baselines}
+        self.squares = squares or {}
 
     def look(self, check: dict[str, Any]) -> Looked:
         """Returns all points of the check, and the missing data. Raises ClaimError for an inconsistent check."""
         if check["measure"] not in MEASURES:
             raise ClaimError(f'the measure "{check["measure"]}" is none of {", ".join(MEASURES)}')
-        looked = Looked(check)
+        looked = Looked(check, self._corners(check))
         for quantity in check["quantities"]:
-            for baseline, above, below in self._sides(check):
+            for corner in looked.corners:
                 for scene in check["scenes"]:
-                    points, missing = self._scene(check, quantity, baseline, above, below, scene)
+                    points, missing = self._scene(check, quantity, corner, scene)
                     looked.points += points
-                    looked.missing += [one for one in missing if one not in looked.missing]
+                    listed = looked.gaps.setdefault(corner.id, []) if corner.optional else looked.missing
+                    listed += [one for one in missing if one not in listed]
                 for scene in check.get("optional_scenes", []):
-                    looked.points += self._scene(check, quantity, baseline, above, below, scene)[0]
+                    looked.points += self._scene(check, quantity, corner, scene)[0]
         return looked
 
-    def _sides(self, check: dict[str, Any]) -> list[tuple[str, dict[str, Any], Optional[dict[str, Any]]]]:
-        """Returns the baseline, the numerator term and the denominator term (None without one), for each baseline that
-        counts.
-        """
-        above, below = check.get("numerator", check.get("of")), check.get("denominator")
+    def _corners(self, check: dict[str, Any]) -> list[Corner]:
+        """Returns the corners of the check's square, else a corner for each baseline that it names, else one for its own terms."""
+        if "square" in check:
+            if check["square"] not in self.squares:
+                raise ClaimError(f'there is no square "{check["square"]}"')
+            listed = self.squares[check["square"]]
+        elif "baselines" in (check.get("numerator"), check.get("denominator"), check.get("of")):
+            sides = {name: check[name] for name in ("numerator", "denominator", "of") if name in check}
+            listed = [
+                {**{name: one["id"] if term == "baselines" else term for name, term in sides.items()},
+                 "id": one["id"], "name": f"against {one['name']}", "short": one["short"]}
+                for one in self.baselines.values()
+            ]  # fmt: skip
+        else:
+            listed = [{**check, "id": "", "name": "", "short": ""}]
+        return [self._corner(check, one) for one in listed]
+
+    def _corner(self, check: dict[str, Any], said: dict[str, Any]) -> Corner:
+        above, below = said.get("numerator", said.get("of")), said.get("denominator")
         if above is None or (check["measure"] == "ratio") != (below is not None):
             raise ClaimError(f'the check "{check["what"]}" does not say what it is of')
-        if "baselines" not in (above, below):
-            return [("", above, below)]
-        return [
-            (one["id"], one if above == "baselines" else above, one if below == "baselines" else below)
-            for one in self.baselines
-        ]
+        return Corner(
+            said["id"], said["name"], said.get("who", said["name"]), said["short"], self._term(above),
+            None if below is None else self._term(below), bool(said.get("optional", False)), said.get("needs"),
+        )  # fmt: skip
 
-    def _scene(
-        self, check: dict[str, Any], quantity: str, baseline: str, above: dict[str, Any],
-        below: Optional[dict[str, Any]], scene: str,
-    ) -> tuple[list[Point], list[str]]:  # fmt: skip
+    def _term(self, said: Any) -> dict[str, Any]:
+        """Returns a term, or the term of the named baseline."""
+        if isinstance(said, dict):
+            return said
+        if said not in self.baselines:
+            raise ClaimError(f'there is no baseline "{said}"')
+        return self.baselines[said]
+
+    def _scene(self, check: dict[str, Any], quantity: str, corner: Corner, scene: str) -> tuple[list[Point], list[str]]:
         """Returns the points of one scene, and the reasons why they do not suffice."""
+        above, below = corner.above, corner.below
         low, high = check["size"]
         everywhere = self.table.places(scene)
         if not everywhere:
             return [], [f"results of the scene {scene}"]
         places = [place for place in everywhere if low / SLACK <= place[0] <= high * SLACK]
+        if places and corner.needs is not None:
+            places = [one for one in places if any(_fits(row, corner.needs, quantity) for row in one[2])]
+            if not places:
+                return [], [f"{words_of(corner.needs)} on {scene}"]
         wanted = f"{text.size(low)} to {text.size(high)}"
         if not places:
             there = text.listing([text.size(size) for size in sorted({place[0] for place in everywhere})])
@@ -255,7 +309,7 @@ class Looker:
         made = {
             "ratio": self._ratio, "value": self._value, "exponent": self._exponent, "next_l": self._over_l,
             "ten_l": self._over_l, "across": self._across,
-        }[check["measure"]](check, quantity, baseline, above, below, scene, places)  # fmt: skip
+        }[check["measure"]](check, quantity, corner.id, above, below, scene, places)  # fmt: skip
         if not made:
             terms = text.listing([words_of(term) for term in (above, below) if term is not None])
             return [], [self._why_nothing(check, terms, scene, places)]
@@ -288,7 +342,7 @@ class Looker:
             gaps.append(f"{scene} at l = {check['l_reaches']:g} or more (measured: {depths})")
         return gaps
 
-    def _point(self, check: dict[str, Any], quantity: str, baseline: str, scene: str, size: float, l: float,
+    def _point(self, check: dict[str, Any], quantity: str, corner: str, scene: str, size: float, l: float,
                value: Optional[Value], runs: list[int]) -> list[Point]:  # fmt: skip
         if value is None or not math.isfinite(value.middle):
             return []
@@ -296,32 +350,32 @@ class Looker:
         ends = {met(check, value.low), met(check, value.high)}
         return [
             Point(
-                baseline, quantity, scene, size, l, value, met(check, value.middle),
+                corner, quantity, scene, size, l, value, met(check, value.middle),
                 tuple(dict.fromkeys(str(row["group"]) for row in rows)), tuple(str(row["key"]) for row in rows),
                 " / ".join(dict.fromkeys(str(row["label"]) for row in rows)), len(ends) > 1,
             )
         ]  # fmt: skip
 
-    def _ratio(self, check, quantity, baseline, above, below, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+    def _ratio(self, check, quantity, corner, above, below, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
         points: list[Point] = []
         for size, l, rows in places:
             a, b = self.table.chosen(rows, above, quantity), self.table.chosen(rows, below, quantity)
             if a is not None and b is not None:
                 value = quotient(self.table, a, b, quantity)
-                points += self._point(check, quantity, baseline, scene, size, l, value, [a, b])
+                points += self._point(check, quantity, corner, scene, size, l, value, [a, b])
         return points
 
-    def _value(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+    def _value(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
         points: list[Point] = []
         for size, l, rows in places:
             run = self.table.chosen(rows, of, quantity)
             if run is not None:
                 known = self.table.values(run, quantity)
                 value = Value(float(np.median(known)), float(known.min()), float(known.max()))
-                points += self._point(check, quantity, baseline, scene, size, l, value, [run])
+                points += self._point(check, quantity, corner, scene, size, l, value, [run])
         return points
 
-    def _exponent(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+    def _exponent(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
         """Returns the slope in logarithms at each l with enough sizes; its extremes come from leaving one size out."""
         points: list[Point] = []
         for depth in sorted({l for _, l, _ in places}):
@@ -337,11 +391,14 @@ class Looker:
             every = np.ones(len(x), dtype=bool)
             without = [slope(np.arange(len(x)) != i) for i in range(len(x))] if len(x) > 2 else [slope(every)]
             value = Value(slope(every), min(without), max(without))
-            points += self._point(check, quantity, baseline, scene, found[-1][0], depth, value, [one[2] for one in found])
+            points += self._point(check, quantity, corner, scene, found[-1][0], depth, value, [one[2] for one in found])
         return points
 
-    def _over_l(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
-        """Compares, at each size, the next l with the preceding l, or ten times an l with that l; within one clip only."""
+    def _over_l(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+        """Compares, at each size, the next l with the preceding l, or ten times an l with that l; within one clip only.
+
+        Only contestants that were measured at both l count.
+        """
         points: list[Point] = []
         for size in sorted({size for size, _, _ in places}):
             depths = [(l, rows) for at, l, rows in places if at == size]
@@ -349,11 +406,15 @@ class Looker:
             if check["measure"] == "ten_l":
                 pairs = [(one, other) for one in depths for other in depths if other[0] == 10 * one[0]]
             for (_, fewer), (l, more) in pairs:
-                a, b = self.table.chosen(more, of, quantity), self.table.chosen(fewer, of, quantity)
+                both = {row["contestant"] for row in more} & {row["contestant"] for row in fewer}
+                a, b = (
+                    self.table.chosen([row for row in rows if row["contestant"] in both], of, quantity)
+                    for rows in (more, fewer)
+                )
                 if a is None or b is None or not self._one_clip(a, b):
                     continue
                 value = quotient(self.table, a, b, quantity)
-                points += self._point(check, quantity, baseline, scene, size, l, value, [a, b])
+                points += self._point(check, quantity, corner, scene, size, l, value, [a, b])
         return points
 
     def _one_clip(self, one: int, other: int) -> bool:
@@ -367,7 +428,7 @@ class Looker:
         a, b = self.table.row(one), self.table.row(other)
         return all(a[name] == b[name] for name in ("machine", "commit", "dirty"))
 
-    def _across(self, check, quantity, baseline, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
+    def _across(self, check, quantity, corner, of, _, scene, places) -> list[Point]:  # type: ignore[no-untyped-def]
         """Divides each point by the largest of the other scene at the same l."""
         low, high = check["other_size"]
         others: dict[float, int] = {}
@@ -379,5 +440,5 @@ class Looker:
             run = self.table.chosen(rows, of, quantity)
             if run is not None and l in others and self._comparable(run, others[l]):
                 value = quotient(self.table, run, others[l], quantity)
-                points += self._point(check, quantity, baseline, scene, size, l, value, [run, others[l]])
+                points += self._point(check, quantity, corner, scene, size, l, value, [run, others[l]])
         return points

@@ -17,7 +17,8 @@ from typing import Any, Optional
 
 import files
 import text
-from claim_points import SLACK, ClaimError, Looked, Looker, Point, Table
+from claim_points import SLACK, ClaimError, Looked, Looker, Table
+from claim_words import NOT_MEASURED, as_in_2006, brief, brief_theory, condition, rule, sentence, unmeasured
 from load import ResultError, Study, load, read_json
 
 SCHEMA = "kbvh-claims-1"
@@ -38,6 +39,17 @@ class Apart:
 
 
 @dataclass
+class CornerVerdict:
+    """A check in one corner of its square."""
+
+    check: str
+    id: str
+    name: str
+    verdict: str  #: one of a claim's, or "not measured here"
+    rule: str  #: where it is met
+
+
+@dataclass
 class Row:
     """One claim in the form of the report."""
 
@@ -45,7 +57,7 @@ class Row:
     claim: str
     citation: str
     paper: str  #: the paper's number, or bound
-    ours: dict[str, str]  #: by baseline ("" for what has none): the measured range
+    ours: dict[str, str]  #: by corner or baseline ("" for what has none): the measured range
     verdict: str
     condition: str
     why: str
@@ -56,6 +68,12 @@ class Row:
     apart: list[Apart] = field(default_factory=list)  #: generated scenes and others, each for itself
     differ: str = ""  #: by what these differ, where they do
     checks: list[dict[str, Any]] = field(default_factory=list)  #: for the data file
+    brief: str = ""  #: why, in two sentences
+    corners: list[CornerVerdict] = field(default_factory=list)  #: of checks with a square, each for itself
+    shown: str = ""  #: numbers beside the verdict
+    unmeasured: list[str] = field(default_factory=list)  #: corners that were not measured, or not all of them
+    as_in_2006: list[str] = field(default_factory=list)  #: corners at their best that are no faster than in 2006
+    looked: list[Looked] = field(default_factory=list)  #: for the picture and the tables
 
 
 @dataclass
@@ -74,10 +92,10 @@ def read_claims(file: Path = FILE) -> dict[str, Any]:
 def evaluate(study: Study, folder: Path, file: Path = FILE) -> Claims:
     """Evaluates every claim, theory first. Raises ClaimError."""
     said = read_claims(file)
-    looker = Looker(Table(study, said["scalar"]), said["baselines"])
+    looker = Looker(Table(study, said["scalar"]), said["baselines"], said.get("squares", {}))
     try:
         rows = theory_rows(said["theory"], folder)
-        rows += [experiment_row(claim, looker, said["baselines"]) for claim in said["claims"]]
+        rows += [experiment_row(claim, looker) for claim in said["claims"]]
     except KeyError as problem:
         raise ClaimError(f"{file}: a claim has no {problem}") from None
     return Claims(rows, said["baselines"])
@@ -100,29 +118,30 @@ def theory_rows(listed: list[dict[str, Any]], folder: Path) -> list[Row]:
         judged = known.get(one["id"])
         if judged is None:
             why = f"Missing: {missing[0]}."
-            rows.append(Row(one["id"], one["claim"], "", "", {}, OPEN, "", why, list(missing)))
+            rows.append(Row(one["id"], one["claim"], "", "", {}, OPEN, "", why, list(missing), brief=why))
             continue
         rows.append(
             Row(
                 judged["id"], judged["claim"][:1].upper() + judged["claim"][1:], judged["citation"], judged["bound"], {"": judged["measured"]},
                 judged["verdict"], judged["condition"], judged["why"], checks=judged["criteria"],
+                brief=brief_theory(judged["condition"], judged["why"]),
             )
         )  # fmt: skip
     return rows
 
 
-def experiment_row(claim: dict[str, Any], looker: Looker, baselines: list[dict[str, Any]]) -> Row:
+def experiment_row(claim: dict[str, Any], looker: Looker) -> Row:
     """Checks one claim against the measurements."""
-    names = {one["id"]: one["name"] for one in baselines}
     looked = [looker.look(check) for check in claim["checks"]]
     missing = list(dict.fromkeys(gap for one in looked for gap in one.missing))
     verdict = verdict_of(looked)
-    sentences = [sentence(one, names) for one in looked if one.points]
+    sentences = [sentence(one) for one in looked if one.points]
     if missing:
         so_far = "Measured so far: " if sentences else ""
         sentences = [f"Missing: {text.listing(missing)}.", so_far + " ".join(sentences)]
-    sentences += [shown(one, looker.table, claim) for one in claim.get("shown", [])]
-    separate = apart(looked, names)
+    beside = [told for one in claim.get("shown", []) if (told := shown(one, looker.table, claim))]
+    sentences += beside
+    separate = apart(looked)
     return Row(
         id=claim["id"],
         claim=claim["claim"],
@@ -130,7 +149,7 @@ def experiment_row(claim: dict[str, Any], looker: Looker, baselines: list[dict[s
         paper=claim["paper"],
         ours=ours(looked),
         verdict=verdict,
-        condition=condition(looked, names) if verdict == CONDITION else "",
+        condition=condition(looked) if verdict == CONDITION else "",
         why=" ".join(one for one in sentences if one).strip(),
         missing=missing,
         note=claim.get("note", ""),
@@ -139,12 +158,21 @@ def experiment_row(claim: dict[str, Any], looker: Looker, baselines: list[dict[s
         apart=separate,
         differ=differences(separate, looker.table, claim),
         checks=[_check_record(one) for one in looked],
+        brief=brief(looked, missing),
+        corners=[one for part in looked if "square" in part.check for one in corner_verdicts(part)],
+        shown=" ".join(beside),
+        unmeasured=unmeasured(looked),
+        as_in_2006=as_in_2006(looked),
+        looked=looked,
     )
 
 
 def verdict_of(looked: list[Looked]) -> str:
     """Decides: undecided while data are missing; refuted by a check that is met nowhere; else by whether all points are met.
+
+    A check with optional corners only does not count without points.
     """
+    looked = [one for one in looked if one.points or not all(corner.optional for corner in one.corners)]
     if not looked or any(one.missing or not one.points for one in looked):
         return OPEN
     if any(not any(point.met for point in one.points) for one in looked):
@@ -152,7 +180,17 @@ def verdict_of(looked: list[Looked]) -> str:
     return HOLDS if all(point.met for one in looked for point in one.points) else CONDITION
 
 
-def apart(looked: list[Looked], names: dict[str, str]) -> list[Apart]:
+def corner_verdicts(looked: Looked) -> list[CornerVerdict]:
+    """Evaluates each corner of a check by itself."""
+    found = []
+    for corner in looked.corners:
+        mine = [point for point in looked.points if point.corner == corner.id]
+        verdict = verdict_of([Looked(looked.check, [corner], mine)]) if mine else NOT_MEASURED
+        found.append(CornerVerdict(looked.check["what"], corner.id, corner.name, verdict, rule(looked, corner)))
+    return found
+
+
+def apart(looked: list[Looked]) -> list[Apart]:
     """Evaluates the claim on the deciding scenes, and on each optional scene, at the l that all of them have; empty without
     optional scenes.
     """
@@ -169,9 +207,11 @@ def apart(looked: list[Looked], names: dict[str, str]) -> list[Apart]:
     common = set.intersection(*(set().union(*(depths[scene] for scene in part)) for part in parts))
     found = []
     for scenes in parts:
-        part = [Looked(one.check, [p for p in one.points if p.scene in scenes and p.l in common]) for one in looked]
+        part = [
+            Looked(one.check, one.corners, [p for p in one.points if p.scene in scenes and p.l in common]) for one in looked
+        ]
         verdict = verdict_of(part)
-        found.append(Apart(scenes, sorted(common), verdict, condition(part, names) if verdict == CONDITION else ""))
+        found.append(Apart(scenes, sorted(common), verdict, condition(part) if verdict == CONDITION else ""))
     return found
 
 
@@ -198,114 +238,23 @@ def differences(separate: list[Apart], table: Table, claim: dict[str, Any]) -> s
 
 
 def ours(looked: list[Looked]) -> dict[str, str]:
-    """Returns the range of the first check for each baseline, followed by further quantities and checks."""
+    """Returns the range of the first check for each corner, followed by further quantities and checks."""
     result: dict[str, list[str]] = {}
     for one in looked:
-        for baseline in dict.fromkeys(point.baseline for point in one.points):
+        for corner in dict.fromkeys(point.corner for point in one.points):
             parts = []
             for quantity in dict.fromkeys(point.quantity for point in one.points):
-                values = [p.value.middle for p in one.points if (p.baseline, p.quantity) == (baseline, quantity)]
+                values = [p.value.middle for p in one.points if (p.corner, p.quantity) == (corner, quantity)]
                 if values:
                     parts.append(_range(values) + (" (with motion)" if quantity.endswith("with motion") else ""))
             name = one.check.get("short", "")
-            result.setdefault(baseline, []).append((f"{name}: " if name else "") + ", ".join(parts))
-    return {baseline: "; ".join(parts) for baseline, parts in result.items()}
+            result.setdefault(corner, []).append((f"{name}: " if name else "") + ", ".join(parts))
+    return {corner: "; ".join(parts) for corner, parts in result.items()}
 
 
 def _range(values: list[float]) -> str:
     low, high = text.factor(min(values)), text.factor(max(values))
     return low if low == high else f"{low} to {high}"
-
-
-def _wanted(check: dict[str, Any]) -> str:
-    words = {"<": "below", "<=": "at most", ">": "above", ">=": "at least"}.get(check["relation"], check["relation"])
-    room = f", give or take {text.percent(check['tolerance'])}" if check["tolerance"] else ""
-    return f"{words} {text.factor(check['bound']) if check['bound'] else '0'}{room}"
-
-
-def _kinds(points: list[Point]) -> list[tuple[str, str]]:
-    return list(dict.fromkeys((point.baseline, point.quantity) for point in points))
-
-
-def _against(baseline: str, quantity: str, names: dict[str, str], several: bool) -> str:
-    told = f"against {names[baseline]}" if baseline else ""
-    if quantity.endswith("with motion"):
-        told += " with motion evaluation"
-    elif several:
-        told += " without motion evaluation"
-    return told.strip()
-
-
-def sentence(one: Looked, names: dict[str, str]) -> str:
-    """Describes a check: the measured values, where it is met, and the requirement."""
-    parts = []
-    several = any(quantity.endswith("with motion") for quantity in one.check["quantities"])
-    for baseline, quantity in _kinds(one.points):
-        mine = [point for point in one.points if (point.baseline, point.quantity) == (baseline, quantity)]
-        low, high = min(mine, key=lambda p: p.value.middle), max(mine, key=lambda p: p.value.middle)
-        told = _against(baseline, quantity, names, several)
-        told = f"{told} " if told else ""
-        if len(mine) == 1:
-            told += f"{text.factor(low.value.middle)} ({place(low)}): {where(mine)}"
-        elif text.factor(low.value.middle) == text.factor(high.value.middle):
-            told += f"{text.factor(low.value.middle)} at all {len(mine)} points: {where(mine)}"
-        else:
-            told += (
-                f"{text.factor(low.value.middle)} ({place(low)}) to {text.factor(high.value.middle)} ({place(high)}): "
-                f"{where(mine)}"
-            )
-        close = sum(point.close for point in mine)
-        if close:
-            told += f" (at {text.plural(close, 'point')} repetitions disagree)"
-        parts.append(told)
-    what = one.check["what"]
-    return f"{what[0].upper()}{what[1:]} (wanted: {_wanted(one.check)}): " + "; ".join(parts) + "."
-
-
-def place(point: Point) -> str:
-    """Describes the place of a point."""
-    return f"{point.scene} {text.size(point.size)}, l = {point.l:g}"
-
-
-def where(points: list[Point]) -> str:
-    """Describes the points at which the check is met: the simplest rule that separates them exactly, or a count."""
-    good = [point for point in points if point.met]
-    if len(good) == len(points):
-        return "met everywhere"
-    if not good:
-        return "met nowhere"
-    for name, of, show in (
-        ("l", lambda p: p.l, lambda v: f"l = {v:g}"),
-        ("size", lambda p: p.size, lambda v: f"{text.size(v)} polygons"),
-    ):
-        bad = [of(point) for point in points if not point.met]
-        if min(of(point) for point in good) > max(bad):
-            return f"met from {show(min(of(point) for point in good))} on"
-        if max(of(point) for point in good) < min(bad):
-            return f"met up to {show(max(of(point) for point in good))}"
-    scenes = sorted({point.scene for point in good})
-    if not any(point.scene in scenes for point in points if not point.met):
-        return f"met on {text.listing(scenes)} only"
-    told = "; ".join(place(point) for point in good[:3]) + ("; …" if len(good) > 3 else "")
-    return f"met at {len(good)} of {len(points)} points ({told})"
-
-
-def condition(looked: list[Looked], names: dict[str, str]) -> str:
-    """Returns the condition under which all checks are met, one clause for each check that is not met everywhere."""
-    clauses = []
-    for one in looked:
-        if all(point.met for point in one.points):
-            continue
-        several = any(quantity.endswith("with motion") for quantity in one.check["quantities"])
-        parts = []
-        kinds = _kinds(one.points)
-        for baseline, quantity in kinds:
-            mine = [point for point in one.points if (point.baseline, point.quantity) == (baseline, quantity)]
-            if any(point.met for point in mine):
-                parts.append(f"{_against(baseline, quantity, names, several)} {where(mine)}".strip())
-        unmet = "; nothing else is met" if len(parts) < len(kinds) else ""
-        clauses.append(f"{one.check['what']}: {'; '.join(parts)}{unmet}")
-    return ". ".join(clauses)
 
 
 def shown(one: dict[str, Any], table: Table, claim: dict[str, Any]) -> str:
@@ -328,9 +277,10 @@ def _check_record(one: Looked) -> dict[str, Any]:
     return {
         **{name: one.check[name] for name in ("what", "measure", "quantities", "relation", "bound", "tolerance")},
         "missing": one.missing,
+        "corners": [{"id": corner.id, "name": corner.name, "missing": one.gaps.get(corner.id, [])} for corner in one.corners],
         "points": [
             {
-                "baseline": p.baseline, "quantity": p.quantity, "scene": p.scene, "size": p.size, "l": p.l,
+                "corner": p.corner, "quantity": p.quantity, "scene": p.scene, "size": p.size, "l": p.l,
                 "value": p.value.middle, "low": p.value.low, "high": p.value.high, "met": p.met, "close": p.close,
                 "of": p.of, "keys": list(p.keys),
             }
@@ -347,7 +297,8 @@ def write(claims: Claims, folder: Path) -> Path:
             "id": row.id, "claim": row.claim, "citation": row.citation, "paper": row.paper, "ours": row.ours,
             "verdict": row.verdict, "condition": row.condition, "why": row.why, "missing": row.missing,
             "note": row.note, "figures": row.figures, "apart": [asdict(one) for one in row.apart], "differ": row.differ,
-            "checks": row.checks,
+            "brief": row.brief, "corners": [asdict(one) for one in row.corners], "not_measured": row.unmeasured,
+            "as_in_2006": row.as_in_2006, "checks": row.checks,
         }
         for row in claims.rows
     ]  # fmt: skip
@@ -363,9 +314,11 @@ def plain(claims: Claims) -> str:
         lines.append(f"{row.id:<4} {row.verdict:<23} {row.claim}")
         if row.condition:
             lines.append(f"     if: {row.condition}")
+        if row.unmeasured:
+            lines.append(f"     {NOT_MEASURED}: {'; '.join(row.unmeasured)}")
         for one in row.apart:
             lines.append(f"     on {text.listing(one.scenes)}: {one.verdict}")
-        lines.append(f"     {row.why}")
+        lines.append(f"     {row.brief}")
     return "\n".join(lines)
 
 

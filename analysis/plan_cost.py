@@ -58,10 +58,10 @@ def configurations(strategy: Any) -> tuple[str, int]:
 def contestants(study: dict[str, Any]) -> Iterator[tuple[str, int]]:
     """Returns ids and configurations of all strategies; a group ("default", "family:...") counts as all known ones."""
     asked = [configurations(strategy) for strategy in study.get("strategies", ["default"])]
-    if any(name in ("default", "all") or name.startswith("family:") for name, _ in asked):
+    groups = [name in ("default", "all") or name.startswith("family:") for name, _ in asked]
+    if any(groups):
         yield from ((name, 1) for name in COSTS)
-    else:
-        yield from (pair for pair in asked if not pair[0].startswith("!"))
+    yield from (pair for pair, group in zip(asked, groups) if not group and not pair[0].startswith("!"))
 
 
 def minutes(study: dict[str, Any]) -> float:

@@ -154,14 +154,3 @@ def crossings(x: np.ndarray, own: np.ndarray, reference: np.ndarray) -> list[Cro
         level = math.exp(math.log(own[i]) + share * (math.log(own[j]) - math.log(own[i])))
         result.append(Crossing(at, level, bool(gap[j] < 0)))
     return result
-
-
-def break_even(x: np.ndarray, own: np.ndarray, reference: np.ndarray) -> str:
-    """Describes the crossings."""
-    found = crossings(x, own, reference)
-    if not found:
-        sides = own - reference
-        if not np.any(sides):
-            return "as fast throughout"
-        return "faster throughout" if sides[np.flatnonzero(sides)[0]] < 0 else "slower throughout"
-    return ", ".join(f"{'faster' if c.faster else 'slower'} from l ≈ {c.x:.0f}" for c in found)

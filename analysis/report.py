@@ -17,6 +17,9 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 import choices
+import break_even
+import claim_pictures
+import claim_tables
 import claims as paper_claims
 import exactness
 import figures
@@ -56,7 +59,6 @@ class Section:
     errors: list[Picture] = field(default_factory=list)  #: time against error
     over_l: list[Picture] = field(default_factory=list)  #: time against frames per keyframe
     missing: str = ""  #: reason for a missing figure
-    break_even: list[tuple[str, ...]] = field(default_factory=list)
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
@@ -136,6 +138,8 @@ def write(
         claims=claims,
         tally=_tally(claims),
         claim_links=_claim_links(claims, study, groups, drawn),
+        **_claim_parts(claims),
+        **_break_even(study, claims, all_looks, folder / "figures", which),
         theory=theory,
         paper=paper,
         sections=[section for section in sections if not section.own],
@@ -160,6 +164,35 @@ def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:
     """Counts the claims by verdict."""
     verdicts = (paper_claims.HOLDS, paper_claims.CONDITION, paper_claims.FAILS, paper_claims.OPEN)
     return [(verdict, sum(row.verdict == verdict for row in claims.rows)) for verdict in verdicts]
+
+
+def _break_even(
+    study: Study, claims: paper_claims.Claims, all_looks: dict[str, Look], folder: Path, which: str
+) -> dict[str, object]:
+    """Returns the break-even points: a figure and tables."""
+    names, places, single = break_even.places(Table(study, "float"), claims.baselines)
+    reading = (
+        "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. An open arrow "
+        "marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown."
+    )
+    made = picture(
+        folder, "break-even", "From which l on kinetic contestants are faster", reading,
+        lambda: break_even.figure(places, names, all_looks),
+    ) if which != "none" else None  # fmt: skip
+    return {
+        "break_even_baselines": names, "break_even_places": places, "break_even_single": single, "break_even_picture": made,
+    }  # fmt: skip
+
+
+def _claim_parts(claims: paper_claims.Claims) -> dict[str, object]:
+    """Returns pictures and tables of the claims, by id."""
+    return {
+        "theory_ids": {row.id for row in claims.rows if not row.looked},
+        "several_checks": {row.id: len({corner.check for corner in row.corners}) > 1 for row in claims.rows},
+        "claim_pictures": {row.id: Markup(claim_pictures.picture(row.looked, row.checks)) for row in claims.rows},
+        "claim_tables": {row.id: claim_tables.tables(row.looked) for row in claims.rows},
+        "claim_criteria": {row.id: claim_tables.criteria(row.checks) if not row.looked else [] for row in claims.rows},
+    }
 
 
 def _claim_links(
@@ -251,7 +284,7 @@ def _sections(
                         section.pictures += _group_pictures(
                             timed[timed["group"] == other], timed[:0], all_looks, folder, name
                         )
-            over, section.break_even = _trends(timed, head, all_looks, folder, slug)
+            over = _trends(timed, head, all_looks, folder, slug)
             section.over_l = [one for one in over if one.name == f"{slug}-l"]
             section.pictures += [one for one in over if one.name != f"{slug}-l"]
         result.append(section)
@@ -350,7 +383,7 @@ def _left_out(rows: pd.DataFrame) -> str:
 
 def _trends(
     timed: pd.DataFrame, head: str, all_looks: dict[str, Look], folder: Path, slug: str
-) -> tuple[list[Picture], list[tuple[str, ...]]]:
+) -> list[Picture]:
     """Draws lines over l and over n: at the size with most l and at the l with most sizes, or else those of the headline
     group.
     """
@@ -381,7 +414,7 @@ def _trends(
             lambda: figures.over_size(sizes, all_looks),
         ),
     ]  # fmt: skip
-    return [one for one in made if one is not None], tables.break_even(depths) if depths["l"].nunique() > 1 else []
+    return [one for one in made if one is not None]
 
 
 def _most(rows: pd.DataFrame, column: str, counted: str, usual: float) -> float:

@@ -236,33 +236,6 @@ def _first(rows: pd.DataFrame) -> Optional[pd.Series]:
     return rows.iloc[0] if len(rows) else None
 
 
-def break_even(rows: pd.DataFrame) -> list[tuple[str, ...]]:
-    """Returns contestant, label, and in words the point from which on it is faster than the best refit (update, total) and
-    than that of 2006.
-    """
-    result = []
-    lines = [
-        (column, line(rows, column, "l"))
-        for line in (ratios.best_refit_line, ratios.period_line)
-        for column in ("updating", "total_motion")
-    ]
-    for contestant, line in rows[~rows["baseline"]].groupby("contestant"):
-        words = []
-        for column, best in lines:
-            own = line.set_index("l")[column].sort_index()
-            shared = own.index.intersection(best.index) if best is not None else own.index[:0]
-            usable = len(shared) > 1 and (own.loc[shared] > 0).all()
-            words.append(
-                ratios.break_even(shared.to_numpy(dtype=float), own.loc[shared].to_numpy(), best.loc[shared].to_numpy())
-                if usable and best is not None
-                else text.MISSING
-            )
-        if line["family"].iloc[0] == "period":
-            words[2:] = [text.MISSING, text.MISSING]
-        result.append((str(contestant), str(line["label"].iloc[0]), *words))
-    return sorted(result, key=lambda entry: entry[1])
-
-
 PLAIN_COLUMNS = ("strategy", "guarantee", "motion", "update", "query", "total", "ratio", "w/o motion", "missed",
                  "extra", "protrusion", "looseness", "memory")  # fmt: skip
 
