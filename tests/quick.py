@@ -9,6 +9,7 @@ case that fails is printed with what its executable said. Exit code 1 if any fai
 import concurrent.futures
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -24,7 +25,7 @@ def registered(build, options):
 
 
 def batches(tests):
-    """Groups cases of one GoogleTest executable: [(name, number of cases, command, environment, folder)]."""
+    """Groups cases of one GoogleTest executable: [(name, number of cases, command, environment, folder, expected output)]."""
     groups = {}
     for test in tests:
         properties = {p["name"]: p["value"] for p in test.get("properties", [])}
@@ -34,10 +35,10 @@ def batches(tests):
         rest = [word for word in test["command"] if word not in cases and word != "--also_run_disabled_tests"]
         case = cases[0].split("=", 1)[1] if cases else None
         key = (tuple(rest), environment, folder, case is None and test["name"])
-        groups.setdefault(key, (test["name"], []))[1].append(case)
-    for (command, environment, folder, _), (name, cases) in groups.items():
+        groups.setdefault(key, (test["name"], [], properties.get("PASS_REGULAR_EXPRESSION", ())))[1].append(case)
+    for (command, environment, folder, _), (name, cases, expected) in groups.items():
         if cases == [None]:
-            yield name, 1, list(command), environment, folder
+            yield name, 1, list(command), environment, folder, expected
             continue
         filters = [""]
         for case in cases:
@@ -46,18 +47,21 @@ def batches(tests):
             filters[-1] += (":" if filters[-1] else "") + case
         for part in filters:
             yield (os.path.basename(command[0]), part.count(":") + 1,
-                   [*command, "--gtest_brief=1", "--gtest_filter=" + part], environment, folder)
+                   [*command, "--gtest_brief=1", "--gtest_filter=" + part], environment, folder, expected)
 
 
 def run(batch):
-    name, count, command, environment, folder = batch
+    name, count, command, environment, folder, expected = batch
     variables = {**os.environ, **dict(entry.split("=", 1) for entry in environment)}
     if "--gtest_filter=" in command[-1]:
         variables.pop("GTEST_FILTER", None)  # for the suites in shards; here the cases are named
     begin = time.monotonic()
     ran = subprocess.run(command, cwd=folder, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                          errors="replace")
-    return name, count, ran.returncode, ran.stdout, time.monotonic() - begin
+    code = ran.returncode
+    if expected:  # as for ctest, the output decides
+        code = 0 if any(re.search(text, ran.stdout, re.DOTALL) for text in expected) else code or 1
+    return name, count, code, ran.stdout, time.monotonic() - begin
 
 
 def main():

@@ -79,10 +79,13 @@ bool has_times(const json& record) {
 std::vector<double> phase_values(const json& record, const std::string& phase) {
   std::vector<double> values;
   const bool per_event = phase == "update_per_event";
-  // Counters are of the whole clip, times of a frame.
-  const double events = per_event ? record.at("counters").value("certificates_failed", 0.0) /
-                                        record.at("scene").at("frames").get<double>()
-                                  : 1;
+  double events = 1;  // per frame
+  if (per_event) {
+    // Counters are of the whole clip, times of a frame.
+    using json_pointer = json::json_pointer;
+    const double frames = record.value(json_pointer("/scene/frames"), 0.0);
+    events = frames > 0 ? record.value(json_pointer("/counters/certificates_failed"), 0.0) / frames : 0;
+  }
   for (const json& repetition : record.at("times").at("repetitions"))
     values.push_back(events > 0 ? phase_of(repetition, per_event ? "update" : phase) / events : 0);
   return values;

@@ -49,7 +49,10 @@ TargetSelector read_selector(JsonReader& target, const std::string& key) {
   selector.phase = needed_word(keys, "phase");
   if (!has(phases, selector.phase))
     keys.fail("phase", "expected one of " + joined(phases) + ", got '" + selector.phase + "'");
-  if (keys.has("scene")) selector.scene = needed_word(keys, "scene");
+  if (const auto scene = keys.word("scene")) {
+    if (scene->empty()) keys.fail("scene", "is empty");
+    selector.scene = *scene;
+  }
   if (const json* params = keys.find("params")) selector.params = read_params(*params, place + ": params");
   if (const json* builder = keys.find("builder"))
     selector.builder = read_builder(*builder, place + ": builder");

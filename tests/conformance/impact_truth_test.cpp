@@ -132,7 +132,7 @@ TEST(ImpactQueries, ComplainWithTheLine) {
   EXPECT_NE(message("vf.csv", row + "1,0,0,1,0,1,0\n").find("line 2"), std::string::npos);
   EXPECT_NE(message("vf.csv", row + "1,2,0,1,0,1,0\n").find("verdict differs"), std::string::npos);
   EXPECT_NE(message("vf.csv", "1,2,3\n").find("columns"), std::string::npos);
-  EXPECT_NE(message("vf.csv", "x,2,0,1,0,1\n").find("no double"), std::string::npos);
+  EXPECT_NE(message("vf.csv", "x,2,0,1,0,1\n").find("not a double"), std::string::npos);
 }
 
 }  // namespace

@@ -127,8 +127,7 @@ TEST_F(Binary, ScenesOfThousandsOfBodiesAreNotWritten) {
   const auto plan = [&](int bodies) {
     json list = json::array();
     for (int i = 0; i < bodies; ++i)
-      list.push_back(
-          {{"shape", "turning_box"}, {"translate", {0, 0, 3 * i}}, {"name", "b" + std::to_string(i)}});
+      list.push_back({{"shape", "box"}, {"translate", {0, 0, 3 * i}}, {"name", "b" + std::to_string(i)}});
     write_text(folder_ / "plan.json", json{{"scenes", {{{"name", "many"}, {"bodies", list}}}},
                                            {"strategies", "bottom_up"},
                                            {"frames_limit", 2},

@@ -209,13 +209,14 @@ void WideHierarchy<S>::set_box(std::uint32_t node, const Box<S>& box) {
 
 template <class S>
 std::size_t WideHierarchy<S>::bytes() const {
-  return topology_.bytes() + nodes_.size() * sizeof(WideNode) +
-         (child_bounds_.size() + node_bounds_.size() + rows_.size()) * sizeof(S) +
-         (vertices_.size() + leaf_vertices_.offsets.size() + leaf_vertices_.vertices.size() +
-          first_entry_.size() + first_corner_.size() + corners_.size() + primitives_.size() + stamps_.size() +
-          fetched_.size() + parent_.size() + listed_.size()) *
+  return topology_.bytes() + nodes_.capacity() * sizeof(WideNode) +
+         (child_bounds_.capacity() + node_bounds_.capacity() + rows_.capacity()) * sizeof(S) +
+         (vertices_.capacity() + leaf_vertices_.offsets.capacity() + leaf_vertices_.vertices.capacity() +
+          first_entry_.capacity() + first_corner_.capacity() + corners_.capacity() + primitives_.capacity() +
+          stamps_.capacity() + fetched_.capacity() + parent_.capacity() + listed_.capacity()) *
              sizeof(std::uint32_t) +
-         places_.size() * sizeof(Place) + subtrees_.size() * sizeof(Subtree);
+         places_.capacity() * sizeof(Place) + subtrees_.capacity() * sizeof(Subtree) +
+         above_subtrees_.capacity() * sizeof(std::uint32_t);
 }
 
 template <class S>
