@@ -10,6 +10,7 @@
 #include "core/families/boxtree/boxtree_rows.hpp"
 #include "core/families/boxtree/kinetic_boxtree.hpp"
 #include "core/families/events/event_log.hpp"
+#include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
 
 namespace kbvh {
@@ -94,32 +95,15 @@ class KineticBox final : public CountedStrategy<S, Count>,
   }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
-    QueryStatus status;
     std::uint64_t tests = 0;
     for (std::uint32_t body = 0; body < rows_.size(); ++body)
       this->count_.add(Counter::positions_fetched, rows_[body].make_visited(tree_of(body), motion_, body));
-    const auto box_of = [&](std::uint32_t body) {
-      const auto& hierarchy = rows_[body].hierarchy();
-      return hierarchy.empty() ? Box<double>{} : to_double(hierarchy.box(0));
+    const auto side_of = [&](std::uint32_t body) -> typename WideQuery<S>::LazySide {
+      return {&rows_[body].hierarchy(), body, rows_[body].stale()};
     };
-    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
-      const BodyPair& pair = this->scene_.pairs()[i];
-      if (tests >= budget.box_tests) {
-        ++status.pending;
-        continue;
-      }
-      const auto side = [&](std::uint32_t body) -> typename WideQuery<S>::LazySide {
-        return {&rows_[body].hierarchy(), body, rows_[body].stale()};
-      };
-      const auto side_a = side(pair.first), side_b = side(pair.second);
-      query_.start_lazy(side_a, side_b, rest_of(budget, tests));
-      using Wanted = typename WideQuery<S>::Wanted;
-      while (const Wanted wanted = query_.step(side_a, side_b, this->scene_, this->sampled_, out, tests)) {
-        make_wanted(pair.first, wanted.first);
-        make_wanted(pair.second, wanted.second);
-      }
-      status.pending += query_.lazy_status().pending;
-    }
+    const auto make = [&](std::uint32_t body, std::uint32_t node) { make_wanted(body, node); };
+    const QueryStatus status =
+        query_lazily(query_, near_bodies_, this->scene_, this->sampled_, budget, side_of, make, out, tests);
     this->count_.add(Counter::box_tests, tests);
     return status;
   }
@@ -226,9 +210,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
     if (rebuilds_) caches_[body].new_frame();
   }
   void make_wanted(std::uint32_t body, std::uint32_t node) {
-    if (node != WideQuery<S>::Wanted::none)
-      this->count_.add(Counter::positions_fetched,
-                       rows_[body].make_wanted(node, tree_of(body), motion_, body));
+    this->count_.add(Counter::positions_fetched, rows_[body].make_wanted(node, tree_of(body), motion_, body));
   }
 
   /// The boxes of all nodes; these are in `order_` then, parents before children.

@@ -10,6 +10,7 @@
 #include "core/families/boxtree/boxtree_search.hpp"
 #include "core/families/events/certifier.hpp"
 #include "core/families/events/kinetic_forest.hpp"
+#include "core/families/events/observer.hpp"
 
 namespace kbvh {
 
@@ -49,12 +50,8 @@ class BoxTreeCertificates : public BoxTreeBounds {
   /// Theorem 5: responsive in one dimension only).
   void handle(const Event& event) {
     KBVH_ASSERT(event.body == body_);
-    // Where keyframes are all that is looked at, no more than the segment is needed of the instant.
-    const bool exact =
-        reads_instants() || event.segment == Event::no_segment || clock_->plans(body_).has_own_plans();
     Crossing<S> crossing;
-    if (exact) crossing = clock_->crossing(event);
-    const Instant<S> now{event.begin, event.end, exact ? &crossing : nullptr, event.segment};
+    const Instant<S> now = certifier_.instant_of(event, reads_instants(observer_), crossing);
     std::uint32_t at = slots_.place(event.slot);
     KBVH_ASSERT(bounds_[at].realiser == event.winner);
     count_->add(Counter::certificates_failed);
@@ -93,11 +90,6 @@ class BoxTreeCertificates : public BoxTreeBounds {
   }
 
  protected:
-  bool reads_instants() const {
-    if constexpr (requires { observer_.reads_instants(); }) return observer_.reads_instants();
-    return true;
-  }
-
   /// The place whose certificate has the realiser at this one among its candidates.
   std::uint32_t above(std::uint32_t at, Side side) {
     if (listed_) return bounds_[at].above;

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/inverted_lists.hpp"
 #include "core/base/list_pool.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/topology/topology.hpp"
@@ -38,14 +39,7 @@ class BoxTreeLeaves {
   /// Makes the lists of each vertex's leaves, unless they are there. O(nodes + vertices).
   void index(const Topology& topology, std::uint32_t vertex_count) {
     if (users_.keys() != 0) return;
-    std::vector<std::uint32_t> offsets(std::size_t(vertex_count) + 1, 0);
-    for (std::uint32_t entry = 0; entry < lists_.keys(); ++entry)
-      for (std::uint32_t v : lists_[entry]) ++offsets[v + 1];
-    for (std::size_t v = 1; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
-    std::vector<std::uint32_t> users(offsets.back()), next(offsets.begin(), offsets.end() - 1);
-    for (std::uint32_t entry = 0; entry < lists_.keys(); ++entry)
-      for (std::uint32_t v : lists_[entry]) users[next[v]++] = entry;
-    users_ = ListPool(offsets, std::move(users));
+    users_ = inverted(lists_, vertex_count);
     nodes_.assign(lists_.keys(), 0);
     for (std::uint32_t node = 0; node < topology.size(); ++node)
       if (const TopologyNode n = topology.nodes[node]; n.is_leaf() && n.count() > 0) nodes_[n.first()] = node;

@@ -7,6 +7,7 @@
 #include "core/contract/strategy.hpp"
 #include "core/families/envelope/kernels/wide_realisers.hpp"
 #include "core/families/envelope/segment_envelope.hpp"
+#include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 #include "core/motion/round_positions.hpp"
@@ -36,30 +37,14 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
   }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
-    QueryStatus status;
     std::uint64_t tests = 0;
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) make_visited(index);
-    const auto box_of = [&](std::uint32_t body) {
-      const auto& hierarchy = bodies_[body].hierarchy;
-      return hierarchy.empty() ? Box<double>{} : to_double(hierarchy.box(0));
+    const auto side_of = [&](std::uint32_t body) -> typename WideQuery<S>::LazySide {
+      return {&bodies_[body].hierarchy, body, bodies_[body].stale.data()};
     };
-    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
-      const BodyPair& pair = this->scene_.pairs()[i];
-      if (tests >= budget.box_tests) {
-        ++status.pending;
-        continue;
-      }
-      Body &a = bodies_[pair.first], &b = bodies_[pair.second];
-      const typename WideQuery<S>::LazySide side_a{&a.hierarchy, pair.first, a.stale.data()},
-          side_b{&b.hierarchy, pair.second, b.stale.data()};
-      query_.start_lazy(side_a, side_b, rest_of(budget, tests));
-      using Wanted = typename WideQuery<S>::Wanted;
-      while (const Wanted wanted = query_.step(side_a, side_b, this->scene_, this->sampled_, out, tests)) {
-        if (wanted.first != Wanted::none) make_wanted(pair.first, wanted.first);
-        if (wanted.second != Wanted::none) make_wanted(pair.second, wanted.second);
-      }
-      status.pending += query_.lazy_status().pending;
-    }
+    const auto make = [&](std::uint32_t body, std::uint32_t node) { make_wanted(body, node); };
+    const QueryStatus status =
+        query_lazily(query_, near_bodies_, this->scene_, this->sampled_, budget, side_of, make, out, tests);
     this->count_.add(Counter::box_tests, tests);
     return status;
   }

@@ -21,6 +21,15 @@ class Certifier {
  public:
   Certifier(Clock& clock, Queue& queue, Count& count) : clock_(&clock), queue_(&queue), count_(&count) {}
 
+  /// Returns the instant at which an event happens. Its exact time is computed, into `crossing`, if `exact`
+  /// asks for it, or if the event lies in no segment or plans of single vertices changed; else the segment is
+  /// enough.
+  Instant<S> instant_of(const Event& event, bool exact, Crossing<S>& crossing) const {
+    exact = exact || event.segment == Event::no_segment || clock_->plans(event.body).has_own_plans();
+    if (exact) crossing = clock_->crossing(event);
+    return {event.begin, event.end, exact ? &crossing : nullptr, event.segment};
+  }
+
   /// Takes a slot's scheduled failure off the queue, if there is one.
   void withdraw(std::uint32_t slot) {
     if (!queue_->cancel(slot)) return;

@@ -99,12 +99,8 @@ class KineticAabbTree {
   /// the winner realises (leaf and tree events, Z&W s.4). O(depth) certificates.
   void handle(const Event& event) {
     KBVH_ASSERT(event.body == body_);
-    // Who looks at keyframes only needs no more than the segment.
-    const bool exact =
-        reads_instants() || event.segment == Event::no_segment || clock_->plans(body_).has_own_plans();
     Crossing<S> crossing;
-    if (exact) crossing = clock_->crossing(event);
-    const Instant<S> now{event.begin, event.end, exact ? &crossing : nullptr, event.segment};
+    const Instant<S> now = certifier_.instant_of(event, reads_instants(observer_), crossing);
     const Side side = event.side;
     std::uint32_t node = node_of(event.slot);
     KBVH_ASSERT(realiser(node, side) == event.winner);
@@ -119,11 +115,6 @@ class KineticAabbTree {
       if (realiser(node, side) != event.winner) break;
     }
     certify(node, side, now);  // one of its challengers has changed
-  }
-
-  bool reads_instants() const {
-    if constexpr (requires { observer_.reads_instants(); }) return observer_.reads_instants();
-    return true;
   }
 
   /// Looks again for the next failure of a certificate, which stands at t, a keyframe.
@@ -165,7 +156,7 @@ class KineticAabbTree {
   /// The plans of `vertices` (ascending, unique) changed at t, each from its stored position: rechecks every
   /// certificate that they, or realisers that change in consequence, take part in.
   void plans_changed(double t, std::span<const std::uint32_t> vertices) {
-    leaf_vertices_.index(topology_, vertex_count());
+    leaf_vertices_.index(vertex_count());
     touched_.clear();
     leaf_vertices_.add_leaves_of(vertices, touched_);
     repair(t, vertices);

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/inverted_lists.hpp"
 #include "core/base/list_pool.hpp"
 #include "core/topology/topology.hpp"
 #include "core/topology/topology_edit.hpp"
@@ -24,16 +25,8 @@ class LeafVertexLists {
   std::span<const std::uint32_t> operator[](std::uint32_t node) const { return vertices_[node]; }
 
   /// Makes the lists of leaves by vertex, the first time it is called. O(nodes + vertices of leaves).
-  void index(const Topology& topology, std::uint32_t vertex_count) {
-    if (leaves_.keys() != 0) return;
-    std::vector<std::uint32_t> offsets(vertex_count + 1, 0);
-    for (std::uint32_t node = 0; node < topology.size(); ++node)
-      for (std::uint32_t v : vertices_[node]) ++offsets[v + 1];
-    for (std::size_t v = 1; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
-    std::vector<std::uint32_t> leaves(offsets.back()), next(offsets.begin(), offsets.end() - 1);
-    for (std::uint32_t node = 0; node < topology.size(); ++node)
-      for (std::uint32_t v : vertices_[node]) leaves[next[v]++] = node;
-    leaves_ = ListPool(offsets, std::move(leaves));
+  void index(std::uint32_t vertex_count) {
+    if (leaves_.keys() == 0) leaves_ = inverted(vertices_, vertex_count);
   }
   /// Appends the leaves of each of `vertices`. A vertex that was added after `index` and belongs to no
   /// primitive has none.

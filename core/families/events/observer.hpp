@@ -29,4 +29,11 @@ struct NoObserver {
   void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
 };
 
+/// Returns whether an observer needs the exact times of events.
+template <class Observer>
+bool reads_instants(const Observer& observer) {
+  if constexpr (requires { observer.reads_instants(); }) return observer.reads_instants();
+  return true;
+}
+
 }  // namespace kbvh

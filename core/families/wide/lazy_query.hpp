@@ -1,0 +1,40 @@
+#pragma once
+#include <cstdint>
+
+#include "core/families/wide/near_bodies.hpp"
+#include "core/families/wide/wide_hierarchy.hpp"
+
+namespace kbvh {
+
+/// Queries all pairs of bodies that are near each other, with boxes that are made at their first use.
+/// side_of(body) returns the WideQuery<S>::LazySide of a body, whose root is current; make(body, wide node)
+/// makes the boxes of the node's children and clears its mark. Pairs of bodies beyond the budget are pending.
+/// Adds the box tests made to `tests`.
+template <class S, class SideOf, class Make>
+QueryStatus query_lazily(WideQuery<S>& query, NearBodies& near_bodies, const SceneView<S>& scene,
+                         const SampledMotion<S>& motion, const Budget& budget, const SideOf& side_of,
+                         const Make& make, PairBuffer& out, std::uint64_t& tests) {
+  using Wanted = typename WideQuery<S>::Wanted;
+  QueryStatus status;
+  const auto box_of = [&](std::uint32_t body) {
+    const WideHierarchy<S>& hierarchy = *side_of(body).hierarchy;
+    return hierarchy.empty() ? Box<double>{} : to_double(hierarchy.box(0));
+  };
+  for (const std::uint32_t i : near_bodies.find(box_of, tests)) {
+    const BodyPair& pair = scene.pairs()[i];
+    if (tests >= budget.box_tests) {
+      ++status.pending;
+      continue;
+    }
+    const auto first = side_of(pair.first), second = side_of(pair.second);
+    query.start_lazy(first, second, rest_of(budget, tests));
+    while (const Wanted wanted = query.step(first, second, scene, motion, out, tests)) {
+      if (wanted.first != Wanted::none) make(pair.first, wanted.first);
+      if (wanted.second != Wanted::none) make(pair.second, wanted.second);
+    }
+    status.pending += query.lazy_status().pending;
+  }
+  return status;
+}
+
+}  // namespace kbvh
