@@ -106,7 +106,9 @@ class SegmentBoxes {
     return box;
   }
   void prefetch(std::uint32_t body, BoxRole role, std::uint32_t node) const {
-    __builtin_prefetch(bodies_[body].boxes[std::size_t(role)].data() + node);
+    // A body that takes no part in this role has no boxes.
+    const auto& boxes = bodies_[body].boxes[std::size_t(role)];
+    if (node < boxes.size()) __builtin_prefetch(&boxes[node]);
   }
   /// A side of a node has another realiser.
   void side_changed(std::uint32_t body, std::uint32_t node, Side side) {
