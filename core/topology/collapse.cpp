@@ -5,7 +5,8 @@
 
 namespace kbvh {
 
-Topology collapsed(const Topology& binary, std::uint32_t width, std::span<const double> weights) {
+Topology collapsed(const Topology& binary, std::uint32_t width, std::span<const double> weights,
+                   std::vector<std::uint32_t>& node_of) {
   if (binary.width != 2)
     throw std::invalid_argument("only binary topologies are collapsed; this one has width " +
                                 std::to_string(binary.width));
@@ -14,6 +15,7 @@ Topology collapsed(const Topology& binary, std::uint32_t width, std::span<const 
   if (weights.size() != binary.size())
     throw std::invalid_argument(std::to_string(weights.size()) + " weights for " +
                                 std::to_string(binary.size()) + " nodes");
+  node_of.clear();
   if (binary.empty()) {
     Topology topology;
     topology.width = width;
@@ -40,7 +42,7 @@ Topology collapsed(const Topology& binary, std::uint32_t width, std::span<const 
       return TopologyNode::leaf(first, n.count());
     }
   };
-  collapse_into(topology, Source{&binary, weights, &topology.primitives});
+  node_of = collapse_into(topology, Source{&binary, weights, &topology.primitives});
   topology.perfect = is_perfect(topology);
   return topology;
 }

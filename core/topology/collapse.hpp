@@ -34,23 +34,19 @@ inline Topology with_root(std::uint32_t width, std::uint32_t leaf_size) {
 
 /// Collapses a binary tree into nodes of up to `topology.width` children: a node takes the two children of
 /// its binary node, then replaces the heaviest inner child (the first of equals) by that child's own two,
-/// until it is full (Wald et al. 2008, s.3.2). Nodes are numbered depth first: those of a subtree are
+/// until it is full (Wald et al. 2008). Nodes are numbered depth first: those of a subtree are
 /// contiguous, and leaves keep their order from left to right. `topology` comes from `with_root`. `Binary` is
 /// copied and has
 ///   children(node)   the two children, or {0, 0} for a leaf; node 0 is the root
 ///   weight(node)     of inner nodes
 ///   leaf(node)       called for each leaf in order; returns its TopologyNode
-/// O(nodes x width).
+/// Returns the binary node of each node of `topology`. O(nodes x width).
 template <class Binary>
-void collapse_into(Topology& topology, Binary binary) {
-  struct Open {
-    std::uint32_t node, source;
-  };
-  std::vector<Open> open{{0, 0}};
-  std::vector<std::uint32_t> children;
+std::vector<std::uint32_t> collapse_into(Topology& topology, Binary binary) {
+  std::vector<std::uint32_t> sources{0}, open{0}, children;  // [node]; nodes; binary nodes
   const auto is_leaf = [&](std::uint32_t node) { return binary.children(node).first == 0; };
   while (!open.empty()) {
-    const auto [index, source] = open.back();
+    const std::uint32_t index = open.back(), source = sources[index];
     open.pop_back();
     if (is_leaf(source)) {
       topology.nodes[index] = binary.leaf(source);
@@ -70,13 +66,16 @@ void collapse_into(Topology& topology, Binary binary) {
       children.insert(children.begin() + std::ptrdiff_t(heaviest) + 1, second);
     }
     const std::uint32_t first = add_children(topology, index, std::uint32_t(children.size()));
-    for (std::size_t c = children.size(); c-- > 0;) open.push_back({first + std::uint32_t(c), children[c]});
+    sources.insert(sources.end(), children.begin(), children.end());
+    for (std::uint32_t child = topology.size(); child-- > first;) open.push_back(child);
   }
+  return sources;
 }
 
 /// Collapses a binary topology, however it was edited, into nodes of 4 or 8 children; `weights` (of its
-/// nodes) are the surfaces of the boxes. Throws std::invalid_argument unless `binary` has width 2 and as many
-/// weights as nodes.
-Topology collapsed(const Topology& binary, std::uint32_t width, std::span<const double> weights);
+/// nodes) are for example the surfaces of the boxes. Replaces `node_of` by the binary node of each node of
+/// the result. Throws std::invalid_argument unless `binary` has width 2 and as many weights as nodes.
+Topology collapsed(const Topology& binary, std::uint32_t width, std::span<const double> weights,
+                   std::vector<std::uint32_t>& node_of);
 
 }  // namespace kbvh

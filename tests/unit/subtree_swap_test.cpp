@@ -227,11 +227,14 @@ TEST(Collapse, EditedTreesBecomeWideOnes) {
       for (double& weight : weights) weight = random.unit();
       const auto below = primitives_below(binary);
       for (const std::uint32_t width : {4u, 8u}) {
-        const Topology wide = collapsed(binary, width, weights);
+        std::vector<std::uint32_t> node_of;
+        const Topology wide = collapsed(binary, width, weights, node_of);
         ASSERT_EQ(check_topology(wide, primitives), "") << name(method) << ", " << primitives;
         std::uint32_t narrow = 0;
-        for (const auto& own : primitives_below(wide))
-          ASSERT_TRUE(std::find(below.begin(), below.end(), own) != below.end());
+        const auto wide_below = primitives_below(wide);
+        ASSERT_EQ(node_of.size(), wide.size());
+        for (std::uint32_t node = 0; node < wide.size(); ++node)
+          ASSERT_EQ(wide_below[node], below[node_of[node]]);
         // A node has room left only if all its children are leaves.
         for (const TopologyNode node : wide.nodes) {
           if (node.is_leaf() || node.count() == width) continue;
@@ -255,7 +258,8 @@ TEST(Collapse, OpensTheHeaviestChild) {
   const std::uint32_t heavy = root.first() + 1;
   weights[heavy] = 2;
   weights[binary.nodes[heavy].first()] = 1;
-  const Topology wide = collapsed(binary, 4, weights);
+  std::vector<std::uint32_t> node_of;
+  const Topology wide = collapsed(binary, 4, weights, node_of);
   ASSERT_EQ(wide.nodes[0].count(), 4u);
   const auto below = primitives_below(binary), found = primitives_below(wide);
   const std::uint32_t opened = binary.nodes[heavy].first();
@@ -268,11 +272,12 @@ TEST(Collapse, RefusesWhatItCannotDo) {
   Random random(3);
   const Topology binary = random_tree(20, BuildMethod::sah, random);
   const std::vector<double> weights(binary.size(), 1), few(3, 1);
-  EXPECT_THROW(collapsed(binary, 2, weights), std::invalid_argument);
-  EXPECT_THROW(collapsed(binary, 8, few), std::invalid_argument);
+  std::vector<std::uint32_t> node_of;
+  EXPECT_THROW(collapsed(binary, 2, weights, node_of), std::invalid_argument);
+  EXPECT_THROW(collapsed(binary, 8, few, node_of), std::invalid_argument);
   const Topology wide = random_tree(20, BuildMethod::sah, random, 4);
-  EXPECT_THROW(collapsed(wide, 8, std::vector<double>(wide.size(), 1)), std::invalid_argument);
-  EXPECT_TRUE(collapsed(Topology{}, 8, {}).empty());
+  EXPECT_THROW(collapsed(wide, 8, std::vector<double>(wide.size(), 1), node_of), std::invalid_argument);
+  EXPECT_TRUE(collapsed(Topology{}, 8, {}, node_of).empty());
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/motion/round_positions.hpp"
+#include "core/topology/collapse.hpp"
 
 namespace kbvh {
 namespace {
@@ -18,51 +19,14 @@ std::uint32_t row_of(std::uint32_t side) {
   return (side >> 1) + 3 * (side & 1);
 }
 
-/// A topology of wide nodes with the leaves of a binary one. node_of[i] is the binary node that i was. The
-/// child with the most leaves is opened first.
-Topology collapsed(const Topology& binary, std::uint32_t width, std::uint32_t leaf_size,
-                   std::vector<std::uint32_t>& node_of) {
-  std::vector<std::uint32_t> leaves(binary.size(), 0);
-  for (std::uint32_t node = binary.size(); node-- > 0;) {
-    const TopologyNode n = binary.nodes[node];
+/// Returns the number of leaves below each node.
+std::vector<double> leaves_below(const Topology& topology) {
+  std::vector<double> leaves(topology.size(), 0);
+  for (std::uint32_t node = topology.size(); node-- > 0;) {
+    const TopologyNode n = topology.nodes[node];
     leaves[node] = n.is_leaf() ? 1 : leaves[n.first()] + leaves[n.first() + 1];
   }
-  Topology topology;
-  topology.width = width;
-  topology.leaf_size = leaf_size;
-  topology.primitives = binary.primitives;
-  const auto add = [&](std::uint32_t node, std::uint32_t parent, unsigned depth) {
-    topology.nodes.push_back(binary.nodes[node]);
-    topology.parents.push_back(parent);
-    topology.depths.push_back(std::uint8_t(std::min(depth, 255U)));
-    node_of.push_back(node);
-  };
-  node_of.clear();
-  if (binary.empty()) return topology;
-  add(0, 0, 0);
-  std::vector<std::uint32_t> open{0}, children;
-  while (!open.empty()) {
-    const std::uint32_t at = open.back();
-    open.pop_back();
-    const TopologyNode n = binary.nodes[node_of[at]];
-    if (n.is_leaf()) continue;
-    children.assign({n.first(), n.first() + 1});
-    while (children.size() < width) {
-      const auto heaviest =
-          std::max_element(children.begin(), children.end(),
-                           [&](std::uint32_t a, std::uint32_t b) { return leaves[a] < leaves[b]; });
-      if (leaves[*heaviest] == 1) break;
-      const std::uint32_t first = binary.nodes[*heaviest].first();
-      *heaviest = first;
-      children.insert(heaviest + 1, first + 1);
-    }
-    const std::uint32_t first = topology.size();
-    topology.nodes[at] = TopologyNode::inner(first, std::uint32_t(children.size()));
-    for (const std::uint32_t child : children) add(child, at, topology.depths[at] + 1U);
-    for (std::uint32_t child = topology.size(); child-- > first;) open.push_back(child);
-  }
-  topology.perfect = is_perfect(topology);
-  return topology;
+  return leaves;
 }
 
 }  // namespace
@@ -79,11 +43,10 @@ void BoxTreeRows<S>::lay_out(const BoxTreeBounds& tree, const Primitives& primit
   leaf_boxes_ = leaf_boxes;
   std::vector<std::uint32_t> order, node_of;
   const Topology binary = tree.compacted_topology(order);
-  // Inherited boxes of leaves are not those of their primitives, which have to show that they overlap: that
-  // is what the query does for leaves of several.
-  const std::uint32_t leaf_size =
-      leaf_boxes == LeafBoxes::tight ? binary.leaf_size : std::max(2U, binary.leaf_size);
-  Topology wide = collapsed(binary, width, leaf_size, node_of);
+  Topology wide = collapsed(binary, width, leaves_below(binary), node_of);
+  // The inherited box of a leaf is larger than that of its primitive. The query tests the boxes of primitives
+  // only where leaves may hold several.
+  if (leaf_boxes != LeafBoxes::tight) wide.leaf_size = std::max(2U, wide.leaf_size);
   for (std::uint32_t& node : node_of) node = order[node];
   wide_of_.assign(std::max(1U, tree.topology().size()), none);
   for (std::uint32_t i = 0; i < node_of.size(); ++i) wide_of_[node_of[i]] = i;
