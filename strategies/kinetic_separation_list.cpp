@@ -1,5 +1,6 @@
-// Kinetic incremental collision detection (Z&W 2006, s.7): two kinetic AABB trees and the separation list of
-// their pairs, all updated at events. A query reads the overlapping leaves and traverses nothing.
+// Kinetic incremental collision detection (Z&W 2006, s.7): one kinetic AABB tree per body, and the separation
+// list of the pairs of their boxes, all updated at events. A query reads the overlapping leaves and traverses
+// no tree.
 
 #include <algorithm>
 #include <variant>
@@ -53,8 +54,8 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     on_collision([&](auto& collision) { collision.advance(t); });
   }
 
-  /// Where there are many candidates their vertices are most of all, and evaluating all of them is cheaper
-  /// than fetching them one by one.
+  /// Returns whether the last frame had many candidates. Their vertices are then most of all vertices, and
+  /// evaluating all positions is cheaper than fetching them one by one.
   bool wants_all_positions() const override { return many_candidates_; }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
@@ -89,7 +90,8 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     });
   }
 
-  /// Appends all leaves that overlap at some time in between. Leaves that overlap twice are found twice.
+  /// Appends the primitive pairs of all leaves that overlap at some time in [t0, t1]. Leaves that overlap
+  /// twice are reported once.
   void find_swept_pairs(double t0, double t1, std::span<const S* const> /*before*/,
                         PairBuffer& out) override {
     on_collision([&](auto& collision) {
@@ -205,7 +207,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     }
   }
 
-  /// Appends every primitive pair of two leaves, those that share a vertex included.
+  /// Appends every primitive pair of two leaves, including pairs that share a vertex.
   template <class System>
   void append_leaves(const System& collision, const BodyPair& pair, std::uint32_t leaf_a,
                      std::uint32_t leaf_b, PairBuffer& out) const {
@@ -245,8 +247,8 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
                std::unique_ptr<Collision<BinaryHeapEventQueue>>>
       collision_;
   std::uint64_t first_step_ = 0;
-  std::size_t vertices_ = 0;      ///< of the scene when it began
-  bool many_candidates_ = false;  ///< at the last frame
+  std::size_t vertices_ = 0;      ///< of the initial scene
+  bool many_candidates_ = false;  ///< in the last frame
 };
 
 }  // namespace

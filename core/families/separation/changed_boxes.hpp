@@ -7,18 +7,18 @@
 
 namespace kbvh {
 
-/// What kinetic trees tell a separation list: boxes that have changed, in the order of the notices, and nodes
-/// that are not what they were.
+/// Observer through which kinetic trees report to a separation list. Collects changed boxes in the order of
+/// the notices, and nodes that edits of the trees changed or removed.
 struct ChangedBoxes {
   static constexpr Side all_sides = 6;
   struct Box {
     std::uint32_t body, node;
-    Side side = all_sides;  ///< the one that has another realiser
+    Side side = all_sides;  ///< the side with a new realiser
     auto operator<=>(const Box&) const = default;
   };
 
-  /// A node that insertions or deletions have changed: it has other children, or became a leaf or ceased to
-  /// be one; or it is gone, and its id means nothing or something else now.
+  /// A node that an insertion or a deletion changed. The node has other children, became a leaf, ceased to be
+  /// a leaf, or is `gone`. The id of a gone node is unused, or belongs to another node now.
   struct Node {
     std::uint32_t body, node;
     bool gone;
@@ -43,7 +43,7 @@ struct ChangedBoxes {
   void subtree_rebuilt(std::uint32_t body, std::uint32_t node) { nodes->push_back({body, node, false}); }
 };
 
-/// The same, also for who watches changes of bounds.
+/// ChangedBoxes that also forwards changes of realisers to `bounds`, the observer of bounds.
 template <class S>
 struct WatchedBoxes : ChangedBoxes {
   BoundObserver<S> bounds;

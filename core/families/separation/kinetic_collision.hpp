@@ -8,14 +8,15 @@
 namespace kbvh {
 
 /// Kinetic incremental collision detection (Z&W s.7): the kinetic AABB trees of a scene, and the separation
-/// lists of its body pairs on top, advanced together in the exact order of their events. `Queue` is a queue
-/// over a clock (event_queue.hpp); trees and lists have one each, whose tops are compared exactly.
+/// lists of its body pairs on top. Trees and lists advance together, in the exact order of their events.
+/// `Queue` is a queue over a clock (event_queue.hpp). The trees share one queue and the lists share another;
+/// the first events of both queues are compared exactly.
 ///
-/// In scenes of many body pairs the list holds those that may meet within a window of time: bodies have a
-/// bound on the way of any vertex, and what is further apart than both can go does not meet. At the end of a
-/// window another one is opened, as an event of its own. A window is halved as long as it holds many more
-/// pairs than there are bodies and pairs that meet when it begins, and the next one is twice as long where it
-/// holds few.
+/// In scenes with many body pairs the list holds only the pairs that may meet within a time window. Each body
+/// has an upper bound on the displacement of its vertices; two bodies whose distance exceeds both
+/// displacements do not meet. The end of a window is an event that opens the next window. A window is halved
+/// while it holds many more pairs than bodies plus pairs that meet at its begin. The next window is twice as
+/// long if the current one holds few pairs.
 template <class S, template <class> class Queue, class Count>
 class KineticCollision {
  public:
@@ -59,11 +60,11 @@ class KineticCollision {
   bool due(double t) const {
     return forest_.due(t) || list_.due(t) || list_.segment_end() <= t || window_end_ < t;
   }
-  /// Is the first event of all one of a tree? At one instant trees come first: the list is then decided with
-  /// their new realisers.
+  /// Returns whether the earliest event belongs to a tree. At one instant tree events come first, so that the
+  /// list is decided with the new realisers.
   bool tree_is_first() const { return first_part() == Part::trees; }
 
-  /// The first event of all; nothing if none is scheduled.
+  /// Returns the earliest event, or nothing if no event is scheduled.
   std::optional<ScheduledEvent<S>> next_event() const {
     switch (first_part()) {
       case Part::trees:
@@ -78,7 +79,7 @@ class KineticCollision {
     }
     return {};
   }
-  /// Replaces `out` by all scheduled events, first event first.
+  /// Replaces `out` by all scheduled events, earliest first.
   void scheduled_events(std::vector<ScheduledEvent<S>>& out) const {
     std::vector<ScheduledEvent<S>> trees, pairs;
     list_events(forest_, trees);
@@ -88,11 +89,12 @@ class KineticCollision {
     out.insert(out.end(), trees.begin(), trees.end());
     out.insert(out.end(), pairs.begin(), pairs.end());
     if (window_end_ < never) out.push_back(without_change(window_end_));
-    // Each part is in order already; at one instant a segment begins first, trees come next, and a window
-    // opens last.
+    // Each part is sorted already. At one instant the begin of a segment comes first, then tree events, then
+    // pair events; a new window opens last.
     std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return comes_before(a, b); });
   }
-  /// Handles the first event of all if it is due by `until`, and describes it.
+  /// Handles the earliest event if it is due by `until`, and describes it in `out`. Returns false, and leaves
+  /// `out` alone, if no event is due.
   bool step(double until, EventDescription<S>& out) {
     if (!due(until)) return false;
     out.event = *next_event();
@@ -104,10 +106,10 @@ class KineticCollision {
     append_rescheduled(forest_, out.touched, out.rescheduled);
     return true;
   }
-  /// Where changes of bounds are written.
+  /// Returns the watch that receives changes of bounds.
   BoundWatch<S>& watch() { return watch_; }
 
-  /// A double after the first event of all, if by little.
+  /// Returns a double slightly after the earliest event.
   double after_next() const {
     switch (first_part()) {
       case Part::trees: {
@@ -123,7 +125,7 @@ class KineticCollision {
     }
     return std::nextafter(window_end_, never);
   }
-  /// Handles the first event of all; `due` for some time.
+  /// Handles the earliest event. Requires that `due` holds for some time.
   void handle_next() {
     switch (first_part()) {
       case Part::trees:
@@ -137,7 +139,8 @@ class KineticCollision {
     }
   }
 
-  /// What the queue of the trees asks its owner for: as the forest does it, and what the list will read.
+  /// Prefetches for the queue of the trees: the data that the forest reads at `event`, and the data that the
+  /// list reads.
   void fetch_ahead(const PackedEvent& event, std::uint32_t slot, int step) const {
     forest_.fetch_ahead(event, slot, step);
     const auto& tree = forest_.tree(event.body);
@@ -147,7 +150,7 @@ class KineticCollision {
   }
   void review(const Event& event, double t) { forest_.review(event, t); }
 
-  /// Follows changes of plans at t that the motion shows already.
+  /// Applies changes of plans at t, which the motion contains already.
   void plans_changed(double t, std::span<const PlanChange<S>> changes) {
     changed_.clear();
     forest_.plans_changed(t, changes);
@@ -155,8 +158,8 @@ class KineticCollision {
     if (near_bodies_.searches()) open_window(t);
   }
 
-  /// Follows a change of geometry at t that scene and motion show already: first the trees, each edit as it
-  /// comes, then the lists at once. Says what the lists had to do.
+  /// Applies a change of geometry at t, which scene and motion contain already. Edits the trees first, one
+  /// edit after another, and then the lists once. Returns the work done by the lists, in pairs.
   ListEdit geometry_changed(double t, const SceneView<S>& scene, const SampledMotion<S>& motion,
                             std::span<const BodyChange> changes) {
     changed_.clear();
@@ -178,8 +181,9 @@ class KineticCollision {
   }
 
  private:
-  /// What the first event of all is one of; trees if there is none. At the end of a segment of the list, the
-  /// next one begins before anything else happens; a window opens when all has happened.
+  /// The part that owns the earliest event; `trees` if there is no event. At the end of a list segment the
+  /// next segment begins before all other events of that instant. A new window opens after all events of its
+  /// instant.
   enum class Part : std::uint8_t { trees, list, segment, window };
   Part first_part() const {
     const bool no_tree = forest_.queue().empty(), no_pair = list_.empty();
@@ -205,7 +209,7 @@ class KineticCollision {
   }
   void handle_tree_event() {
     const Event event = forest_.queue().top();
-    // The clock forgets a crossing of plans of their own when its event is handled.
+    // For a body with per-vertex plans the clock drops an event's crossing when the event is handled.
     const bool own = forest_.clock().plans(event.body).has_own_plans();
     Crossing<S> crossing;
     if (own) crossing = forest_.clock().crossing(event);
@@ -234,8 +238,8 @@ class KineticCollision {
   static constexpr double never = std::numeric_limits<double>::infinity();
   static constexpr int most_halvings = 40;
 
-  /// The box of a body at t, by the realisers of its root: larger than that by more than all roundings here
-  /// and by more than the margin with which the list compares boxes.
+  /// Returns the box of a body at t, from the realisers of its root. The box is inflated by more than all
+  /// rounding errors of this function plus the list's comparison margin.
   Box<double> root_box(std::uint32_t body, double t) const {
     Box<double> box;
     const auto& tree = forest_.tree(body);
@@ -258,7 +262,8 @@ class KineticCollision {
     return 32 * double(std::numeric_limits<S>::epsilon()) * largest +
            32 * double(std::numeric_limits<S>::min());
   }
-  /// A box that holds the body, and the list's margin, from t, when it has `box`, until `end`.
+  /// Returns a box that encloses the body, inflated by the list's margin, from t until `end`. `box` is the
+  /// body's box at t.
   Box<double> swept(std::uint32_t body, Box<double> box, double t, double end) const {
     if (box.empty()) return box;
     const double way = motion_.displacement_bound(body, t, end);
@@ -270,8 +275,8 @@ class KineticCollision {
     return box;
   }
 
-  /// Every event up to t has been handled: enters the body pairs that may meet from t until the window's end,
-  /// and takes out those that do not.
+  /// Opens the window that begins at t. Requires that every event up to t has been handled. Enters the body
+  /// pairs that may meet until the window's end, and removes the others from the list.
   void open_window(double t) {
     boxes_.resize(forest_.size());
     for (std::uint32_t body = 0; body < boxes_.size(); ++body) boxes_[body] = root_box(body, t);
@@ -307,7 +312,8 @@ class KineticCollision {
     std::sort(still_.begin(), still_.end());
     entered_.swap(still_);
   }
-  /// Until the first knot of any plan, or for a second.
+  /// Returns the length of the first window in seconds: until the first knot of any plan, or 1 s if there is
+  /// none.
   double first_window(double t) const {
     double end = never;
     for (std::uint32_t body = 0; body < boxes_.size(); ++body)
@@ -317,17 +323,17 @@ class KineticCollision {
 
   ClipMotion<S> motion_;
   NearBodies near_bodies_;
-  std::span<const BodyPair> body_pairs_;  ///< of the scene
+  std::span<const BodyPair> body_pairs_;  ///< body pairs of the scene
   Count* count_;
   BoundWatch<S> watch_;
   std::vector<ChangedBoxes::Box> changed_;
   std::vector<ChangedBoxes::Node> nodes_;
   Forest forest_;
   List list_;
-  // Only where there are many body pairs:
-  double window_ = 0, window_end_ = never;  ///< seconds; and when the present one ends
-  std::vector<Box<double>> boxes_;          ///< of the bodies when a window begins
-  std::vector<std::uint32_t> number_of_;    ///< [pair of the scene] in the list, or none
+  // Used only in scenes with many body pairs:
+  double window_ = 0, window_end_ = never;  ///< length of the window, and end of the current window; seconds
+  std::vector<Box<double>> boxes_;          ///< boxes of the bodies at the begin of the window
+  std::vector<std::uint32_t> number_of_;    ///< [pair of the scene] number in the list, or none
   std::vector<std::uint32_t> entered_;      ///< pairs of the scene that are in the list, ascending
   std::vector<std::uint32_t> still_;
 };

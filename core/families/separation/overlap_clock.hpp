@@ -11,20 +11,22 @@
 
 namespace kbvh {
 
-/// What is added to a bound before it is compared with another body's. Rounding keeps <= but not <: two
-/// bounds that are apart on the flight plans may be equal as rounded positions, by a gap of at most one ulp.
-/// Widened by at least four ulps at its knots, a bound is apart from another only if their rounded positions
-/// are, too: between knots the margin is linear, and thus at least four ulps of the value in between.
+/// Direction in which a bound is inflated before it is compared with another body's bound. Rounding preserves
+/// <= but not <: two bounds that are at most one ulp apart on the flight plans may be equal as rounded
+/// positions. A bound is therefore inflated by at least four ulps at its knots. If an inflated bound is apart
+/// from another bound, their rounded positions are apart, too: between knots the margin is linear, and thus
+/// at least four ulps of the interpolated value.
 enum class Widening : std::uint8_t { none, up, down };
 
-/// A value of S that is above x by 4 to 8 ulps (some 2^-21 or 2^-50 of |x|), and by something at zero.
+/// Returns a value of S that is 4 to 8 ulps above x (some 2^-21 |x| in float, 2^-50 |x| in double). For x = 0
+/// the result is positive.
 template <class S>
 S widened_up(S x) {
   using Bits = std::conditional_t<sizeof(S) == 4, std::uint32_t, std::uint64_t>;
   constexpr S share = sizeof(S) == 4 ? S(0x1p-21) : S(0x1p-50);
   constexpr Bits sign = std::bit_cast<Bits>(S(-0.0));
   const S sum = x + std::abs(x) * share;
-  // Two units up, for the roundings of product and sum.
+  // Adds two ulps for the rounding errors of product and sum.
   const Bits bits = std::bit_cast<Bits>(sum);
   if ((bits & ~sign) <= 2) [[unlikely]] {
     if (sum == 0) return 2 * std::numeric_limits<S>::denorm_min();
@@ -33,7 +35,7 @@ S widened_up(S x) {
   return std::bit_cast<S>(Bits(bits + 2 - ((bits & sign) != 0 ? 4 : 0)));
 }
 
-/// One coordinate of a vertex, piece by piece from an instant on.
+/// Iterates over the linear pieces of one vertex coordinate, from an instant on.
 template <class S>
 class PieceWalk {
  public:
@@ -51,14 +53,15 @@ class PieceWalk {
   }
 
   const Piece<S>& piece() const { return piece_; }
-  /// Goes on to the piece that begins where this one ends.
+  /// Advances to the piece that begins where the current piece ends.
   void next() {
     if (own_ || segment_ == before_first)
       take(piece_.t1);
     else
       take_segment(segment_ + 1);
   }
-  /// The value at `end`, not after the piece's own, if it is one of the stored numbers.
+  /// Returns the value at `end` if it is one of the stored numbers. Requires that `end` is not after the end
+  /// of the piece.
   std::optional<S> stored_value(double end) const {
     if (piece_.kind == PieceKind::chord) return end == piece_.t1 ? std::optional<S>(piece_.x1) : std::nullopt;
     return piece_.x1 == 0 ? std::optional<S>(piece_.x0) : std::nullopt;
@@ -90,7 +93,7 @@ class PieceWalk {
   void widen() {
     if (widening_ == Widening::none) return;
     piece_.x0 = widened(piece_.x0);
-    // A body at rest stays there; a velocity takes its share of the margin.
+    // A resting body keeps velocity zero. A nonzero velocity is widened like a position.
     if (piece_.kind == PieceKind::chord || piece_.x1 != 0) piece_.x1 = widened(piece_.x1);
   }
   S widened(S x) const { return widening_ == Widening::up ? widened_up(x) : -widened_up(-x); }
@@ -105,36 +108,39 @@ class PieceWalk {
   Piece<S> piece_;
 };
 
-/// A box by the six vertices that realise its sides now: [lower x, upper x, lower y, ...].
+/// A box given by the six vertices that realise its sides now: [lower x, upper x, lower y, ...].
 template <class S>
 struct RealisedBox {
   const FlightPlans<S>* plans;
   const std::uint32_t* realisers;
 };
 
-/// The moment at which two boxes begin or cease to overlap: the root of two pieces, within `error` of `hint`.
-/// Or one up to which it is known that they do not, and at which the clock is to be asked again.
+/// The instant at which two boxes begin or cease to overlap: a crossing of two pieces, within `error` of
+/// `hint`. For a review, the instant up to which the state of the boxes is known to last; the clock must be
+/// asked again at that instant.
 template <class S>
 struct OverlapEvent {
   double hint = 0, error = 0;
   Crossing<S> crossing;
   std::uint32_t slot = 0;
-  std::uint32_t depth = 0;  ///< of the pair below the pair of roots
-  bool review = false;      ///< nothing happens at `hint`, exactly
+  std::uint32_t depth = 0;  ///< depth of the pair below the pair of roots
+  bool review = false;      ///< `hint` is exact, and nothing changes there
 
-  /// Doubles on either side of the moment.
+  /// Return doubles before and after the event.
   double not_after() const { return std::nextafter(hint - error, -std::numeric_limits<double>::infinity()); }
   double not_before() const { return std::nextafter(hint + error, std::numeric_limits<double>::infinity()); }
   Instant<S> instant() const { return {not_after(), not_before(), &crossing}; }
 };
 
 /// Decides exactly, on the flight plans, when two boxes of different bodies overlap (Z&W s.8.1 with its
-/// erratum: the overlap intervals of the axes are intersected). Boxes are closed, the first one widened as
-/// `Widening` says. "After" an instant means right after it: a contact of no duration is none, which the
-/// margin allows. Boxes are taken with the realisers that they have; who changes one asks anew.
+/// erratum: the overlap intervals of the axes are intersected). Boxes are closed; the first box is inflated
+/// as `Widening` describes. "After" an instant means right after it. A contact of zero duration therefore
+/// does not count, which the margin allows. Boxes are evaluated with their current realisers; after a change
+/// of realisers the caller must ask again.
 ///
-/// It looks some linear pieces ahead and then asks to be asked again: realisers seldom last through a clip,
-/// and looking to its end each time would be quadratic in its keyframes.
+/// The clock looks a limited number of linear pieces ahead, and then returns a review. Realisers seldom last
+/// through a clip, and a search to the clip's end for each of them would be quadratic in the number of
+/// keyframes.
 template <class S>
 class OverlapClock {
  public:
@@ -142,7 +148,7 @@ class OverlapClock {
   static constexpr int usual_look_ahead = 32;
   explicit OverlapClock(int look_ahead = usual_look_ahead) : look_ahead_(look_ahead) {}
 
-  /// Strict weak order of events: exact time, higher pair, slot.
+  /// Strict weak order of events: exact time, then the smaller depth, then the slot.
   bool earlier(const Event& a, const Event& b) const {
     const int order = compare_times(a, b);
     if (order != 0) return order < 0;
@@ -156,20 +162,20 @@ class OverlapClock {
     if (a.crossing == b.crossing) return 0;  // pairs often share their realisers
     return compare_crossings(a.crossing, b.crossing);
   }
-  /// Does the event happen at or before t?
+  /// Returns whether the event happens at or before t.
   bool due(const Event& event, double t) const {
     if (event.hint + event.error < t) return true;
     if (event.hint - event.error > t) return false;
     return compare_crossing_to(event.crossing, t) <= 0;
   }
 
-  /// Does the event happen before t?
+  /// Returns whether the event happens before t.
   bool before(const Event& event, double t) const {
     if (event.hint + event.error < t) return true;
     if (event.hint - event.error > t) return false;
     return compare_crossing_to(event.crossing, t) < 0;
   }
-  /// Fills in when an event happens; false: beyond any time that can be asked for.
+  /// Sets the time of an event. Returns false if the crossing has no finite time.
   static bool set(Event& event, const Crossing<S>& crossing) {
     const TimeEstimate estimate = crossing_estimate(crossing);
     if (!std::isfinite(estimate.time)) return false;
@@ -180,21 +186,22 @@ class OverlapClock {
     return true;
   }
 
-  /// Do the boxes overlap right after the instant?
+  /// Returns whether the boxes overlap right after the instant.
   bool overlap_after(const RealisedBox<S>& a, const RealisedBox<S>& b, const Instant<S>& now) const {
     for (int side = 0; side < 6; ++side)
       if (Gap(a, b, side, now).sign_after(now) < 0) return false;
     return true;
   }
 
-  /// The first moment after `now` from which on boxes that are apart right after `now` overlap, or a review;
-  /// false: never.
+  /// Finds when two boxes that are apart right after `now` begin to overlap, or a review. Returns false if
+  /// they never overlap.
   bool next_overlap(const RealisedBox<S>& a, const RealisedBox<S>& b, const Instant<S>& now,
                     Event& event) const {
     Instant<S> instant = now;
     int pieces = look_ahead_;
     event.review = false;
-    // Each axis in turn moves the instant on to where it does not separate; done when six in a row agree.
+    // Each gap in turn advances the instant to where the gap closes. The search ends when six gaps in a row
+    // are not negative.
     for (int side = 0, agreed = 0; agreed < 6; side = (side + 1) % 6) {
       Gap gap(a, b, side, instant);
       if (gap.sign_after(instant) >= 0) {
@@ -214,8 +221,8 @@ class OverlapClock {
     return true;
   }
 
-  /// The first moment after `now` right after which boxes that overlap right after `now` do not, or a review;
-  /// false: never.
+  /// Finds when two boxes that overlap right after `now` separate, or a review. Returns false if they never
+  /// separate.
   bool next_separation(const RealisedBox<S>& a, const RealisedBox<S>& b, const Instant<S>& now,
                        Event& event) const {
     constexpr double never = std::numeric_limits<double>::infinity();
@@ -240,8 +247,8 @@ class OverlapClock {
   }
 
  private:
-  /// One of the six conditions of an overlap: upper bound of one box minus lower bound of the other on one
-  /// axis; apart where it is negative.
+  /// One of the six conditions of an overlap: the upper bound of one box minus the lower bound of the other
+  /// box on one axis. The boxes are apart if any gap is negative.
   class Gap {
    public:
     Gap(const RealisedBox<S>& a, const RealisedBox<S>& b, int side, const Instant<S>& now)
@@ -253,10 +260,10 @@ class OverlapClock {
                                : PieceWalk<S>(*a.plans, a.realisers[2 * axis_], axis_, Widening::down, now)) {
     }
 
-    /// Sign of the gap right after the instant at which the walk stands.
+    /// Returns the sign of the gap right after `now`, at which the walk stands.
     int sign_after(const Instant<S>& now) const {
       const Piece<S>&u = upper_.piece(), &l = lower_.piece();
-      int sign = 0;  // as for the gap that closes or opens at this very instant
+      int sign = 0;  // the gap is zero if it closes or opens exactly at `now`
       if (now.exact == nullptr)
         sign = compare_at(u, l, now.begin);
       else if (!is_crossing(*now.exact, u, l))
@@ -264,8 +271,8 @@ class OverlapClock {
       return sign != 0 ? sign : compare_slopes(u, l);
     }
 
-    /// From a gap that is negative: where it is no longer. Takes what it looks at off `pieces`, and gives up
-    /// when none is left.
+    /// Finds where a negative gap ceases to be negative. Subtracts the visited linear pieces from `pieces`,
+    /// and gives up when none is left. Returns false if the gap stays negative or the search gave up.
     bool first_closing(int& pieces, Crossing<S>& crossing) {
       for (double begin = -never;;) {
         const double end = this->end();
@@ -276,18 +283,18 @@ class OverlapClock {
         }
         const int sign = sign_at(end);
         if (sign >= 0) crossing = {lower_.piece(), upper_.piece()};
-        // It is negative throughout this piece.
+        // The gap is negative throughout this piece.
         if (sign < 0 && --pieces < 0 && std::isfinite(begin)) return gives_up(begin);
         next(end);
         if (sign > 0) return true;
-        // At zero it depends on where it goes from there.
+        // At zero the slope of the next pieces decides.
         if (sign == 0 && compare_slopes(upper_.piece(), lower_.piece()) >= 0) return true;
         begin = end;
       }
     }
 
-    /// From a gap that is not negative: where it becomes so, unless that is after `latest`. Gives up
-    /// when that is not known after so many pieces.
+    /// Finds where a gap that is not negative becomes negative, unless that is after `latest`. Gives up after
+    /// `pieces` linear pieces. Returns false if the gap does not open by `latest` or the search gave up.
     bool first_opening(int pieces, double latest, Crossing<S>& crossing) {
       for (double begin = -never; begin <= latest;) {
         const double end = this->end();
@@ -297,7 +304,7 @@ class OverlapClock {
           return true;
         }
         if (std::isinf(end)) return false;
-        // It is not negative throughout this piece.
+        // The gap is not negative throughout this piece.
         if (--pieces < 0) return gives_up(begin);
         next(end);
         begin = end;
@@ -305,8 +312,8 @@ class OverlapClock {
       return false;
     }
 
-    /// When a search gave up: begin of a piece through which the gap has the sign it began with. Infinite
-    /// when it did not.
+    /// Returns, after a search that gave up, the begin of a piece through which the gap keeps its initial
+    /// sign. Infinite if the search did not give up.
     double known_until() const { return known_until_; }
 
    private:

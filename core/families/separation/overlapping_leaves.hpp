@@ -7,27 +7,28 @@
 
 namespace kbvh {
 
-/// Overlapping leaves, and since when at the earliest.
+/// Two overlapping leaves, and the earliest possible begin of their overlap.
 struct OverlappingLeaves {
   std::uint32_t a, b, slot;
   double since;
 };
-/// An overlap that is over: of which body pair, and until when at the latest.
+/// An overlap that has ended: its body pair, its leaves, and the latest possible end.
 struct EndedOverlap {
   std::uint32_t bodies;
   OverlappingLeaves leaf;
   double until;
 };
 
-/// The overlapping leaves of each body pair, as a separation list answers with them; and those that have
-/// ended while somebody asks for spans. A pair's `place` is that among its body pair's.
+/// Stores the overlapping leaves of each body pair, from which a separation list answers queries. While spans
+/// are recorded, also stores the overlaps that have ended. `BoxPair::place` is the index of a pair among the
+/// overlapping leaves of its body pair.
 class LeafOverlaps {
  public:
   void resize(std::size_t body_pairs) { leaves_.resize(body_pairs); }
   void clear() {
     for (auto& leaves : leaves_) leaves.clear();
   }
-  /// Of one body pair, in no order.
+  /// Returns the overlapping leaves of one body pair, unordered.
   std::span<const OverlappingLeaves> of(std::size_t body_pair) const { return leaves_[body_pair]; }
 
   void begin(PairTree& tree, std::uint32_t slot, double since) {
@@ -46,7 +47,7 @@ class LeafOverlaps {
     pair.place = PairTree::none;
   }
 
-  /// From now on ended overlaps are kept; those that last already count from t.
+  /// Starts recording ended overlaps. Overlaps that last already count from t.
   void start_spans(double t) {
     for (auto& leaves : leaves_)
       for (OverlappingLeaves& leaf : leaves) leaf.since = t;

@@ -9,22 +9,23 @@
 
 namespace kbvh {
 
-/// How far ahead the next event of a pair of boxes is looked for.
+/// How far ahead the next event of a pair of boxes is searched.
 enum class LookAhead : std::uint8_t {
-  pieces,  ///< so many linear pieces (OverlapClock)
-  /// Until the present segment ends, between keyframes that all moving bodies have in common; else pieces.
-  /// All pairs without an event are looked at when the next segment begins.
+  pieces,  ///< a fixed number of linear pieces (OverlapClock)
+  /// Until the current segment ends. Requires keyframe times that all moving bodies share; otherwise `pieces`
+  /// applies. When the next segment begins, all pairs without an event are checked again.
   segment,
 };
 
-/// Finds out of pairs of boxes whether they overlap, and when that changes: by the signs of their gaps at
-/// both ends of the segment where these tell (SegmentOverlap), else with OverlapClock.
+/// Decides whether pairs of boxes overlap, and when that changes. Uses the signs of their gaps at both ends
+/// of the segment where these signs suffice (SegmentOverlap), and OverlapClock otherwise.
 template <class S>
 class PairOutlook {
  public:
-  /// What is known of a pair right after an instant.
+  /// The known state of a pair right after an instant.
   enum class State : std::uint8_t { unknown, apart, overlapping };
-  /// Whether boxes overlap right after an instant, and whether that changes: `event()` is when.
+  /// Whether boxes overlap right after an instant, and whether that changes later. `event()` is the instant
+  /// of the change.
   struct Outlook {
     bool overlapping, changes;
   };
@@ -43,7 +44,7 @@ class PairOutlook {
     return {bodies_[body].plans, bodies_[body].realisers + std::size_t(6) * node};
   }
 
-  /// Where the trees keep their realisers now, and room for all their nodes.
+  /// Rereads the addresses of the trees' realisers, and makes room for all their nodes.
   template <class Forest>
   void read_trees(const Forest& forest) {
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
@@ -52,13 +53,13 @@ class PairOutlook {
       if (by_segments_) boxes_.follow_tree(body, topology.size(), bodies_[body].realisers);
     }
   }
-  /// Starts over at t.
+  /// Restarts at t.
   void start(double t) {
     if (by_segments_) boxes_.start(t);
   }
-  /// When the present segment ends; infinite if there is none.
+  /// Returns the end of the current segment; infinite if there is none.
   double segment_end() const { return by_segments_ ? boxes_.end() : std::numeric_limits<double>::infinity(); }
-  /// Goes on to the next segment, and returns when it begins.
+  /// Advances to the next segment, and returns its begin.
   double open_segment() {
     boxes_.go_on();
     for (std::uint32_t body = 0; body < bodies_.size(); ++body)
@@ -66,7 +67,7 @@ class PairOutlook {
                       [&](std::uint32_t node) { return tree_->first_of(body, node) != PairTree::none; });
     return boxes_.begin();
   }
-  /// These boxes have other realisers, or realisers with other plans.
+  /// Updates the boxes whose realisers, or whose realisers' plans, have changed.
   void take_over(std::span<const ChangedBoxes::Box> boxes) {
     if (!by_segments_) return;
     for (const auto& box : boxes)
@@ -75,21 +76,21 @@ class PairOutlook {
       else
         boxes_.side_changed(box.body, box.node, box.side);
   }
-  /// Fetches the boxes of a pair.
+  /// Prefetches the boxes of a pair.
   void prefetch(const BoxPair& pair) const {
     if (!by_segments_ || !pair.used) return;
     boxes_.prefetch(tree_->body_of(pair, 0), BoxRole::first, pair.a);
     boxes_.prefetch(tree_->body_of(pair, 1), BoxRole::second, pair.b);
   }
 
-  /// Fetches the boxes of a node.
+  /// Prefetches the boxes of a node.
   void prefetch(std::uint32_t body, std::uint32_t node) const {
     if (!by_segments_) return;
     boxes_.prefetch(body, BoxRole::first, node);
     boxes_.prefetch(body, BoxRole::second, node);
   }
 
-  /// Looks at a pair from `now` on; its state right after is found out if it is not known.
+  /// Finds the state of a pair right after `now`, unless `known` gives it, and the next change of that state.
   Outlook look(std::uint32_t slot, const Moment<S>& now, State known) {
     using Kind = typename SegmentOverlap<S>::Kind;
     const BoxPair& pair = (*tree_)[slot];
@@ -115,7 +116,7 @@ class PairOutlook {
         [&] { return clock_.next_separation(a, b, instant, event_); },
         [&] { return clock_.next_overlap(a, b, instant, event_); });
   }
-  /// Of the pair that was looked at last, if its state changes.
+  /// Returns the event of the last pair that `look` examined. Valid only if the state of the pair changes.
   const OverlapEvent<S>& event() const { return event_; }
 
   std::size_t bytes() const { return boxes_.bytes(); }

@@ -13,31 +13,31 @@
 
 namespace kbvh {
 
-/// Two boxes of a body pair and where they stand in the tree of pairs. 48 bytes.
+/// Two boxes of a body pair, and their position in the tree of pairs. 48 bytes.
 struct BoxPair {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   std::uint32_t a, b;                  ///< nodes of the first and the second body
-  std::uint32_t parent = none;         ///< slot
+  std::uint32_t parent = none;         ///< slot of the parent
   std::uint32_t children = none;       ///< first of a block of slots, none of which may be in use
-  std::uint32_t next[2], previous[2];  ///< among the pairs linked from a, and from b
-  std::uint32_t place = none;          ///< among the overlapping leaves of the body pair
+  std::uint32_t next[2], previous[2];  ///< in the lists of pairs linked from a, and from b
+  std::uint32_t place = none;          ///< index among the overlapping leaves of the body pair
   std::uint32_t bodies = 0;            ///< number of the body pair
-  std::uint32_t depth = 0;             ///< below the pair of roots
+  std::uint32_t depth = 0;             ///< depth below the pair of roots
   bool used = false, overlapping = false;
   bool scheduled = false;  ///< has an event in the queue
-  bool dirty = false;      ///< has a node with other children, while a change of geometry is followed
+  bool dirty = false;      ///< has a node with other children, during a change of geometry
 };
 static_assert(sizeof(BoxPair) == 48);
 
-/// The tree of pairs of a separation list (separation_list.hpp): its pairs in blocks of siblings, numbered by
-/// slot, each linked from both of its boxes; and the numbers of the body pairs. It knows topologies, and
-/// nothing of motion.
+/// The tree of pairs of a separation list (separation_list.hpp). Stores pairs in blocks of siblings,
+/// addressed by slot, and links each pair from both of its boxes. Also numbers the body pairs. Uses
+/// topologies only; motion and bounds are not stored here.
 class PairTree {
  public:
   static constexpr std::uint32_t none = BoxPair::none;
 
-  /// Over the topologies of a scene's bodies, which it reads whenever it is asked.
+  /// Refers to the topologies of a scene's bodies; every call reads their current state.
   explicit PairTree(const std::vector<const Topology*>& topologies) {
     for (const Topology* topology : topologies) {
       bodies_.push_back({topology, {}, {}});
@@ -45,12 +45,12 @@ class PairTree {
     }
   }
   const Topology& topology(std::uint32_t body) const { return *bodies_[body].topology; }
-  /// Makes room for links from all nodes that there are now; ids are never given up.
+  /// Makes room for links from all current nodes. The room never shrinks, because ids are never given up.
   void follow_topologies() {
     for (Body& body : bodies_)
       if (body.first_pair.size() < body.topology->size()) body.first_pair.resize(body.topology->size(), none);
   }
-  /// Removes all pairs; body pairs keep their numbers.
+  /// Removes all pairs. Body pairs keep their numbers.
   void clear() {
     pairs_.clear();
     free_blocks_.clear();
@@ -70,7 +70,7 @@ class PairTree {
     body_pairs_[number] = pair;
     return number;
   }
-  /// Takes out a body pair that has no pairs of boxes.
+  /// Removes a body pair that has no pairs of boxes.
   void leave(std::uint32_t number) {
     body_pairs_[number] = unused;
     free_numbers_.push_back(number);
@@ -79,7 +79,7 @@ class PairTree {
     body_pairs_.clear();
     free_numbers_.clear();
   }
-  /// Numbers of body pairs, some of which may not be in use.
+  /// Returns the number of body-pair numbers, including unused ones.
   std::uint32_t body_pair_count() const { return std::uint32_t(body_pairs_.size()); }
   bool is_entered(std::uint32_t number) const { return body_pairs_[number].first != unused.first; }
   const BodyPair& body_pair(std::uint32_t number) const { return body_pairs_[number]; }
@@ -92,7 +92,7 @@ class PairTree {
 
   BoxPair& operator[](std::uint32_t slot) { return pairs_[slot]; }
   const BoxPair& operator[](std::uint32_t slot) const { return pairs_[slot]; }
-  /// All pairs by slot, the unused ones included.
+  /// Returns all pairs by slot, including unused slots.
   std::span<const BoxPair> pairs() const { return pairs_; }
   std::uint32_t slots() const { return std::uint32_t(pairs_.size()); }
   std::uint32_t slot_capacity() const { return std::uint32_t(pairs_.capacity()); }
@@ -105,11 +105,11 @@ class PairTree {
   }
   bool both_leaves(const BoxPair& pair) const { return node(pair, 0).is_leaf() && node(pair, 1).is_leaf(); }
 
-  /// The first pair that has a node, or none.
+  /// Returns the first pair that has the node, or none.
   std::uint32_t first_of(std::uint32_t body, std::uint32_t node) const {
     return bodies_[body].first_pair[node];
   }
-  /// The pair after `slot` that has the node, or none.
+  /// Returns the pair after `slot` that has the node, or none.
   std::uint32_t next_of(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
     return pairs_[slot].next[side_of(slot, body, node)];
   }
@@ -123,7 +123,8 @@ class PairTree {
            (bodies.second == body && pairs_[slot].b == node);
   }
 
-  /// A block of slots for siblings, none of which is in use. Pairs may move in memory.
+  /// Returns a block of slots for siblings, all unused. May move the pairs in memory. Throws
+  /// std::length_error beyond 2^32 pairs.
   std::uint32_t new_block() {
     if (!free_blocks_.empty()) {
       const std::uint32_t block = free_blocks_.back();
@@ -135,15 +136,15 @@ class PairTree {
     pairs_.resize(block + block_);
     return std::uint32_t(block);
   }
-  /// Gives up a block of slots, none of which is in use any more.
+  /// Releases a block of slots. Requires that none of them is in use.
   void free_block(std::uint32_t block) { free_blocks_.push_back(block); }
-  /// Calls work(slot) for each pair of a block; work may remove it.
+  /// Calls work(slot) for each pair of a block. `work` may remove that pair.
   template <class Work>
   void for_block(std::uint32_t block, const Work& work) {
     for (std::uint32_t slot = block; slot < block + block_ && pairs_[slot].used; ++slot) work(slot);
   }
 
-  /// Makes a pair in a free slot and links it from its boxes. Used slots come first in a block.
+  /// Makes a pair in an unused slot, and links it from its boxes. Within a block, used slots must come first.
   void insert(std::uint32_t slot, std::uint32_t bodies, std::uint32_t a, std::uint32_t b,
               std::uint32_t parent, std::uint32_t depth) {
     BoxPair& pair = pairs_[slot];
@@ -163,13 +164,13 @@ class PairTree {
       first = slot;
     }
   }
-  /// Makes the pairs of a pair's children in a new block, as many as there are, and calls made(slot) for
-  /// each.
+  /// Makes the pairs of a pair's children in a new block, and calls made(slot) for each. A leaf stands for
+  /// itself against the children of the other node.
   template <class Made>
   void insert_children(std::uint32_t parent, const Made& made) {
     const std::uint32_t block = new_block();
     pairs_[parent].children = block;
-    const BoxPair pair = pairs_[parent];  // by value: blocks move
+    const BoxPair pair = pairs_[parent];  // by value: new_block may move the pairs
     const TopologyNode a = node(pair, 0), b = node(pair, 1);
     const std::uint32_t begin_a = a.is_leaf() ? pair.a : a.first(), count_a = a.is_leaf() ? 1 : a.count();
     const std::uint32_t begin_b = b.is_leaf() ? pair.b : b.first(), count_b = b.is_leaf() ? 1 : b.count();
@@ -180,8 +181,8 @@ class PairTree {
         made(child++);
       }
   }
-  /// Makes, within one body, the pairs of two children of each inner node, in a block for each node: the
-  /// roots of its tree of pairs. Calls made_block(block), then made(slot) for each of its pairs. O(nodes).
+  /// Makes the roots of the pair tree within one body: for each inner node, a block with one pair for every
+  /// two of its children. Calls made_block(block), then made(slot) for each pair of the block. O(nodes).
   template <class MadeBlock, class Made>
   void insert_self_roots(std::uint32_t bodies, const MadeBlock& made_block, const Made& made) {
     const Topology& own = topology(body_pairs_[bodies].first);
@@ -203,7 +204,7 @@ class PairTree {
         }
     }
   }
-  /// Takes a pair out; its block stays taken.
+  /// Removes a pair. Its block stays allocated.
   void remove(std::uint32_t slot) {
     BoxPair& pair = pairs_[slot];
     for (const int side : {0, 1}) {
@@ -218,10 +219,11 @@ class PairTree {
     pair.used = false;
   }
 
-  /// Replaces `tops` by the highest pairs that have a changed node and will stay, for below a pair of a node
-  /// that is gone stands nothing that stays. All goes by the tree of pairs, which is that of the trees before
-  /// the change, whatever the ids mean now: an id that lost its meaning lay, then, below a node that the
-  /// trees named. O(pairs that have a changed node, times the depth).
+  /// Replaces `tops` by the highest pairs that have a changed node and will stay. A pair with a gone node
+  /// does not stay, and nothing below it stays; its nearest ancestor without a gone node counts as changed.
+  /// The search uses only the tree of pairs, which still represents the trees before the change, whatever the
+  /// ids mean now. An id that lost its meaning then lay below a node that the trees have reported. O(pairs
+  /// that have a changed node, times the depth).
   void find_highest_changed(std::span<const ChangedBoxes::Node> nodes, std::vector<std::uint32_t>& tops) {
     for (const auto& changed : nodes) {
       if (!changed.gone) continue;
@@ -263,11 +265,12 @@ class PairTree {
 
   struct Body {
     const Topology* topology;
-    std::vector<std::uint32_t> first_pair;  ///< linked from each node, or none
-    std::vector<std::uint8_t> gone;         ///< nodes, while a change of geometry is followed
+    std::vector<std::uint32_t> first_pair;  ///< first pair linked from each node, or none
+    std::vector<std::uint8_t> gone;         ///< [node] is gone, during a change of geometry
   };
 
-  /// Of a pair that has the node: 0 if it is the first, else 1.
+  /// Returns which of the pair's two nodes the given node is: 0 for the first, 1 for the second. Requires
+  /// that the pair has the node.
   int side_of(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
     return body_pairs_[pairs_[slot].bodies].first == body && pairs_[slot].a == node ? 0 : 1;
   }
@@ -278,7 +281,7 @@ class PairTree {
     return gone(body_of(pair, 0), pair.a) || gone(body_of(pair, 1), pair.b);
   }
 
-  std::uint32_t block_ = 4;  ///< most children of a pair
+  std::uint32_t block_ = 4;  ///< maximum number of children of a pair
   std::vector<BoxPair> pairs_;
   std::vector<std::uint32_t> free_blocks_;
   std::vector<Body> bodies_;

@@ -11,16 +11,16 @@
 
 namespace kbvh {
 
-/// A box over one segment, in which its bounds are linear: their values at begin and end, in the lanes of the
-/// six gaps (OverlapClock) that the box takes part in. Of the first box of a pair these are upper x, -lower
-/// x, upper y, ..., of the second one -lower x, upper x, -lower y, ...: the gaps of a pair are sums lane by
-/// lane.
+/// A box over one segment, in which its bounds are linear. Stores the bounds at the segment's begin and end,
+/// in the lanes of the six gaps (OverlapClock) that the box contributes to. The first box of a pair stores
+/// upper x, -lower x, upper y, ...; the second box stores -lower x, upper x, -lower y, .... The gaps of a
+/// pair are lane-by-lane sums.
 template <class S>
 struct alignas(16 * sizeof(S)) SegmentBox {
   static constexpr std::size_t lanes = 8;
   static constexpr std::size_t stamp_lane = 7;
-  S at[2]
-      [lanes];  ///< [begin, end]; lanes 6 and 7 are positive numbers, and at[1][7] says which segment it is
+  /// [begin, end][lane]. Lanes 6 and 7 are positive numbers; at[1][7] is the stamp of the segment.
+  S at[2][lanes];
 
   static SegmentBox none() {
     SegmentBox box{};
@@ -29,16 +29,17 @@ struct alignas(16 * sizeof(S)) SegmentBox {
 };
 static_assert(sizeof(SegmentBox<float>) == 64);
 
-/// Which box of a pair: bounds of the first one are widened (overlap_clock.hpp).
+/// Position of a box in its pair. Bounds of the first box are inflated (overlap_clock.hpp).
 enum class BoxRole : std::uint8_t { first, second };
 
-/// The boxes of all nodes over the segment between two keyframes, by the vertices that realise their sides
-/// now. All moving bodies must have the same keyframes; where a vertex with a plan of its own takes part, all
-/// numbers are NaN. Boxes are made when they are read; a side that has another realiser is made anew at once.
+/// The boxes of all nodes over the segment between two keyframes, from the vertices that currently realise
+/// their sides. Requires that all moving bodies have the same keyframe times. If a realiser has its own plan,
+/// all numbers of the box are NaN. A box is computed when it is read. A side with a new realiser is
+/// recomputed at once.
 template <class S>
 class SegmentBoxes {
  public:
-  /// Room for the boxes in which bodies take part in the scene's pairs.
+  /// Reserves the roles that the bodies have in the scene's pairs. follow_tree makes room for their boxes.
   SegmentBoxes(std::vector<const FlightPlans<S>*> plans, std::span<const BodyPair> pairs)
       : bodies_(plans.size()) {
     for (std::size_t body = 0; body < plans.size(); ++body) {
@@ -49,7 +50,7 @@ class SegmentBoxes {
       if (times_.empty()) times_ = times;
       alike_ = alike_ && std::equal(times.begin(), times.end(), times_.begin(), times_.end());
     }
-    // Segments are numbered in the scalar.
+    // The scalar type must represent stamps, which are segment numbers, exactly.
     alike_ = alike_ && times_.size() < (std::size_t(1) << 20);
     for (const BodyPair& pair : pairs) {
       bodies_[pair.first].takes_part[0] = true;
@@ -57,31 +58,32 @@ class SegmentBoxes {
     }
   }
 
-  /// Is there anything to be known of segments? Else nothing here may be called.
+  /// Returns whether the moving bodies share keyframe times. If not, no other function but bytes() may be
+  /// called.
   bool usable() const { return alike_ && !times_.empty(); }
 
-  /// The present segment: from begin until before end; infinite before the first and after the last keyframe.
+  /// Return the current segment, [begin, end). Infinite before the first and after the last keyframe.
   double begin() const { return begin_; }
   double end() const { return end_; }
 
-  /// Room for all nodes; forgets their boxes. `realisers` has six vertices a node.
+  /// Sets the realisers of a body, six vertices per node, and makes room for the boxes of all nodes.
   void follow_tree(std::uint32_t body, std::size_t nodes, const std::uint32_t* realisers) {
     Body& own = bodies_[body];
     own.realisers = realisers;
     for (const int role : {0, 1})
       if (own.takes_part[role] && own.boxes[role].size() < nodes) own.boxes[role].resize(nodes);
   }
-  /// Goes to the segment that t is in, and forgets all boxes.
+  /// Enters the segment that contains t, and invalidates all boxes.
   void start(double t) {
     for (Body& body : bodies_)
       for (auto& boxes : body.boxes)
         for (SegmentBox<S>& box : boxes) box.at[1][SegmentBox<S>::stamp_lane] = 0;
     go_to(std::size_t(std::upper_bound(times_.begin(), times_.end(), t) - times_.begin()));
   }
-  /// Goes to the segment after the present one.
+  /// Advances to the next segment.
   void go_on() { go_to(segment_ + 1); }
 
-  /// Makes the boxes of those nodes for which wanted(node) is true, in the order of the nodes.
+  /// Computes the boxes of the nodes for which wanted(node) is true, in the order of the nodes.
   template <class Wanted>
   void make_all(std::uint32_t body, const Wanted& wanted) {
     Body& own = bodies_[body];
@@ -106,11 +108,11 @@ class SegmentBoxes {
     return box;
   }
   void prefetch(std::uint32_t body, BoxRole role, std::uint32_t node) const {
-    // A body that takes no part in this role has no boxes.
+    // A body without this role has no boxes.
     const auto& boxes = bodies_[body].boxes[std::size_t(role)];
     if (node < boxes.size()) __builtin_prefetch(&boxes[node]);
   }
-  /// A side of a node has another realiser.
+  /// Updates one side of a node, which has a new realiser.
   void side_changed(std::uint32_t body, std::uint32_t node, Side side) {
     Body& own = bodies_[body];
     for (const int role : {0, 1}) {
@@ -122,14 +124,14 @@ class SegmentBoxes {
         read_lane(own, BoxRole(role), node, role == 0 ? side ^ 1U : side, box);
     }
   }
-  /// Anything may have changed about a node's realisers or their plans.
+  /// Invalidates the boxes of a node, whose realisers or plans may have changed.
   void node_changed(std::uint32_t body, std::uint32_t node) {
     for (auto& boxes : bodies_[body].boxes)
       if (!boxes.empty()) forget(boxes[node]);
   }
 
-  /// The linear piece of a coordinate of a body that has these values at begin and end of the segment; only
-  /// between keyframes.
+  /// Returns the linear piece of a coordinate of a body with the given values at the segment's begin and end.
+  /// Valid only between keyframes.
   Piece<S> piece(std::uint32_t body, S first, S last) const {
     if (!bodies_[body].at_rest) return {begin_, end_, first, last, PieceKind::chord};
     return {bodies_[body].plans->keyframe_times()[0], infinity, first, S(0), PieceKind::ray};
@@ -148,7 +150,7 @@ class SegmentBoxes {
   struct Body {
     const FlightPlans<S>* plans = nullptr;
     const std::uint32_t* realisers = nullptr;
-    bool at_rest = false;                               ///< but for plans of their own
+    bool at_rest = false;                               ///< has no motion apart from per-vertex plans
     std::array<bool, 2> takes_part{};                   ///< [role]
     std::array<std::vector<SegmentBox<S>>, 2> boxes{};  ///< [role][node]
     const S *first = nullptr, *last = nullptr;          ///< keyframes at the ends of the segment
@@ -165,7 +167,7 @@ class SegmentBoxes {
       body.last = body.plans->keyframe(body.at_rest ? 0 : std::min(segment, last_keyframe));
     }
   }
-  /// What the stamp of a box that holds is: for a body at rest the same in all segments.
+  /// Returns the stamp of an up-to-date box. A resting body has the same stamp in all segments.
   S stamp(const Body& body) const { return body.at_rest ? S(1) : stamp_; }
   static void forget(SegmentBox<S>& box) { box.at[1][SegmentBox<S>::stamp_lane] = 0; }
 
@@ -193,7 +195,7 @@ class SegmentBoxes {
       to[lane] = value(keyframe, realiser(body, role, node, lane), role, lane);
   }
   void make(const Body& body, BoxRole role, std::uint32_t node, SegmentBox<S>& box) const {
-    // What was the end is the begin now.
+    // The values at the end of the previous segment are those at the begin of this one.
     const bool follows = !body.at_rest && box.at[1][SegmentBox<S>::stamp_lane] == stamp_ - 1;
     if (body.plans->has_own_plans() && has_own_plan(body, node)) {
       std::fill_n(&box.at[0][0], 2 * SegmentBox<S>::lanes, std::numeric_limits<S>::quiet_NaN());
@@ -212,9 +214,9 @@ class SegmentBoxes {
   }
 
   std::vector<Body> bodies_;
-  std::span<const double> times_;  ///< of the keyframes of all moving bodies
+  std::span<const double> times_;  ///< keyframe times of all moving bodies
   bool alike_ = true;
-  std::size_t segment_ = 0;  ///< keyframes not after it begins
+  std::size_t segment_ = 0;  ///< number of keyframes at or before its begin
   S stamp_ = 0;
   double begin_ = -infinity, end_ = infinity;
 };

@@ -18,16 +18,19 @@ struct Moment {
   static Moment at(double t) { return {Instant<S>::at(t), t, 0}; }
 };
 
-/// Decides when two boxes overlap within one segment. Each of the six gaps is linear there, so that the
-/// boxes overlap throughout one interval, from the last gap's closing until the first one's opening, or
-/// never; signs at begin and end of the segment mostly tell that they do all the time or never. Decides
-/// exactly, and as OverlapClock does; leaves to it what is at zero at an end.
+/// Decides when two boxes overlap within one segment. Each of the six gaps is linear there. The boxes
+/// therefore overlap during one interval, from the closing of the last gap until the opening of the first
+/// one, or never. In most cases the signs at the segment's begin and end show that the boxes always or never
+/// overlap. Decisions are exact and agree with OverlapClock. A gap that is zero at an end of the segment is
+/// left to OverlapClock.
 template <class S>
 class SegmentOverlap {
  public:
   enum class Kind : std::uint8_t { apart, overlapping, changes, unsure };
 
-  /// What signs at the ends of the segment tell.
+  /// Classifies two boxes by the signs of their gaps at the ends of the segment. `apart`: one gap is negative
+  /// at both ends. `overlapping`: all gaps are positive at both ends. `unsure`: a gap is zero or NaN at an
+  /// end. `changes`: all other cases.
   static Kind kind(const SegmentBox<S>& a, const SegmentBox<S>& b) {
     Mask separates{}, positive = ~Mask{}, sure = ~Mask{};
     for (std::size_t lane = 0; lane < SegmentBox<S>::lanes; lane += width) {
@@ -45,7 +48,7 @@ class SegmentOverlap {
     return any(~sure) ? Kind::unsure : Kind::changes;
   }
 
-  /// Two boxes of a kind that changes.
+  /// Takes two boxes of the kind `changes`.
   SegmentOverlap(const SegmentBoxes<S>& boxes, std::uint32_t body_a, const SegmentBox<S>& a,
                  std::uint32_t body_b, const SegmentBox<S>& b)
       : boxes_(&boxes),
@@ -56,13 +59,13 @@ class SegmentOverlap {
         error_(16 * std::numeric_limits<double>::epsilon() *
                std::max(std::abs(boxes.begin()), std::abs(boxes.end()))) {
     for (std::size_t side = 0; side < 6; ++side) {
-      // Exact in float, else rounded once; signs are.
+      // The sums are exact in float, and rounded once in double; their signs are exact.
       const double first = double(a.at[0][side]) + double(b.at[0][side]),
                    last = double(a.at[1][side]) + double(b.at[1][side]);
       if (first > 0 && last > 0) continue;
       const Root root{boxes.begin() + (boxes.end() - boxes.begin()) * (first / (first - last)),
                       std::uint8_t(side)};
-      // Of several at one instant the first side counts.
+      // Of several gaps at one instant the first side counts.
       if (first < 0) {
         if (closing_.side == no_side || compare(root, closing_) > 0) closing_ = root;
       } else if (opening_.side == no_side || compare(root, opening_) < 0) {
@@ -72,17 +75,18 @@ class SegmentOverlap {
     never_ = closing_.side != no_side && opening_.side != no_side && compare(closing_, opening_) >= 0;
   }
 
-  /// Do the boxes overlap right after an instant of the segment?
+  /// Returns whether the boxes overlap right after an instant of the segment.
   bool overlap_after(const Moment<S>& now) const {
     return !never_ && (closing_.side == no_side || compare(closing_, now) <= 0) &&
            (opening_.side == no_side || compare(opening_, now) > 0);
   }
-  /// Whether boxes that are apart right after an instant begin to overlap later in the segment; and when.
+  /// Finds when boxes that are apart right after `now` begin to overlap. Returns false if they do not within
+  /// the segment.
   bool next_overlap(const Moment<S>& now, OverlapEvent<S>& event) const {
     if (never_ || closing_.side == no_side || compare(closing_, now) <= 0) return false;
     return OverlapClock<S>::set(event, crossing(closing_.side, Turn::closes));
   }
-  /// Whether boxes that overlap right after an instant cease to do so later in the segment; and when.
+  /// Finds when boxes that overlap now separate. Returns false if they do not within the segment.
   bool next_separation(OverlapEvent<S>& event) const {
     if (opening_.side == no_side) return false;
     return OverlapClock<S>::set(event, crossing(opening_.side, Turn::opens));
@@ -95,7 +99,7 @@ class SegmentOverlap {
   static constexpr std::uint8_t no_side = 6;
   enum class Turn : std::uint8_t { closes, opens };
 
-  /// When a gap is zero, roughly.
+  /// The approximate time at which a gap is zero.
   struct Root {
     double time = 0;
     std::uint8_t side = no_side;
@@ -114,14 +118,15 @@ class SegmentOverlap {
 
   Crossing<S> crossing(std::uint8_t side, Turn turn) const {
     const S a0 = a_->at[0][side], a1 = a_->at[1][side], b0 = b_->at[0][side], b1 = b_->at[1][side];
-    // An even side is a's upper bound minus b's lower one, an odd side b's upper bound minus a's.
+    // The gap of an even side is a's upper bound minus b's lower bound; of an odd side, b's upper bound minus
+    // a's lower bound.
     const bool even = side % 2 == 0;
     const Piece<S> of_a = even ? boxes_->piece(body_a_, a0, a1) : boxes_->piece(body_a_, -a0, -a1);
     const Piece<S> of_b = even ? boxes_->piece(body_b_, -b0, -b1) : boxes_->piece(body_b_, b0, b1);
     const Piece<S>&upper = even ? of_a : of_b, &lower = even ? of_b : of_a;
     return turn == Turn::closes ? Crossing<S>{lower, upper} : Crossing<S>{upper, lower};
   }
-  /// The sign of x - y, exact.
+  /// Return the exact sign of x - y, or of x - now.
   int compare(const Root& x, const Root& y) const {
     if (x.time + 3 * error_ < y.time) return -1;
     if (y.time + 3 * error_ < x.time) return 1;
@@ -142,7 +147,7 @@ class SegmentOverlap {
   std::uint32_t body_a_, body_b_;
   const SegmentBox<S>*a_, *b_;
   double error_;  ///< of a root: differences, sum, quotient, product and final sum are each rounded once
-  Root closing_, opening_;  ///< of the last gap to close, and of the first one to open
+  Root closing_, opening_;  ///< of the last gap to close, and of the first gap to open
   bool never_ = false;
 };
 

@@ -12,45 +12,49 @@
 
 namespace kbvh {
 
-/// What a change of geometry cost a separation list, in pairs.
+/// The work of a separation list after a change of geometry, in pairs.
 struct ListEdit {
-  std::uint64_t removed = 0;  ///< taken out of the tree of pairs
-  std::uint64_t decided = 0;  ///< decided anew: new ones, those with other children, those with other boxes
+  std::uint64_t removed = 0;  ///< removed from the tree of pairs
+  std::uint64_t decided = 0;  ///< decided anew: new pairs, pairs with other children, pairs with other boxes
 };
 
-/// The separation list of kinetic incremental collision detection (Z&W s.7), for body pairs of a scene:
-/// the pairs of boxes at which a simultaneous traversal would stop now, kept from event to event.
+/// The separation list of kinetic incremental collision detection (Z&W s.7), for body pairs of a scene: the
+/// pairs of boxes at which a simultaneous traversal would stop now, maintained from event to event.
 ///
-/// The pairs form a tree: a pair's parent is the pair of their parents (a leaf against an inner node
-/// descends on one side only). Pairs that do not overlap, and overlapping pairs of leaves, are the list;
-/// overlapping inner pairs stand above it. Each has one event in the queue:
-///   apart: the boxes overlap ("BV-overlap"): an inner pair gets children, which may overlap in their turn;
-///   inner, overlapping: they are apart ("parents do not overlap"): all below goes. The paper schedules this
-///     with each child and has to insert the parent once; here it is the parent's own;
-///   leaves, overlapping: they are apart ("leaves do not overlap").
-/// Or, where that is too far ahead, one at which only its next event is looked for (OverlapClock); it is
-/// counted as an operation on the queue.
-/// When a box changes ("BV change": another realiser, or another plan of one), the pairs that it takes part
-/// in, which are linked from it, are decided anew.
+/// The pairs form a tree: a pair's parent is the pair of their parents (a leaf against an inner node descends
+/// on one side only). The list consists of the pairs that do not overlap and the overlapping pairs of leaves;
+/// overlapping inner pairs are their ancestors. Each pair has at most one event in the queue:
+///   apart: the boxes begin to overlap ("BV-overlap"). An inner pair gets children, which may overlap in
+///     turn.
+///   inner, overlapping: the boxes separate ("parents do not overlap"). All pairs below are removed. The
+///     paper schedules this event with each child and has to insert the parent once; here the event belongs
+///     to the parent.
+///   leaves, overlapping: the boxes separate ("leaves do not overlap").
+/// If the event is too far ahead, the pair has a review instead, at which only its next event is searched
+/// (OverlapClock). A review counts as an operation on the queue.
+/// When a box changes ("BV change": a new realiser, or a new plan of a realiser), the pairs that are linked
+/// from the box are decided anew.
 ///
-/// Insertions and deletions change the trees below a few nodes. The pairs of such a node stay, what is below
-/// them goes, and they are decided anew on the trees as they are then; a pair of a node that is gone lies
-/// below a pair of its former parent, which counts as changed. Nothing else is looked at.
+/// Insertions and deletions change the trees below a few nodes. The pairs of such a node stay, the pairs
+/// below them are removed, and the remaining pairs are decided anew on the changed trees. A pair of a removed
+/// node lies below a pair of the node's former parent, which counts as changed. No other pair is examined.
 ///
-/// Within one body, a node with itself always overlaps and needs no event: below it stand the pairs of two of
-/// its children, one for each two, which are roots of the tree of pairs; they keep the list at least as long
-/// as the tree has inner nodes. A leaf with itself is in no list.
+/// Within one body, a node always overlaps itself, which needs no event. Below such a self pair stand the
+/// pairs of two of its children, one for every two. These pairs are roots of the tree of pairs; the list is
+/// therefore never shorter than the number of inner nodes of the tree. The pair of a leaf with itself is in
+/// no list.
 ///
-/// Body pairs have numbers. A list of all pairs of a scene numbers them as the scene does; of many pairs
-/// those are entered that may meet (`enter`), and those that are apart can be taken out again (`leave`):
-/// their numbers are used again.
+/// Body pairs have numbers. A list of all pairs of a scene numbers them as the scene does. In a scene of many
+/// pairs only those that may meet are entered (`enter`), and pairs whose roots are apart can be removed
+/// (`leave`). The numbers of removed pairs are reused.
 ///
-/// Boxes are compared on the flight plans with the margin of OverlapClock: the list may hold a pair of boxes
-/// that are apart by some ulps, and misses none whose rounded boxes touch.
+/// Boxes are compared on the flight plans with the margin of OverlapClock. The list may contain a pair of
+/// boxes that are apart by some ulps, and contains all pairs whose rounded boxes touch.
 ///
 /// With a queue that orders events by segments, a pair has an event only if its boxes begin or cease to
-/// overlap before the present segment ends: `open_segment` looks at all pairs when the next one begins, and
-/// most of them are decided by the signs of their gaps at its ends (SegmentOverlap).
+/// overlap before the current segment ends. `open_segment` checks all pairs without an event when the next
+/// segment begins. Most of them are decided by the signs of their gaps at the segment's ends
+/// (SegmentOverlap).
 template <class S, template <class> class Queue, class Count>
 class SeparationList {
   using Event = OverlapEvent<S>;
@@ -58,7 +62,7 @@ class SeparationList {
  public:
   static constexpr std::uint32_t none = PairTree::none;
 
-  /// Which body pairs a list begins with.
+  /// The body pairs with which a list begins.
   enum class BodyPairs : std::uint8_t { all, none };
 
   template <class Forest>
@@ -79,21 +83,21 @@ class SeparationList {
   SeparationList(const SeparationList&) = delete;
   SeparationList& operator=(const SeparationList&) = delete;
 
-  /// Starts over at t by one traversal.
+  /// Restarts at t, by one traversal per body pair.
   void reset(double t) {
     clear(t);
     for (std::uint32_t i = 0; i < tree_.body_pair_count(); ++i)
       if (tree_.both_have_nodes(i)) start_pair(i, Moment<S>::at(t));
   }
 
-  /// Enters a body pair at t, decided by one traversal; returns its number.
+  /// Enters a body pair at t, by one traversal. Returns the number of the body pair.
   std::uint32_t enter(const BodyPair& pair, double t) {
     time_ = end_ = t;
     const std::uint32_t bodies = number(pair);
     if (tree_.both_have_nodes(bodies)) start_pair(bodies, Moment<S>::at(t));
     return bodies;
   }
-  /// Takes out a pair of two bodies whose boxes are apart. Returns whether it did: not while its roots
+  /// Removes a pair of two bodies whose root boxes are apart. Returns false, and removes nothing, if they
   /// overlap.
   bool leave(std::uint32_t bodies) {
     const std::uint32_t root = roots_[bodies];
@@ -107,14 +111,14 @@ class SeparationList {
     tree_.leave(bodies);
     return true;
   }
-  /// Takes out all body pairs, and starts over at t.
+  /// Removes all body pairs, and restarts at t.
   void leave_all(double t) {
     clear(t);
     tree_.leave_all();
     roots_.clear();
     self_roots_.clear();
   }
-  /// Numbers of body pairs, some of which may not be in use.
+  /// Returns the number of body-pair numbers, including unused ones.
   std::uint32_t body_pair_count() const { return tree_.body_pair_count(); }
   bool is_entered(std::uint32_t bodies) const { return tree_.is_entered(bodies); }
   const BodyPair& body_pair(std::uint32_t bodies) const { return tree_.body_pair(bodies); }
@@ -128,7 +132,7 @@ class SeparationList {
   bool empty() const { return queue_.empty(); }
   decltype(auto) top() const { return queue_.top(); }
 
-  /// Takes the first event off the queue and handles it.
+  /// Removes the first event from the queue and handles it.
   void handle_next() {
     const Event event = queue_.top();
     queue_.pop();
@@ -147,15 +151,15 @@ class SeparationList {
     turn(event.slot, now, look(event.slot, now, pair.overlapping ? State::apart : State::overlapping));
   }
 
-  /// Fetches what handling an event of a pair will read: first the pair, then its boxes.
+  /// Prefetches the data that an event of a pair will read: in step 0 the pair, in step 1 its boxes.
   void fetch_ahead(const Event& /*event*/, std::uint32_t slot, int step) const {
     if (step == 0) tree_.prefetch(slot);
     if (step == 1) outlook_.prefetch(tree_[slot]);
   }
-  /// The queue is not asked for reviews: pairs without an event wait for the next segment.
+  /// Does nothing: pairs without an event are checked again at the begin of the next segment.
   void review(const Event& /*event*/, double /*t*/) {}
-  /// Fetches what a change of a node's box will read: first its boxes and where its pairs are, then the first
-  /// of these, then that one's boxes.
+  /// Prefetches the data that a change of a node's box will read: in step 0 its boxes and the link to its
+  /// first pair, in step 1 that pair, then the boxes of that pair.
   void fetch_ahead(std::uint32_t body, std::uint32_t node, int step) const {
     if (step == 0) {
       tree_.prefetch_first_of(body, node);
@@ -165,10 +169,10 @@ class SeparationList {
     }
   }
 
-  /// When the present segment ends; infinite if there is none. `open_segment` is due then, before any event
-  /// from then on.
+  /// Returns the end of the current segment; infinite if there is none. `open_segment` is due at that time,
+  /// before any event at or after it.
   double segment_end() const { return outlook_.segment_end(); }
-  /// Goes on to the next segment: looks which pairs have an event in it.
+  /// Advances to the next segment, and schedules the pairs that have an event in it.
   void open_segment() {
     const Moment<S> now = Moment<S>::at(outlook_.open_segment());
     const std::uint32_t slots = tree_.slots();
@@ -180,18 +184,18 @@ class SeparationList {
     }
   }
 
-  /// These boxes have other realisers, or realisers with other plans. Returns whether they are in any pair:
-  /// `boxes_changed` is called then.
+  /// Updates the boxes whose realisers, or whose realisers' plans, have changed. Returns whether any of the
+  /// boxes is in a pair; if so, the caller must call `boxes_changed`.
   bool take_over(std::span<const ChangedBoxes::Box> boxes) {
     outlook_.take_over(boxes);
     return std::any_of(boxes.begin(), boxes.end(),
                        [&](const auto& box) { return tree_.first_of(box.body, box.node) != none; });
   }
-  /// Decides anew the pairs of boxes that have changed at `now`. Boxes may be named twice.
+  /// Decides anew the pairs of boxes that have changed at `now`. Boxes may be listed twice.
   void boxes_changed(std::span<const ChangedBoxes::Box> boxes, const Moment<S>& now) {
     time_ = now.instant.begin;
     end_ = now.instant.end;
-    // Of a node that went while the geometry changed, no pair is left.
+    // A node that a change of geometry removed has no pairs any more.
     for (const auto& box : boxes) {
       linked_.clear();
       for (std::uint32_t slot = tree_.first_of(box.body, box.node); slot != none;
@@ -202,7 +206,7 @@ class SeparationList {
       if (linked_.empty()) continue;
       count_->add(Counter::bound_change_events);
       for (const std::uint32_t slot : linked_) {
-        // What a collapse has removed, or an expansion made anew in its place, needs nothing.
+        // Skips a pair that a collapse has removed, and a slot that an expansion has reused for other nodes.
         if (!tree_[slot].used || !tree_.has_node(slot, box.body, box.node)) continue;
         count_->add(Counter::nodes_visited);
         ++work_done_.decided;
@@ -215,11 +219,11 @@ class SeparationList {
     }
   }
 
-  /// Follows a change of geometry at t that the trees of `forest` have made already, all of them: `nodes` and
-  /// `boxes` are what they told of it, in their order (boxes are sorted here). Costs what hangs below the
-  /// pairs of changed nodes, and the pairs of changed boxes; the whole list of a body pair if a root changes.
-  /// O(nodes) room the first time, amortised O(change) after; but what is within one body is made
-  /// anew as a whole. Not between start_spans and stop_spans.
+  /// Applies a change of geometry at t, after all edits of the trees of `forest`. `nodes` and `boxes` are the
+  /// notices of the trees, in their order; this function sorts `boxes`. Visits the pairs below those of
+  /// changed nodes, and the pairs of changed boxes; if a root changes, the whole list of the body pair.
+  /// Memory is O(nodes) the first time, then amortised O(change). Pairs within one body are all rebuilt. Not
+  /// allowed between start_spans and stop_spans.
   template <class Forest>
   ListEdit geometry_changed(double t, const Forest& forest, std::span<const ChangedBoxes::Node> nodes,
                             std::vector<ChangedBoxes::Box>& boxes) {
@@ -244,7 +248,7 @@ class SeparationList {
     return work_done_;
   }
 
-  /// An event of the list as the contract describes it.
+  /// Describes an event of the list in the contract's terms.
   ScheduledEvent<S> described(const Event& event) const {
     const BoxPair& pair = tree_[event.slot];
     ScheduledEvent<S> out;
@@ -260,7 +264,7 @@ class SeparationList {
     if (out.has_crossing) out.crossing = event.crossing;
     return out;
   }
-  /// Appends all scheduled events in their order.
+  /// Appends all scheduled events, earliest first.
   void list_events(std::vector<ScheduledEvent<S>>& out) const {
     std::vector<Event> events;
     for (std::uint32_t slot = 0; slot < queue_.slots(); ++slot)
@@ -270,18 +274,19 @@ class SeparationList {
     for (const Event& event : events) out.push_back(described(event));
   }
 
-  /// The overlapping leaves of one body pair, in no order.
+  /// Returns the overlapping leaves of one body pair, unordered.
   std::span<const OverlappingLeaves> leaf_pairs(std::size_t body_pair) const { return leaves_.of(body_pair); }
-  /// Pairs in the list: apart, or overlapping leaves.
+  /// Returns the number of pairs in the list: pairs that are apart, and overlapping leaves.
   std::size_t size() const { return list_size_; }
-  /// All pairs by slot, for audits.
+  /// Returns all pairs by slot, for audits.
   std::span<const BoxPair> pairs() const { return tree_.pairs(); }
   const OverlapClock<S>& clock() const { return outlook_.clock(); }
 
-  /// From now on ended overlaps of leaves are kept; those that last already count from t.
+  /// Starts recording ended overlaps of leaves. Overlaps that last already count from t.
   void start_spans(double t) { leaves_.start_spans(t); }
   bool is_recording() const { return leaves_.is_recording(); }
-  /// The overlaps that ended since `start_spans`; those that last are the leaf pairs.
+  /// Stops recording, and returns the overlaps that ended since `start_spans`. Overlaps that last are in
+  /// `leaf_pairs`.
   std::span<const EndedOverlap> stop_spans() { return leaves_.stop_spans(); }
 
   std::uint64_t steps() const { return queue_.steps(); }
@@ -295,7 +300,7 @@ class SeparationList {
  private:
   using State = typename PairOutlook<S>::State;
   using Outlook = typename PairOutlook<S>::Outlook;
-  /// Does the queue keep what waits by segments?
+  /// Whether the queue stores waiting events by segments.
   static constexpr bool by_segments = requires(Queue<OverlapClock<S>> queue) {
     queue.split_at(std::span<const double>());
   };
@@ -307,7 +312,7 @@ class SeparationList {
       topologies.push_back(&forest.tree(body).topology());
     return topologies;
   }
-  /// Where the trees keep their realisers now, and room for all their nodes.
+  /// Rereads the addresses of the trees' realisers, and makes room for all their nodes.
   template <class Forest>
   void read_trees(const Forest& forest) {
     tree_.follow_topologies();
@@ -332,7 +337,7 @@ class SeparationList {
     }
     return bodies;
   }
-  /// Makes the list of a body pair that has none.
+  /// Builds the list of a body pair that has none.
   void start_pair(std::uint32_t bodies, const Moment<S>& now) {
     work_.clear();
     if (tree_.body_pair(bodies).first == tree_.body_pair(bodies).second) {
@@ -346,7 +351,7 @@ class SeparationList {
     }
     settle_new(now);
   }
-  /// Removes all pairs within a body, as far as there are any.
+  /// Removes all pairs within a body, if there are any.
   void remove_self_pairs(std::uint32_t bodies) {
     for (const std::uint32_t block : self_roots_[bodies]) {
       tree_.for_block(block, [&](std::uint32_t slot) {
@@ -357,15 +362,16 @@ class SeparationList {
     }
     self_roots_[bodies].clear();
   }
-  /// Removes all pairs below those of changed nodes, and leaves the highest of these in `tops_`, as pairs of
-  /// which nothing is known. Root pairs of a body that has nothing left go.
+  /// Removes all pairs below those of changed nodes. Leaves the highest of the latter in `tops_`, undecided.
+  /// Removes the root pairs of a body without nodes.
   void remove_changed(std::span<const ChangedBoxes::Node> nodes) {
     tree_.find_highest_changed(nodes, tops_);
     for (const std::uint32_t slot : tops_) unsettle(slot);
     for (std::uint32_t i = 0; i < tree_.body_pair_count(); ++i) {
       const std::uint32_t root = roots_[i];
       if (root == none || tree_.both_have_nodes(i)) continue;
-      // The body's last node was its root, so this pair is one of them, and the only one of its list.
+      // The body's last node was its root. This pair is therefore one of `tops_`, and the only pair of its
+      // list.
       [[maybe_unused]] const std::size_t found = std::erase(tops_, root);
       KBVH_ASSERT(found == 1);
       remove(root);
@@ -373,7 +379,7 @@ class SeparationList {
       roots_[i] = none;
     }
   }
-  /// Makes a pair one that `settle_new` has still to decide.
+  /// Resets a pair to undecided, for `settle_new`.
   void unsettle(std::uint32_t slot) {
     tree_[slot].overlapping = false;
     if (tree_[slot].place != none) leaves_.end(tree_, slot, end_);
@@ -400,7 +406,7 @@ class SeparationList {
     count_->add(Counter::queue_operations);
   }
 
-  /// Decides the pairs in `work_`, which are new, and all below them that have to be there.
+  /// Decides the new pairs in `work_`, and makes all pairs below them that have to exist.
   void settle_new(const Moment<S>& now) {
     queue_.grow(tree_.slot_capacity());
     while (!work_.empty()) {
@@ -415,7 +421,7 @@ class SeparationList {
     }
   }
 
-  /// A pair in the list overlaps: notes it, and leaves its new children, if there are any, in `work_`.
+  /// Marks a pair of the list as overlapping. Leaves its new children, if there are any, in `work_`.
   void begin_overlap(std::uint32_t slot) {
     tree_[slot].overlapping = true;
     if (tree_.both_leaves(tree_[slot])) {
@@ -427,7 +433,7 @@ class SeparationList {
     queue_.grow(tree_.slot_capacity());
   }
 
-  /// A pair changes between apart and overlapping at `now`; what lies ahead of it is given.
+  /// Switches a pair between apart and overlapping at `now`, and schedules its next event from `outlook`.
   void turn(std::uint32_t slot, const Moment<S>& now, const Outlook& outlook) {
     put(slot, outlook);
     if (!tree_[slot].overlapping) {
@@ -468,7 +474,7 @@ class SeparationList {
     count_->add(Counter::certificates_made);
     return outlook_.look(slot, now, known);
   }
-  /// Puts the pair's next event into the queue, in place of the one that stood.
+  /// Replaces the pair's event in the queue by its next one.
   void put(std::uint32_t slot, const Outlook& outlook) {
     cancel(slot);
     if (!outlook.changes) return;
@@ -493,7 +499,7 @@ class SeparationList {
   std::vector<std::vector<std::uint32_t>> self_roots_;  ///< [body pair] blocks of roots within one body
   std::vector<std::uint32_t> work_, linked_, tops_;
   ListEdit work_done_;         ///< since the last change of geometry began
-  double time_ = 0, end_ = 0;  ///< around the instant of the event at hand
+  double time_ = 0, end_ = 0;  ///< doubles before and after the current event
 };
 
 }  // namespace kbvh

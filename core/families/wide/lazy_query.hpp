@@ -6,10 +6,10 @@
 
 namespace kbvh {
 
-/// Queries all pairs of bodies that are near each other, with boxes that are made at their first use.
-/// side_of(body) returns the WideQuery<S>::LazySide of a body, whose root is current; make(body, wide node)
-/// makes the boxes of the node's children and clears its mark. Pairs of bodies beyond the budget are pending.
-/// Adds the box tests made to `tests`.
+/// Queries all pairs of bodies that are near each other, and computes boxes at their first use. side_of(body)
+/// returns the WideQuery<S>::LazySide of a body, whose root box must be current. make(body, wide node)
+/// computes the boxes of the node's children and clears the node's mark. Appends the candidates to `out`.
+/// Counts body pairs beyond the budget as pending. Adds the number of box tests to `tests`.
 template <class S, class SideOf, class Make>
 QueryStatus query_lazily(WideQuery<S>& query, NearBodies& near_bodies, const SceneView<S>& scene,
                          const SampledMotion<S>& motion, const Budget& budget, const SideOf& side_of,
