@@ -1,6 +1,6 @@
-// The kinetic BoxTree (Z&W 2006, s.6), with the errata of the reproduction: at most two planes per inner
-// node, all other sides inherited, valid at every time, updated at events only; parts that have degenerated
-// can be rebuilt. Queries make boxes as they need them, many at once (BoxTreeRows).
+// The kinetic BoxTree (Z&W 2006, s.6), with the errata of the reproduction. An inner node has at most two
+// planes; all other sides are inherited. The tree is valid at every time and updated only at events.
+// Degenerated parts can be rebuilt. Queries compute boxes on demand, many at once (BoxTreeRows).
 
 #include <numeric>
 #include <variant>
@@ -20,7 +20,7 @@ BoxTreeConstruction construction(const Params& params, LeafBoxes leaf_boxes, std
   BoxTreeConstruction made;
   made.planes = params.word("planes") == "clip" ? PlaneChoice::clip : PlaneChoice::start;
   made.candidates = params.word("candidates") == "listed" ? Candidates::listed : Candidates::searched;
-  // Where the boxes of leaves are made of vertices, no query reads a side below a wide node of leaves.
+  // If leaf boxes are computed from vertices, no query reads a side below a wide node of leaves.
   if (made.planes == PlaneChoice::clip && leaf_boxes == LeafBoxes::tight) made.bare_leaves = wide;
   return made;
 }
@@ -118,7 +118,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
   void follow_geometry(double t, const GeometryChange<S>& change) override {
     const std::vector<BodyChange> changes = body_changes(this->scene_, change);
     on_forest([&](auto& forest) { forest.geometry_changed(t, this->scene_, this->sampled_, changes); });
-    plans_changed_ = true;  // bodies may move that did not
+    plans_changed_ = true;  // bodies that were at rest may move
     for (const BodyChange& own : changes) {
       follow_tree(own.body);
       changed_now(own.body);
@@ -161,7 +161,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
                                                                    leaf_boxes_);
       for (const std::uint32_t node : order) {
         boxes.ensure(node);
-        // What a query read counts.
+        // Reports the box that a query has read, if there is one.
         Box<S> room;
         const Box<S>* read = rows_[body].read_box(node, room);
         view.boxes.push_back(to_double(read != nullptr ? *read : boxes(node)));
@@ -199,12 +199,12 @@ class KineticBox final : public CountedStrategy<S, Count>,
   const BoxTreeBounds& tree_of(std::uint32_t body) const {
     return on_forest([&](auto& forest) -> const BoxTreeBounds& { return forest.tree(body); });
   }
-  /// Lays a body's rows out anew if its tree has changed.
+  /// Lays out a body's rows anew if its tree has changed.
   void follow_tree(std::uint32_t body) {
     rows_[body].follow(tree_of(body), this->scene_.primitives(body), leaf_boxes_);
     rows_[body].wake();
   }
-  /// Boxes made before are not those of the present time.
+  /// Marks the boxes of a body as out of date.
   void changed_now(std::uint32_t body) {
     rows_[body].new_frame(motion_, body);
     if (rebuilds_) caches_[body].new_frame();
@@ -213,7 +213,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
     this->count_.add(Counter::positions_fetched, rows_[body].make_wanted(node, tree_of(body), motion_, body));
   }
 
-  /// The boxes of all nodes; these are in `order_` then, parents before children.
+  /// Computes the boxes of all nodes. Leaves the nodes in `order_`, parents before children.
   template <class Tree>
   InheritedBoxes<S, Tree> all_boxes(const Tree& tree, std::uint32_t body) {
     if (tree.edited()) {
@@ -259,7 +259,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
   BuildMethod method_ = BuildMethod::median;
   double threshold_;
   std::uint64_t frames_per_check_, frames_ = 0;
-  // [body]; none if nothing is rebuilt
+  // [body]; empty without rebuilds
   std::vector<BoxCache<S>> caches_;
   std::vector<BoxTreeDegradation> degradations_;
 };

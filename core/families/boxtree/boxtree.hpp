@@ -11,18 +11,18 @@
 
 namespace kbvh {
 
-// A BoxTree (Zachmann 1995): a binary hierarchy of which every node but the root owns one side of its box, at
-// most, and inherits the other five from its parent. Sides are numbered 2 * axis + (0 lower, 1 upper).
+// A BoxTree (Zachmann 1995) is a binary hierarchy. Each node except the root owns at most one side of its
+// box, and inherits the other sides from its parent. Sides are numbered 2 * axis + (0 lower, 1 upper).
 
-/// Where a query finds the boxes of a BoxTree's leaves.
+/// The source of the leaf boxes that a query reads.
 enum class LeafBoxes : std::uint8_t {
-  inherited,  ///< as those of inner nodes: nothing but realisers is read
-  tight,      ///< made of the leaf's vertices
+  inherited,  ///< as those of inner nodes: only realisers are read
+  tight,      ///< computed from the leaf's vertices
 };
 
-/// A bounds view (traversal.hpp) of a kinetic BoxTree: a node's box is its parent's with the own side read
-/// from the realising vertex. Extents are reconstructed on the way down, each once per frame: a query asks
-/// for a parent first.
+/// A bounds view (traversal.hpp) of a kinetic BoxTree. A node's box is its parent's box with the own side
+/// read from the realising vertex. Boxes are computed top-down, each once per frame; the caller must ensure a
+/// parent before its children.
 template <class S, class Tree>
 class InheritedBoxes {
  public:

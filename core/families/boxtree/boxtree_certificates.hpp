@@ -14,21 +14,23 @@
 
 namespace kbvh {
 
-/// The certificates of a BoxTree and their events (Z&W s.6, with errata). A bound's certificate says that its
-/// realiser is extremal below its node. The search for its earliest failure goes down depth first: at a child
-/// with the same own side the stored realiser answers for all below it; other children, also those split on
-/// the same axis but to the other side, are descended; at a leaf every vertex is a candidate. So each stored
-/// realiser is a candidate of exactly one certificate, that of the nearest ancestor with the same own side
-/// (or of the root), and so is each vertex of a leaf per side: for each side, certificates are the inner
-/// nodes of a tree whose leaves are the leaves' vertices. If all hold, every realiser is extremal; when one
-/// is replaced, that one certificate above is concerned, and none other; and there, if its own realiser
-/// stays, the search is needed only if it was the replaced vertex that would have come next.
+/// The certificates of a BoxTree and their events (Z&W s.6, with errata). A bound's certificate states that
+/// its realiser is extremal below its node. The search for the certificate's earliest failure is depth first.
+/// At a child with the same own side, the stored realiser stands for all vertices below the child. The search
+/// descends to all other children, including those split on the same axis that own the opposite side. At a
+/// leaf every vertex is a candidate. Each stored realiser is therefore a candidate of exactly one
+/// certificate, that of the nearest ancestor with the same own side (or of the root), and each vertex of a
+/// leaf is a candidate of exactly one certificate per side. For each side, the certificates are the inner
+/// nodes of a tree whose leaves are the leaves' vertices. If all certificates hold, every realiser is
+/// extremal. Replacing a realiser affects only the one certificate above. If that certificate keeps its own
+/// realiser, it needs a new search only if the replaced vertex was its next loser.
 ///
-/// Who takes part in a certificate changes with the topology only, so that searches can be made once and
+/// The candidates of a certificate change only with the topology. Searches can therefore be made once and
 /// listed (Candidates::listed), until the topology is edited.
 ///
-/// Slots of the queue are first_slot + place, for the bounds that there were at the start; later ones get
-/// theirs in chunks. Events are handled and observers told as by KineticAabbTree, but for own sides only.
+/// Slots of the queue are first_slot + place for the initial bounds; later bounds get slots in chunks. Events
+/// are handled as by KineticAabbTree. Observers receive realiser_changed for own sides only, and no
+/// realiser_plan_changed.
 template <class S, class Queue, class Count, class Observer, class Rules>
 class BoxTreeCertificates : public BoxTreeBounds {
  public:
@@ -45,9 +47,9 @@ class BoxTreeCertificates : public BoxTreeBounds {
 
   SearchCost& search_cost() { return search_cost_; }
 
-  /// Handles a failure that was popped from the queue: the loser takes over, here and up from certificate to
-  /// certificate as long as the winner realises them. O(depth) searches, which cost up to O(nodes) each (Z&W
-  /// Theorem 5: responsive in one dimension only).
+  /// Handles a failure that was popped from the queue. The loser becomes the realiser of this bound, and of
+  /// the bounds of the certificates above while the winner realises them. O(depth) searches of up to O(nodes)
+  /// each (Z&W Theorem 5: responsive in one dimension only).
   void handle(const Event& event) {
     KBVH_ASSERT(event.body == body_);
     Crossing<S> crossing;
@@ -66,13 +68,13 @@ class BoxTreeCertificates : public BoxTreeBounds {
     exchange_candidate(at, event.side, event.winner, event.loser, now);
   }
 
-  /// Looks again for the next failure of a certificate, which stands at t, a keyframe.
+  /// Searches the next failure of a certificate that holds at t, a keyframe time.
   void review(const Event& event, double t) {
     count_->add(Counter::queue_operations);
     certify(slots_.place(event.slot), event.side, Instant<S>::at(t));
   }
-  /// Fetches what handling the event will read: its bound and the one above, then the list of candidates,
-  /// then the keyframes of the first of these.
+  /// Prefetches the data that the event will read: in step 0 its bound, in step 1 the bound above and the
+  /// list of candidates, in step 2 the keyframes of the first candidates.
   void fetch_ahead(const PackedEvent& event, std::uint32_t slot_of_event, int step) const {
     if (!listed_) return;
     const Bound& bound = bounds_[slots_.place(slot_of_event)];
@@ -90,7 +92,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
   }
 
  protected:
-  /// The place whose certificate has the realiser at this one among its candidates.
+  /// Returns the place whose certificate has the realiser at `at` as a candidate.
   std::uint32_t above(std::uint32_t at, Side side) {
     if (listed_) return bounds_[at].above;
     std::uint32_t node = node_at(at);
@@ -103,7 +105,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
     return place(node, side);
   }
 
-  /// The candidates of a certificate; valid until the next call.
+  /// Returns the candidates of a certificate; valid until the next call.
   std::span<const std::uint32_t> candidates(std::uint32_t at, Side side) {
     candidates_.clear();
     if (listed_) {
@@ -125,7 +127,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
     if constexpr (Count::enabled) search_cost_.add(visited);
     return candidates_;
   }
-  /// Lists the candidates of all certificates, for nodes in `order`. O(nodes).
+  /// Lists the candidates of all certificates, for the nodes in `order`. O(nodes).
   void list_candidates(std::span<const std::uint32_t> order) {
     list_.clear();
     for (const std::uint32_t node : order)
@@ -150,10 +152,11 @@ class BoxTreeCertificates : public BoxTreeBounds {
       }
     listed_ = true;
   }
-  /// The topology is about to be edited: from now on candidates are searched for.
+  /// Discards the lists before an edit of the topology. From now on candidates are searched.
   void forget_lists() { listed_ = false; }
 
-  /// The best candidate; of equal ones `preferred`, if it is among them, or else the first.
+  /// Returns the best candidate at t. Of equal candidates returns `preferred` if it is one of them, otherwise
+  /// the first.
   std::uint32_t best_at(std::uint32_t at, Side side, double t, std::uint32_t preferred) {
     std::uint32_t best = no_vertex;
     const std::span<const std::uint32_t> all = candidates(at, side);
@@ -162,10 +165,11 @@ class BoxTreeCertificates : public BoxTreeBounds {
       if (order > 0 || (order == 0 && challenger == preferred)) best = challenger;
     }
     count_->add(Counter::vertex_reads, all.size());
-    return best == no_vertex ? preferred : best;  // none: only where rules are faulty
+    return best == no_vertex ? preferred : best;  // no candidate: only with faulty Rules
   }
 
-  /// Finds the realisers of a node's own sides and schedules their certificates, with those below in place.
+  /// Finds the realisers of a node's own sides and schedules their certificates. Requires the realisers
+  /// below.
   void start(std::uint32_t node, const Instant<S>& now) {
     std::uint32_t any = node;
     while (!topology_.nodes[any].is_leaf()) any = topology_.nodes[any].first();
@@ -183,13 +187,13 @@ class BoxTreeCertificates : public BoxTreeBounds {
     observer_.template realiser_changed<S>(body_, node_at(at), side, old, vertex, now);
   }
 
-  /// Schedules the earliest failure of a bound's certificate from now on, in place of the one that stood.
+  /// Schedules the earliest failure of a bound's certificate from `now` on, and replaces the scheduled one.
   void certify(std::uint32_t at, Side side, const Instant<S>& now) {
     certifier_.certify(event_of(at, side), now, candidates(at, side));
   }
 
-  /// Of a certificate's candidates, `before` has been replaced by `after`, which is not ahead of the
-  /// realiser. As long as it was not `before` who comes next, the others need not be looked at again.
+  /// Updates a certificate in which `after` replaces the candidate `before`. Requires that `after` is not
+  /// ahead of the realiser. The other candidates are searched again only if `before` was the next loser.
   void exchange_candidate(std::uint32_t at, Side side, std::uint32_t before, std::uint32_t after,
                           const Instant<S>& now) {
     const std::uint32_t slot = slots_.slot(at);
@@ -210,7 +214,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
   SearchCost search_cost_;
 
  private:
-  /// Names the certificate of a bound.
+  /// Returns an event that identifies the certificate of a bound, without a time.
   Event event_of(std::uint32_t at, Side side) const {
     Event event;
     event.winner = bounds_[at].realiser;
@@ -221,8 +225,8 @@ class BoxTreeCertificates : public BoxTreeBounds {
     return event;
   }
 
-  std::vector<std::uint32_t> list_;        ///< of candidates, by bound
-  std::vector<std::uint32_t> candidates_;  ///< of the certificate that is being made
+  std::vector<std::uint32_t> list_;        ///< candidates, by bound
+  std::vector<std::uint32_t> candidates_;  ///< candidates of the current certificate
   bool listed_ = false;
 };
 

@@ -8,17 +8,17 @@
 
 namespace kbvh {
 
-/// How far the parts of a BoxTree have degenerated, so that they can be rebuilt (the future work of Z&W
-/// s.10). A box is cut by two planes per level only and keeps sides that were chosen for where its vertices
-/// once were. Measure: the cost of a subtree is the summed surface area of its boxes over the area of its
-/// root's box (the surface-area heuristic with all costs 1, indifferent to growth and to what happens above);
-/// its degradation is this cost over what it was when the subtree was built, or last edited at its root.
-/// Every call is O(nodes); no allocation but the first time, and where nodes are added.
+/// Measures how far the parts of a BoxTree have degenerated, so that they can be rebuilt (the future work of
+/// Z&W s.10). A box is cut by only two planes per level, and its own sides were chosen for former positions
+/// of its vertices. The cost of a subtree is the summed surface area of its boxes divided by the area of its
+/// root's box (the surface-area heuristic with all costs 1, independent of scale and of the nodes above). The
+/// degradation of a subtree is its cost divided by its cost when it was built, or when its root was last
+/// edited. Every measuring call is O(nodes). Allocates only in the first call, and for added nodes.
 ///
-/// Topologies are given with their nodes in an `order` that has parents before children.
+/// `order` lists the nodes of the topology, parents before children.
 class BoxTreeDegradation {
  public:
-  /// Takes the tree as freshly built. `boxes(node)` is a box.
+  /// Records the tree as freshly built. `boxes(node)` is the box of a node.
   template <class Boxes>
   void start(const Topology& topology, std::span<const std::uint32_t> order, const Boxes& boxes) {
     measure(topology, order, boxes);
@@ -26,8 +26,7 @@ class BoxTreeDegradation {
     content_ = topology.nodes;
   }
 
-  /// Nodes may have been added, moved and removed: those that have other children or primitives now are taken
-  /// as freshly built.
+  /// Follows an edit of the tree. Nodes with other children or primitives than before count as freshly built.
   template <class Boxes>
   void edited(const Topology& topology, std::span<const std::uint32_t> order, const Boxes& boxes) {
     measure(topology, order, boxes);
@@ -40,7 +39,8 @@ class BoxTreeDegradation {
     }
   }
 
-  /// The highest nodes whose degradation exceeds the threshold, in order; no node lies below another.
+  /// Returns the highest nodes whose degradation exceeds the threshold, in the order of `order`. No returned
+  /// node lies below another.
   template <class Boxes>
   const std::vector<std::uint32_t>& beyond(double threshold, const Topology& topology,
                                            std::span<const std::uint32_t> order, const Boxes& boxes) {
@@ -56,7 +56,7 @@ class BoxTreeDegradation {
     return found_;
   }
 
-  /// The nodes found last have been rebuilt: takes them and all below as freshly built.
+  /// Records the nodes that `beyond` returned last, and all nodes below them, as freshly built.
   template <class Boxes>
   void rebuilt(const Topology& topology, std::span<const std::uint32_t> order, const Boxes& boxes) {
     measure(topology, order, boxes);
@@ -72,7 +72,7 @@ class BoxTreeDegradation {
     }
   }
 
-  /// Of the last measurement: at least 1.
+  /// Returns the cost of a node in the last measurement, at least 1.
   double cost(std::uint32_t node) const { return costs_[node]; }
   std::size_t bytes() const {
     return (costs_.size() + built_.size()) * sizeof(double) + covered_.size() +
@@ -83,7 +83,7 @@ class BoxTreeDegradation {
   template <class Boxes>
   void measure(const Topology& topology, std::span<const std::uint32_t> order, const Boxes& boxes) {
     costs_.resize(topology.size());
-    // Sums first, which a parent needs of its children, then quotients.
+    // Sums first, because a parent needs the sums of its children; then quotients.
     for (std::size_t i = order.size(); i-- > 0;) {
       const std::uint32_t node = order[i];
       const TopologyNode n = topology.nodes[node];
@@ -99,9 +99,9 @@ class BoxTreeDegradation {
   }
 
   std::vector<double> costs_, built_;  ///< [node]
-  std::vector<std::uint8_t> covered_;  ///< [node]: at or below a node that was found
+  std::vector<std::uint8_t> covered_;  ///< [node]: at or below a node in found_
   std::vector<std::uint32_t> found_;
-  std::vector<TopologyNode> content_;  ///< [node]: what it was when built or edited
+  std::vector<TopologyNode> content_;  ///< [node]: children or primitives when built or edited
 };
 
 }  // namespace kbvh

@@ -12,8 +12,8 @@
 
 namespace kbvh {
 
-/// The unique vertices of leaves, ascending, found by the primitives a leaf holds and not by its node: they
-/// stay what they are when leaves move to other nodes.
+/// The vertices of leaves, unique and ascending. A list is keyed by the leaf's first primitive entry, not by
+/// its node, so that lists do not change when leaves move to other nodes.
 class BoxTreeLeaves {
  public:
   BoxTreeLeaves(const Topology& topology, const Primitives& primitives) {
@@ -36,7 +36,7 @@ class BoxTreeLeaves {
     return LaneBox<S>::of((*this)[leaf], positions).box();
   }
 
-  /// Makes the lists of each vertex's leaves, unless they are there. O(nodes + vertices).
+  /// Makes the lists of leaves by vertex, unless they exist. O(nodes + vertices).
   void index(const Topology& topology, std::uint32_t vertex_count) {
     if (users_.keys() != 0) return;
     users_ = inverted(lists_, vertex_count);
@@ -44,19 +44,19 @@ class BoxTreeLeaves {
     for (std::uint32_t node = 0; node < topology.size(); ++node)
       if (const TopologyNode n = topology.nodes[node]; n.is_leaf() && n.count() > 0) nodes_[n.first()] = node;
   }
-  /// Calls visit(node) for every leaf that has this vertex; `index` must have been called.
+  /// Calls visit(node) for every leaf that has the vertex. Requires a call of `index`.
   template <class Visit>
   void for_leaves_of(std::uint32_t vertex, Visit&& visit) const {
-    if (vertex >= users_.keys()) return;  // new, and of no primitive yet
+    if (vertex >= users_.keys()) return;  // a new vertex, in no primitive yet
     for (std::uint32_t entry : users_[vertex]) visit(nodes_[entry]);
   }
 
-  /// A leaf's content lies at this node now.
+  /// Records that a leaf's content is stored at `node` now.
   void placed(TopologyNode leaf, std::uint32_t node) {
     if (!nodes_.empty() && leaf.is_leaf() && leaf.count() > 0) nodes_[leaf.first()] = node;
   }
-  /// Gives a leaf at a node another list, ascending and unique, of vertices below vertex_count. O(its
-  /// length).
+  /// Sets the vertices of a leaf at `node`. `vertices` must be ascending, unique and below vertex_count.
+  /// O(length of the list).
   void assign(TopologyNode leaf, std::uint32_t node, std::span<const std::uint32_t> vertices,
               std::uint32_t vertex_count) {
     if (lists_.keys() <= leaf.first()) lists_.resize(leaf.first() + leaf.count());
@@ -68,7 +68,7 @@ class BoxTreeLeaves {
     for (std::uint32_t v : vertices) users_.push(v, leaf.first());
     nodes_[leaf.first()] = node;
   }
-  /// Forgets the list of a leaf.
+  /// Removes the list of a leaf.
   void drop(TopologyNode leaf) {
     if (users_.keys() != 0)
       for (std::uint32_t v : lists_[leaf.first()]) users_.erase(v, leaf.first());
@@ -81,8 +81,8 @@ class BoxTreeLeaves {
 
  private:
   ListPool lists_;                    ///< by the leaf's first entry in the topology's primitives
-  ListPool users_;                    ///< by vertex: first entries of leaves; none before `index`
-  std::vector<std::uint32_t> nodes_;  ///< by first entry: the leaf's node; none before `index`
+  ListPool users_;                    ///< by vertex: first entries of leaves; empty before `index`
+  std::vector<std::uint32_t> nodes_;  ///< by first entry: the leaf's node; empty before `index`
 };
 
 }  // namespace kbvh

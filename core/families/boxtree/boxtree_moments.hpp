@@ -7,11 +7,12 @@
 
 namespace kbvh {
 
-/// Positions of one body at a few moments of its clip.
+/// Positions of one body at up to a given number of moments of its clip.
 template <class S>
 class ClipMoments {
  public:
-  /// At t and, if more than one moment is wanted, at keyframes after it, evenly spread. O(vertices) each.
+  /// Evaluates positions at t and, if `moments` > 1, at evenly spread keyframes after t. O(vertices) per
+  /// moment.
   ClipMoments(const FlightPlans<S>& plans, double t, std::size_t moments)
       : stride_(std::size_t(3) * plans.vertex_count() + 1) {
     const auto times = plans.keyframe_times();
@@ -24,15 +25,16 @@ class ClipMoments {
       plans.evaluate(times[later + (m * left) / (count_ - 1) - 1], room_.data() + m * stride_);
     positions_ = room_.data();
   }
-  /// One moment, whose positions lie elsewhere.
+  /// Refers to the positions of a single moment, without a copy.
   explicit ClipMoments(const S* positions) : positions_(positions) {}
   ClipMoments(const ClipMoments&) = delete;
   ClipMoments& operator=(const ClipMoments&) = delete;
 
   std::size_t count() const { return count_; }
-  /// [vertex][3]
+  /// Returns the positions at a moment: [vertex][3].
   const S* positions(std::size_t moment) const { return positions_ + moment * stride_; }
-  /// So many moments of a tree of that many nodes are looked at without taking much memory.
+  /// Returns the number of moments that limits the memory for a tree of `nodes` nodes to some 2^21 boxes; at
+  /// least 2.
   static std::size_t most_of(std::uint32_t nodes) {
     constexpr std::size_t most_boxes = std::size_t(1) << 21;
     return std::max<std::size_t>(2, most_boxes / nodes);

@@ -14,25 +14,25 @@
 
 namespace kbvh {
 
-/// Chooses the planes of a subtree: per inner node the axis and which child is the left one, such that the
-/// children's boxes, sides inherited, have the least summed area x primitives (the local surface-area cost);
-/// the least summed edges where areas are equal; then the first. Parents before children, for a child can
-/// only cut what its ancestors left.
+/// Chooses the planes of a subtree. For each inner node, chooses the axis and the left child such that the
+/// children's inherited boxes have the least summed area x primitives (the local surface-area cost). Of equal
+/// areas the least summed edge length x primitives counts, then the first choice. Parents are cut before
+/// children, because a child can only cut the box that its ancestors left.
 template <class S>
 class BoxTreePlanes {
  public:
-  /// `nodes`: a node and all below it, ascending, of a topology that is laid out as a built one.
+  /// `nodes` lists a node and all nodes below it, ascending. The topology must have a builder's layout.
   BoxTreePlanes(const Topology& topology, std::span<const std::uint32_t> nodes)
       : topology_(&topology), nodes_(nodes), tight_(nodes.size()), weights_(nodes.size()) {}
 
-  /// The tight box of leaf nodes[i].
+  /// Sets the tight box of leaf nodes[i].
   void set_leaf(std::size_t i, const Box<S>& box) {
     tight_[i] = box;
     weights_[i] = topology_->nodes[nodes_[i]].count();
   }
 
-  /// Sets own_sides[node] for all nodes but the first, whose box is `box`, or the tight one. axis(node)
-  /// forces a split axis; 3 does not. O(nodes log nodes).
+  /// Sets own_sides[node] for all nodes but the first. The first node has the box `box`, or its tight box if
+  /// null. axis(node) forces a split axis (0, 1, 2), or returns 3 for a free choice. O(nodes log nodes).
   template <class Axis>
   void choose(const Box<S>* box, Axis&& axis, std::vector<std::uint8_t>& own_sides) {
     for (std::size_t i = nodes_.size(); i-- > 0;) {
@@ -91,10 +91,11 @@ class BoxTreePlanes {
   const Topology* topology_;
   std::span<const std::uint32_t> nodes_;
   std::vector<Box<S>> tight_, inherited_;
-  std::vector<std::uint32_t> weights_;  ///< primitives below
+  std::vector<std::uint32_t> weights_;  ///< number of primitives below
 };
 
-/// A node and all below it, parents before children; of a topology in any order, as edited ones are.
+/// Returns a node and all nodes below it, parents before children. The topology may have any layout,
+/// including that of edited ones.
 inline std::vector<std::uint32_t> subtree_of(const Topology& topology, std::uint32_t top) {
   std::vector<std::uint32_t> ids{top};
   for (std::size_t i = 0; i < ids.size(); ++i)
@@ -103,12 +104,13 @@ inline std::vector<std::uint32_t> subtree_of(const Topology& topology, std::uint
   return ids;
 }
 
-/// The own sides of the nodes of a subtree, `ids` as `subtree_of` gives them, as BoxTreePlanes chooses them;
-/// nothing is said of the first. box_of(leaf) is a leaf's tight box, axis(node) as there.
+/// Returns the own sides that BoxTreePlanes chooses for the nodes of a subtree, in the order of `ids`, which
+/// `subtree_of` returned. The entry of the first node has no meaning. box_of(leaf) is a leaf's tight box.
+/// `box` and axis(node) are those of BoxTreePlanes::choose.
 template <class S, class BoxOf, class Axis>
 std::vector<std::uint8_t> choose_own_sides(const Topology& topology, const std::vector<std::uint32_t>& ids,
                                            BoxOf&& box_of, const Box<S>* box, Axis&& axis) {
-  // The part is laid out in a topology of its own, in the order that BoxTreePlanes needs.
+  // Copies the subtree to a topology in the layout that BoxTreePlanes needs.
   Topology part;
   std::vector<std::uint32_t> places(ids.size());
   std::iota(places.begin(), places.end(), 0u);
@@ -127,8 +129,9 @@ std::vector<std::uint8_t> choose_own_sides(const Topology& topology, const std::
   return own_sides;
 }
 
-/// Builds the inner nodes of a subtree anew over its leaves, which stay what they are but change places.
-/// `ids` are its nodes, the top first and the others ascending; `boxes` those of its leaves, in that order.
+/// Rebuilds the inner nodes of a subtree over its leaves. Leaves keep their content and change places. `ids`
+/// lists the nodes of the subtree, the top first and the others ascending; `boxes` the boxes of its leaves in
+/// that order.
 template <class S>
 void regrow_subtree(Topology& topology, std::span<const std::uint32_t> ids, std::span<const Box<S>> boxes,
                     BuildMethod method) {
@@ -137,7 +140,8 @@ void regrow_subtree(Topology& topology, std::span<const std::uint32_t> ids, std:
     if (const TopologyNode n = topology.nodes[id]; n.is_leaf()) leaves.push_back(n);
   const Topology made = build_topology<S>(boxes, {.method = method, .width = 2, .leaf_size = 1});
   KBVH_ASSERT(made.size() == ids.size());
-  // Children are pairs of neighbours here and there, so the order-preserving renaming keeps them pairs.
+  // Children are pairs of neighbours in both topologies. The renaming preserves the order, and thus these
+  // pairs.
   for (std::uint32_t i = 0; i < made.size(); ++i) {
     const TopologyNode n = made.nodes[i];
     const std::uint32_t id = ids[i];

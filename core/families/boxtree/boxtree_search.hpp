@@ -9,21 +9,25 @@
 
 namespace kbvh {
 
-/// What a kinetic BoxTree may be told otherwise: trees with forced axes (Z&W fig. 10), seeded faults.
+/// The replaceable rules of a kinetic BoxTree, for trees with forced axes (Z&W fig. 10) and for seeded
+/// faults.
 struct BoxTreeRules {
-  /// The axis on which every inner node of a depth is split; 3: the best for its children's boxes.
+  /// Returns the axis (0, 1, 2) on which all inner nodes of a depth are split, or 3 for the axis with the
+  /// best boxes of the children.
   static int split_axis(int /*depth*/) { return 3; }
-  /// Does a certificate search of `sought` go down to a child whose own side is another? It must.
+  /// Returns whether a certificate search for side `sought` descends to a child that owns another side. Must
+  /// be true for a correct tree.
   static bool descends(Side /*own*/, Side /*sought*/) { return true; }
-  /// Is a certificate looked at again when a change has replaced a realiser among its candidates? It must.
+  /// Returns whether a certificate is checked again after a change of a realiser among its candidates. Must
+  /// be true for a correct tree.
   static bool carries_up() { return true; }
 };
 
-/// What the certificate searches of a BoxTree cost since it was made or `forget` was called.
+/// The cost of a BoxTree's certificate searches since construction or the last call of `forget`.
 struct SearchCost {
   std::uint64_t searches = 0;
-  std::uint64_t nodes = 0;       ///< nodes looked at by all of them
-  std::uint64_t most_nodes = 0;  ///< by the dearest one
+  std::uint64_t nodes = 0;       ///< nodes visited by all searches
+  std::uint64_t most_nodes = 0;  ///< nodes visited by the most expensive search
   void add(std::uint64_t visited) {
     ++searches;
     nodes += visited;
@@ -32,18 +36,19 @@ struct SearchCost {
   void forget() { *this = {}; }
 };
 
-/// Finds the candidates of a BoxTree's certificates (Z&W figs. 8, 9): depth first, down to children with the
-/// same own side, whose realisers answer for all below them, and to leaves, of which every vertex is one.
+/// Finds the candidates of a BoxTree's certificates (Z&W figs. 8, 9). The search is depth first. It stops at
+/// children with the same own side, whose realisers stand for all vertices below. At a leaf every vertex is a
+/// candidate.
 template <class Rules>
 class CandidateSearch {
  public:
   explicit CandidateSearch(std::uint32_t vertex_count) : seen_(vertex_count, 0) {}
-  /// Vertices may have been added.
+  /// Makes room for added vertices.
   void resize(std::uint32_t vertex_count) { seen_.resize(vertex_count, 0); }
 
-  /// Calls on_child(child) for every child with the same own side that the search of a node's certificate for
-  /// one side meets, and on_vertex(vertex) for the vertices of the leaves that it meets, each once;
-  /// `own_sides` [node]. Returns how many nodes were looked at, up to O(nodes).
+  /// Searches the candidates of a node's certificate for one side. Calls on_child(child) for every child with
+  /// the same own side that the search meets, and on_vertex(vertex) for the vertices of the leaves that it
+  /// meets, each once. `own_sides` is [node]. Returns the number of visited nodes, up to O(nodes).
   template <class OnChild, class OnVertex>
   std::uint64_t run(const Topology& topology, const BoxTreeLeaves& leaves, const std::uint8_t* own_sides,
                     std::uint32_t node, Side side, OnChild&& on_child, OnVertex&& on_vertex) {
@@ -74,7 +79,7 @@ class CandidateSearch {
     }
     return visited;
   }
-  /// Within a search: was the vertex not met before? It is now.
+  /// Marks a vertex as visited by the current search. Returns whether this was its first visit.
   bool first_visit(std::uint32_t vertex) {
     if (seen_[vertex] == search_) return false;
     seen_[vertex] = search_;
@@ -85,7 +90,7 @@ class CandidateSearch {
 
  private:
   std::vector<std::uint32_t> open_;
-  std::vector<std::uint32_t> seen_;  ///< [vertex]: the last search that met it, for leaves share vertices
+  std::vector<std::uint32_t> seen_;  ///< [vertex]: last search that visited it; leaves may share vertices
   std::uint32_t search_ = 0;
 };
 

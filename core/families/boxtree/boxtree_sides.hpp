@@ -8,44 +8,46 @@
 
 namespace kbvh {
 
-/// How the sides are chosen that the nodes of a BoxTree own.
+/// How the own sides of a BoxTree's nodes are chosen.
 enum class PlaneChoice : std::uint8_t {
-  start,  ///< as Zachmann 1995: two children are cut on one axis, for the least summed area of their boxes
-          ///< at the start
-  clip,   ///< each child owns the side that cuts most off what its box is expected to overlap, over the
-          ///< positions of the whole clip
+  /// As in Zachmann 1995: both children are cut on one axis, for the least summed area of their boxes at the
+  /// start.
+  start,
+  /// Each child owns the side that saves its box most of the expected overlaps, over the positions of the
+  /// whole clip.
+  clip,
 };
 
-/// How a certificate search finds its candidates.
+/// How a certificate's candidates are found.
 enum class Candidates : std::uint8_t {
-  searched,  ///< by going down the tree, each time (Z&W figs. 8, 9)
-  listed,    ///< from a list that one search made at the start
+  searched,  ///< by a search of the tree, each time (Z&W figs. 8, 9)
+  listed,    ///< from a list made by one search at the start
 };
 
-/// What a kinetic BoxTree is built like; the default is the paper's.
+/// Options for the construction of a kinetic BoxTree. The defaults are those of the paper.
 struct BoxTreeConstruction {
   PlaneChoice planes = PlaneChoice::start;
   Candidates candidates = Candidates::searched;
-  /// Subtrees of so many leaves, at most, have no sides below their top: their boxes are made of the vertices
-  /// of their leaves where they are asked for. 0: every node but the root owns one.
+  /// Subtrees of at most this many leaves have no own sides below their top, and no leaf has one: queries
+  /// must compute the boxes of leaves from their vertices. 0: every node but the root owns a side.
   std::uint32_t bare_leaves = 0;
-  /// The clip is looked at in so many moments, at most.
+  /// Maximum number of moments of the clip that PlaneChoice::clip evaluates.
   std::uint32_t moments = 16;
 };
 
-/// A node that owns no side of its box.
+/// The own side of a node that owns none.
 inline constexpr std::uint8_t no_side = 6;
 
-/// Chooses the own sides of the nodes of a subtree for positions at several moments. A node's candidates are
-/// its six sides: each would cut its parent's box, as inherited, to what the node needs. The best one leaves
-/// the least volume to a box that is somewhere near, as large as the node's tight box is on average: the
-/// expected number of overlaps (for a flat node the volume itself would be 0 whatever is cut). Sums are over
-/// moments. O(nodes x moments).
+/// Chooses the own sides of the nodes of a subtree for positions at several moments. Each of a node's six
+/// sides would cut the inherited box of its parent to the node's tight box on that side. The best side leaves
+/// the least expected number of overlaps with a nearby box, which is a cube whose edge is the mean extent of
+/// the node's tight box. This number is the volume of the cut box enlarged by that edge. (The plain volume of
+/// a flat node would be 0 whatever side is cut.) Sums are over moments. O(nodes x moments).
 template <class S>
 class ExpectedOverlap {
  public:
-  /// `ids` as `subtree_of` gives them. leaf_box(leaf, moment) is the tight box of a leaf's content; `top` the
-  /// box of ids[0] at all moments, or null: the tight one.
+  /// `ids` must come from `subtree_of`. leaf_box(leaf, moment) is the tight box of a leaf's content. `top` is
+  /// the box of ids[0] at all moments; if null, its tight box.
   template <class LeafBox>
   ExpectedOverlap(const Topology& topology, const std::vector<std::uint32_t>& ids, std::size_t moments,
                   LeafBox&& leaf_box, const Box<S>* top)
@@ -72,7 +74,7 @@ class ExpectedOverlap {
     for (std::size_t m = 0; m < moments; ++m) boxes_[m] = top != nullptr ? *top : tight_[m];
   }
 
-  /// The own sides, in the order of the nodes; nothing is said of the first.
+  /// Returns the own sides in the order of the nodes. The entry of the first node has no meaning.
   std::vector<std::uint8_t> choose(std::uint32_t bare_leaves) {
     std::vector<std::uint8_t> sides(nodes_.size(), no_side);
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -92,8 +94,8 @@ class ExpectedOverlap {
 
  private:
   struct Node {
-    std::uint32_t first_child = 0;  ///< 0: a leaf
-    std::uint32_t leaves = 0;       ///< below
+    std::uint32_t first_child = 0;  ///< 0 for a leaf
+    std::uint32_t leaves = 0;       ///< leaves below
   };
   static double extent(const Box<S>& box, int axis) {
     return double(box.upper[axis]) - double(box.lower[axis]);

@@ -11,13 +11,14 @@
 
 namespace kbvh {
 
-/// The kinetic BoxTree of one body (Z&W s.6, with errata): what it stores is a BoxTreeBounds, how it is kept
-/// valid is said at BoxTreeCertificates. Here is how it starts, and how it follows changes of plans and of
-/// geometry. Observers are not told what insertions and deletions do to nodes.
+/// The kinetic BoxTree of one body (Z&W s.6, with errata). BoxTreeBounds stores its data, and
+/// BoxTreeCertificates keeps it valid. This class builds the tree, and applies changes of plans and of
+/// geometry. Observers receive no notices about nodes that insertions and deletions change.
 ///
-/// Primitives can be inserted and removed at any time. The edit of the topology is local; where it was, the
-/// one certificate per side that searches there is made again, those of new nodes are made, and from there up
-/// those are made again below whose node a realiser has changed.
+/// Primitives can be inserted and removed at any time. The edit of the topology is local. Afterwards the
+/// certificates of new nodes are made, and, for each side, the one certificate whose search covers the edited
+/// place is recomputed. Further up, a certificate is recomputed if a realiser among its candidates has
+/// changed.
 template <class S, class Queue, class Count, class Observer = NoObserver, class Rules = BoxTreeRules>
 class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rules> {
   using Base = BoxTreeCertificates<S, Queue, Count, Observer, Rules>;
@@ -32,13 +33,13 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
                  Observer observer = {})
       : Base(std::move(topology), primitives, body, first_slot, clock, queue, count, observer) {}
 
-  /// How it is built from the next `initialise` on.
+  /// Sets the options of construction, which take effect at the next `initialise`.
   void construct_as(const BoxTreeConstruction& construction) { construction_ = construction; }
 
   using Base::box_of, Base::realiser, Base::slot, Base::slot_count;
 
-  /// Chooses the planes, finds every realiser at t and schedules every certificate. O(nodes log nodes +
-  /// vertices of leaves), for each moment that is looked at.
+  /// Chooses the planes, finds every realiser at t, and schedules every certificate. O(nodes log nodes +
+  /// vertices of leaves) per evaluated moment.
   void initialise(double t) {
     if (topology_.empty()) return;
     if (!original_.empty()) {
@@ -55,8 +56,9 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
     for (std::size_t i = all.size(); i-- > 0;) this->start(all[i], now);
   }
 
-  /// The plans of `vertices` (ascending, unique) changed at t, each from its stored position: rechecks every
-  /// certificate that they, or realisers that change in consequence, take part in.
+  /// Applies changes of the plans of `vertices` (ascending, unique) at t; each new plan begins at the stored
+  /// position. Rechecks every certificate that has one of these vertices, or a realiser that changes in
+  /// consequence, as a candidate or as its winner.
   void plans_changed(double t, std::span<const std::uint32_t> vertices) {
     leaves_.index(topology_, clock_->plans(body_).vertex_count());
     const auto changed = [&](std::uint32_t v) {
@@ -68,10 +70,11 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
     repair(t, changed);
   }
 
-  /// Inserts a primitive that the body has now, at t: at the leaf whose boxes on the way down grow least. At
-  /// most two certificates of new nodes, one above for each side, and more where realisers change; what their
-  /// searches cost is the tree's to say (search_cost). O(nodes) the first time for what edits need. Where a
-  /// leaf gets deeper than 2 log2(leaves), a subtree is balanced anew, amortised O(log) leaves per insertion.
+  /// Inserts a primitive, which the body contains already, at t: at the leaf whose boxes from the root down
+  /// grow least. Computes at most two certificates of new nodes, one certificate above for each side, and
+  /// further ones where realisers change; `search_cost` counts the cost of their searches. The first edit
+  /// needs O(nodes) in addition. If a leaf becomes deeper than 2 log2(leaves), a subtree is rebalanced,
+  /// amortised O(log) leaves per insertion.
   void insert(double t, std::uint32_t primitive, const Primitives& primitives,
               const SampledMotion<S>& motion) {
     start_editing(primitives);
@@ -91,9 +94,9 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
     }
     const std::uint32_t leaf = editor_->insert(topology_, old_leaf, primitive, edit_);
     follow_edit();
-    if (leaf == old_leaf) {  // had room
+    if (leaf == old_leaf) {  // the leaf had room
       unique_.insert(unique_.end(), leaves_[before].begin(), leaves_[before].end());
-      leaves_.drop(before);  // its entries may be others
+      leaves_.drop(before);  // its entries in the topology's primitives may have moved
     }
     set_leaf_vertices(leaf, vertex_count);
     if (leaf != old_leaf && old_leaf != TopologyEditor::none) {
@@ -114,7 +117,7 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
     }
   }
 
-  /// Takes a primitive out at t: the certificates above are made again as after an insertion.
+  /// Removes a primitive at t. The certificates above are recomputed as after an insertion.
   void remove(double t, std::uint32_t primitive, const Primitives& primitives) {
     start_editing(primitives);
     const std::uint32_t leaf = editor_->leaf_of(primitive);
@@ -134,10 +137,11 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
     repair_edit(t);
   }
 
-  /// Builds the tree below a node anew, from positions at the motion's time, to which the tree has been
-  /// advanced: leaves stay what they are, inner nodes and planes are chosen again, certificates made again
-  /// for these and for the at most six above that searched through them. Node ids below are given anew, their
-  /// number stays; observers are not told. `box` is the node's own. O(leaves below, and searches).
+  /// Rebuilds the tree below a node from the positions at the motion's time, to which the tree must have been
+  /// advanced. Leaves keep their content. Inner nodes and planes are chosen anew; the certificates of these
+  /// nodes, and of the at most six bounds above whose searches cover them, are recomputed. Nodes below get
+  /// new ids; their number does not change. Observers receive no notices. `box` is the box of `top`. O(leaves
+  /// below), plus searches.
   void rebuild_below(std::uint32_t top, const Box<S>& box, const SampledMotion<S>& motion,
                      BuildMethod method) {
     if (topology_.nodes[top].is_leaf()) return;
@@ -163,12 +167,13 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
   }
 
  private:
-  static constexpr std::uint32_t marked_only = 0x40;  ///< above all sides: a node on a marked path
+  static constexpr std::uint32_t marked_only =
+      0x40;  ///< a bit above those of all sides: the node is on a marked path
 
   // ---- Planes and rebuilding
 
-  /// Chooses the own sides of all nodes below `top`, whose box is `box`, or the tight one. Returns `top` and
-  /// all below it, parents before children.
+  /// Chooses the own sides of all nodes below `top`. The box of `top` is `box`; if null, its tight box.
+  /// Returns `top` and all nodes below it, parents before children.
   std::vector<std::uint32_t> choose_planes(std::uint32_t top, const ClipMoments<S>& clip, const Box<S>* box) {
     std::vector<std::uint32_t> ids = subtree_of(topology_, top);
     const auto leaf_box = [&](TopologyNode leaf, std::size_t moment) {
@@ -212,8 +217,8 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
   void mark(std::uint32_t node) { concerned_[node] |= marked_only; }
   void concern(std::uint32_t node, Side side) { concerned_[node] |= std::uint8_t(1U << side); }
 
-  /// Marks the path above a leaf whose vertices changed: for each side the certificate that takes the leaf's
-  /// vertices for candidates, and all whose realiser changed.
+  /// Marks the path from a leaf with changed vertices to the root. On this path marks, for each side, the
+  /// certificate that has the leaf's vertices as candidates, and all certificates whose realiser `changed`.
   template <class Changed>
   void mark_certificates_of(std::uint32_t leaf, Changed&& changed) {
     std::uint32_t open = Base::all_sides;
@@ -229,8 +234,8 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
     }
   }
 
-  /// Looks at every concerned certificate on the marked paths, from the leaves up. Realisers that `changed`
-  /// have another plan.
+  /// Rechecks every marked certificate on the marked paths, from the leaves up. `changed(realiser)` tells
+  /// whether a realiser has a new plan.
   template <class Changed>
   void repair(double t, Changed&& changed) {
     const auto now = Instant<S>::at(t);
@@ -242,8 +247,8 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
       for (std::uint32_t child = n.first(); child < n.first() + 2; ++child)
         if (concerned_[child] != 0) affected_.push_back(child);
     }
-    // Level by level from the root, so backwards it is bottom-up. Certificates that come to be concerned on
-    // the way lie further up, on a path that was marked.
+    // The nodes are in breadth-first order from the root; the reverse order is bottom-up. Certificates that
+    // are marked during this pass lie further up, on a marked path.
     for (std::size_t i = affected_.size(); i-- > 0;) {
       const std::uint32_t node = affected_[i];
       std::uint32_t sides = concerned_[node];
@@ -266,9 +271,9 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
     ++version_;
     if (editor_) return;
     editor_.emplace(topology_, primitives.count());
-    original_ = {};  // starting over starts with what is there
+    original_ = {};  // from now on `initialise` starts with the edited topology
   }
-  /// Brings all that is kept by node in line with what the editor did.
+  /// Updates all data stored by node after an edit.
   void follow_edit() {
     for (const std::uint32_t node : edit_.vacated)
       for (Side side = 0; side < 6; ++side) {
@@ -284,13 +289,14 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
       own_sides_.resize(nodes, construction_.bare_leaves == 0 ? std::uint8_t(0) : no_side);
     for (const TopologyEdit::Move& move : edit_.moved) leaves_.placed(topology_.nodes[move.to], move.to);
   }
-  /// Makes `unique_`, in any order and with repetitions, the list of a leaf.
+  /// Makes `unique_`, in any order and with repetitions, the vertex list of a leaf.
   void set_leaf_vertices(std::uint32_t leaf, std::uint32_t vertex_count) {
     std::sort(unique_.begin(), unique_.end());
     unique_.erase(std::unique(unique_.begin(), unique_.end()), unique_.end());
     leaves_.assign(topology_.nodes[leaf], leaf, unique_, vertex_count);
   }
-  /// After an edit: certificates of nodes that are new, and all that searched through those that changed.
+  /// Computes, after an edit, the certificates of new nodes and all certificates whose searches cover changed
+  /// nodes.
   void repair_edit(double t) {
     const auto unchanged = [](std::uint32_t) { return false; };
     if (concerned_.size() < topology_.size()) concerned_.resize(topology_.size(), 0);
@@ -306,16 +312,16 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
   }
 
   BoxTreeConstruction construction_;
-  Topology original_;  ///< what starting over starts with; empty as long as nothing was rebuilt
-  // For changes, made when the first one comes.
+  Topology original_;  ///< topology with which `initialise` starts; empty until the first rebuild
+  // For changes, allocated at the first one.
   std::vector<std::uint32_t> affected_;
-  std::vector<std::uint8_t> concerned_;  ///< [node]: sides whose certificate is to be rechecked, one bit each
+  std::vector<std::uint8_t> concerned_;  ///< [node]: sides whose certificate must be rechecked, one bit each
   // For changes of geometry.
   TopologyEdit edit_;
   std::vector<std::uint32_t> unique_;
 };
 
-/// The plain tree, as a parameter of KineticForest.
+/// The plain tree, as a template argument of KineticForest.
 template <class S, class Queue, class Count, class Observer>
 using PlainBoxTree = KineticBoxTree<S, Queue, Count, Observer>;
 
