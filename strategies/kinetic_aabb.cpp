@@ -15,10 +15,12 @@ class KineticAabb final : public OnAnyQueue<S, Count> {
  public:
   KineticAabb(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
               const Params& params)
-      : OnAnyQueue<S, Count>(scene, motion, std::move(topologies),
-                             params.word("queue") == SegmentHeapQueue<S>::name ? 0
-                             : params.word("queue") == AvlQueue<S>::name       ? 1
-                                                                               : 2) {}
+      : OnAnyQueue<S, Count>(
+            scene, motion, std::move(topologies),
+            params.word("queue") == SegmentHeapQueue<S>::name ? 0
+            : params.word("queue") == AvlQueue<S>::name       ? 1
+                                                              : 2,
+            params.word("query") == "rows" ? KineticQuery::wide_rows : KineticQuery::node_pairs) {}
 };
 
 }  // namespace
@@ -33,11 +35,15 @@ KBVH_STRATEGY(kinetic_aabb) {
       .citation = "Zachmann & Weller 2006, s.4",
       .positions = PositionUse::fetched,
       .declares = {.continuous = true, .time_budget = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"queue",
                       "segment_heap",
                       {"segment_heap", "avl", "binary_heap"},
                       "event queue: lists by segment and a heap of what comes next, the paper's AVL tree, or "
-                      "an indexed binary heap"}},
+                      "an indexed binary heap"},
+                     {"query",
+                      "rows",
+                      {"rows", "nodes"},
+                      "traversal of a query: rows of eight boxes at a time, or pairs of nodes as in 2006"}},
   })};
 }

@@ -24,7 +24,8 @@ class KineticAabbApproximate final : public Approximate<S, Count> {
                          const Params& params)
       : Approximate<S, Count>(scene, motion, std::move(topologies),
                               (params.word("event_times") == "float" ? 2u : 0u) +
-                                  (params.word("formula") == "textbook" ? 1u : 0u)) {}
+                                  (params.word("formula") == "textbook" ? 1u : 0u),
+                              KineticQuery::wide_rows) {}
 };
 
 }  // namespace

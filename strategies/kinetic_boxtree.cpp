@@ -111,7 +111,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
     on_forest([&](auto& forest) { forest.plans_changed(t, changes); });
     plans_changed_ = true;
-    for (const PlanChange<S>& change : changes) rows_[change.body].wake();
+    for (const PlanChange<S>& change : changes) rows_[change.body].plans_changed();
     for (std::uint32_t body = 0; body < rows_.size(); ++body) changed_now(body);  // realisers may differ now
   }
 
@@ -202,7 +202,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
   /// Lays out a body's rows anew if its tree has changed.
   void follow_tree(std::uint32_t body) {
     rows_[body].follow(tree_of(body), this->scene_.primitives(body), leaf_boxes_);
-    rows_[body].wake();
+    rows_[body].plans_changed();
   }
   /// Marks the boxes of a body as out of date.
   void changed_now(std::uint32_t body) {
@@ -279,7 +279,7 @@ KBVH_STRATEGY(kinetic_boxtree) {
       .declares = {.continuous = true,
                    .restructures = true /* with rebuild=median or sah */,
                    .time_budget = true},
-      .topology = {.widths = {2}, .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 4}},
+      .topology = {.widths = {2}, .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 16}},
       .parameters =
           {{"queue",
             "segment_heap",

@@ -20,13 +20,14 @@ class KineticCalendar final : public RealiserStrategy<S, Count>, public TakesPla
                   const Params& /*params*/)
       : Base(scene, motion, std::move(topologies)) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-      trees_.emplace_back(this->bodies_[body].hierarchy, motion, body);
+      trees_.emplace_back(this->hierarchy(body), motion, body);
   }
 
   void reset_to(double /*t*/) override {
     this->near_bodies_.start_over();
     for (std::uint32_t body = 0; body < trees_.size(); ++body) {
-      trees_[body].reset(this->bodies_[body].hierarchy, this->bodies_[body].realisers);
+      trees_[body].reset(this->hierarchy(body), this->bodies_[body].realisers);
+      this->bodies_[body].rows.start_over();
       this->new_frame(body);
       trees_[body].clear_counts();
     }
@@ -34,16 +35,17 @@ class KineticCalendar final : public RealiserStrategy<S, Count>, public TakesPla
 
   void advance_to(double /*t*/) override {
     for (std::uint32_t body = 0; body < trees_.size(); ++body)
-      if (trees_[body].advance(this->bodies_[body].hierarchy, this->bodies_[body].realisers))
-        this->new_frame(body);
+      if (trees_[body].advance(this->hierarchy(body), this->bodies_[body].realisers)) this->new_frame(body);
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     body_changed_.assign(trees_.size(), 0);
     for (const PlanChange<S>& change : changes) body_changed_[change.body] = 1;
     for (std::uint32_t body = 0; body < trees_.size(); ++body) {
-      if (body_changed_[body] != 0)
-        trees_[body].plans_changed(this->bodies_[body].hierarchy, this->bodies_[body].realisers, changes);
+      if (body_changed_[body] != 0) {
+        trees_[body].plans_changed(this->hierarchy(body), this->bodies_[body].realisers, changes);
+        this->bodies_[body].rows.plans_changed();
+      }
       this->new_frame(body);  // realisers may differ now
     }
   }

@@ -39,7 +39,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
             const Params& /*params*/)
       : Base(scene, motion, std::move(topologies)), view_(motion), states_(scene.body_count()) {
     for (std::uint32_t index = 0; index < scene.body_count(); ++index) {
-      const auto& hierarchy = this->bodies_[index].hierarchy;
+      const auto& hierarchy = this->hierarchy(index);
       states_[index].envelope.assign(hierarchy, ahead ? slices : 1);
       if (ahead)
         states_[index].at_end.assign(hierarchy.node_count() * lane_scalars(hierarchy.topology().width), 0);
@@ -50,6 +50,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     this->near_bodies_.start_over();
     for (std::uint32_t body = 0; body < states_.size(); ++body) {
       states_[body].known = Known::nothing;
+      this->bodies_[body].rows.start_over();
       begin_segment(body);
     }
   }
@@ -76,7 +77,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
       if (states_[change.body].known == Known::refitted) continue;
       states_[change.body].known = Known::refitted;
       states_[change.body].next = Next::nothing;
-      this->bodies_[change.body].line_ends[0] = nullptr;
+      this->bodies_[change.body].rows.plans_changed();
       refit(change.body);
     }
   }
@@ -121,7 +122,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
 
   void refit(std::uint32_t body) {
     Base::refit(body);
-    const auto& hierarchy = this->bodies_[body].hierarchy;
+    const auto& hierarchy = this->hierarchy(body);
     this->count_.add(Counter::nodes_visited, hierarchy.topology().size());
     this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology().size());
     this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
@@ -136,7 +137,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     this->new_frame(index);
     const Next foreseen = state.next;
     state.next = Next::nothing;
-    if (body.hierarchy.empty()) {
+    if (this->hierarchy(index).empty()) {
       state.end = std::numeric_limits<double>::infinity();
       return true;
     }
@@ -148,14 +149,13 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
         state.known != Known::nothing && (rests ? motion.lines_begin(index) : begin) == state.end;
     if (continues && foreseen == Next::envelope) make_next(index, 1);
     if (!continues)
-      find_realisers(body.hierarchy, first, body.realisers);
+      find_realisers(this->hierarchy(index), first, body.realisers);
     else if (state.known == Known::envelope)
       state.envelope.advance(state.end, body.realisers);
     if (!continues) count_pass(index);
     state.end = motion.lines_end(index);
     if (rests) {
       state.known = Known::at_rest;
-      body.line_ends[0] = nullptr;
       return continues;
     }
     const S* last = motion.positions_on_lines(index, state.end, state.room[1]);
@@ -168,15 +168,11 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
       state.envelope.make_empty(begin, state.end);
       this->count_.add(Counter::bodies_translated);
     } else {
-      state.envelope.make(body.hierarchy, body.realisers, first, last, begin, state.end);
+      state.envelope.make(this->hierarchy(index), body.realisers, first, last, begin, state.end);
       count_pass(index);
       made = false;
     }
     state.envelope.advance(t, body.realisers);
-    body.line_ends[0] = first;
-    body.line_ends[1] = last;
-    body.line_times[0] = begin;
-    body.line_times[1] = state.end;
     if constexpr (ahead) foresee(index);
     return made && continues;
   }
@@ -195,7 +191,7 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     state.pacer = {this->time(), state.end};
     const double next_end = later.lines_end(index);
     // The ends are keyframes, which need no extra memory.
-    state.envelope.start_next(this->bodies_[index].hierarchy,
+    state.envelope.start_next(this->hierarchy(index),
                               later.positions_on_lines(index, state.end, state.room[0]),
                               later.positions_on_lines(index, next_end, state.room[1]), next_end);
   }
@@ -209,14 +205,14 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
     State& state = states_[index];
     auto& body = this->bodies_[index];
     const std::uint32_t before = state.envelope.nodes_left();
-    state.envelope.step(body.hierarchy, body.realisers, state.at_end, share);
+    state.envelope.step(this->hierarchy(index), body.realisers, state.at_end, share);
     count_part(index, before, state.envelope.nodes_left());
   }
 
-  void count_pass(std::uint32_t index) { count_part(index, this->bodies_[index].hierarchy.node_count(), 0); }
+  void count_pass(std::uint32_t index) { count_part(index, this->hierarchy(index).node_count(), 0); }
   /// Counts the part of a pass that leaves `after` of `before` wide nodes; parts add up to a pass.
   void count_part(std::uint32_t index, std::uint32_t before, std::uint32_t after) {
-    const auto& hierarchy = this->bodies_[index].hierarchy;
+    const auto& hierarchy = this->hierarchy(index);
     const auto part = [&](std::uint64_t all) {
       return all * before / hierarchy.node_count() - all * after / hierarchy.node_count();
     };
@@ -241,7 +237,7 @@ Info info_of(std::string id, std::string title) {
       .citation = "kbvh; upper envelopes of lines instead of the event queue of Zachmann & Weller 2006, s.4",
       .positions = PositionUse::fetched,
       .declares = {.event_driven = true, .continuous = true, .time_budget = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4}},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 8}},
   };
 }
 

@@ -5,6 +5,16 @@
 
 namespace kbvh {
 
+std::vector<double> leaves_below(const Topology& topology) {
+  std::vector<double> leaves(topology.size(), 0);
+  for (std::uint32_t node = topology.size(); node-- > 0;) {
+    const TopologyNode n = topology.nodes[node];
+    if (n.is_leaf()) leaves[node] = 1;
+    for (std::uint32_t i = 0; i < n.count() && !n.is_leaf(); ++i) leaves[node] += leaves[n.first() + i];
+  }
+  return leaves;
+}
+
 Topology collapsed(const Topology& binary, std::uint32_t width, std::span<const double> weights,
                    std::vector<std::uint32_t>& node_of) {
   if (binary.width != 2)

@@ -72,6 +72,9 @@ std::vector<std::uint32_t> collapse_into(Topology& topology, Binary binary) {
   return sources;
 }
 
+/// Returns the number of leaves below each node of a topology in built layout: weights for `collapsed`.
+std::vector<double> leaves_below(const Topology& topology);
+
 /// Collapses a binary topology, however it was edited, into nodes of 4 or 8 children; `weights` (of its
 /// nodes) are for example the surfaces of the boxes. Replaces `node_of` by the binary node of each node of
 /// the result. Throws std::invalid_argument unless `binary` has width 2 and as many weights as nodes.

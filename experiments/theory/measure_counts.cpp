@@ -15,9 +15,9 @@ class PaperTree {
  public:
   PaperTree(const SceneView<float>& view, Playback<float>& playback, const Topologies& topologies, double t) {
     const StrategyEntry& entry = find_strategy("kinetic_aabb");
-    strategy_ =
-        create(entry, view, playback, topologies,
-               Params(entry.info.id, entry.info.parameters, {{"queue", "avl"}}), CountingPolicy::counting);
+    strategy_ = create(entry, view, playback, topologies,
+                       Params(entry.info.id, entry.info.parameters, {{"queue", "avl"}, {"query", "nodes"}}),
+                       CountingPolicy::counting);
     strategy_->reset(t);
     source().watch_bounds(&notices_);
   }

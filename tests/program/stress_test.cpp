@@ -68,7 +68,8 @@ template <class S, class Count>
 class LosesEvents : public KineticAabbStrategy<S, Count, LossyQueue<S>> {
  public:
   LosesEvents(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params&)
-      : KineticAabbStrategy<S, Count, LossyQueue<S>>(scene, motion, std::move(topologies), 0) {}
+      : KineticAabbStrategy<S, Count, LossyQueue<S>>(scene, motion, std::move(topologies), 0,
+                                                     KineticQuery::wide_rows) {}
 };
 
 template <template <class, class> class Strategy>

@@ -19,16 +19,6 @@ std::uint32_t row_of(std::uint32_t side) {
   return (side >> 1) + 3 * (side & 1);
 }
 
-/// Returns the number of leaves below each node.
-std::vector<double> leaves_below(const Topology& topology) {
-  std::vector<double> leaves(topology.size(), 0);
-  for (std::uint32_t node = topology.size(); node-- > 0;) {
-    const TopologyNode n = topology.nodes[node];
-    leaves[node] = n.is_leaf() ? 1 : leaves[n.first()] + leaves[n.first() + 1];
-  }
-  return leaves;
-}
-
 }  // namespace
 
 template <class S>
@@ -50,17 +40,14 @@ void BoxTreeRows<S>::lay_out(const BoxTreeBounds& tree, const Primitives& primit
   for (std::uint32_t& node : node_of) node = order[node];
   wide_of_.assign(std::max(1U, tree.topology().size()), none);
   for (std::uint32_t i = 0; i < node_of.size(); ++i) wide_of_[node_of[i]] = i;
-  hierarchy_.assign(std::move(wide), primitives, active_kernel_set());
-  stale_.assign(hierarchy_.node_count(), 1);
-  visited_.clear();
-  visited_.reserve(hierarchy_.node_count());
+  this->assign(std::move(wide), primitives, active_kernel_set());
   list_planes(tree, node_of);
 }
 
 template <class S>
 void BoxTreeRows<S>::list_planes(const BoxTreeBounds& tree, std::span<const std::uint32_t> node_of) {
-  const Topology& wide = hierarchy_.topology();
-  const std::uint32_t count = hierarchy_.node_count();
+  const Topology& wide = this->hierarchy().topology();
+  const std::uint32_t count = this->hierarchy().node_count();
   const std::size_t scalars = lane_scalars(width);
   first_plane_.assign(1, 0);
   planes_.clear();
@@ -99,10 +86,11 @@ void BoxTreeRows<S>::list_planes(const BoxTreeBounds& tree, std::span<const std:
     list.clear();
     const std::uint32_t first = only_leaf ? 0 : n.first(), last = only_leaf ? 1 : first + n.count();
     for (std::uint32_t child = first; child < last; ++child) {
-      list_child(child, node_of[i], hierarchy_.row_place(child, 0));
+      list_child(child, node_of[i], this->hierarchy().row_place(child, 0));
       if (!wide.nodes[child].is_leaf())
-        parent_row_[hierarchy_.wide_node(child)] = std::uint32_t(hierarchy_.row_place(child, 0));
-      const auto own = hierarchy_.leaf_vertices(child);
+        parent_row_[this->hierarchy().wide_node(child)] =
+            std::uint32_t(this->hierarchy().row_place(child, 0));
+      const auto own = this->hierarchy().leaf_vertices(child);
       if (leaf_boxes_ == LeafBoxes::tight) list.insert(list.end(), own.begin(), own.end());
     }
     std::sort(list.begin(), list.end());
@@ -114,39 +102,9 @@ void BoxTreeRows<S>::list_planes(const BoxTreeBounds& tree, std::span<const std:
 }
 
 template <class S>
-void BoxTreeRows<S>::new_frame(const SegmentMotion<S>& motion, std::uint32_t body) {
-  const double t = motion.time();
-  if (t <= rests_until_) return;
-  hierarchy_.positions_changed();
-  std::fill(stale_.begin(), stale_.end(), std::uint8_t(1));
-  ++frames_;
-  line_ends_[0] = nullptr;
-  wake();
-  if (!motion.as_in_the_scene(body)) return;
-  if (motion.at_rest(body)) {
-    rests_until_ = motion.lines_end(body);
-    return;
-  }
-  const double begin = motion.lines_begin(body), end = motion.lines_end(body);
-  if (!std::isfinite(begin) || !std::isfinite(end) || !(begin < end)) return;
-  std::vector<S> unused;  // keyframes are stored
-  line_ends_[0] = motion.positions_on_lines(body, begin, unused);
-  line_ends_[1] = motion.positions_on_lines(body, end, unused);
-  line_times_[0] = begin;
-  line_times_[1] = end;
-}
-
-template <class S>
 std::uint64_t BoxTreeRows<S>::make_visited(const BoxTreeBounds& tree, const SegmentMotion<S>& motion,
                                            std::uint32_t body) {
-  if (hierarchy_.empty()) return 0;
-  if (frames_ >= visits_kept) {
-    visited_.clear();
-    frames_ = 0;
-  }
-  if (stale_[0] == 0) return 0;
-  if (visited_.empty()) return make_wanted(0, tree, motion, body);  // a query begins with the root's box
-  return make(visited_, tree, motion, body);
+  return make(this->due(), tree, motion, body);
 }
 
 template <class S>
@@ -166,10 +124,10 @@ std::uint64_t BoxTreeRows<S>::make(std::span<const std::uint32_t> nodes, const B
     const S* own = values;
     for (const std::uint32_t node : some) {
       if (first_vertex_[node] != first_vertex_[node + 1])
-        hierarchy_.refit_nodes(motion.positions(body), node, node + 1);
+        this->hierarchy().refit_nodes(motion.positions(body), node, node + 1);
       write_rows(node, own);
       own += first_plane_[node + 1] - first_plane_[node];
-      stale_[node] = 0;
+      this->computed(node);
     }
     nodes = nodes.subspan(some.size());
   }
@@ -180,7 +138,7 @@ template <class S>
 std::uint64_t BoxTreeRows<S>::read_planes(std::span<const std::uint32_t> nodes, const BoxTreeBounds& tree,
                                           const SegmentMotion<S>& motion, std::uint32_t body, S* values) {
   const bool all_current = motion.all_current(body);
-  const bool on_lines = line_ends_[0] != nullptr && !all_current;
+  const bool on_lines = this->on_lines() && !all_current;
   alignas(64) S ends[made_together * most_planes];
   std::uint32_t vertices[made_together * most_planes];
   std::size_t count = 0;
@@ -189,11 +147,11 @@ std::uint64_t BoxTreeRows<S>::read_planes(std::span<const std::uint32_t> nodes, 
       vertices[count] = tree.realiser_at(planes_[i].place);
       const std::size_t place = std::size_t(3) * vertices[count] + (planes_[i].side >> 1);
       if (!on_lines) continue;
-      values[count] = line_ends_[0][place];
-      ends[count] = line_ends_[1][place];
+      values[count] = this->line_end(0)[place];
+      ends[count] = this->line_end(1)[place];
     }
   if (on_lines) {
-    round_chord(values, ends, count, line_times_[0], line_times_[1], motion.time(), values);
+    round_chord(values, ends, count, this->line_time(0), this->line_time(1), motion.time(), values);
     return count;
   }
   if (!all_current) motion.fetch(body, {vertices, count});
@@ -207,7 +165,7 @@ std::uint64_t BoxTreeRows<S>::read_planes(std::span<const std::uint32_t> nodes, 
 
 template <class S>
 void BoxTreeRows<S>::write_rows(std::uint32_t node, const S* values) {
-  const WideArrays<S> arrays = hierarchy_.arrays();
+  const WideArrays<S> arrays = this->hierarchy().arrays();
   const WideNode& wide = arrays.nodes[node];
   S table[first_plane_entry + most_planes];
   const std::uint32_t planes = first_plane_[node + 1] - first_plane_[node];
@@ -240,17 +198,17 @@ void BoxTreeRows<S>::write_rows(std::uint32_t node, const S* values) {
 template <class S>
 const Box<S>* BoxTreeRows<S>::read_box(std::uint32_t node, Box<S>& room) const {
   if (wide_of_.empty() || node >= wide_of_.size() || wide_of_[node] == none) return nullptr;
-  const std::uint32_t parent = hierarchy_.wide_parent(wide_of_[node]);
-  if (parent == WideHierarchy<S>::no_node || stale_[parent] != 0) return nullptr;
-  room = hierarchy_.box(wide_of_[node]);
+  if (this->hierarchy().wide_parent(wide_of_[node]) == WideHierarchy<S>::no_node) return nullptr;
+  if (!this->current(wide_of_[node])) return nullptr;
+  room = this->hierarchy().box(wide_of_[node]);
   return &room;
 }
 
 template <class S>
 std::size_t BoxTreeRows<S>::bytes() const {
-  return hierarchy_.bytes() + planes_.size() * sizeof(Plane) + sources_.size() + stale_.size() +
+  return this->bytes_on_demand() + planes_.size() * sizeof(Plane) + sources_.size() +
          (wide_of_.size() + first_plane_.size() + first_vertex_.size() + vertices_.size() +
-          parent_row_.size() + visited_.capacity() + fetched_.capacity()) *
+          parent_row_.size() + fetched_.capacity()) *
              sizeof(std::uint32_t);
 }
 

@@ -1,50 +1,26 @@
 #pragma once
-#include <algorithm>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
 #include "core/families/boxtree/boxtree_bounds.hpp"
-#include "core/families/wide/wide_hierarchy.hpp"
+#include "core/families/wide/rows_on_demand.hpp"
 
 namespace kbvh {
 
-/// The boxes of a kinetic BoxTree of one body, in the rows of a wide hierarchy. Boxes are computed when a
-/// query asks for them, and the query runs on the kernels for stored boxes. A wide node is a part of the
-/// binary tree: the box of its child is the wide node's box with the own sides of the few binary nodes in
-/// between, each read once. With LeafBoxes::tight the boxes of leaves are computed from their vertices.
-///
-/// A wide node's rows are computed from its parent's rows, which must be current. One coordinate costs
-/// several times as much in a call of its own as in a batch. The nodes that recent queries visited are
-/// therefore computed together.
+/// The boxes of a kinetic BoxTree of one body, in the rows of a wide hierarchy, computed on demand. A wide
+/// node is a part of the binary tree: the box of its child is the wide node's box with the own sides of the
+/// few binary nodes in between, each read once. With LeafBoxes::tight the boxes of leaves are computed from
+/// their vertices. A wide node's rows are computed from its parent's rows, which must be current.
 template <class S>
-class BoxTreeRows {
+class BoxTreeRows : public RowsOnDemand<S> {
  public:
   /// Maximum number of children of a wide node.
   static constexpr std::uint32_t width = 8;
 
-  /// Discards all rows and the visits learnt from queries, so that a replayed clip costs the same again.
-  void start_over() {
-    std::fill(stale_.begin(), stale_.end(), std::uint8_t(1));
-    visited_.clear();
-    frames_ = 0;
-    wake();
-  }
   /// Lays out the rows for the current tree. Does nothing if the tree has not changed since the last call.
   /// O(nodes).
   void follow(const BoxTreeBounds& tree, const Primitives& primitives, LeafBoxes leaf_boxes);
-
-  WideHierarchy<S>& hierarchy() { return hierarchy_; }
-  const WideHierarchy<S>& hierarchy() const { return hierarchy_; }
-  /// Returns, by wide node, a value that is not 0 while the boxes of the node's children are out of date.
-  const std::uint8_t* stale() const { return stale_.data(); }
-
-  /// Marks all rows as out of date, after a change of the time or of realisers. A body that rests from the
-  /// last time to the new one keeps its rows.
-  void new_frame(const SegmentMotion<S>& motion, std::uint32_t body);
-  /// Ends the body's rest, after a change of its vertices' plans.
-  void wake() { rests_until_ = -std::numeric_limits<double>::infinity(); }
 
   /// Computes the boxes of the root's children and of the children of the nodes that recent queries visited.
   /// Returns the number of positions read.
@@ -53,8 +29,7 @@ class BoxTreeRows {
   /// read.
   std::uint64_t make_wanted(std::uint32_t node, const BoxTreeBounds& tree, const SegmentMotion<S>& motion,
                             std::uint32_t body) {
-    visited_.push_back(node);
-    return make({&visited_.back(), 1}, tree, motion, body);
+    return make(this->visit(node), tree, motion, body);
   }
 
   /// Returns the box of a node of the binary tree, stored in `room`, if a query may have read it: the node is
@@ -69,8 +44,7 @@ class BoxTreeRows {
     std::uint32_t place;  ///< place of the bound
     std::uint32_t side;
   };
-  static constexpr std::uint32_t visits_kept = 16;  ///< frames after which visits are learnt anew
-  static constexpr std::size_t made_together = 16;  ///< nodes per batch
+  using RowsOnDemand<S>::made_together;
   static constexpr std::size_t most_planes = 2 * (width - 1) + 6;
   static constexpr std::uint32_t rows = 6;
 
@@ -82,7 +56,6 @@ class BoxTreeRows {
                             const SegmentMotion<S>& motion, std::uint32_t body, S* values);
   void write_rows(std::uint32_t node, const S* values);
 
-  WideHierarchy<S> hierarchy_;
   LeafBoxes leaf_boxes_ = LeafBoxes::tight;
   std::uint32_t version_ = 0;           ///< version of the tree
   std::vector<std::uint32_t> wide_of_;  ///< by node of the binary tree: node of the wide topology, or none
@@ -92,14 +65,7 @@ class BoxTreeRows {
   std::vector<std::uint32_t> first_vertex_;  ///< by wide node, plus the end
   std::vector<std::uint32_t> vertices_;      ///< unique vertices of each wide node's leaves
   std::vector<std::uint32_t> parent_row_;    ///< by wide node: offset of its box in the parent's rows
-  std::vector<std::uint8_t> stale_;
-  std::vector<std::uint32_t> visited_;  ///< nodes computed since the list was last cleared, parents first
   std::vector<std::uint32_t> fetched_;
-  std::uint32_t frames_ = 0;  ///< frames since visited_ was last cleared
-  double rests_until_ = -std::numeric_limits<double>::infinity();
-  // Stored positions at both ends of the vertices' current lines, or null.
-  const S* line_ends_[2] = {nullptr, nullptr};
-  double line_times_[2] = {0, 0};
 };
 
 extern template class BoxTreeRows<float>;

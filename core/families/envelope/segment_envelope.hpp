@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/families/envelope/kernels/wide_realisers.hpp"
+#include "core/families/wide/kernels/wide_realisers.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 
 namespace kbvh {

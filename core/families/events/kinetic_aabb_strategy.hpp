@@ -5,14 +5,22 @@
 #include "core/contract/strategy.hpp"
 #include "core/families/events/event_log.hpp"
 #include "core/families/events/kinetic_forest.hpp"
+#include "core/families/events/kinetic_rows.hpp"
 #include "core/families/events/realiser_boxes.hpp"
+#include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/topology/leaf_pairs.hpp"
 
 namespace kbvh {
 
-/// A strategy of kinetic AABB trees (Z&W s.4) and nothing else: boxes are read from the realisers when a
-/// query asks. `Queues` are the event queues that it can be made with; their clock decides what an event is.
+/// The traversal of a query of kinetic AABB trees.
+enum class KineticQuery : std::uint8_t {
+  wide_rows,   ///< on the kernels of stored boxes (KineticRows)
+  node_pairs,  ///< node by node, as in 2006
+};
+
+/// A strategy of kinetic AABB trees (Z&W s.4) and nothing else. Queries compute boxes on demand from the
+/// realisers. `Queues` are the event queues to choose from; the clock of a queue defines its events.
 template <class S, class Count, class... Queues>
 class KineticAabbStrategy : public CountedStrategy<S, Count> {
   template <class Queue>
@@ -21,22 +29,32 @@ class KineticAabbStrategy : public CountedStrategy<S, Count> {
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
 
-  /// `queue` is the index among Queues of the one to use.
+  /// Uses the queue with the index `queue` in Queues.
   KineticAabbStrategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
-                      std::size_t queue)
-      : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
-    for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
+                      std::size_t queue, KineticQuery query)
+      : CountedStrategy<S, Count>(scene, motion),
+        motion_(motion),
+        near_bodies_(scene.pairs(), scene.body_count()),
+        by_rows_(query == KineticQuery::wide_rows) {
+    if (!by_rows_)
+      for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
     std::size_t index = 0;
     (void)((index++ == queue &&
             (forest_ = std::make_unique<Forest<Queues>>(scene, motion, std::move(topologies), this->count_,
                                                         BoundObserver<S>{&watch_}),
              true)) ||
            ...);
+    if (!by_rows_) return;
+    rows_.resize(scene.body_count());
+    for (std::uint32_t body = 0; body < rows_.size(); ++body) lay_out(body);
+    check_layouts(
+        scene.pairs(), [&](std::uint32_t body) -> const auto& { return rows_[body].hierarchy(); });
   }
 
   void reset_to(double t) override {
     near_bodies_.start_over();
     on_forest([&](auto& forest) { forest.reset(t); });
+    for (auto& rows : rows_) rows.rows().start_over();
     new_frame();
   }
 
@@ -46,34 +64,9 @@ class KineticAabbStrategy : public CountedStrategy<S, Count> {
   }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
-    QueryStatus status;
-    BoxTests tests;
-    on_forest([&](auto& forest) {
-      const auto box_of = [&](std::uint32_t body) -> Box<double> {
-        const auto& tree = forest.tree(body);
-        if (tree.topology().empty()) return {};
-        RealiserBoxes<S> boxes(tree.realisers(0), this->sampled_, body, caches_[body]);
-        boxes.ensure(0);
-        return to_double(boxes(0));
-      };
-      for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
-        const BodyPair& pair = this->scene_.pairs()[i];
-        if (tests.made >= budget.box_tests) {
-          ++status.pending;
-          continue;
-        }
-        const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
-        LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
-                                      b.topology(), tests, out);
-        RealiserBoxes<S> boxes_a(a.realisers(0), this->sampled_, pair.first, caches_[pair.first]);
-        RealiserBoxes<S> boxes_b(b.realisers(0), this->sampled_, pair.second, caches_[pair.second]);
-        status.pending += traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack_, tests,
-                                   rest_of(budget, tests.made), leaves)
-                              .pending;
-      }
+    return on_forest([&](auto& forest) {
+      return by_rows_ ? query_rows(forest, out, budget) : query_nodes(forest, out, budget);
     });
-    this->count_.add(Counter::box_tests, tests.made);
-    return status;
   }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
@@ -82,10 +75,13 @@ class KineticAabbStrategy : public CountedStrategy<S, Count> {
       std::vector<std::uint32_t> order;
       AuditView view{tree.compacted_topology(order), {}, {}};
       for (const std::uint32_t node : order) {
-        const Box<S> box = caches_[body].current(node)
-                               ? caches_[body].box(node)
-                               : box_of_realisers(tree.realisers(node), this->sampled_, body);
-        view.boxes.push_back(to_double(box));
+        // Reports the box that a query has read, if there is one.
+        Box<S> room;
+        const Box<S>* read = by_rows_                      ? rows_[body].read_box(node, room)
+                             : caches_[body].current(node) ? &caches_[body].box(node)
+                                                           : nullptr;
+        view.boxes.push_back(to_double(
+            read != nullptr ? *read : box_of_realisers(tree.realisers(node), this->sampled_, body)));
       }
       return view;
     });
@@ -94,23 +90,29 @@ class KineticAabbStrategy : public CountedStrategy<S, Count> {
   std::size_t bytes() const override {
     std::size_t total = on_forest([](auto& forest) { return forest.bytes(); });
     for (const auto& cache : caches_) total += cache.bytes();
-    return total + near_bodies_.bytes() + stack_.capacity() * sizeof(NodePair);
+    for (const auto& rows : rows_) total += rows.bytes();
+    return total + near_bodies_.bytes() + query_.bytes() + stack_.capacity() * sizeof(NodePair);
   }
 
  protected:
-  /// What a derived class does in `follow_plans` if it takes changes of plans.
+  /// Implements `follow_plans` for derived classes that take changes of plans.
   void change_plans(double t, std::span<const PlanChange<S>> changes) {
     on_forest([&](auto& forest) { forest.plans_changed(t, changes); });
+    for (const PlanChange<S>& change : changes)
+      if (by_rows_) rows_[change.body].rows().plans_changed();
     new_frame();  // realisers may differ now
   }
 
-  /// What a derived class does in `follow_geometry` if it takes changes of geometry.
+  /// Implements `follow_geometry` for derived classes that take changes of geometry.
   void change_geometry(double t, const GeometryChange<S>& change) {
     const std::vector<BodyChange> changes = body_changes(this->scene_, change);
     on_forest([&](auto& forest) {
       forest.geometry_changed(t, this->scene_, this->sampled_, changes);
-      for (const BodyChange& own : changes) caches_[own.body].resize(forest.tree(own.body).topology().size());
+      for (const BodyChange& changed : changes)
+        if (!by_rows_) caches_[changed.body].resize(forest.tree(changed.body).topology().size());
     });
+    for (const BodyChange& changed : changes)
+      if (by_rows_) lay_out(changed.body);
     new_frame();
   }
 
@@ -131,16 +133,74 @@ class KineticAabbStrategy : public CountedStrategy<S, Count> {
  private:
   void new_frame() {
     for (auto& cache : caches_) cache.new_frame();
+    for (std::uint32_t body = 0; body < rows_.size(); ++body) rows_[body].rows().new_frame(motion_, body);
+  }
+  void lay_out(std::uint32_t body) {
+    on_forest([&](auto& forest) { rows_[body].follow(forest.tree(body), this->scene_.primitives(body)); });
+    rows_[body].rows().plans_changed();
+  }
+
+  template <class Forest>
+  QueryStatus query_rows(const Forest& forest, PairBuffer& out, const Budget& budget) {
+    std::uint64_t tests = 0, reads = 0;
+    for (std::uint32_t body = 0; body < rows_.size(); ++body)
+      reads += rows_[body].make_visited(forest.tree(body), this->sampled_, body);
+    const auto side_of = [&](std::uint32_t body) -> typename WideQuery<S>::LazySide {
+      return {&rows_[body].rows().hierarchy(), body, rows_[body].rows().stale()};
+    };
+    const auto make = [&](std::uint32_t body, std::uint32_t node) {
+      reads += rows_[body].make_wanted(node, forest.tree(body), this->sampled_, body);
+    };
+    const QueryStatus status =
+        query_lazily(query_, near_bodies_, this->scene_, this->sampled_, budget, side_of, make, out, tests);
+    this->count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::positions_fetched, reads);
+    return status;
+  }
+
+  template <class Forest>
+  QueryStatus query_nodes(const Forest& forest, PairBuffer& out, const Budget& budget) {
+    QueryStatus status;
+    BoxTests tests;
+    const auto box_of = [&](std::uint32_t body) -> Box<double> {
+      const auto& tree = forest.tree(body);
+      if (tree.topology().empty()) return {};
+      RealiserBoxes<S> boxes(tree.realisers(0), this->sampled_, body, caches_[body]);
+      boxes.ensure(0);
+      return to_double(boxes(0));
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      if (tests.made >= budget.box_tests) {
+        ++status.pending;
+        continue;
+      }
+      const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
+      LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
+                                    b.topology(), tests, out);
+      RealiserBoxes<S> boxes_a(a.realisers(0), this->sampled_, pair.first, caches_[pair.first]);
+      RealiserBoxes<S> boxes_b(b.realisers(0), this->sampled_, pair.second, caches_[pair.second]);
+      status.pending += traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack_, tests,
+                                 rest_of(budget, tests.made), leaves)
+                            .pending;
+    }
+    this->count_.add(Counter::box_tests, tests.made);
+    return status;
   }
 
   std::variant<std::unique_ptr<Forest<Queues>>...> forest_;
+  ClipMotion<S> motion_;
   NearBodies near_bodies_;
-  std::vector<BoxCache<S>> caches_;
+  bool by_rows_;
+  std::vector<KineticRows<S>> rows_;  ///< [body]; for queries by rows
+  WideQuery<S> query_;
+  std::vector<BoxCache<S>> caches_;  ///< [body]; for queries by node pairs
   std::vector<NodePair> stack_;
   std::uint64_t first_step_ = 0;
 };
 
-/// The same on clocks that are exact (EventClock): plans and geometry may change, and events can be stepped.
+/// A KineticAabbStrategy on exact clocks (EventClock): plans and geometry may change, and events can be
+/// stepped.
 template <class S, class Count, class... Queues>
 class ExactKineticAabbStrategy : public KineticAabbStrategy<S, Count, Queues...>,
                                  public EventSource<S>,

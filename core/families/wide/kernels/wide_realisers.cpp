@@ -1,4 +1,4 @@
-#include "core/families/envelope/kernels/wide_realisers.hpp"
+#include "core/families/wide/kernels/wide_realisers.hpp"
 
 #include "core/families/wide/kernels/node_fit.hpp"
 

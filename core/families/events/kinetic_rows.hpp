@@ -1,0 +1,71 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "core/families/wide/realiser_rows.hpp"
+
+namespace kbvh {
+
+/// The boxes of a kinetic AABB tree of one body, in the rows of a wide hierarchy, computed on demand from the
+/// realisers. Binary trees are collapsed into nodes of eight children; wider trees keep their nodes.
+template <class S>
+class KineticRows {
+ public:
+  /// Lays out the rows for a tree, after construction and changes of its topology. O(nodes).
+  template <class Tree>
+  void follow(const Tree& tree, const Primitives& primitives) {
+    std::vector<std::uint32_t> order;
+    lay_out(tree.compacted_topology(order), order, primitives);
+  }
+
+  RealiserRows<S>& rows() { return rows_; }
+  const WideHierarchy<S>& hierarchy() const { return rows_.hierarchy(); }
+
+  /// Computes boxes as RealiserRows does. Returns the same.
+  template <class Tree>
+  std::uint64_t make_visited(const Tree& tree, const SampledMotion<S>& motion, std::uint32_t body) {
+    return rows_.make_visited(motion, body, places_of(tree));
+  }
+  template <class Tree>
+  std::uint64_t make_wanted(std::uint32_t node, const Tree& tree, const SampledMotion<S>& motion,
+                            std::uint32_t body) {
+    return rows_.make_wanted(node, motion, body, places_of(tree));
+  }
+
+  /// Returns the box of a node of the tree, stored in `room`, if a query may have read it. Returns null
+  /// otherwise.
+  const Box<S>* read_box(std::uint32_t node, Box<S>& room) const;
+
+  std::size_t bytes() const {
+    return rows_.bytes() + (lane_nodes_.capacity() + wide_of_.capacity()) * sizeof(std::uint32_t);
+  }
+
+ private:
+  void lay_out(Topology topology, const std::vector<std::uint32_t>& order, const Primitives& primitives);
+
+  /// Returns a callable for RealiserRows.
+  template <class Tree>
+  auto places_of(const Tree& tree) const {
+    const std::uint32_t width = hierarchy().topology().width;
+    return [this, &tree, width](std::uint32_t node, std::uint32_t* room) {
+      const std::uint32_t* lanes = lane_nodes_.data() + std::size_t(node) * width;
+      for (std::uint32_t lane = 0; lane < width; ++lane) {
+        const std::uint32_t* realisers = tree.realisers(lanes[lane]);
+        for (std::uint32_t axis = 0; axis < 3; ++axis) {
+          room[axis * width + lane] = 3 * realisers[2 * axis] + axis;
+          room[(3 + axis) * width + lane] = 3 * realisers[2 * axis + 1] + axis;
+        }
+      }
+      return room;
+    };
+  }
+
+  RealiserRows<S> rows_;
+  std::vector<std::uint32_t> lane_nodes_;  ///< [wide node][width]: nodes of the tree; the root in empty lanes
+  std::vector<std::uint32_t> wide_of_;     ///< by node of the tree: node of the wide topology, or none
+};
+
+extern template class KineticRows<float>;
+extern template class KineticRows<double>;
+
+}  // namespace kbvh
