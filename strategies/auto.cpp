@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/base/cost_constants.hpp"
 #include "core/contract/registry.hpp"
 
 namespace kbvh {
@@ -26,23 +27,22 @@ struct Seen {
   double spread = 1;         // how different the steps are among a body's vertices; 0: all the same
 };
 
-// Predicted nanoseconds per frame, fitted to the scenes "tuned on" of experiments/plans/auto.json at l = 1 to
-// 30 (Zen 5, float). Only their order matters.
+using Cost = costs::Choice;
 
 double refit_cost(const Seen& seen) {
-  return 0.27 * seen.reads + 28 * seen.candidates;
+  return Cost::refit_read * seen.reads + Cost::refit_candidate * seen.candidates;
 }
 
 /// One search serves the frames in which a leaf moves by a part of its size. Where bodies deform, more pairs
 /// come near in these frames than a query takes to find.
 double drift_cost(const Seen& seen) {
-  const double watching = 0.1 * seen.reads;
-  if (seen.candidates == 0) return seen.step < 0.2 ? 0.5 * watching : 1.2 * refit_cost(seen);
-  if (seen.spread > 0.02) return 1.2 * refit_cost(seen);
+  const double watching = Cost::watch_read * seen.reads;
+  if (seen.candidates == 0) return seen.step < 0.2 ? 0.5 * watching : Cost::unfit * refit_cost(seen);
+  if (seen.spread > 0.02) return Cost::unfit * refit_cost(seen);
   const double frames = seen.step > 0 ? std::min(0.4 / seen.step, 24.0) : 24;
-  if (frames < 3) return 1.2 * refit_cost(seen);
-  const double search = 0.35 * seen.reads + 45 * seen.candidates;
-  return watching + search / frames + 15 * seen.candidates;
+  if (frames < 3) return Cost::unfit * refit_cost(seen);
+  const double search = Cost::search_read * seen.reads + Cost::search_candidate * seen.candidates;
+  return watching + search / frames + Cost::kept_candidate * seen.candidates;
 }
 
 /// One join serves a segment. Its cost grows with the distance that primitives move past each other within
@@ -52,12 +52,14 @@ double join_cost(const Seen& seen) {
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
   // Bodies apart: one box at each end, unless they come to meet; over a long distance they may pass through
   // each other.
-  if (seen.candidates == 0) return 1.5 / l * (1 + moves * moves) * refit_cost(seen);
+  if (seen.candidates == 0) return Cost::join_apart / l * (1 + moves * moves) * refit_cost(seen);
   const double alike = 1 - seen.spread;
   // Small bodies that move past each other meet further bodies on their way, in addition to their current
   // contacts.
   const double others = seen.many_bodies ? 1 + moves : 1;
-  return refit_cost(seen) * (0.08 + 5.5 / (l + 4.6) * (1 + moves) * others + 0.2 * alike * alike * moves);
+  return refit_cost(seen) *
+         (Cost::join_frame + Cost::join_segment / (l + Cost::join_frames) * (1 + moves) * others +
+          Cost::join_slide * alike * alike * moves);
 }
 
 /// A strategy to choose, its explicitly set parameters, and its predicted cost. To add a candidate, add a

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/cost_constants.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/wide/kernels/wide_inflate.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
@@ -233,20 +234,22 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
   // opened in vain). Among many small bodies a margin also adds neighbours, in proportion to the growth of
   // the body's box, and a body without contact at the last query may then have some.
 
+  using Cost = costs::InflatedBoxes;
+
   /// Returns the cost of a check, in box tests. Positions count only if the query would not evaluate them all
   /// anyway. A check that is due at every frame only costs its writes.
   double check_cost(std::uint32_t index) const {
-    constexpr double reading = 0.6, evaluating = 1.2, writing = 0.2;  // per vertex
-    const double each = !bounded_ ? writing : bodies_[index].query_takes_all ? reading : reading + evaluating;
+    const double each = !bounded_                        ? Cost::writing
+                        : bodies_[index].query_takes_all ? Cost::reading
+                                                         : Cost::reading + Cost::evaluating;
     return each * this->scene_.vertex_count(index);
   }
   double query_cost(const Body& body, double margin) const {
     const double side = 1 + margin / body.leaf_size;
-    double tests = double(body.tests) / (1 + 0.4 * double(body.margin) / body.leaf_size);
+    double tests = double(body.tests) / (1 + Cost::opened * double(body.margin) / body.leaf_size);
     if (this->near_bodies_.searches() && body.size > 0) {
       const auto neighbours = [&](double m) { return std::pow(1 + 2 * m / body.size, 3); };
-      constexpr double one_meeting = 64;
-      tests = std::max(tests, one_meeting) * neighbours(margin) / neighbours(double(body.margin));
+      tests = std::max(tests, Cost::meeting) * neighbours(margin) / neighbours(double(body.margin));
     }
     return tests * side * side;
   }

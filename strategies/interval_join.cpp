@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/base/cost_constants.hpp"
 #include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/linear/interval_join.hpp"
@@ -187,9 +188,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
  private:
   using Stage = WorkAhead::Stage;
-  /// The costs of the parts of the work, in box tests of the join: measured once, and used only for even
-  /// slices.
-  static constexpr double node_cost = 35, answer_cost = 5;
+  using Cost = costs::JoinAhead;
 
   /// More pairs of bodies than this are joined together: a separate join takes some kilobytes.
   static constexpr std::size_t most_joins = 16;
@@ -251,11 +250,11 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   /// Estimates the work as if the next segment resembled the current one, or, if that one has little work,
   /// many others.
   double all_work() const {
-    const double boxes = node_cost * double(bounds_.nodes_of_segment());
+    const double boxes = Cost::node * double(bounds_.nodes_of_segment());
     double known = 0;
     for (std::size_t i = 0; joined_ && i < now_.joins.size(); ++i) {
       known += double(now_.joins[i].tests());
-      if (by_spans_[i]) known += answer_cost * double(now_.joins[i].from_begin());
+      if (by_spans_[i]) known += Cost::answer * double(now_.joins[i].from_begin());
     }
     return boxes + std::max(2 * boxes, known);
   }
@@ -263,13 +262,13 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     if (ahead_.stage != Stage::bounds) return;
     const double share = share_due(), wanted = share * all_work() - ahead_.done;
     if (share < 1 && !(wanted > 0)) return;
-    const double most = share < 1 ? wanted / node_cost : 1e15;
+    const double most = share < 1 ? wanted / Cost::node : 1e15;
     if (bounds_.step_ahead(std::uint64_t(most) + 1))
       ahead_.stage = Stage::joins;
     else if (!bounds_.has_ahead())
       ahead_.stage = Stage::nothing;
     if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
-    ahead_.done += std::clamp(wanted, 0.0, node_cost * double(bounds_.nodes_of_segment()));
+    ahead_.done += std::clamp(wanted, 0.0, Cost::node * double(bounds_.nodes_of_segment()));
   }
   /// Brings the work on joins and answers ahead to a share of the whole; from 1 on, to its end.
   void join_ahead(const LinearSegment<S>& segment, double share) {
@@ -293,7 +292,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
       } else {
         if (by_spans_[i] && !ahead_.begun) next_.answers[i].start_ahead(join);
         ahead_.begun = by_spans_[i] && !next_.answers[i].step(segment, this->scene_, join, answers_at_once);
-        if (by_spans_[i]) ahead_.done += answer_cost * answers_at_once;
+        if (by_spans_[i]) ahead_.done += Cost::answer * answers_at_once;
       }
       if (!ahead_.begun) ++ahead_.join;
     }

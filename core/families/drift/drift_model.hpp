@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/cost_constants.hpp"
+
 namespace kbvh {
 
 /// The counts of one search for near pairs, summed over the scene.
@@ -40,11 +42,11 @@ class DriftModel {
   int period(double step) {
     // An empty list does not predict the size of later lists.
     if (!known_ || counts_.listed == 0)
-      return step > longest_step ? 0 : int(std::clamp(first_reach / step, 2.0, 8.0));
-    double least = clear_gain * plain_cost();
+      return step > Cost::longest_step ? 0 : int(std::clamp(Cost::first_reach / step, 2.0, 8.0));
+    double least = Cost::clear_gain * plain_cost();
     int best = 0;
     for (const int frames : {2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64}) {
-      if (frames > 4 * period_ || frames * step > longest_reach)
+      if (frames > 4 * period_ || frames * step > Cost::longest_reach)
         break;  // extrapolates no further than the observations allow
       const double cost = listed_cost(frames);
       if (!(cost < least)) continue;
@@ -63,18 +65,13 @@ class DriftModel {
   }
 
  private:
-  /// A smaller predicted gain is within the error of the prediction.
-  static constexpr double clear_gain = 0.9;
-  static constexpr double longest_step = 0.12, first_reach = 0.15, longest_reach = 0.3;
+  using Cost = costs::Drift;
   static constexpr int shortest_rest = 16;
-  // In units of one box test of a query: reading a vertex in a refit; reading a vertex twice in memory order;
-  // a box test of a search; listing a pair; testing whether a listed pair overlaps now.
-  static constexpr double refitting = 0.2, observing = 0.15, searching = 1.3, listing = 4, checking = 5;
 
   /// Interpolates a count for a reach of `frames` frames, from `none` at no reach and `some` at the reach of
   /// the last search.
   double grown(double none, double some, double frames) const {
-    return none + std::max(0.0, some - none) * std::pow(frames / period_, 1.3);
+    return none + std::max(0.0, some - none) * std::pow(frames / period_, Cost::growth);
   }
   /// Returns the box tests of a query at one frame without lists.
   double tests() const {
@@ -83,13 +80,14 @@ class DriftModel {
   }
   double listed_cost(double frames) const {
     const double listed = grown(counts_.overlapping, counts_.listed, frames);
-    const double search = refitting * counts_.reads + observing * counts_.vertices +
-                          searching * grown(tests(), counts_.tests, frames) + listing * listed;
-    const double active = counts_.overlapping + (listed - counts_.overlapping) / 2.3;
-    const double each = (watching_ == Watching::reads ? observing * counts_.vertices : 0) + checking * active;
+    const double search = Cost::refitting * counts_.reads + Cost::observing * counts_.vertices +
+                          Cost::searching * grown(tests(), counts_.tests, frames) + Cost::listing * listed;
+    const double active = counts_.overlapping + (listed - counts_.overlapping) / Cost::kept_listed;
+    const double each =
+        (watching_ == Watching::reads ? Cost::observing * counts_.vertices : 0) + Cost::checking * active;
     return search / frames + each * (frames - 1) / frames;
   }
-  double plain_cost() const { return refitting * counts_.reads + tests(); }
+  double plain_cost() const { return Cost::refitting * counts_.reads + tests(); }
 
   DriftCounts counts_;
   int period_ = 1, rest_ = shortest_rest;

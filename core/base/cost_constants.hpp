@@ -1,0 +1,49 @@
+#pragma once
+
+/// The constants of all cost models by which strategies choose: measured once, and kept here with the commit
+/// that fitted them, so that they can be fitted anew. Choices multiply them by counts of the scene, never by
+/// times, so that a choice does not depend on the machine or its load.
+namespace kbvh::costs {
+
+/// drift_boxes and DriftModel, in box tests of a query. Fitted in 4238658; `clear_gain` and `kept_listed` in
+/// 167e5b8, the steps in c6e0cf1.
+struct Drift {
+  static constexpr double refitting = 0.2;    ///< reading a vertex in a refit
+  static constexpr double observing = 0.15;   ///< reading a vertex twice in memory order
+  static constexpr double searching = 1.3;    ///< a box test of a search
+  static constexpr double listing = 4;        ///< listing a pair
+  static constexpr double checking = 5;       ///< testing whether a listed pair overlaps now
+  static constexpr double kept_listed = 2.3;  ///< listed pairs without overlap, over those that are tested
+  static constexpr double growth = 1.3;       ///< exponent of counts over the frames of a search
+  static constexpr double clear_gain = 0.9;   ///< smaller predicted gains are within the prediction's error
+  static constexpr double longest_step = 0.12, first_reach = 0.15, longest_reach = 0.3;  ///< in leaf sides
+};
+
+/// inflated_lazy with tuned margins, in box tests of a query. Fitted in 734fb07; `meeting` in 154f79e.
+struct InflatedBoxes {
+  static constexpr double reading = 0.6;     ///< reading a vertex in a check
+  static constexpr double evaluating = 1.2;  ///< evaluating a vertex that no query reads
+  static constexpr double writing = 0.2;     ///< writing the boxes of a vertex
+  static constexpr double opened = 0.4;      ///< further tests for a margin of one leaf side
+  static constexpr double meeting = 64;      ///< tests of two small bodies that meet
+};
+
+/// interval_join ahead of time, in box tests of the join: only for even slices of work. Fitted in 2f76992.
+struct JoinAhead {
+  static constexpr double node = 35;   ///< making the boxes of a node
+  static constexpr double answer = 5;  ///< sorting in an answer
+};
+
+/// auto, in nanoseconds per frame on the scenes "tuned on" of experiments/plans/auto.json at l = 1 to 30 (Zen
+/// 5, float); only their order matters. Fitted in c6e0cf1 and 167e5b8, the join in ef3f1d8.
+struct Choice {
+  static constexpr double refit_read = 0.27, refit_candidate = 28;    ///< per vertex read; per candidate
+  static constexpr double watch_read = 0.1;                           ///< per vertex whose drift is read
+  static constexpr double search_read = 0.35, search_candidate = 45;  ///< one search of drift_boxes
+  static constexpr double kept_candidate = 15;                        ///< a frame of drift_boxes
+  static constexpr double unfit = 1.2;  ///< drift_boxes that fall back, over a refit
+  static constexpr double join_frame = 0.08, join_segment = 5.5, join_frames = 4.6;  ///< of a refit
+  static constexpr double join_slide = 0.2, join_apart = 1.5;                        ///< of a refit
+};
+
+}  // namespace kbvh::costs
