@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/families/events/kinetic_aabb_strategy.hpp"
+#include "core/families/events/kinetic_tree_strategy.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/theory/envelope.hpp"
 

@@ -11,13 +11,19 @@
 #include <vector>
 
 #include "core/families/events/keyframe_rows.hpp"
+#include "core/families/events/projected_plan.hpp"
 #include "core/motion/exact_piece.hpp"
 #include "core/motion/flight_plans.hpp"
 
 namespace kbvh {
 
-/// One of the six sides of a box: 2 * axis + (0 lower, 1 upper).
+/// One of the sides of a box or k-DOP: 2 * direction + (0 lower, 1 upper). Directions are numbered as in
+/// `slab_directions`, so the first six sides are those of the box.
 using Side = std::uint32_t;
+inline std::size_t direction_of(Side side) {
+  return side >> 1;
+}
+/// Returns the axis of a side of a box.
 inline int axis_of(Side side) {
   return int(side >> 1);
 }
@@ -32,14 +38,14 @@ struct Event {
   double hint = 0, error = 0, begin = 0, end = 0;
   std::uint32_t winner = 0, loser = 0;
   std::uint32_t slot = 0;       ///< which certificate: unique in the whole queue
-  std::uint32_t body : 21 = 0;  ///< below most_bodies
-  std::uint32_t side : 3 = 0;
+  std::uint32_t body : 19 = 0;  ///< below most_bodies
+  std::uint32_t side : 5 = 0;
   std::uint32_t depth : 8 = 0;  ///< of the node; deeper events of one instant come first
 
   /// Which segment of the body's keyframes [begin, end) is, if it is one and that is known.
   std::uint32_t segment = no_segment;
 
-  static constexpr std::uint32_t most_bodies = 1U << 21;
+  static constexpr std::uint32_t most_bodies = 1U << 19;
   static constexpr std::uint32_t no_segment = std::numeric_limits<std::uint32_t>::max();
 };
 static_assert(sizeof(Event) == 56);
@@ -50,8 +56,8 @@ struct PackedEvent {
   double hint = 0;
   std::uint32_t winner = 0, loser = 0;
   std::uint32_t segment = 0;    ///< of the keyframes, or none: a plan of its own takes part
-  std::uint32_t body : 21 = 0;  ///< as in Event
-  std::uint32_t side : 3 = 0;
+  std::uint32_t body : 19 = 0;  ///< as in Event
+  std::uint32_t side : 5 = 0;
   std::uint32_t depth : 8 = 0;
 };
 static_assert(sizeof(PackedEvent) == 24);
@@ -75,13 +81,16 @@ class EventClock {
  public:
   using Event = kbvh::Event;
   using Packed = PackedEvent;
-  /// Copies the keyframes of moving bodies; bodies that share theirs share the copy.
-  explicit EventClock(std::vector<const FlightPlans<S>*> plans) : plans_(std::move(plans)) {
+  /// Copies the keyframes of moving bodies along the directions of the sides; bodies that share theirs share
+  /// the copy.
+  explicit EventClock(std::vector<const FlightPlans<S>*> plans,
+                      std::span<const SlabDirection> directions = Dop<S, 6>::directions)
+      : plans_(std::move(plans)), directions_(directions) {
     std::unordered_map<const S*, const KeyframeRows<S>*> of_keyframes;
     for (const FlightPlans<S>* body : plans_) {
       const KeyframeRows<S>*& rows = of_keyframes[body->keyframe(0)];
       if (rows == nullptr) {
-        distinct_rows_.push_back(std::make_unique<const KeyframeRows<S>>(*body));
+        distinct_rows_.push_back(std::make_unique<const KeyframeRows<S>>(*body, directions));
         rows = distinct_rows_.back().get();
       }
       rows_.push_back(rows);
@@ -89,6 +98,32 @@ class EventClock {
   }
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return *plans_[body]; }
+
+  /// The piece of a vertex's plan along a direction that holds at t and right after it.
+  Piece<S> piece_after(std::uint32_t body, std::uint32_t vertex, std::size_t direction, double t) const {
+    if (direction < 3) return plans_[body]->piece_after(vertex, int(direction), t);
+    return projected_piece(*plans_[body], vertex, directions_[direction], t);
+  }
+  /// Computes values[side], for sides 0 to count - 1: where realisers[side] is at t along the side's
+  /// direction. Rounded correctly to S.
+  void values_at(std::uint32_t body, const std::uint32_t* realisers, std::size_t count, double t,
+                 S* values) const {
+    const KeyframeRows<S>& rows = *rows_[body];
+    const auto times = rows.times();
+    if (plans_[body]->has_own_plans() || times.size() < 2 || t < times.front() || t >= times.back()) {
+      for (Side side = 0; side < count; ++side)
+        values[side] = round_piece(piece_after(body, realisers[side], direction_of(side), t), t);
+      return;
+    }
+    const std::size_t segment = rows.segment_at(t);
+    S ends[32];
+    for (Side side = 0; side < count; ++side) {
+      const S* const row = rows.row(realisers[side], direction_of(side)) + segment;
+      values[side] = row[0];
+      ends[side] = row[1];
+    }
+    round_chord(values, ends, count, times[segment], times[segment + 1], t, values);
+  }
 
   /// The two pieces whose crossing is the event.
   Crossing<S> crossing(const Event& event) const {
@@ -136,7 +171,7 @@ class EventClock {
   /// Fetches what the event's handling will read of a vertex's keyframes.
   void fetch_ahead(const Packed& packed, std::uint32_t vertex) const {
     if (packed.segment != none && vertex < plans_[packed.body]->keyframed_count())
-      __builtin_prefetch(rows_[packed.body]->row(vertex, axis_of(packed.side)) + packed.segment);
+      __builtin_prefetch(rows_[packed.body]->row(vertex, direction_of(packed.side)) + packed.segment);
   }
   /// How far to look ahead from an instant: the time so many keyframes later, or infinity. Realisers seldom
   /// last through a long clip, and looking to its end each time would be quadratic in its keyframes.
@@ -169,12 +204,12 @@ class EventClock {
   }
 
   /// The same for short forms and their slots. Often two vertices exchange their ranks in several nodes at
-  /// once, on both sides of an axis.
+  /// once, on both sides of a direction.
   bool earlier(const Packed& a, std::uint32_t slot_a, const Packed& b, std::uint32_t slot_b) const {
     const bool same_pair =
         (a.winner == b.winner && a.loser == b.loser) || (a.winner == b.loser && a.loser == b.winner);
     if (!same_pair || a.segment == none || a.segment != b.segment || a.body != b.body ||
-        axis_of(a.side) != axis_of(b.side))
+        direction_of(a.side) != direction_of(b.side))
       return earlier(unpack(a, slot_a), unpack(b, slot_b));
     return a.depth != b.depth ? a.depth > b.depth : slot_a < slot_b;
   }
@@ -220,20 +255,20 @@ class EventClock {
   /// Where certificates of one side of a body that takes part with keyframes only look for their failures.
   struct KeyframeSearch {
     const KeyframeRows<S>* rows;
-    int axis;
+    std::size_t direction;
     bool upper;
     std::size_t begin, end;  ///< keyframes at which a loser can be ahead for the first time
 
     /// The first of these, before `limit`, at which `loser` is strictly ahead of `winner`; else `limit`.
     std::size_t first_ahead(std::uint32_t loser, std::uint32_t winner, std::size_t limit) const {
-      const S *const l = rows->row(loser, axis), *const w = rows->row(winner, axis);
+      const S *const l = rows->row(loser, direction), *const w = rows->row(winner, direction);
       return upper ? rows->first_above(l, w, begin, limit) : rows->first_above(w, l, begin, limit);
     }
     /// The next of `losers`, from number `first` on, that is strictly ahead of `winner` at one of these
     /// before `limit`, and at which.
     RowAhead next_ahead(std::span<const std::uint32_t> losers, std::size_t first, std::uint32_t winner,
                         std::size_t limit) const {
-      return rows->next_ahead(axis, upper, losers, first, winner, begin, limit);
+      return rows->next_ahead(direction, upper, losers, first, winner, begin, limit);
     }
   };
   /// From an instant on, in segments that begin before `until`. Only for bodies with several keyframes.
@@ -249,14 +284,14 @@ class EventClock {
       const std::size_t last = rows.segment_at(until);
       end = std::min(end, last + (times[last] < until ? 2 : 1));
     }
-    return {&rows, axis_of(side), is_upper(side), k + 1, std::max(end, k + 1)};
+    return {&rows, direction_of(side), is_upper(side), k + 1, std::max(end, k + 1)};
   }
   /// Fills hint, error, begin and end of an event whose loser is ahead for the first time at a keyframe.
   void set_failure(Event& event, std::size_t ahead_at) const {
     const KeyframeRows<S>& rows = *rows_[event.body];
-    const int axis = axis_of(event.side);
-    const S* const winner = rows.row(event.winner, axis) + ahead_at - 1;
-    const S* const loser = rows.row(event.loser, axis) + ahead_at - 1;
+    const std::size_t direction = direction_of(event.side);
+    const S* const winner = rows.row(event.winner, direction) + ahead_at - 1;
+    const S* const loser = rows.row(event.loser, direction) + ahead_at - 1;
     const double sign = is_upper(event.side) ? 1.0 : -1.0;
     const double ahead = sign * (double(loser[1]) - double(winner[1]));
     const double behind = sign * (double(winner[0]) - double(loser[0]));
@@ -271,9 +306,9 @@ class EventClock {
   /// means ahead.
   int compare_values(std::uint32_t body, Side side, std::uint32_t challenger, std::uint32_t winner,
                      double t) const {
-    const FlightPlans<S>& plan = *plans_[body];
-    const int axis = axis_of(side);
-    const int sign = compare_at(plan.piece_after(challenger, axis, t), plan.piece_after(winner, axis, t), t);
+    const std::size_t direction = direction_of(side);
+    const int sign =
+        compare_at(piece_after(body, challenger, direction, t), piece_after(body, winner, direction, t), t);
     return is_upper(side) ? sign : -sign;
   }
 
@@ -347,23 +382,24 @@ class EventClock {
   Piece<S> keyframed_piece(const Event& event, std::uint32_t vertex) const {
     // Read from the keyframes: they stay what they are when a vertex gets a plan of its own.
     const KeyframeRows<S>& rows = *rows_[event.body];
-    const S* const values = rows.row(vertex, axis_of(event.side)) + segment_of(event);
+    const S* const values = rows.row(vertex, direction_of(event.side)) + segment_of(event);
     return {event.begin, event.end, values[0], values[1], PieceKind::chord};
   }
 
   /// The piece that holds at the instant and right after it.
-  Piece<S> piece_at(std::uint32_t body, std::uint32_t vertex, int axis, const Instant<S>& now) const {
-    Piece<S> piece = plans_[body]->piece_after(vertex, axis, now.begin);
+  Piece<S> piece_at(std::uint32_t body, std::uint32_t vertex, std::size_t direction,
+                    const Instant<S>& now) const {
+    Piece<S> piece = piece_after(body, vertex, direction, now.begin);
     while (now.exact != nullptr && piece.t1 < now.end && compare_crossing_to(*now.exact, piece.t1) >= 0)
-      piece = plans_[body]->piece_after(vertex, axis, piece.t1);
+      piece = piece_after(body, vertex, direction, piece.t1);
     return piece;
   }
 
   bool first_own_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own,
                          double until) const {
-    const int axis = axis_of(event.side);
-    Piece<S> winner = piece_at(event.body, event.winner, axis, now);
-    Piece<S> loser = piece_at(event.body, event.loser, axis, now);
+    const std::size_t direction = direction_of(event.side);
+    Piece<S> winner = piece_at(event.body, event.winner, direction, now);
+    Piece<S> loser = piece_at(event.body, event.loser, direction, now);
     double begin = now.begin;
     for (;;) {
       const double end = std::min(winner.t1, loser.t1);
@@ -381,13 +417,14 @@ class EventClock {
         return true;
       }
       if (std::isinf(end) || end >= until) return false;
-      if (winner.t1 <= end) winner = plans_[event.body]->piece_after(event.winner, axis, end);
-      if (loser.t1 <= end) loser = plans_[event.body]->piece_after(event.loser, axis, end);
+      if (winner.t1 <= end) winner = piece_after(event.body, event.winner, direction, end);
+      if (loser.t1 <= end) loser = piece_after(event.body, event.loser, direction, end);
       begin = end;
     }
   }
 
   std::vector<const FlightPlans<S>*> plans_;
+  std::span<const SlabDirection> directions_;
   std::vector<const KeyframeRows<S>*> rows_;  ///< [body]
   std::vector<std::unique_ptr<const KeyframeRows<S>>> distinct_rows_;
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();

@@ -5,7 +5,7 @@
 
 #include "core/contract/strategy.hpp"
 #include "core/families/events/event_queue.hpp"
-#include "core/families/events/kinetic_aabb_tree.hpp"
+#include "core/families/events/kinetic_tree.hpp"
 
 namespace kbvh {
 
@@ -21,7 +21,7 @@ class KineticForest {
 
   KineticForest(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, Count& count,
                 Observer observer = {})
-      : clock_(plans_of(scene, motion)), queue_(clock_, slots_of(topologies)), count_(&count) {
+      : clock_(plans_of(scene, motion), directions()), queue_(clock_, slots_of(topologies)), count_(&count) {
     if (scene.body_count() > Event::most_bodies)
       throw std::length_error("a scene of " + std::to_string(scene.body_count()) +
                               " bodies, but events number " + std::to_string(Event::most_bodies));
@@ -121,6 +121,13 @@ class KineticForest {
     const Event event = queue_.top();
     queue_.pop();
     return event;
+  }
+  /// Returns the directions of the trees' sides: the axes, for trees that name none.
+  static std::span<const SlabDirection> directions() {
+    if constexpr (requires { Tree::directions; })
+      return Tree::directions;
+    else
+      return Dop<S, 6>::directions;
   }
   static std::vector<const FlightPlans<S>*> plans_of(const SceneView<S>& scene, const ClipMotion<S>& motion) {
     std::vector<const FlightPlans<S>*> plans;

@@ -6,6 +6,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/base/assert.hpp"
 #include "core/families/events/event.hpp"
 
 namespace kbvh {
@@ -25,7 +26,12 @@ template <class S, class T, FailureRule rule>
 class RoundedClock {
  public:
   using Event = kbvh::Event;
-  explicit RoundedClock(std::vector<const FlightPlans<S>*> plans) : plans_(std::move(plans)) {}
+  /// Only for the sides of boxes: `directions` are the axes.
+  RoundedClock(std::vector<const FlightPlans<S>*> plans, std::span<const SlabDirection> directions)
+      : plans_(std::move(plans)) {
+    KBVH_ASSERT(directions.size() == 3);
+    (void)directions;
+  }
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return *plans_[body]; }
   /// Nothing: `first_failure` starts from an event's `begin`.

@@ -17,17 +17,22 @@
 #include "core/families/events/observer.hpp"
 #include "core/families/events/realiser_boxes.hpp"
 #include "core/geometry/lane_box.hpp"
+#include "core/geometry/volumes/dop.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/topology/topology_edit.hpp"
 
 namespace kbvh {
 
-/// The kinetic AABB tree of one body (Z&W s.4): per node and side the vertex that realises the bound, and one
-/// certificate that it does; the earliest failure of each certificate is scheduled in a queue that several
-/// structures may share. Any width and leaf size: a leaf's certificate is the earliest overtaker among its
-/// unique vertices, an inner node's the earliest among its other children's realisers.
+/// The kinetic tree of one body (Z&W s.4) over bounding volumes with K sides of fixed directions: 6 for
+/// boxes, 14, 18 or 26 for k-DOPs (`slab_directions`). Per node and side it keeps the vertex that realises
+/// the bound, and one certificate that it does; the earliest failure of each certificate is scheduled in a
+/// queue that several structures may share. Any width and leaf size: a leaf's certificate is the earliest
+/// overtaker among its unique vertices, an inner node's the earliest among its other children's realisers.
 ///
-/// Slots of the queue are first_slot + 6 * node + side for the nodes that there were at the start; later ones
+/// The clock must have the tree's directions. Along the axes, realisers and events are exact for the flight
+/// plans; along other directions, for the projected plans (projected_plan.hpp).
+///
+/// Slots of the queue are first_slot + K * node + side for the nodes that there were at the start; later ones
 /// get theirs in chunks. Observer::realiser_changed(body, node, side, old, new, instant) is called at every
 /// change of a bound's realiser, deeper nodes first, and Observer::realiser_plan_changed(body, node) for a
 /// node of which a realiser has another plan from now on.
@@ -35,12 +40,18 @@ namespace kbvh {
 /// Primitives can be inserted and removed at any time (the paper's claim): a local edit of the topology, then
 /// certificates of the few nodes whose candidates are others, and of their ancestors as far up and on as many
 /// sides as the realisers change.
-template <class S, class Queue, class Count, class Observer = NoObserver>
-class KineticAabbTree {
+template <class S, class Queue, class Count, class Observer, int K>
+class KineticTree {
+  /// One bit for each side, and one more.
+  using SideBits = std::conditional_t<K <= 7, std::uint8_t, std::uint32_t>;
+
  public:
-  KineticAabbTree(Topology topology, const Primitives& primitives, std::uint32_t body,
-                  std::uint32_t first_slot, typename Queue::ClockType& clock, Queue& queue, Count& count,
-                  Observer observer = {})
+  static constexpr Side sides = K;
+  /// The directions of the sides: side = 2 * direction + (0 lower, 1 upper).
+  static constexpr const auto& directions = Dop<S, K>::directions;
+
+  KineticTree(Topology topology, const Primitives& primitives, std::uint32_t body, std::uint32_t first_slot,
+              typename Queue::ClockType& clock, Queue& queue, Count& count, Observer observer = {})
       : topology_(std::move(topology)),
         leaf_vertices_(topology_, primitives),
         body_(body),
@@ -50,9 +61,9 @@ class KineticAabbTree {
         count_(&count),
         observer_(observer),
         certifier_(clock, queue, count),
-        realisers_(std::size_t(6) * topology_.size(), 0) {}
+        realisers_(std::size_t(sides) * topology_.size(), 0) {}
 
-  static std::uint64_t slot_count(const Topology& topology) { return std::uint64_t(6) * topology.size(); }
+  static std::uint64_t slot_count(const Topology& topology) { return std::uint64_t(sides) * topology.size(); }
   /// After insertions or deletions it is laid out as TopologyEditor says, with ids that mean nothing.
   const Topology& topology() const { return topology_; }
   /// The topology as a builder lays it out, for audits: node i of it is node order[i] of the tree.
@@ -64,25 +75,25 @@ class KineticAabbTree {
   }
   /// Unique vertices of a leaf, ascending.
   std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const { return leaf_vertices_[node]; }
-  std::uint32_t slot(std::uint32_t node, Side side) const { return slots_.slot(6 * node + side); }
+  std::uint32_t slot(std::uint32_t node, Side side) const { return slots_.slot(sides * node + side); }
   /// The node that a slot of the queue belongs to.
-  std::uint32_t node_of(std::uint32_t slot) const { return slots_.place(slot) / 6; }
+  std::uint32_t node_of(std::uint32_t slot) const { return slots_.place(slot) / sides; }
   /// The node whose certificate is concerned, but for its own, when a realiser of `node` changes; not of the
   /// root.
   std::uint32_t certificate_above(std::uint32_t node, Side /*side*/) const { return topology_.parents[node]; }
   std::uint32_t realiser(std::uint32_t node, Side side) const {
-    return realisers_[std::size_t(6) * node + side];
+    return realisers_[std::size_t(sides) * node + side];
   }
   const std::uint32_t* realisers(std::uint32_t node) const {
-    return realisers_.data() + std::size_t(6) * node;
+    return realisers_.data() + std::size_t(sides) * node;
   }
 
   /// Finds every realiser at t and schedules every certificate. O(nodes log nodes + vertices of leaves).
   void initialise(double t) {
     const auto now = Instant<S>::at(t);
     const auto start = [&](std::uint32_t node) {
-      for (Side side = 0; side < 6; ++side) {
-        realisers_[std::size_t(6) * node + side] = best_at(node, side, t, candidate(node, side, 0));
+      for (Side side = 0; side < sides; ++side) {
+        realisers_[std::size_t(sides) * node + side] = best_at(node, side, t, candidate(node, side, 0));
         certify(node, side, now);
       }
     };
@@ -128,14 +139,14 @@ class KineticAabbTree {
     const std::uint32_t node = node_of(slot_of_event);
     const Side side = event.side;
     if (step == 0) {
-      __builtin_prefetch(realisers(node));
+      __builtin_prefetch(realisers(node) + side);
       __builtin_prefetch(topology_.nodes.data() + node);
       __builtin_prefetch(topology_.parents.data() + node);
       return;
     }
     const std::uint32_t parent = topology_.parents[node];
     if (step == 1) {
-      __builtin_prefetch(realisers(parent));
+      __builtin_prefetch(realisers(parent) + side);
       __builtin_prefetch(topology_.nodes.data() + parent);
       __builtin_prefetch(topology_.parents.data() + parent);
       if constexpr (requires { queue_->prefetch(0); }) queue_->prefetch(slot(parent, side));
@@ -217,7 +228,7 @@ class KineticAabbTree {
   }
 
   std::size_t bytes() const {
-    return topology_.bytes() + leaf_vertices_.bytes() + moved_.size() + slots_.bytes() +
+    return topology_.bytes() + leaf_vertices_.bytes() + moved_.size() * sizeof(SideBits) + slots_.bytes() +
            (realisers_.size() + marked_.size()) * sizeof(std::uint32_t) + (editor_ ? editor_->bytes() : 0);
   }
 
@@ -248,7 +259,7 @@ class KineticAabbTree {
   }
 
   void replace(std::uint32_t node, Side side, std::uint32_t vertex, const Instant<S>& now) {
-    std::uint32_t& realiser = realisers_[std::size_t(6) * node + side];
+    std::uint32_t& realiser = realisers_[std::size_t(sides) * node + side];
     const std::uint32_t old = realiser;
     realiser = vertex;
     count_->add(Counter::values_written);
@@ -261,7 +272,7 @@ class KineticAabbTree {
     event.winner = realiser(node, side);
     event.slot = slot(node, side);
     event.body = body_ % Event::most_bodies;
-    event.side = side & 7U;
+    event.side = side & 31U;
     event.depth = topology_.depths[node];
     const TopologyNode n = topology_.nodes[node];
     if (n.is_leaf()) return certifier_.certify(event, now, leaf_vertices_[node]);
@@ -278,15 +289,15 @@ class KineticAabbTree {
   /// Brings all that is kept by node in line with what the editor did, and notes which nodes to look at.
   void follow_edit() {
     for (const std::uint32_t node : edit_.vacated) {
-      for (Side side = 0; side < 6; ++side) {
+      for (Side side = 0; side < sides; ++side) {
         certifier_.withdraw(slot(node, side));
         clock_->remember(slot(node, side), {});
-        realisers_[std::size_t(6) * node + side] = no_vertex;
+        realisers_[std::size_t(sides) * node + side] = no_vertex;
       }
     }
     const std::uint32_t nodes = topology_.size();
-    slots_.grow(6 * nodes, *queue_);
-    realisers_.resize(std::size_t(6) * nodes, no_vertex);
+    slots_.grow(sides * nodes, *queue_);
+    realisers_.resize(std::size_t(sides) * nodes, no_vertex);
     leaf_vertices_.follow(edit_, nodes, vertex_count());
     touched_ = edit_.fresh;
     touched_.insert(touched_.end(), edit_.changed.begin(), edit_.changed.end());
@@ -332,7 +343,7 @@ class KineticAabbTree {
     // Level by level from the root, so backwards it is bottom-up.
     for (std::size_t i = affected_.size(); i-- > 0;) {
       const std::uint32_t node = affected_[i];
-      for (Side side = 0; side < 6; ++side) {
+      for (Side side = 0; side < sides; ++side) {
         const std::uint32_t old = realiser(node, side);
         bool concerned = (moved_[node] & other_candidates) != 0 || changed(old);
         const TopologyNode content = topology_.nodes[node];
@@ -345,18 +356,18 @@ class KineticAabbTree {
         const std::uint32_t best = best_at(node, side, t, still_there ? old : candidate(node, side, 0));
         if (best != old) {
           replace(node, side, best, now);
-          moved_[node] = std::uint8_t(moved_[node] | (1u << side));
+          moved_[node] = SideBits(moved_[node] | (1u << side));
         }
         certify(node, side, now);
       }
-      if (!vertices.empty() && std::any_of(realisers(node), realisers(node) + 6, changed))
+      if (!vertices.empty() && std::any_of(realisers(node), realisers(node) + sides, changed))
         observer_.realiser_plan_changed(body_, node);
     }
     for (std::uint32_t node : affected_) moved_[node] = 0;
   }
   bool side_moved(std::uint32_t node, Side side) const { return (moved_[node] >> side) & 1; }
 
-  static constexpr std::uint8_t other_candidates = 1 << 6;  ///< in `moved_`
+  static constexpr SideBits other_candidates = SideBits(1u << sides);  ///< in `moved_`
 
   Topology topology_;
   LeafVertexLists leaf_vertices_;
@@ -370,12 +381,23 @@ class KineticAabbTree {
   std::vector<std::uint32_t> realisers_;  ///< [node][side]
   // For changes of plans, made when the first one comes: marks of affected nodes.
   std::vector<std::uint32_t> touched_, marked_, affected_;
-  std::vector<std::uint8_t> moved_;  ///< sides whose realiser changed in this pass, one bit each
+  std::vector<SideBits> moved_;  ///< sides whose realiser changed in this pass, one bit each
   std::uint32_t mark_ = 0;
   // For changes of geometry, made when the first one comes.
   std::optional<TopologyEditor> editor_;
   TopologyEdit edit_;
   std::vector<std::uint32_t> unique_;
+};
+
+/// The kinetic AABB tree of the paper.
+template <class S, class Queue, class Count, class Observer = NoObserver>
+using KineticAabbTree = KineticTree<S, Queue, Count, Observer, 6>;
+
+/// The kinetic k-DOP tree, as a template argument of KineticForest: KineticDop<18>::Tree.
+template <int K>
+struct KineticDop {
+  template <class S, class Queue, class Count, class Observer = NoObserver>
+  using Tree = KineticTree<S, Queue, Count, Observer, K>;
 };
 
 }  // namespace kbvh

@@ -1,0 +1,260 @@
+#pragma once
+#include <memory>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+#include "core/contract/audited_volumes.hpp"
+#include "core/contract/strategy.hpp"
+#include "core/families/events/event_log.hpp"
+#include "core/families/events/kinetic_forest.hpp"
+#include "core/families/events/realiser_boxes.hpp"
+#include "core/families/events/realiser_dops.hpp"
+#include "core/families/wide/near_bodies.hpp"
+#include "core/geometry/volumes/aligned_box.hpp"
+#include "core/topology/leaf_pairs.hpp"
+
+namespace kbvh {
+
+/// A strategy of kinetic trees (Z&W s.4) and nothing else: volumes are read from the realisers when a query
+/// asks. `Forests` are the kinds of KineticForest that it can be made with, of boxes or of k-DOPs; the clock
+/// of a forest's queue decides what an event is. k-DOPs need an EventClock.
+template <class S, class Count, class... Forests>
+class KineticTreeStrategy : public CountedStrategy<S, Count> {
+  /// A forest, and the volumes of its trees at the current frame.
+  template <class ForestType>
+  struct Kind {
+    static constexpr int sides = ForestType::Tree::sides;
+    static constexpr bool boxes = sides == 6;
+    using Volumes = std::conditional_t<boxes, BoxCache<S>, RealiserDops<S, sides>>;
+    template <class... Arguments>
+    explicit Kind(Arguments&&... arguments) : forest(std::forward<Arguments>(arguments)...) {
+      for (std::uint32_t body = 0; body < forest.size(); ++body)
+        if constexpr (boxes)
+          volumes.emplace_back(forest.tree(body).topology().size());
+        else
+          volumes.emplace_back(forest.clock(), body, forest.tree(body).topology().size());
+    }
+    ForestType forest;
+    std::vector<Volumes> volumes;  ///< [body]
+  };
+
+ public:
+  static constexpr Foresight foresight = Foresight::whole_clip;
+
+  /// `kind` is the index among Forests of the one to use.
+  KineticTreeStrategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+                      std::size_t kind)
+      : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+    std::size_t index = 0;
+    (void)((index++ == kind &&
+            (kind_ = std::make_unique<Kind<Forests>>(scene, motion, std::move(topologies), this->count_,
+                                                     BoundObserver<S>{&watch_}),
+             true)) ||
+           ...);
+  }
+
+  void reset_to(double t) override {
+    near_bodies_.start_over();
+    on_kind([&](auto& kind) {
+      kind.forest.reset(t);
+      if constexpr (!kind.boxes)
+        for (auto& volumes : kind.volumes) volumes.start_over();
+    });
+    new_frame(t);
+  }
+
+  void advance_to(double t) override {
+    on_forest([&](auto& forest) { forest.advance(t); });
+    new_frame(t);
+  }
+
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
+    QueryStatus status;
+    BoxTests tests;
+    on_kind([&](auto& kind) {
+      const auto box_of = [&](std::uint32_t body) -> Box<double> {
+        if (kind.forest.tree(body).topology().empty()) return {};
+        auto&& volumes = view(kind, body);
+        volumes.ensure(0);
+        return enclosing_box(volumes(0));
+      };
+      for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
+        const BodyPair& pair = this->scene_.pairs()[i];
+        if (tests.made >= budget.box_tests) {
+          ++status.pending;
+          continue;
+        }
+        const auto &a = kind.forest.tree(pair.first), &b = kind.forest.tree(pair.second);
+        LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
+                                      b.topology(), tests, out);
+        const auto compare = [&](auto&& volumes_a, auto&& volumes_b) {
+          status.pending += traverse(a.topology(), volumes_a, b.topology(), volumes_b, stack_, tests,
+                                     rest_of(budget, tests.made), leaves)
+                                .pending;
+        };
+        if constexpr (!kind.boxes)
+          if (answered_by_boxes(pair)) {
+            compare(BoxesOfDops(kind.volumes[pair.first]), BoxesOfDops(kind.volumes[pair.second]));
+            continue;
+          }
+        compare(view(kind, pair.first), view(kind, pair.second));
+      }
+    });
+    this->count_.add(Counter::box_tests, tests.made);
+    return status;
+  }
+
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    return on_kind([&](auto& kind) {
+      const auto& tree = kind.forest.tree(body);
+      const auto& volumes = kind.volumes[body];
+      std::vector<std::uint32_t> order;
+      AuditView view{tree.compacted_topology(order), {}, {}};
+      if constexpr (kind.boxes) {
+        for (const std::uint32_t node : order) {
+          const Box<S> box = volumes.current(node)
+                                 ? volumes.volume(node)
+                                 : box_of_realisers(tree.realisers(node), this->sampled_, body);
+          view.boxes.push_back(to_double(box));
+        }
+      } else {
+        std::vector<Dop<S, kind.sides>> dops;
+        for (const std::uint32_t node : order) dops.push_back(volumes.current_or_computed(node));
+        view.volumes = std::make_shared<AuditedVolumes<Dop<S, kind.sides>>>(std::move(dops));
+      }
+      return view;
+    });
+  }
+
+  std::size_t bytes() const override {
+    return on_kind([&](auto& kind) {
+      std::size_t total = kind.forest.bytes();
+      for (const auto& volumes : kind.volumes) total += volumes.bytes();
+      return total + near_bodies_.bytes() + stack_.capacity() * sizeof(NodePair);
+    });
+  }
+
+ protected:
+  /// What a derived class does in `follow_plans` if it takes changes of plans.
+  void change_plans(double t, std::span<const PlanChange<S>> changes) {
+    on_kind([&](auto& kind) {
+      kind.forest.plans_changed(t, changes);
+      if constexpr (!kind.boxes)
+        for (const PlanChange<S>& change : changes) kind.volumes[change.body].include(change.vertex, t);
+    });
+    new_frame(t);  // realisers may differ now
+  }
+
+  /// What a derived class does in `follow_geometry` if it takes changes of geometry.
+  void change_geometry(double t, const GeometryChange<S>& change) {
+    const std::vector<BodyChange> changes = body_changes(this->scene_, change);
+    on_kind([&](auto& kind) {
+      kind.forest.geometry_changed(t, this->scene_, this->sampled_, changes);
+      for (const BodyChange& body_change : changes) {
+        auto& volumes = kind.volumes[body_change.body];
+        volumes.resize(kind.forest.tree(body_change.body).topology().size());
+        if constexpr (!kind.boxes)
+          for (std::uint32_t v = body_change.first_vertex; v < this->scene_.vertex_count(body_change.body);
+               ++v)
+            volumes.include(v, t);
+      }
+    });
+    new_frame(t);
+  }
+
+  void counts_cleared() override {
+    first_step_ = on_forest([](auto& forest) { return forest.queue().steps(); });
+  }
+  void add_counts(Counters& table) const override {
+    table[Counter::queue_steps] =
+        on_forest([](auto& forest) { return forest.queue().steps(); }) - first_step_;
+  }
+
+  template <class Work>
+  decltype(auto) on_forest(Work&& work) const {
+    return on_kind([&](auto& kind) -> decltype(auto) { return work(kind.forest); });
+  }
+  BoundWatch<S> watch_;
+
+ private:
+  template <class Work>
+  decltype(auto) on_kind(Work&& work) const {
+    return std::visit([&](const auto& kind) -> decltype(auto) { return work(*kind); }, kind_);
+  }
+  /// Returns the bounds view of a body.
+  template <class KindType>
+  decltype(auto) view(KindType& kind, std::uint32_t body) const {
+    if constexpr (KindType::boxes)
+      return RealiserBoxes<S>(kind.forest.tree(body).realisers(0), this->sampled_, body, kind.volumes[body]);
+    else
+      return (kind.volumes[body]);
+  }
+  /// Returns whether boxes of primitives decide a pair; a k-DOP around the vertices need not contain them.
+  bool answered_by_boxes(const BodyPair& pair) const {
+    return this->scene_.primitives(pair.first).kind != PrimitiveKind::polygons ||
+           this->scene_.primitives(pair.second).kind != PrimitiveKind::polygons;
+  }
+  void new_frame(double t) {
+    on_kind([&](auto& kind) {
+      for (std::uint32_t body = 0; body < kind.volumes.size(); ++body)
+        if constexpr (kind.boxes)
+          kind.volumes[body].new_frame();
+        else
+          kind.volumes[body].new_frame(t, kind.forest.tree(body).realisers(0));
+    });
+  }
+
+  std::variant<std::unique_ptr<Kind<Forests>>...> kind_;
+  NearBodies near_bodies_;
+  std::vector<NodePair> stack_;
+  std::uint64_t first_step_ = 0;
+};
+
+/// The same on clocks that are exact (EventClock): plans and geometry may change, and events can be stepped.
+template <class S, class Count, class... Forests>
+class ExactKineticTreeStrategy : public KineticTreeStrategy<S, Count, Forests...>,
+                                 public EventSource<S>,
+                                 public TakesPlanChanges<S>,
+                                 public TakesGeometryChanges<S> {
+ public:
+  using KineticTreeStrategy<S, Count, Forests...>::KineticTreeStrategy;
+
+  std::optional<ScheduledEvent<S>> next_event() const override {
+    return this->on_forest([](auto& forest) {
+      return forest.queue().empty() ? std::optional<ScheduledEvent<S>>()
+                                    : described(forest, forest.queue().top());
+    });
+  }
+  void scheduled_events(std::vector<ScheduledEvent<S>>& out) const override {
+    this->on_forest([&](auto& forest) { list_events(forest, out); });
+  }
+  const Topology& tree(std::uint32_t body) const override {
+    return this->on_forest([&](auto& forest) -> const Topology& { return forest.tree(body).topology(); });
+  }
+  std::uint32_t realiser(std::uint32_t body, std::uint32_t node, std::uint32_t side) const override {
+    return this->on_forest([&](auto& forest) { return forest.tree(body).realiser(node, side); });
+  }
+  void watch_bounds(std::vector<BoundNotice<S>>* log) override { this->watch_.log = log; }
+
+ protected:
+  bool step(double until, EventDescription<S>& out) override {
+    return this->on_forest([&](auto& forest) { return step_forest(forest, this->watch_, until, out); });
+  }
+  void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
+    this->change_plans(t, changes);
+  }
+  void follow_geometry(double t, const GeometryChange<S>& change) override {
+    this->change_geometry(t, change);
+  }
+};
+
+/// Kinetic AABB trees on one of several queues.
+template <class S, class Count, class... Queues>
+using KineticAabbStrategy =
+    KineticTreeStrategy<S, Count, KineticForest<S, Queues, Count, BoundObserver<S>>...>;
+template <class S, class Count, class... Queues>
+using ExactKineticAabbStrategy =
+    ExactKineticTreeStrategy<S, Count, KineticForest<S, Queues, Count, BoundObserver<S>>...>;
+
+}  // namespace kbvh
