@@ -39,7 +39,7 @@ class CertificateSlots {
       queue.grow(first + chunk);
     }
   }
-  std::size_t bytes() const { return chunks_.size() * sizeof(std::uint32_t); }
+  std::size_t bytes() const { return chunks_.capacity() * sizeof(std::uint32_t); }
 
  private:
   static constexpr std::uint32_t chunk = 384;  ///< 64 nodes of an AABB tree

@@ -360,7 +360,7 @@ class EventClock {
   std::size_t bytes() const {
     std::size_t total = own_.capacity() * sizeof(Crossing<S>) +
                         (place_.capacity() + free_.capacity()) * sizeof(std::uint32_t);
-    for (const auto& rows : distinct_rows_) total += rows->bytes();
+    for (const auto& rows : distinct_rows_) total += sizeof(*rows) + rows->bytes();
     return total;
   }
 

@@ -96,7 +96,7 @@ class AvlEventQueue {
     nodes_.swap(larger);
   }
   std::uint64_t steps() const { return *steps_; }
-  std::size_t bytes() const { return nodes_.size() * sizeof(Node); }
+  std::size_t bytes() const { return nodes_.capacity() * sizeof(Node); }
 
  private:
   std::unique_ptr<std::uint64_t> steps_;
@@ -159,7 +159,10 @@ class BinaryHeapEventQueue {
     place_.resize(slots, none);
   }
   std::uint64_t steps() const { return steps_; }
-  std::size_t bytes() const { return events_.size() * (sizeof(Event) + 2 * sizeof(std::uint32_t)); }
+  std::size_t bytes() const {
+    return events_.capacity() * sizeof(Event) +
+           (place_.capacity() + heap_.capacity()) * sizeof(std::uint32_t);
+  }
 
  private:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();

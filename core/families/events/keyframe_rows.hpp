@@ -38,7 +38,7 @@ class KeyframeRows {
     return kernels_->next_ahead[upper ? 1 : 0]({row(0, direction), times_.size()}, vertices.data(), first,
                                                vertices.size(), row(winner, direction), from, end);
   }
-  std::size_t bytes() const { return values_.size() * sizeof(S); }
+  std::size_t bytes() const { return values_.capacity() * sizeof(S); }
 
  private:
   std::span<const double> times_;  ///< the plans'

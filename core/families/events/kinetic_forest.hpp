@@ -110,7 +110,8 @@ class KineticForest {
   Queue& queue() { return queue_; }
   const Queue& queue() const { return queue_; }
   std::size_t bytes() const {
-    std::size_t total = queue_.bytes() + clock_.bytes();
+    std::size_t total = queue_.bytes() + clock_.bytes() + changes_.capacity() * sizeof(changes_[0]) +
+                        changed_.capacity() * sizeof(std::uint32_t);
     for (const Tree& tree : trees_) total += tree.bytes();
     return total;
   }

@@ -228,8 +228,12 @@ class KineticTree {
   }
 
   std::size_t bytes() const {
-    return topology_.bytes() + leaf_vertices_.bytes() + moved_.size() * sizeof(SideBits) + slots_.bytes() +
-           (realisers_.size() + marked_.size()) * sizeof(std::uint32_t) + (editor_ ? editor_->bytes() : 0);
+    return topology_.bytes() + leaf_vertices_.bytes() + moved_.capacity() * sizeof(SideBits) +
+           slots_.bytes() +
+           (realisers_.capacity() + touched_.capacity() + marked_.capacity() + affected_.capacity() +
+            unique_.capacity()) *
+               sizeof(std::uint32_t) +
+           (editor_ ? editor_->bytes() : 0);
   }
 
  private:

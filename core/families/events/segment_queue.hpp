@@ -157,11 +157,11 @@ class SegmentHeapEventQueue {
   std::uint64_t steps() const { return steps_; }
   std::size_t bytes() const {
     std::size_t total = records_.capacity() * sizeof(Record) + heap_.capacity() * sizeof(Entry) +
-                        cuts_.size() * sizeof(double);
+                        cuts_.capacity() * sizeof(double) + reviews_.capacity() * sizeof(std::uint32_t);
     for (const auto& list : segments_) total += list.capacity() * sizeof(std::uint32_t);
     for (const auto& list : bins_) total += list.capacity() * sizeof(std::uint32_t);
-    return total + (segments_.size() + bins_.size()) * sizeof(std::vector<std::uint32_t>) +
-           keys_.capacity() * sizeof(double);
+    return total + (segments_.capacity() + bins_.capacity()) * sizeof(std::vector<std::uint32_t>) +
+           (keys_.capacity() + sorted_.capacity()) * sizeof(double);
   }
 
  private:
