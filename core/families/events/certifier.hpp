@@ -43,7 +43,7 @@ class Certifier {
     withdraw(event.slot);  // the queue must not hold this slot while the clock learns its new crossing
     if constexpr (reads_keyframes)
       if (!clock_->plans(event.body).has_own_plans()) return certify_keyframed(event, now, candidates);
-    std::optional<Crossing<S>> own, earliest_own;
+    std::optional<Crossing<S>> own_crossing, earliest_crossing;
     Event earliest;
     bool found = false;
     double horizon = never;
@@ -54,11 +54,11 @@ class Certifier {
         if (challenger == event.winner) continue;
         event.loser = challenger;
         count_->add(Counter::certificates_made);
-        if (!clock_->first_failure(event, now, own, until)) continue;
-        if (found && !clock_->overtakes_first(event, own, earliest, earliest_own)) continue;
+        if (!clock_->first_failure(event, now, own_crossing, until)) continue;
+        if (found && !clock_->overtakes_first(event, own_crossing, earliest, earliest_crossing)) continue;
         found = true;
         earliest = event;
-        earliest_own = own;
+        earliest_crossing = own_crossing;
         until = std::min(until, earliest.end);
       }
       if (std::isinf(horizon)) break;
@@ -71,7 +71,7 @@ class Certifier {
       horizon = never;
       found = false;
     }
-    clock_->remember(event.slot, earliest_own);
+    clock_->remember(event.slot, earliest_crossing);
     if (found) schedule(earliest);
   }
 
@@ -86,19 +86,19 @@ class Certifier {
     const bool scheduled = queue_->scheduled(event.slot);
     double until = scheduled ? queue_->event(event.slot).end : never;
     if (const std::optional<double> review = review_time(event.slot)) until = *review;
-    std::optional<Crossing<S>> own, next_own;
-    if (!clock_->first_failure(event, now, own, until)) return;
+    std::optional<Crossing<S>> own_crossing, next_crossing;
+    if (!clock_->first_failure(event, now, own_crossing, until)) return;
     if (scheduled) {
       const Event next = queue_->event(event.slot);
       const FlightPlans<S>& plans = clock_->plans(event.body);
       if (plans.has_own_plan(next.winner) || plans.has_own_plan(next.loser))
-        next_own = clock_->crossing(next);
-      if (!clock_->overtakes_first(event, own, next, next_own)) return;
-    } else if (own && !std::isinf(until) && compare_crossing_to(*own, until) >= 0) {
+        next_crossing = clock_->crossing(next);
+      if (!clock_->overtakes_first(event, own_crossing, next, next_crossing)) return;
+    } else if (own_crossing && !std::isinf(until) && compare_crossing_to(*own_crossing, until) >= 0) {
       return;  // all candidates are looked at again before that
     }
     withdraw(event.slot);
-    clock_->remember(event.slot, own);
+    clock_->remember(event.slot, own_crossing);
     schedule(event);
   }
 

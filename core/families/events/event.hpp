@@ -127,14 +127,14 @@ class EventClock {
 
   /// The two pieces whose crossing is the event.
   Crossing<S> crossing(const Event& event) const {
-    if (event.slot < place_.size() && place_[event.slot] != none) return own_[place_[event.slot]];
+    if (event.slot < place_.size() && place_[event.slot] != none) return crossings_[place_[event.slot]];
     return keyframed_crossing(event);
   }
 
   /// The short form of an event that is about to be scheduled, its crossing remembered.
   Packed pack(const Event& event) const {
-    const bool own = event.slot < place_.size() && place_[event.slot] != none;
-    return {event.hint, event.winner, event.loser, own ? none : segment_of(event),
+    const bool stored = event.slot < place_.size() && place_[event.slot] != none;
+    return {event.hint, event.winner, event.loser, stored ? none : segment_of(event),
             event.body, event.side,   event.depth};
   }
   /// The event again: as it was, but that the pieces of an own crossing begin where they do, not at the
@@ -149,10 +149,10 @@ class EventClock {
     event.side = packed.side;
     event.depth = packed.depth;
     if (packed.segment == none) {
-      const Crossing<S>& own = own_[place_[slot]];
-      event.begin = std::max(own.winner.t0, own.loser.t0);
-      event.end = std::min(own.winner.t1, own.loser.t1);
-      event.error = crossing_estimate(own).error;
+      const Crossing<S>& own_crossing = crossings_[place_[slot]];
+      event.begin = std::max(own_crossing.winner.t0, own_crossing.loser.t0);
+      event.end = std::min(own_crossing.winner.t1, own_crossing.loser.t1);
+      event.error = crossing_estimate(own_crossing).error;
     } else {
       const double* const times = rows_[packed.body]->times().data() + packed.segment;
       event.begin = times[0];
@@ -164,7 +164,7 @@ class EventClock {
   }
   /// The error bound of an event in short form.
   double error_of(const Packed& packed, std::uint32_t slot) const {
-    if (packed.segment == none) return crossing_estimate(own_[place_[slot]]).error;
+    if (packed.segment == none) return crossing_estimate(crossings_[place_[slot]]).error;
     const double* const times = rows_[packed.body]->times().data() + packed.segment;
     return keyframed_error(times[0], times[1]);
   }
@@ -237,13 +237,13 @@ class EventClock {
   /// points; in a bounded segment the end points decide, on an unbounded one the slopes). Fills hint, error,
   /// begin and end of `event` (its winner, loser, side, body and slot are given) and returns true, or false:
   /// never, or surely not before `until`: who looks for the earliest of several need not look beyond one.
-  /// `own` gets the crossing if a plan of its own takes part, for `remember`.
-  bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own,
+  /// `own_crossing` gets the crossing if a plan of its own takes part, for `remember`.
+  bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own_crossing,
                      double until = std::numeric_limits<double>::infinity()) const {
-    own.reset();
+    own_crossing.reset();
     const FlightPlans<S>& plan = *plans_[event.body];
     if (plan.has_own_plan(event.winner) || plan.has_own_plan(event.loser))
-      return first_own_failure(event, now, own, until);
+      return first_own_failure(event, now, own_crossing, until);
     if (rows_[event.body]->times().size() < 2) return false;
     const KeyframeSearch search = keyframe_search(event.body, event.side, now, until);
     const std::size_t ahead_at = search.first_ahead(event.loser, event.winner, search.end);
@@ -314,13 +314,14 @@ class EventClock {
 
   /// Of two failures of the same certificate: does `a` come first? Of several that overtake at one instant
   /// the fastest counts as first, for it stays ahead: no second change at once.
-  bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& own_a, const Event& b,
-                       const std::optional<Crossing<S>>& own_b) const {
-    if (!own_a && !own_b) {
+  bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& crossing_a, const Event& b,
+                       const std::optional<Crossing<S>>& crossing_b) const {
+    if (!crossing_a && !crossing_b) {
       if (a.end <= b.begin || a.hint + a.error + b.error < b.hint) return true;
       if (b.end <= a.begin || b.hint + a.error + b.error < a.hint) return false;
     }
-    const Crossing<S> x = own_a ? *own_a : keyframed_crossing(a), y = own_b ? *own_b : keyframed_crossing(b);
+    const Crossing<S> x = crossing_a ? *crossing_a : keyframed_crossing(a),
+                      y = crossing_b ? *crossing_b : keyframed_crossing(b);
     const int order = compare_crossings(x, y);
     if (order != 0) return order < 0;
     const int faster = compare_slopes(x.loser, y.loser);
@@ -330,8 +331,8 @@ class EventClock {
   /// Keeps the crossing of the event that is about to be scheduled in a slot; nothing: forgets the one
   /// before. No event of that slot may be in a queue meanwhile. Allocates only for more of them than ever
   /// before, or for a slot beyond all before.
-  void remember(std::uint32_t slot, const std::optional<Crossing<S>>& own) {
-    if (!own) {
+  void remember(std::uint32_t slot, const std::optional<Crossing<S>>& own_crossing) {
+    if (!own_crossing) {
       if (slot >= place_.size() || place_[slot] == none) return;
       free_.push_back(std::exchange(place_[slot], none));
       return;
@@ -340,25 +341,25 @@ class EventClock {
       place_.resize(std::max<std::size_t>(2 * place_.size(), std::size_t(slot) + 1), none);
     std::uint32_t& place = place_[slot];
     if (place == none && free_.empty()) {
-      place = std::uint32_t(own_.size());
-      own_.push_back(*own);
-      free_.reserve(own_.capacity());
+      place = std::uint32_t(crossings_.size());
+      crossings_.push_back(*own_crossing);
+      free_.reserve(crossings_.capacity());
       return;
     }
     if (place == none) {
       place = free_.back();
       free_.pop_back();
     }
-    own_[place] = *own;
+    crossings_[place] = *own_crossing;
   }
   void clear() {
-    if (own_.empty()) return;
-    own_.clear();
+    if (crossings_.empty()) return;
+    crossings_.clear();
     free_.clear();
     std::fill(place_.begin(), place_.end(), none);
   }
   std::size_t bytes() const {
-    std::size_t total = own_.capacity() * sizeof(Crossing<S>) +
+    std::size_t total = crossings_.capacity() * sizeof(Crossing<S>) +
                         (place_.capacity() + free_.capacity()) * sizeof(std::uint32_t);
     for (const auto& rows : distinct_rows_) total += sizeof(*rows) + rows->bytes();
     return total;
@@ -395,7 +396,7 @@ class EventClock {
     return piece;
   }
 
-  bool first_own_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own,
+  bool first_own_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own_crossing,
                          double until) const {
     const std::size_t direction = direction_of(event.side);
     Piece<S> winner = piece_at(event.body, event.winner, direction, now);
@@ -413,7 +414,7 @@ class EventClock {
         event.end = end;
         event.hint = estimate.time;
         event.error = estimate.error;
-        own = crossing;
+        own_crossing = crossing;
         return true;
       }
       if (std::isinf(end) || end >= until) return false;
@@ -428,9 +429,9 @@ class EventClock {
   std::vector<const KeyframeRows<S>*> rows_;  ///< [body]
   std::vector<std::unique_ptr<const KeyframeRows<S>>> distinct_rows_;
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-  std::vector<Crossing<S>> own_;      ///< crossings that involve a plan of its own
-  std::vector<std::uint32_t> place_;  ///< [slot] in own_, or none; slots beyond have none
-  std::vector<std::uint32_t> free_;   ///< places that are not in use
+  std::vector<Crossing<S>> crossings_;  ///< crossings that involve a plan of its own
+  std::vector<std::uint32_t> place_;    ///< [slot] in crossings_, or none; slots beyond have none
+  std::vector<std::uint32_t> free_;     ///< places that are not in use
 };
 
 }  // namespace kbvh

@@ -61,7 +61,7 @@ class ProjectionMargin {
 
   /// Forgets the vertices' own plans.
   void start_over() {
-    own_ = speed_ = 0;
+    own_reach_ = speed_ = 0;
     since_ = std::numeric_limits<double>::infinity();
   }
   /// Includes the plan that a vertex follows from t on. Until `start_over` the margin never shrinks.
@@ -76,7 +76,7 @@ class ProjectionMargin {
         first[axis] = piece.x0;
         second[axis] = piece.x1;
       }
-      own_ = std::max(own_, length(first));
+      own_reach_ = std::max(own_reach_, length(first));
       if (piece.kind == PieceKind::ray) {
         speed_ = std::max(speed_, length(second));
         return;
@@ -88,7 +88,7 @@ class ProjectionMargin {
   /// Returns the margin at t.
   double at(double t) const {
     const double elapsed = since_ < t ? t - since_ : 0;
-    const double reach = std::max(keyframed_, own_ + speed_ * elapsed);
+    const double reach = std::max(keyframed_, own_reach_ + speed_ * elapsed);
     return 5 * unit * reach + (8 + elapsed) * least;
   }
 
@@ -99,9 +99,9 @@ class ProjectionMargin {
     return std::fabs(double(x[0])) + std::fabs(double(x[1])) + std::fabs(double(x[2]));
   }
 
-  double keyframed_ = 0;        ///< R of the keyframes
-  double own_ = 0, speed_ = 0;  ///< of the vertices' own plans: largest |x| + |y| + |z| at knots, and of
-                                ///< velocities
+  double keyframed_ = 0;              ///< R of the keyframes
+  double own_reach_ = 0, speed_ = 0;  ///< of the vertices' own plans: largest |x| + |y| + |z| at knots, and
+                                      ///< of velocities
   double since_ = std::numeric_limits<double>::infinity();  ///< no own plan begins earlier
 };
 

@@ -48,9 +48,9 @@ class RoundedClock {
 
   /// As EventClock::first_failure, with rounded times: `hint` is the event's time; `begin` and `end` are the
   /// same, but for a time that is rounded out of its segment, which they are not.
-  bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own,
+  bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own_crossing,
                      double until = std::numeric_limits<double>::infinity()) const {
-    own.reset();
+    own_crossing.reset();
     const FlightPlans<S>& plan = *plans_[event.body];
     const auto times = plan.keyframe_times();
     const auto axis = std::size_t(axis_of(event.side));
@@ -98,8 +98,8 @@ class RoundedClock {
 
   /// Of two failures of the same certificate, does `a` come first? At equal times the one that gets further
   /// ahead by the end of the segment.
-  bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& /*own_a*/, const Event& b,
-                       const std::optional<Crossing<S>>& /*own_b*/) const {
+  bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& /*crossing_a*/, const Event& b,
+                       const std::optional<Crossing<S>>& /*crossing_b*/) const {
     if (a.hint != b.hint) return a.hint < b.hint;
     const FlightPlans<S>& plan = *plans_[a.body];
     const std::size_t k = std::min(plan.segment_at(a.hint) + 1, plan.keyframe_count() - 1);
@@ -109,7 +109,7 @@ class RoundedClock {
     return is_upper(a.side) ? end_a > end_b : end_a < end_b;
   }
 
-  void remember(std::uint32_t /*slot*/, const std::optional<Crossing<S>>& /*own*/) {}
+  void remember(std::uint32_t /*slot*/, const std::optional<Crossing<S>>& /*own_crossing*/) {}
   void clear() {}
 
  private:
