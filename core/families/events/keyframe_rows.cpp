@@ -19,7 +19,7 @@ KeyframeRows<S>::KeyframeRows(const FlightPlans<S>& plans, std::span<const SlabD
   const double duration = times_.back() - times_.front();
   per_second_ = double(keyframes - 1) / duration;
   values_.resize(directions.size() * vertices_ * keyframes + row_padding, S(0));
-  // Blocks that stay in the cache on both sides.
+  // Copies in blocks that fit into the cache on both sides.
   constexpr std::size_t block = 64;
   for (std::size_t first = 0; first < vertices_; first += block)
     for (std::size_t begin = 0; begin < keyframes; begin += block) {
@@ -41,7 +41,7 @@ std::size_t KeyframeRows<S>::segment_at(double t) const {
   const std::size_t last = times_.size() - 1;
   if (guess >= 0 && guess <= double(last)) {
     std::size_t k = std::size_t(guess);
-    // Rounding misses evenly spaced keyframes by one at most.
+    // For evenly spaced keyframes, rounding is off by one at most.
     if (t < times_[k] && k > 0) --k;
     if (k < last && t >= times_[k + 1]) ++k;
     if (t >= times_[k] && (k == last || t < times_[k + 1])) return k;

@@ -16,9 +16,9 @@
 
 namespace kbvh {
 
-/// A strategy of kinetic trees (Z&W s.4) and nothing else: volumes are read from the realisers when a query
-/// asks. `Forests` are the kinds of KineticForest that it can be made with, of boxes or of k-DOPs; the clock
-/// of a forest's queue decides what an event is. k-DOPs need an EventClock.
+/// A strategy of kinetic trees (Z&W s.4) alone: queries compute volumes from the realisers. `Forests` are the
+/// selectable kinds of KineticForest, of boxes or of k-DOPs. The clock of a forest's queue decides about
+/// events; k-DOPs need an EventClock.
 template <class S, class Count, class... Forests>
 class KineticTreeStrategy : public CountedStrategy<S, Count> {
   /// A forest, and the volumes of its trees at the current frame.
@@ -42,7 +42,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
 
-  /// `kind` is the index among Forests of the one to use.
+  /// Uses the forest with index `kind` among Forests.
   KineticTreeStrategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                       std::size_t kind)
       : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
@@ -136,7 +136,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
   }
 
  protected:
-  /// What a derived class does in `follow_plans` if it takes changes of plans.
+  /// Applies changes of plans; for `follow_plans` of derived classes.
   void change_plans(double t, std::span<const PlanChange<S>> changes) {
     on_kind([&](auto& kind) {
       kind.forest.plans_changed(t, changes);
@@ -146,7 +146,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
     new_frame(t);  // realisers may differ now
   }
 
-  /// What a derived class does in `follow_geometry` if it takes changes of geometry.
+  /// Applies changes of geometry; for `follow_geometry` of derived classes.
   void change_geometry(double t, const GeometryChange<S>& change) {
     const std::vector<BodyChange> changes = body_changes(this->scene_, change);
     on_kind([&](auto& kind) {
@@ -211,7 +211,8 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
   std::uint64_t first_step_ = 0;
 };
 
-/// The same on clocks that are exact (EventClock): plans and geometry may change, and events can be stepped.
+/// A KineticTreeStrategy on exact clocks (EventClock): plans and geometry may change, and events can be
+/// stepped.
 template <class S, class Count, class... Forests>
 class ExactKineticTreeStrategy : public KineticTreeStrategy<S, Count, Forests...>,
                                  public EventSource<S>,

@@ -8,7 +8,7 @@
 
 namespace kbvh {
 
-/// The box whose sides are realised by six vertices: [lower x, upper x, lower y, ...]. Fetches their
+/// Returns the box whose sides are realised by six vertices: [lower x, upper x, lower y, ...]. Fetches their
 /// positions.
 template <class S>
 Box<S> box_of_realisers(const std::uint32_t* realisers, const SampledMotion<S>& motion, std::uint32_t body) {
@@ -56,7 +56,7 @@ class VolumeCache {
 template <class S>
 using BoxCache = VolumeCache<Box<S>>;
 
-/// A bounds view (traversal.hpp) of implicit boxes: read from the realising vertices when the query asks.
+/// A bounds view (traversal.hpp) of boxes that are computed from their realisers when a query reads them.
 template <class S>
 class RealiserBoxes {
  public:
