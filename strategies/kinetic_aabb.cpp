@@ -2,7 +2,7 @@
 // events only.
 
 #include "core/contract/registry.hpp"
-#include "core/families/events/kinetic_aabb_strategy.hpp"
+#include "core/families/events/kinetic_tree_strategy.hpp"
 
 namespace kbvh {
 namespace {

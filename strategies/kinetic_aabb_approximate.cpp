@@ -2,7 +2,7 @@
 // where two lines cross. It shows the benefit of the exact decisions of kinetic_aabb.
 
 #include "core/contract/registry.hpp"
-#include "core/families/events/kinetic_aabb_strategy.hpp"
+#include "core/families/events/kinetic_tree_strategy.hpp"
 #include "core/families/events/rounded_clock.hpp"
 
 namespace kbvh {

@@ -76,8 +76,9 @@ class ListPool {
 
   std::size_t value_count() const { return values_.size(); }
   std::size_t bytes() const {
-    std::size_t total = lists_.size() * sizeof(List) + values_.size() * sizeof(std::uint32_t);
-    for (const auto& list : free_) total += list.size() * sizeof(std::uint32_t);
+    std::size_t total = lists_.capacity() * sizeof(List) + values_.capacity() * sizeof(std::uint32_t) +
+                        free_.capacity() * sizeof(std::vector<std::uint32_t>);
+    for (const auto& list : free_) total += list.capacity() * sizeof(std::uint32_t);
     return total;
   }
 

@@ -47,8 +47,8 @@ struct Topology {
   bool empty() const { return nodes.empty(); }
   bool operator==(const Topology&) const = default;
   std::size_t bytes() const {
-    return nodes.size() * (sizeof(TopologyNode) + sizeof(std::uint32_t) + 1) +
-           primitives.size() * sizeof(std::uint32_t);
+    return nodes.capacity() * sizeof(TopologyNode) + depths.capacity() +
+           (parents.capacity() + primitives.capacity()) * sizeof(std::uint32_t);
   }
 };
 

@@ -78,7 +78,7 @@ class TopologyEditor {
   void placed(const Topology& topology, std::uint32_t leaf);
 
   std::size_t bytes() const {
-    return (leaf_of_.size() + free_pairs_.size() + free_entries_.size()) * sizeof(std::uint32_t);
+    return (leaf_of_.capacity() + free_pairs_.capacity() + free_entries_.capacity()) * sizeof(std::uint32_t);
   }
 
  private:

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/families/events/kinetic_aabb_strategy.hpp"
+#include "core/families/events/kinetic_tree_strategy.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/theory/envelope.hpp"
 
@@ -192,7 +192,8 @@ Recording<S> record(const Scene<S>& scene, const PlanScript<S>& script, const Pl
   return record_events(
       scene, script, play,
       [](const SceneView<S>& view, Playback<S>& playback, const Topologies& topologies) {
-        return std::make_unique<Recorded>(view, ClipMotion<S>(playback), topologies, 0);
+        return std::make_unique<Recorded>(view, ClipMotion<S>(playback), topologies, 0,
+                                          KineticQuery::node_pairs);
       },
       watcher);
 }

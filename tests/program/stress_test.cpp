@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "core/families/events/kinetic_aabb_strategy.hpp"
+#include "core/families/events/kinetic_tree_strategy.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/bytes.hpp"

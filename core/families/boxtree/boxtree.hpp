@@ -33,7 +33,7 @@ class InheritedBoxes {
   void ensure(std::uint32_t node) {
     if (!cache_->current(node)) cache_->store(node, make(node));
   }
-  const Box<S>& operator()(std::uint32_t node) const { return cache_->box(node); }
+  const Box<S>& operator()(std::uint32_t node) const { return cache_->volume(node); }
 
  private:
   Box<S> make(std::uint32_t node) const {
@@ -43,7 +43,7 @@ class InheritedBoxes {
       return LaneBox<S>::of(vertices, motion_->positions(body_)).box();
     }
     if (node == 0) return box_of_realisers(tree_->root_realisers().data(), *motion_, body_);
-    Box<S> box = cache_->box(tree_->topology().parents[node]);
+    Box<S> box = cache_->volume(tree_->topology().parents[node]);
     const std::uint32_t side = tree_->own_side(node), axis = side >> 1;
     if (side == no_side) return box;
     const S value = motion_->position(body_, tree_->realiser(node))[axis];

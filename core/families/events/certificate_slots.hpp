@@ -7,12 +7,12 @@
 
 namespace kbvh {
 
-/// Which slots of a shared event queue the bounds of one tree have. A tree numbers its bounds as it likes
-/// (their places): those that there are at the start have slots in a row, later ones get theirs in chunks at
-/// the queue's end, so that no slot ever moves. O(1), the way back O(log chunks).
+/// Maps the certificates of one tree to slots of a shared event queue. A tree numbers its certificates by
+/// places. The initial places have consecutive slots. Later places get slots in chunks at the queue's end, so
+/// that no slot ever moves. place -> slot is O(1), slot -> place O(log chunks).
 class CertificateSlots {
  public:
-  /// Places 0 .. places - 1 have slots from `first` on.
+  /// Assigns the slots from `first` on to places 0 .. places - 1.
   CertificateSlots(std::uint32_t first, std::uint32_t places) : first_(first), packed_(places) {}
 
   std::uint32_t slot(std::uint32_t place) const {
@@ -20,7 +20,7 @@ class CertificateSlots {
     const std::uint32_t late = place - packed_;
     return chunks_[late / chunk] + late % chunk;
   }
-  /// The place that has a slot of this tree.
+  /// Returns the place of a slot of this tree.
   std::uint32_t place(std::uint32_t slot) const {
     const std::uint32_t at = slot - first_;
     if (at < packed_) return at;
@@ -28,7 +28,8 @@ class CertificateSlots {
     const auto index = std::uint32_t(above - chunks_.begin()) - 1;
     return packed_ + index * chunk + (slot - chunks_[index]);
   }
-  /// Makes room for so many places, in the queue as well. Throws std::length_error if it cannot number them.
+  /// Makes room for `places` places, here and in the queue. Throws std::length_error if the queue cannot
+  /// number them.
   template <class Queue>
   void grow(std::uint32_t places, Queue& queue) {
     while (packed_ + chunks_.size() * chunk < places) {
@@ -39,7 +40,7 @@ class CertificateSlots {
       queue.grow(first + chunk);
     }
   }
-  std::size_t bytes() const { return chunks_.size() * sizeof(std::uint32_t); }
+  std::size_t bytes() const { return chunks_.capacity() * sizeof(std::uint32_t); }
 
  private:
   static constexpr std::uint32_t chunk = 384;  ///< 64 nodes of an AABB tree

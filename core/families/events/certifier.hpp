@@ -11,9 +11,9 @@
 
 namespace kbvh {
 
-/// Computes the failures of certificates for a kinetic tree, and schedules them. A certificate says that one
-/// vertex, its winner, is ahead of other candidates on one side of a body; it fails when the first of them
-/// gets ahead. Certificates are passed as events that have a winner, a slot, a body, a side and a depth.
+/// Computes and schedules the failures of certificates for a kinetic tree. A certificate states that one
+/// vertex, its winner, is not behind any of its candidates on one side of a body. The certificate fails when
+/// the first candidate gets ahead. Certificates are passed as events with winner, slot, body, side and depth.
 template <class S, class Queue, class Count>
 class Certifier {
   using Clock = typename Queue::ClockType;
@@ -21,29 +21,29 @@ class Certifier {
  public:
   Certifier(Clock& clock, Queue& queue, Count& count) : clock_(&clock), queue_(&queue), count_(&count) {}
 
-  /// Returns the instant at which an event happens. Its exact time is computed, into `crossing`, if `exact`
-  /// asks for it, or if the event lies in no segment or plans of single vertices changed; else the segment is
-  /// enough.
+  /// Returns the instant at which an event happens. Computes the exact time, into `crossing`, if `exact` is
+  /// set, if the event lies in no segment, or if the body has per-vertex plans. Otherwise the segment
+  /// identifies the instant well enough.
   Instant<S> instant_of(const Event& event, bool exact, Crossing<S>& crossing) const {
     exact = exact || event.segment == Event::no_segment || clock_->plans(event.body).has_own_plans();
     if (exact) crossing = clock_->crossing(event);
     return {event.begin, event.end, exact ? &crossing : nullptr, event.segment};
   }
 
-  /// Takes a slot's scheduled failure off the queue, if there is one.
+  /// Removes a slot's scheduled failure from the queue, if there is one.
   void withdraw(std::uint32_t slot) {
     if (!queue_->cancel(slot)) return;
     count_->add(Counter::certificates_discarded);
     count_->add(Counter::queue_operations);
   }
 
-  /// Schedules the certificate's earliest failure from `now` on, in place of the one that stood. The winner
-  /// may be among the candidates. O(candidates x segments until then).
+  /// Schedules the certificate's earliest failure from `now` on, and replaces the scheduled one. The winner
+  /// may be among the candidates. O(candidates x segments until the failure).
   void certify(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates) {
-    withdraw(event.slot);  // the queue must not hold this slot while the clock learns its new crossing
+    withdraw(event.slot);  // the queue must not hold this slot while the clock stores its new crossing
     if constexpr (reads_keyframes)
       if (!clock_->plans(event.body).has_own_plans()) return certify_keyframed(event, now, candidates);
-    std::optional<Crossing<S>> own, earliest_own;
+    std::optional<Crossing<S>> own_crossing, earliest_crossing;
     Event earliest;
     bool found = false;
     double horizon = never;
@@ -54,11 +54,11 @@ class Certifier {
         if (challenger == event.winner) continue;
         event.loser = challenger;
         count_->add(Counter::certificates_made);
-        if (!clock_->first_failure(event, now, own, until)) continue;
-        if (found && !clock_->overtakes_first(event, own, earliest, earliest_own)) continue;
+        if (!clock_->first_failure(event, now, own_crossing, until)) continue;
+        if (found && !clock_->overtakes_first(event, own_crossing, earliest, earliest_crossing)) continue;
         found = true;
         earliest = event;
-        earliest_own = own;
+        earliest_crossing = own_crossing;
         until = std::min(until, earliest.end);
       }
       if (std::isinf(horizon)) break;
@@ -71,12 +71,12 @@ class Certifier {
       horizon = never;
       found = false;
     }
-    clock_->remember(event.slot, earliest_own);
+    clock_->remember(event.slot, earliest_crossing);
     if (found) schedule(earliest);
   }
 
-  /// The certificate has one candidate more, which is not ahead of its winner at `now`: it fails earlier, or
-  /// as it did.
+  /// Adds a candidate that is not ahead of the winner at `now`: the certificate fails at the scheduled time
+  /// or earlier.
   void add_candidate(Event event, const Instant<S>& now, std::uint32_t challenger) {
     if (challenger == event.winner) return;
     event.loser = challenger;
@@ -86,19 +86,19 @@ class Certifier {
     const bool scheduled = queue_->scheduled(event.slot);
     double until = scheduled ? queue_->event(event.slot).end : never;
     if (const std::optional<double> review = review_time(event.slot)) until = *review;
-    std::optional<Crossing<S>> own, next_own;
-    if (!clock_->first_failure(event, now, own, until)) return;
+    std::optional<Crossing<S>> own_crossing, next_crossing;
+    if (!clock_->first_failure(event, now, own_crossing, until)) return;
     if (scheduled) {
       const Event next = queue_->event(event.slot);
       const FlightPlans<S>& plans = clock_->plans(event.body);
       if (plans.has_own_plan(next.winner) || plans.has_own_plan(next.loser))
-        next_own = clock_->crossing(next);
-      if (!clock_->overtakes_first(event, own, next, next_own)) return;
-    } else if (own && !std::isinf(until) && compare_crossing_to(*own, until) >= 0) {
-      return;  // all candidates are looked at again before that
+        next_crossing = clock_->crossing(next);
+      if (!clock_->overtakes_first(event, own_crossing, next, next_crossing)) return;
+    } else if (own_crossing && !std::isinf(until) && compare_crossing_to(*own_crossing, until) >= 0) {
+      return;  // the review, which checks all candidates, comes first
     }
     withdraw(event.slot);
-    clock_->remember(event.slot, own);
+    clock_->remember(event.slot, own_crossing);
     schedule(event);
   }
 
@@ -119,14 +119,14 @@ class Certifier {
     else
       return false;
   }
-  /// When all candidates of a certificate without a scheduled failure are looked at again.
+  /// Returns the time of the next review of a certificate without a scheduled failure, if there is one.
   std::optional<double> review_time(std::uint32_t slot) const {
     if constexpr (Queue::look_ahead > 0)
       if (queue_->reviewing(slot)) return queue_->event(slot).begin;
     return {};
   }
 
-  /// `certify` where no vertex has a plan of its own.
+  /// Implements `certify` for a body without per-vertex plans.
   void certify_keyframed(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates) {
     if (clock_->keyframe_count(event.body) < 2) return;
     double horizon = never;
@@ -143,7 +143,7 @@ class Certifier {
       schedule(event);
     }
   }
-  /// Fills in the earliest failure of a certificate, if there is one.
+  /// Writes the earliest failure of a certificate to `event`. Returns whether there is one.
   template <class Search>
   bool find_failure(Event& event, const Search& search, std::span<const std::uint32_t> candidates) {
     std::size_t limit = search.end, next = 0;
@@ -165,7 +165,8 @@ class Certifier {
     if (found) clock_->set_failure(event, limit - 1);
     return found;
   }
-  /// Of two that get ahead in one segment.
+  /// Returns whether `challenger`, which gets ahead at keyframe `ahead_at`, overtakes before the loser of
+  /// `than`, which gets ahead in the same segment.
   bool comes_first(const Event& than, std::uint32_t challenger, std::size_t ahead_at) const {
     Event first = than, other = than;
     first.loser = challenger;

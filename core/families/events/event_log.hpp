@@ -7,14 +7,14 @@
 
 namespace kbvh {
 
-/// Where changes of bounds are written while somebody watches.
+/// The logs that receive changes of bounds.
 template <class S>
 struct BoundWatch {
-  std::vector<BoundNotice<S>>* log = nullptr;    ///< of who watches all the time, or null
-  std::vector<BoundNotice<S>>* event = nullptr;  ///< of the event that is being stepped, or null
+  std::vector<BoundNotice<S>>* log = nullptr;    ///< receives all changes; may be null
+  std::vector<BoundNotice<S>>* event = nullptr;  ///< receives the changes of the current step; may be null
 };
 
-/// Writes changes of bounds to `touched` for as long as it lives.
+/// Writes changes of bounds to `touched` during its lifetime.
 template <class S>
 class WatchedEvent {
  public:
@@ -30,8 +30,8 @@ class WatchedEvent {
   BoundWatch<S>* watch_;
 };
 
-/// An observer of kinetic trees (see NoObserver in observer.hpp) that writes changes of bounds where `watch`
-/// says.
+/// An observer of kinetic trees (see NoObserver in observer.hpp) that writes changes of bounds to the logs of
+/// `watch`.
 template <class S>
 struct BoundObserver {
   const BoundWatch<S>* watch = nullptr;
@@ -55,7 +55,7 @@ struct BoundObserver {
   void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
 };
 
-/// An event of a kinetic forest as the contract describes it.
+/// Returns an event of a kinetic forest in the form of the contract.
 template <class Forest, class S = typename Forest::Scalar>
 ScheduledEvent<S> described(const Forest& forest, const Event& event) {
   ScheduledEvent<S> out;
@@ -71,7 +71,7 @@ ScheduledEvent<S> described(const Forest& forest, const Event& event) {
   return out;
 }
 
-/// Replaces `out` by what the forest's queue holds, first event first. O(slots + events log events).
+/// Replaces `out` by all events of the forest's queue, earliest first. O(slots + events log events).
 template <class Forest, class S = typename Forest::Scalar>
 void list_events(const Forest& forest, std::vector<ScheduledEvent<S>>& out) {
   std::vector<Event> events;
@@ -84,8 +84,8 @@ void list_events(const Forest& forest, std::vector<ScheduledEvent<S>>& out) {
   for (const Event& event : events) out.push_back(described(forest, event));
 }
 
-/// Appends the certificates of the bounds that an event changed, as they stand now, and that of the bound
-/// above the last of them, whose candidates are others. A certificate that never fails is left out.
+/// Appends the current certificates of the bounds that an event changed, and that of the bound above the last
+/// of them, which has other candidates now. Certificates that never fail are not appended.
 template <class Forest, class S = typename Forest::Scalar>
 void append_rescheduled(const Forest& forest, const std::vector<BoundNotice<S>>& touched,
                         std::vector<ScheduledEvent<S>>& out) {
@@ -99,7 +99,8 @@ void append_rescheduled(const Forest& forest, const std::vector<BoundNotice<S>>&
   append(last.body, forest.tree(last.body).certificate_above(last.node, last.side), last.side);
 }
 
-/// Handles the first event of a forest if it is due by `until`, and describes it.
+/// Handles the earliest event of a forest if it is due by `until`, and describes it in `out`. Returns false,
+/// and leaves `out` alone, if no event is due.
 template <class Forest, class S = typename Forest::Scalar>
 bool step_forest(Forest& forest, BoundWatch<S>& watch, double until, EventDescription<S>& out) {
   if (!forest.due(until)) return false;

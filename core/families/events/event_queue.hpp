@@ -11,19 +11,20 @@
 
 namespace kbvh {
 
-/// An event queue holds at most one event per certificate slot and can be shared by several structures:
-///   schedule(event)   inserts, or replaces the event of the same slot
-///   cancel(slot)      removes the slot's event if there is one; says whether there was
-///   scheduled(slot), event(slot)  whether the slot has an event, and which
+/// An event queue holds at most one event per certificate slot. Several structures may share it. Its
+/// interface:
+///   schedule(event)   inserts the event, or replaces the event of the same slot
+///   cancel(slot)      removes the slot's event; returns whether there was one
+///   scheduled(slot), event(slot)  whether the slot has an event, and that event
 ///   top(), pop(), empty(), size(), clear(), bytes()
 ///   grow(slots)       makes room for slots below this number, amortised O(1) each; events stay scheduled
-///   slots()           how many there is room for
-///   ClockType         the clock: EventClock in all but contestants that round times
-///   look_ahead        0, or how many keyframes to look for a failure at once: there is review(event, time)
-///                     then, for certificates that are known to stand until that time
-/// A queue may also have
-///   due(t)            whether the first event, if there is one, happens at or before t
-///   split_at(times)   is told where time is best divided
+///   slots()           number of slots that fit
+///   ClockType         the clock: EventClock, except in contestants that round times
+///   look_ahead        0, or the number of keyframes of one search for a failure. If not 0, there is
+///                     review(event, time), for certificates that are known to hold until that time
+/// Optional:
+///   due(t)            whether the earliest event, if there is one, happens at or before t
+///   split_at(times)   suggests times at which to divide the events
 /// `steps()` counts comparisons. Events and their order come from a clock: Clock::Event has a `slot`, and
 /// clock.earlier(a, b) orders by exact time first (EventClock, OverlapClock).
 
@@ -83,7 +84,7 @@ class AvlEventQueue {
       if (slots > nodes_.size()) nodes_.resize(slots);
       return;
     }
-    // The tree is threaded through the nodes: each takes the place of the one it was, without comparisons.
+    // The tree is threaded through the nodes: each new node replaces its old one, without comparisons.
     std::vector<Node> larger;
     larger.reserve(std::size_t(2) * slots);
     larger.resize(slots);
@@ -96,7 +97,7 @@ class AvlEventQueue {
     nodes_.swap(larger);
   }
   std::uint64_t steps() const { return *steps_; }
-  std::size_t bytes() const { return nodes_.size() * sizeof(Node); }
+  std::size_t bytes() const { return nodes_.capacity() * sizeof(Node); }
 
  private:
   std::unique_ptr<std::uint64_t> steps_;
@@ -104,7 +105,7 @@ class AvlEventQueue {
   Tree tree_;
 };
 
-/// An indexed binary heap: the obvious array queue; all operations O(log events), no pointers.
+/// An indexed binary heap: the standard array queue. All operations are O(log events).
 template <class Clock>
 class BinaryHeapEventQueue {
   using Event = typename Clock::Event;
@@ -159,7 +160,10 @@ class BinaryHeapEventQueue {
     place_.resize(slots, none);
   }
   std::uint64_t steps() const { return steps_; }
-  std::size_t bytes() const { return events_.size() * (sizeof(Event) + 2 * sizeof(std::uint32_t)); }
+  std::size_t bytes() const {
+    return events_.capacity() * sizeof(Event) +
+           (place_.capacity() + heap_.capacity()) * sizeof(std::uint32_t);
+  }
 
  private:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
@@ -196,13 +200,13 @@ class BinaryHeapEventQueue {
   }
 
   const Clock* clock_;
-  std::vector<Event> events_;         ///< by slot
-  std::vector<std::uint32_t> place_;  ///< of each slot in the heap
+  std::vector<Event> events_;         ///< [slot]
+  std::vector<std::uint32_t> place_;  ///< [slot] index in the heap, or none
   std::vector<std::uint32_t> heap_;
   std::uint64_t steps_ = 0;
 };
 
-/// The queues of kinetic trees.
+/// The event queues of kinetic trees.
 template <class S>
 using AvlQueue = AvlEventQueue<EventClock<S>>;
 template <class S>

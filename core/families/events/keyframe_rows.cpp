@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/families/events/projected_plan.hpp"
 #include "core/kernels/kernel_set.hpp"
 
 namespace kbvh {
@@ -9,7 +10,7 @@ namespace kbvh {
 KBVH_DEFINE_KERNEL_CHOICE(RowScanKernels, row_scan_kernels, row_scan)
 
 template <class S>
-KeyframeRows<S>::KeyframeRows(const FlightPlans<S>& plans)
+KeyframeRows<S>::KeyframeRows(const FlightPlans<S>& plans, std::span<const SlabDirection> directions)
     : times_(plans.keyframe_times()),
       vertices_(plans.keyframed_count()),
       kernels_(&row_scan_kernels<S>(active_kernel_set())) {
@@ -17,16 +18,19 @@ KeyframeRows<S>::KeyframeRows(const FlightPlans<S>& plans)
   if (keyframes < 2 || vertices_ == 0) return;
   const double duration = times_.back() - times_.front();
   per_second_ = double(keyframes - 1) / duration;
-  values_.resize(3 * vertices_ * keyframes + row_padding, S(0));
-  // Blocks that stay in the cache on both sides.
+  values_.resize(directions.size() * vertices_ * keyframes + row_padding, S(0));
+  // Copies in blocks that fit into the cache on both sides.
   constexpr std::size_t block = 64;
   for (std::size_t first = 0; first < vertices_; first += block)
     for (std::size_t begin = 0; begin < keyframes; begin += block) {
       const std::size_t end = std::min(begin + block, keyframes);
       for (std::size_t v = first; v < std::min(first + block, vertices_); ++v)
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          S* const to = values_.data() + (axis * vertices_ + v) * keyframes;
-          for (std::size_t k = begin; k < end; ++k) to[k] = plans.keyframe(k)[3 * v + axis];
+        for (std::size_t direction = 0; direction < directions.size(); ++direction) {
+          S* const to = values_.data() + (direction * vertices_ + v) * keyframes;
+          for (std::size_t k = begin; k < end; ++k) {
+            const S* const position = plans.keyframe(k) + 3 * v;
+            to[k] = direction < 3 ? position[direction] : projected(directions[direction], position);
+          }
         }
     }
 }
@@ -37,7 +41,7 @@ std::size_t KeyframeRows<S>::segment_at(double t) const {
   const std::size_t last = times_.size() - 1;
   if (guess >= 0 && guess <= double(last)) {
     std::size_t k = std::size_t(guess);
-    // Rounding misses evenly spaced keyframes by one at most.
+    // For evenly spaced keyframes, rounding is off by one at most.
     if (t < times_[k] && k > 0) --k;
     if (k < last && t >= times_[k + 1]) ++k;
     if (t >= times_[k] && (k == last || t < times_[k + 1])) return k;

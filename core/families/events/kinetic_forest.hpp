@@ -5,12 +5,12 @@
 
 #include "core/contract/strategy.hpp"
 #include "core/families/events/event_queue.hpp"
-#include "core/families/events/kinetic_aabb_tree.hpp"
+#include "core/families/events/kinetic_tree.hpp"
 
 namespace kbvh {
 
-/// The kinetic trees of all bodies of a scene on one event queue: AABB trees, or others that are made and
-/// used alike.
+/// The kinetic trees of all bodies of a scene on one event queue. KineticTree is the kind of tree: AABB
+/// trees, k-DOP trees (KineticDop), or others with the same interface.
 template <class S, class Queue, class Count, class Observer = NoObserver,
           template <class, class, class, class> class KineticTree = KineticAabbTree>
 class KineticForest {
@@ -21,7 +21,7 @@ class KineticForest {
 
   KineticForest(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, Count& count,
                 Observer observer = {})
-      : clock_(plans_of(scene, motion)), queue_(clock_, slots_of(topologies)), count_(&count) {
+      : clock_(plans_of(scene, motion), directions()), queue_(clock_, slots_of(topologies)), count_(&count) {
     if (scene.body_count() > Event::most_bodies)
       throw std::length_error("a scene of " + std::to_string(scene.body_count()) +
                               " bodies, but events number " + std::to_string(Event::most_bodies));
@@ -40,7 +40,7 @@ class KineticForest {
   KineticForest(const KineticForest&) = delete;  // trees point to the clock and the queue
   KineticForest& operator=(const KineticForest&) = delete;
 
-  /// Starts over at t.
+  /// Restarts at t.
   void reset(double t) {
     queue_.clear();
     clock_.clear();
@@ -56,26 +56,26 @@ class KineticForest {
     else
       return !queue_.empty() && clock_.due(queue_.top(), t);
   }
-  /// Takes the first event off the queue and handles it.
+  /// Removes the earliest event from the queue and handles it.
   void handle_next() {
     const Event event = first_event();
     count_->add(Counter::queue_operations);
     trees_[event.body].handle(event);
   }
 
-  /// Fetches what handling the event will read: of what step 0 fetched, step 1 says what else, and so on.
+  /// Prefetches the data that handling the event will read. Each step reads what the step before prefetched.
   void fetch_ahead(const PackedEvent& event, std::uint32_t slot, int step) const {
     if (step == 0)
       for (const std::uint32_t vertex : {event.winner, event.loser}) clock_.fetch_ahead(event, vertex);
     if constexpr (requires { trees_[event.body].fetch_ahead(event, slot, step); })
       trees_[event.body].fetch_ahead(event, slot, step);
   }
-  /// Looks again for the failure of a certificate that stands at t.
+  /// Searches the next failure of a certificate that holds at t.
   void review(const Event& event, double t) {
     if constexpr (requires { trees_[event.body].review(event, t); }) trees_[event.body].review(event, t);
   }
 
-  /// Follows changes of plans at t that the motion shows already; of each body's tree once.
+  /// Applies changes of plans at t, which the motion contains already; calls each changed tree once.
   void plans_changed(double t, std::span<const PlanChange<S>> changes) {
     changes_.clear();
     for (const PlanChange<S>& change : changes) changes_.emplace_back(change.body, change.vertex);
@@ -89,8 +89,8 @@ class KineticForest {
     }
   }
 
-  /// Follows a change of geometry at t that scene and motion show already. O(depth) certificates for each
-  /// primitive, and O(nodes) the first time.
+  /// Applies a change of geometry at t, which scene and motion contain already. O(depth) certificates per
+  /// primitive, and O(nodes) at the first change.
   void geometry_changed(double t, const SceneView<S>& scene, const SampledMotion<S>& motion,
                         std::span<const BodyChange> changes) {
     for (const BodyChange& change : changes) {
@@ -110,7 +110,8 @@ class KineticForest {
   Queue& queue() { return queue_; }
   const Queue& queue() const { return queue_; }
   std::size_t bytes() const {
-    std::size_t total = queue_.bytes() + clock_.bytes();
+    std::size_t total = queue_.bytes() + clock_.bytes() + changes_.capacity() * sizeof(changes_[0]) +
+                        changed_.capacity() * sizeof(std::uint32_t);
     for (const Tree& tree : trees_) total += tree.bytes();
     return total;
   }
@@ -121,6 +122,13 @@ class KineticForest {
     const Event event = queue_.top();
     queue_.pop();
     return event;
+  }
+  /// Returns the directions of the trees' sides: the axes, for trees that name none.
+  static std::span<const SlabDirection> directions() {
+    if constexpr (requires { Tree::directions; })
+      return Tree::directions;
+    else
+      return Dop<S, 6>::directions;
   }
   static std::vector<const FlightPlans<S>*> plans_of(const SceneView<S>& scene, const ClipMotion<S>& motion) {
     std::vector<const FlightPlans<S>*> plans;

@@ -2,6 +2,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/families/wide/lazy_query.hpp"
+#include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/realiser_rows.hpp"
 
 namespace kbvh {
@@ -67,5 +69,66 @@ class KineticRows {
 
 extern template class KineticRows<float>;
 extern template class KineticRows<double>;
+
+/// Queries of the kinetic AABB trees of all bodies of a scene, through their rows.
+template <class S>
+class KineticRowsQuery {
+ public:
+  /// Lays out the rows of all trees. Throws std::invalid_argument if trees of a pair of bodies have different
+  /// widths or leaf sizes.
+  template <class Forest>
+  void assign(const Forest& forest, const SceneView<S>& scene) {
+    rows_.resize(scene.body_count());
+    for (std::uint32_t body = 0; body < rows_.size(); ++body) follow(forest, scene, body);
+    check_layouts(
+        scene.pairs(), [&](std::uint32_t body) -> const auto& { return rows_[body].hierarchy(); });
+  }
+  /// Lays out the rows of one body anew, after a change of its tree. O(nodes).
+  template <class Forest>
+  void follow(const Forest& forest, const SceneView<S>& scene, std::uint32_t body) {
+    rows_[body].follow(forest.tree(body), scene.primitives(body));
+    plans_changed(body);
+  }
+  void start_over() {
+    for (auto& rows : rows_) rows.rows().start_over();
+  }
+  void plans_changed(std::uint32_t body) { rows_[body].rows().plans_changed(); }
+  void new_frame(const SegmentMotion<S>& motion) {
+    for (std::uint32_t body = 0; body < rows_.size(); ++body) rows_[body].rows().new_frame(motion, body);
+  }
+
+  /// Appends the candidates of the current frame. Adds the number of box tests to `tests`, and that of
+  /// positions read without being fetched to `reads`.
+  template <class Forest>
+  QueryStatus find(const Forest& forest, NearBodies& near_bodies, const SceneView<S>& scene,
+                   const SampledMotion<S>& motion, const Budget& budget, PairBuffer& out,
+                   std::uint64_t& tests, std::uint64_t& reads) {
+    for (std::uint32_t body = 0; body < rows_.size(); ++body)
+      reads += rows_[body].make_visited(forest.tree(body), motion, body);
+    const auto side_of = [&](std::uint32_t body) -> typename WideQuery<S>::LazySide {
+      return {&rows_[body].rows().hierarchy(), body, rows_[body].rows().stale()};
+    };
+    const auto make = [&](std::uint32_t body, std::uint32_t node) {
+      reads += rows_[body].make_wanted(node, forest.tree(body), motion, body);
+    };
+    return query_lazily(query_, near_bodies, scene, motion, budget, side_of, make, out, tests);
+  }
+
+  /// Returns the box of a node of a body's tree, stored in `room`, if a query may have read it. Returns null
+  /// otherwise.
+  const Box<S>* read_box(std::uint32_t body, std::uint32_t node, Box<S>& room) const {
+    return rows_[body].read_box(node, room);
+  }
+
+  std::size_t bytes() const {
+    std::size_t total = query_.bytes() + rows_.capacity() * sizeof(KineticRows<S>);
+    for (const auto& rows : rows_) total += rows.bytes();
+    return total;
+  }
+
+ private:
+  std::vector<KineticRows<S>> rows_;  ///< [body]
+  WideQuery<S> query_;
+};
 
 }  // namespace kbvh

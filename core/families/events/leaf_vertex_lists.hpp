@@ -12,8 +12,8 @@
 
 namespace kbvh {
 
-/// The unique vertices of every leaf of one body, ascending, by node; and, once `index` was called, the
-/// leaves of every vertex. Both follow edits of the topology.
+/// The unique vertices of every leaf of one body, ascending, by node, and, after `index`, the leaves of every
+/// vertex. Both follow edits of the topology.
 class LeafVertexLists {
  public:
   LeafVertexLists(const Topology& topology, const Primitives& primitives) {
@@ -21,15 +21,15 @@ class LeafVertexLists {
     vertices_ = ListPool(lists.offsets, std::move(lists.vertices));
   }
 
-  /// The vertices of a leaf; none of an inner node.
+  /// Returns the vertices of a leaf; empty for an inner node.
   std::span<const std::uint32_t> operator[](std::uint32_t node) const { return vertices_[node]; }
 
-  /// Makes the lists of leaves by vertex, the first time it is called. O(nodes + vertices of leaves).
+  /// Lists the leaves of every vertex at the first call. O(nodes + vertices of leaves).
   void index(std::uint32_t vertex_count) {
     if (leaves_.keys() == 0) leaves_ = inverted(vertices_, vertex_count);
   }
-  /// Appends the leaves of each of `vertices`. A vertex that was added after `index` and belongs to no
-  /// primitive has none.
+  /// Appends the leaves of each of `vertices`. A vertex that was added after `index`, and is in no primitive,
+  /// has none.
   void add_leaves_of(std::span<const std::uint32_t> vertices, std::vector<std::uint32_t>& leaves) const {
     for (std::uint32_t v : vertices) {
       if (v >= leaves_.keys()) continue;
@@ -37,7 +37,7 @@ class LeafVertexLists {
     }
   }
 
-  /// Replaces the vertices of a leaf by `vertices`, which is sorted and made unique.
+  /// Replaces the vertices of a leaf by `vertices`, after sorting them and removing duplicates.
   void assign(std::uint32_t leaf, std::vector<std::uint32_t>& vertices, std::uint32_t vertex_count) {
     std::sort(vertices.begin(), vertices.end());
     vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
@@ -45,7 +45,7 @@ class LeafVertexLists {
     vertices_.assign(leaf, vertices);
     list(leaf, vertex_count);
   }
-  /// Moves the lists of nodes that an edit gave other ids, and makes room for `nodes` nodes.
+  /// Moves the lists of nodes that have new ids after an edit, and makes room for `nodes` nodes.
   void follow(const TopologyEdit& edit, std::uint32_t nodes, std::uint32_t vertex_count) {
     std::vector<std::pair<std::uint32_t, std::vector<std::uint32_t>>> moved;
     for (const TopologyEdit::Move& move : edit.moved) {
@@ -66,13 +66,13 @@ class LeafVertexLists {
   std::size_t bytes() const { return vertices_.bytes() + leaves_.bytes(); }
 
  private:
-  /// Enters a leaf in the lists of its vertices.
+  /// Adds a leaf to the lists of its vertices.
   void list(std::uint32_t leaf, std::uint32_t vertex_count) {
     if (leaves_.keys() == 0) return;
     leaves_.resize(vertex_count);
     for (std::uint32_t v : vertices_[leaf]) leaves_.push(v, leaf);
   }
-  /// Takes a leaf out of the lists of its vertices.
+  /// Removes a leaf from the lists of its vertices.
   void unlist(std::uint32_t leaf) {
     if (leaves_.keys() == 0) return;
     for (std::uint32_t v : vertices_[leaf]) leaves_.erase(v, leaf);

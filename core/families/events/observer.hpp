@@ -5,21 +5,21 @@
 
 namespace kbvh {
 
-/// The observer of a kinetic tree whose changes are not watched.
+/// The observer of a kinetic tree that ignores all changes; the interface of observers.
 ///
 /// An observer may also have any of the following functions, which report how insertions and deletions change
-/// the nodes. They are called once the topology is whole again, and before the realisers that change in
-/// consequence are reported:
+/// the nodes. They are called after the edit of the topology is complete, and before the resulting changes of
+/// realisers are reported:
 ///   leaf_split(body, node, first_child)            a leaf became the parent of first_child, which holds the
 ///                                                  leaf's former primitives, and of first_child + 1, which
 ///                                                  holds the new primitive
 ///   leaf_changed(body, node)                       a leaf has other primitives, or is a new root
 ///   node_removed(body, node)                       a leaf lost its last primitive; its id is free
-///   node_moved(body, from, to)                     the subtree of `from` is the subtree of `to` now, which
-///                                                  was its parent, or a removed sibling; `from` is free
+///   node_moved(body, from, to)                     the subtree of `from` is now that of `to`, which was
+///                                                  its parent or a removed sibling; `from` is free
 ///   subtree_rebuilt(body, node)                    all nodes below an inner node are new
-/// New nodes have `no_vertex` as old realisers. An observer may have `reads_instants()`, too: while it
-/// returns false, the tree does not compute exact times of events for it.
+/// New nodes have `no_vertex` as old realisers. An observer may also have `reads_instants()`: while it
+/// returns false, the tree does not compute exact times of events for the observer.
 struct NoObserver {
   static constexpr bool reads_instants() { return false; }
   template <class S>

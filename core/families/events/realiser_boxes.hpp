@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -7,7 +8,7 @@
 
 namespace kbvh {
 
-/// The box whose sides are realised by six vertices: [lower x, upper x, lower y, ...]. Fetches their
+/// Returns the box whose sides are realised by six vertices: [lower x, upper x, lower y, ...]. Fetches their
 /// positions.
 template <class S>
 Box<S> box_of_realisers(const std::uint32_t* realisers, const SampledMotion<S>& motion, std::uint32_t body) {
@@ -21,11 +22,11 @@ Box<S> box_of_realisers(const std::uint32_t* realisers, const SampledMotion<S>& 
   return box;
 }
 
-/// Boxes made on demand, each at most once per frame.
-template <class S>
-class BoxCache {
+/// The volumes of one body's nodes, computed on demand, each at most once per frame.
+template <class Volume>
+class VolumeCache {
  public:
-  explicit BoxCache(std::uint32_t nodes) : boxes_(nodes), stamps_(nodes, 0) {}
+  explicit VolumeCache(std::uint32_t nodes) : volumes_(nodes), stamps_(nodes, 0) {}
   void new_frame() {
     if (++frame_ == 0) {
       std::fill(stamps_.begin(), stamps_.end(), 0);
@@ -33,25 +34,29 @@ class BoxCache {
     }
   }
   bool current(std::uint32_t node) const { return stamps_[node] == frame_; }
-  const Box<S>& box(std::uint32_t node) const { return boxes_[node]; }
-  void store(std::uint32_t node, const Box<S>& box) {
-    boxes_[node] = box;
+  const Volume& volume(std::uint32_t node) const { return volumes_[node]; }
+  void store(std::uint32_t node, const Volume& volume) {
+    volumes_[node] = volume;
     stamps_[node] = frame_;
   }
-  /// For a hierarchy that has more nodes now; boxes made before stay.
+  /// Makes room for more nodes; volumes computed before stay.
   void resize(std::uint32_t nodes) {
-    boxes_.resize(nodes);
+    volumes_.resize(nodes);
     stamps_.resize(nodes, 0);
   }
-  std::size_t bytes() const { return boxes_.size() * (sizeof(Box<S>) + sizeof(std::uint32_t)); }
+  std::size_t bytes() const {
+    return volumes_.capacity() * sizeof(Volume) + stamps_.capacity() * sizeof(std::uint32_t);
+  }
 
  private:
-  std::vector<Box<S>> boxes_;
+  std::vector<Volume> volumes_;
   std::vector<std::uint32_t> stamps_;
   std::uint32_t frame_ = 1;
 };
+template <class S>
+using BoxCache = VolumeCache<Box<S>>;
 
-/// A bounds view (traversal.hpp) of implicit boxes: read from the realising vertices when the query asks.
+/// A bounds view (traversal.hpp) of boxes that are computed from their realisers when a query reads them.
 template <class S>
 class RealiserBoxes {
  public:
@@ -63,7 +68,7 @@ class RealiserBoxes {
     if (!cache_->current(node))
       cache_->store(node, box_of_realisers(realisers_ + std::size_t(6) * node, *motion_, body_));
   }
-  const Box<S>& operator()(std::uint32_t node) const { return cache_->box(node); }
+  const Box<S>& operator()(std::uint32_t node) const { return cache_->volume(node); }
 
  private:
   const std::uint32_t* realisers_;

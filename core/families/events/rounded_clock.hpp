@@ -6,29 +6,35 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/base/assert.hpp"
 #include "core/families/events/event.hpp"
 
 namespace kbvh {
 
-/// How a clock that rounds finds the failure of a certificate within a segment.
+/// How a clock with rounded times finds the failure of a certificate within a segment.
 enum class FailureRule : std::uint8_t {
-  end_point_rule,  ///< there is one iff the loser is ahead at the segment's end, which is data; only its time
-                   ///< is rounded
-  textbook,  ///< intersect the two lines, and take what lies between now and the segment's end (Z&W 2006,
-             ///< Algorithm 3, as printed): all of it is rounded
+  end_point_rule,  ///< it fails if and only if the loser is ahead at the segment's end, which is stored data;
+                   ///< only the time is rounded
+  textbook,  ///< it fails if the two lines cross between now and the segment's end (Z&W 2006, Algorithm 3, as
+             ///< printed); everything is rounded
 };
 
-/// What EventClock would be without exact arithmetic: times of events are numbers of type T (float or
-/// double), and what two of them say about each other is what counts. For contestants that show what
-/// exactness buys; with either rule a bound may be late. Plans of single vertices are not supported.
+/// EventClock without exact arithmetic: event times are numbers of type T (float or double), compared as they
+/// are. For contestants that show the benefit of exactness; with either rule a bound may be late. Per-vertex
+/// plans are not supported.
 template <class S, class T, FailureRule rule>
 class RoundedClock {
  public:
   using Event = kbvh::Event;
-  explicit RoundedClock(std::vector<const FlightPlans<S>*> plans) : plans_(std::move(plans)) {}
+  /// Only for the sides of boxes: `directions` are the axes.
+  RoundedClock(std::vector<const FlightPlans<S>*> plans, std::span<const SlabDirection> directions)
+      : plans_(std::move(plans)) {
+    KBVH_ASSERT(directions.size() == 3);
+    (void)directions;
+  }
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return *plans_[body]; }
-  /// Nothing: `first_failure` starts from an event's `begin`.
+  /// Returns an empty crossing: `first_failure` starts from an event's `begin`.
   Crossing<S> crossing(const Event& /*event*/) const { return {}; }
 
   std::size_t bytes() const { return 0; }
@@ -40,16 +46,16 @@ class RoundedClock {
   }
   bool due(const Event& event, double t) const { return event.hint <= t; }
 
-  /// As EventClock::first_failure, with rounded times: `hint` is the event's time; `begin` and `end` are the
-  /// same, but for a time that is rounded out of its segment, which they are not.
-  bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own,
+  /// Does the same as EventClock::first_failure, with rounded times. `hint` is the event's time. `begin` and
+  /// `end` equal it, unless rounding moved it out of its segment.
+  bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own_crossing,
                      double until = std::numeric_limits<double>::infinity()) const {
-    own.reset();
+    own_crossing.reset();
     const FlightPlans<S>& plan = *plans_[event.body];
     const auto times = plan.keyframe_times();
     const auto axis = std::size_t(axis_of(event.side));
     const std::size_t w = std::size_t(3) * event.winner + axis, l = std::size_t(3) * event.loser + axis;
-    // Differences of coordinates come first, so that float times do not mean float coordinates.
+    // Differences of coordinates are computed first, so that float times do not imply float coordinates.
     using Wide = std::conditional_t<sizeof(T) < sizeof(S), S, T>;
     const T sign = is_upper(event.side) ? T(1) : T(-1);
     for (std::size_t k = plan.segment_at(now.begin); k + 1 < times.size() && times[k] < until; ++k) {
@@ -60,7 +66,8 @@ class RoundedClock {
         const double ahead = double(plan.keyframe(k + 1)[l]) - double(plan.keyframe(k + 1)[w]);
         if (!((is_upper(event.side) ? ahead : -ahead) > 0)) continue;
         time = begin + length * (behind / (behind + T(sign * T(ahead))));
-        // Behind at the start and ahead at the end, so it is in between, whatever rounding says.
+        // The loser is behind at the start and ahead at the end: the time lies in between, in spite of
+        // rounding.
         if (!(time >= begin)) time = begin;
         time = std::min(time, T(times[k + 1]));
         if (!(double(time) >= now.begin)) time = T(now.begin);
@@ -72,8 +79,8 @@ class RoundedClock {
         if (!(double(time) >= std::max(now.begin, times[k]) && double(time) < times[k + 1])) continue;
       }
       event.hint = double(time);
-      // What follows is looked for from within this segment on: no event comes twice, and those that are
-      // still to come in it are not passed over because this one was rounded to its end.
+      // The next search starts within this segment. No event is found twice, and later events of the segment
+      // are not skipped if this time was rounded to its end.
       event.begin = event.end = std::clamp(double(time), times[k], std::nextafter(times[k + 1], times[k]));
       event.error = 0;
       return true;
@@ -81,7 +88,7 @@ class RoundedClock {
     return false;
   }
 
-  /// Exact: only times are rounded, not what holds at the beginning.
+  /// Compares exactly: only times are rounded, not the state at the beginning.
   int compare_values(std::uint32_t body, Side side, std::uint32_t challenger, std::uint32_t winner,
                      double t) const {
     const FlightPlans<S>& plan = *plans_[body];
@@ -90,10 +97,10 @@ class RoundedClock {
     return is_upper(side) ? sign : -sign;
   }
 
-  /// Of two failures of the same certificate, does `a` come first? At equal times the one that gets further
-  /// ahead by the end of the segment.
-  bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& /*own_a*/, const Event& b,
-                       const std::optional<Crossing<S>>& /*own_b*/) const {
+  /// Returns whether `a` comes first of two failures of one certificate. At equal times the loser that is
+  /// further ahead at the segment's end comes first.
+  bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& /*crossing_a*/, const Event& b,
+                       const std::optional<Crossing<S>>& /*crossing_b*/) const {
     if (a.hint != b.hint) return a.hint < b.hint;
     const FlightPlans<S>& plan = *plans_[a.body];
     const std::size_t k = std::min(plan.segment_at(a.hint) + 1, plan.keyframe_count() - 1);
@@ -103,7 +110,7 @@ class RoundedClock {
     return is_upper(a.side) ? end_a > end_b : end_a < end_b;
   }
 
-  void remember(std::uint32_t /*slot*/, const std::optional<Crossing<S>>& /*own*/) {}
+  void remember(std::uint32_t /*slot*/, const std::optional<Crossing<S>>& /*own_crossing*/) {}
   void clear() {}
 
  private:

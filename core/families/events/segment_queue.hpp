@@ -12,7 +12,7 @@
 
 namespace kbvh {
 
-/// How a queue keeps an event of a clock that has a shorter form of its events; else the event as it is.
+/// The form in which a queue stores events: the clock's short form if it has one, else the event itself.
 template <class Clock>
 struct StoredEvent {
   using type = typename Clock::Event;
@@ -25,36 +25,35 @@ struct StoredEvent<Clock> {
   using type = typename Clock::Packed;
 };
 
-/// An event queue (event_queue.hpp) in three parts, each event in the last one that its time allows:
-///   segments  unsorted lists, one for each span between the times of `split_at`
-///   bins      the present segment, cut into equal spans of some twenty events, unsorted
-///   heap      the present bin: a 4-ary heap by time and error bound, compared exactly where these overlap
-/// Segments and bins order events by the earliest time that their error bounds allow, which proves that what
-/// waits comes later than any event that is over before the next bin begins; so an event is first in the
-/// queue only if it is over by then. What lies after the last of the times is cut again and again, at the
-/// median of what waits there.
+/// An event queue (event_queue.hpp) in three parts. Each event waits in the last part that its time allows:
+///   segments  unsorted lists, one per span between the times of `split_at`
+///   bins      the current segment, divided into equal spans of about 24 events, unsorted
+///   heap      the current bin: a 4-ary heap by time and error bound; overlapping bounds are compared exactly
+/// Segments and bins order events by the earliest time that their error bounds allow. An event whose latest
+/// possible time lies before the next bin is therefore earlier than all waiting events, and only such an
+/// event is returned as the first. The span after the last of the times is divided repeatedly, at the median
+/// of the events that wait there.
 ///
-/// `schedule` and `cancel` are O(1) but for events of the present bin, which are O(log bin); what was
-/// cancelled stays in its list until that is opened, or until half of all that waits is such.
+/// `schedule` and `cancel` are O(1), except for events of the current bin, which are O(log bin). A cancelled
+/// event stays in its list until the list is opened, or until half of all entries are cancelled ones.
 template <class Clock>
 class SegmentHeapEventQueue {
   using Event = typename Clock::Event;
   using Stored = typename StoredEvent<Clock>::type;
   static constexpr bool packed = !std::is_same_v<Stored, Event>;
-  /// By value where it is made on demand.
+  /// Returned by value where events are unpacked on demand.
   using Returned = std::conditional_t<packed, Event, const Event&>;
 
  public:
   using ClockType = Clock;
   static constexpr const char* name = "segment_heap";
-  /// Keyframes: a clip's end is seldom reached by a certificate, so that looking for its failure costs no
-  /// more than this many. 64: the next keyframes of one vertex in a few cache lines.
+  /// The number of keyframes of one search. Certificates seldom last to the clip's end. 64 keyframes of one
+  /// vertex fill a few cache lines.
   static constexpr std::size_t look_ahead = 64;
   SegmentHeapEventQueue(const Clock& clock, std::uint32_t slots)
       : clock_(&clock), records_(slots), segments_(1) {}
 
-  /// Cuts time at `times` (ascending), where many events are expected on either side. Only while the queue is
-  /// empty.
+  /// Divides time at `times` (ascending). Requires an empty queue.
   void split_at(std::span<const double> times) {
     KBVH_ASSERT(size() == 0);
     cuts_.assign(times.begin(), times.end());
@@ -63,8 +62,8 @@ class SegmentHeapEventQueue {
     clear();
   }
 
-  /// Calls owner.fetch_ahead(stored event, slot, step) for many events that will come soon, with steps 0, 1
-  /// and 2 one after the other; and owner.review(event, time) where `review` asked for it.
+  /// Calls owner.fetch_ahead(stored event, slot, step) for batches of upcoming events, with steps 0, 1 and 2
+  /// in turn, and owner.review(event, time) for the certificates passed to `review`.
   template <class Owner>
   void serve(Owner& owner) {
     owner_ = &owner;
@@ -84,9 +83,9 @@ class SegmentHeapEventQueue {
       push({event.hint, error, event.slot});
     }
   }
-  /// Until `time`, one of the times of `split_at`, the certificate does not fail: it is to be looked at again
-  /// before any event from then on comes first. Takes the place of the slot's event. False, with nothing
-  /// done, if that is too late: later events have been compared already.
+  /// Schedules a review of a certificate that is known to hold until `time`, one of the times of `split_at`.
+  /// The review comes before any event from `time` on, and replaces the slot's event. Returns false, and does
+  /// nothing, if later events have been compared already.
   bool review(const Event& event, double time) {
     const std::size_t segment = segment_of(time);
     if (segment <= segment_) return false;
@@ -99,7 +98,7 @@ class SegmentHeapEventQueue {
     return records_[slot].place != nowhere &&
            (records_[slot].place & (waits | reviewed)) != (waits | reviewed);
   }
-  /// The slot has no event, but is to be looked at again.
+  /// Returns whether the slot has a review instead of an event.
   bool reviewing(std::uint32_t slot) const { return records_[slot].place != nowhere && !scheduled(slot); }
   Returned event(std::uint32_t slot) const {
     if constexpr (packed)
@@ -115,7 +114,7 @@ class SegmentHeapEventQueue {
     find_first();
     withdraw(records_[heap_.front().slot]);
   }
-  /// `top` and `pop` at once.
+  /// Removes and returns the earliest event.
   Event take() {
     find_first();
     const std::uint32_t slot = heap_.front().slot;
@@ -123,7 +122,7 @@ class SegmentHeapEventQueue {
     withdraw(records_[slot]);
     return first;
   }
-  /// Does the first event happen at or before t?
+  /// Returns whether the earliest event happens at or before t.
   bool due(double t) const {
     if (empty()) return false;
     const Entry& first = heap_.front();
@@ -135,7 +134,7 @@ class SegmentHeapEventQueue {
     find_first();
     return heap_.empty();
   }
-  /// Certificates to be looked at again included.
+  /// Counts reviews, too.
   std::size_t size() const { return heap_.size() + waiting_; }
   void clear() {
     for (auto& list : segments_) list.clear();
@@ -148,7 +147,7 @@ class SegmentHeapEventQueue {
     opened_ = -1;
     limit_ = -infinity;
   }
-  /// Fetches what is kept of a slot.
+  /// Prefetches the record of a slot.
   void prefetch(std::uint32_t slot) const { __builtin_prefetch(&records_[slot]); }
   std::uint32_t slots() const { return std::uint32_t(records_.size()); }
   void grow(std::uint32_t slots) {
@@ -157,20 +156,19 @@ class SegmentHeapEventQueue {
   std::uint64_t steps() const { return steps_; }
   std::size_t bytes() const {
     std::size_t total = records_.capacity() * sizeof(Record) + heap_.capacity() * sizeof(Entry) +
-                        cuts_.size() * sizeof(double);
+                        cuts_.capacity() * sizeof(double) + reviews_.capacity() * sizeof(std::uint32_t);
     for (const auto& list : segments_) total += list.capacity() * sizeof(std::uint32_t);
     for (const auto& list : bins_) total += list.capacity() * sizeof(std::uint32_t);
-    return total + (segments_.size() + bins_.size()) * sizeof(std::vector<std::uint32_t>) +
-           keys_.capacity() * sizeof(double);
+    return total + (segments_.capacity() + bins_.capacity()) * sizeof(std::vector<std::uint32_t>) +
+           (keys_.capacity() + sorted_.capacity()) * sizeof(double);
   }
 
  private:
   static constexpr double infinity = std::numeric_limits<double>::infinity();
   static constexpr std::uint32_t nowhere = std::numeric_limits<std::uint32_t>::max();
-  static constexpr std::uint32_t waits = 1U
-                                         << 31;  ///< in `place`, with the number of a list; else in the heap
-  static constexpr std::uint32_t seen = 1U << 30;      ///< in `place`, while lists are tidied up
-  static constexpr std::uint32_t reviewed = 1U << 29;  ///< in `place`, of what waits: no event
+  static constexpr std::uint32_t waits = 1U << 31;     ///< in `place`: it is in a list, not in the heap
+  static constexpr std::uint32_t seen = 1U << 30;      ///< in `place`: met already by tidy_up or cut_segment
+  static constexpr std::uint32_t reviewed = 1U << 29;  ///< in `place`, with `waits`: a review
   static constexpr std::int32_t most_bins = 1 << 14;
   static constexpr std::size_t events_per_bin = 24;
 
@@ -198,12 +196,14 @@ class SegmentHeapEventQueue {
       return {stored.hint, error_above(stored.error), slot};
   }
 
-  // ---- Lists of what waits
+  // ---- Lists of waiting events
 
-  /// Bins are numbered from 0, segments from most_bins; rises with the time.
+  /// Returns the number of the list for a time. Bins are numbered from 0, segments from most_bins; numbers
+  /// rise with time.
   std::int32_t number_of(double time) const {
     if (time < limit_) {
-      // Error bounds beyond float make infinite times, and no number of their differences: the first bin.
+      // Error bounds beyond the range of float make infinite times, whose differences are not numbers: the
+      // first bin.
       const double share = (time - bins_begin_) * bins_per_second_;
       return !(share > 0) ? 0 : share >= double(bin_count_ - 1) ? bin_count_ - 1 : std::int32_t(share);
     }
@@ -228,7 +228,7 @@ class SegmentHeapEventQueue {
     ++waiting_;
     if (++entries_ > 2 * waiting_ + 4096) tidy_up();
   }
-  /// Forgets entries of what is not there any more, and double ones.
+  /// Removes outdated and duplicate entries from all lists.
   void tidy_up() {
     entries_ = 0;
     for (std::int32_t number = 0; number < most_bins + std::int32_t(segments_.size()); ++number) {
@@ -244,7 +244,7 @@ class SegmentHeapEventQueue {
     }
   }
 
-  /// Stores an event in its slot's record, whose former event is taken out.
+  /// Stores an event in its slot's record; removes the slot's former event from its list or the heap.
   Record& replaced(const Event& event) {
     Record& record = records_[event.slot];
     withdraw(record);
@@ -254,7 +254,7 @@ class SegmentHeapEventQueue {
       record.event = event;
     return record;
   }
-  /// Takes an event out, wherever it is; says whether it was one.
+  /// Removes the event or review of a record. Returns whether it was an event.
   bool withdraw(Record& record) {
     const std::uint32_t place = record.place;
     if (place == nowhere) return false;
@@ -267,7 +267,7 @@ class SegmentHeapEventQueue {
     return (place & reviewed) == 0;
   }
 
-  /// Opens bins until the first event of the heap is the first of all, or there is none.
+  /// Opens bins until the first event of the heap is the earliest of all, or no event is left.
   void find_first() const {
     while (waiting_ > 0) {
       if (!heap_.empty()) {
@@ -298,7 +298,7 @@ class SegmentHeapEventQueue {
     }
     cut_segment();
   }
-  /// Looks again at what asked for it when the segment begins: some of it gets events.
+  /// Performs the reviews of the segment that begins; some of them schedule events.
   void review_segment(std::uint32_t here) const {
     reviews_.clear();
     for (const std::uint32_t slot : segments_[segment_]) {
@@ -314,7 +314,7 @@ class SegmentHeapEventQueue {
       review_(owner_, event(reviews_[i]), cuts_[segment_ - 1]);
     }
   }
-  /// Cuts the first segment with events into bins. None of them is open then.
+  /// Divides the first non-empty segment into bins. Requires that no bin is open.
   void cut_segment() const {
     while (segments_[segment_].empty()) ++segment_;
     const std::uint32_t here = waits | std::uint32_t(most_bins + std::int32_t(segment_));
@@ -342,7 +342,7 @@ class SegmentHeapEventQueue {
     } else if (kept <= events_per_bin || begin == end) {
       limit_ = std::nextafter(end, infinity);
     } else {
-      // The first half, or all but the largest where so many are equal.
+      // The first half, or all but the largest if many are equal.
       sorted_ = keys_;
       const auto middle = sorted_.begin() + std::ptrdiff_t(kept / 2);
       std::nth_element(sorted_.begin(), middle, sorted_.end());
@@ -422,17 +422,18 @@ class SegmentHeapEventQueue {
   void* owner_ = nullptr;
   void (*fetch_ahead_)(void* owner, const Stored& event, std::uint32_t slot, int step) = nullptr;
   void (*review_)(void* owner, const Event& event, double time) = nullptr;
-  // Which part an event is in changes when the first one is looked for; what the queue holds does not.
-  mutable std::vector<Record> records_;                       ///< by slot
+  // Finding the earliest event moves events between the parts, but leaves the contents of the queue
+  // unchanged.
+  mutable std::vector<Record> records_;                       ///< [slot]
   mutable std::vector<std::vector<std::uint32_t>> segments_;  ///< slots; one more than cuts
   mutable std::vector<std::vector<std::uint32_t>> bins_;      ///< slots
   mutable std::vector<Entry> heap_;
   mutable std::vector<std::uint32_t> reviews_;
   mutable std::vector<double> keys_, sorted_;
   mutable std::size_t waiting_ = 0, entries_ = 0;  ///< events in lists, and entries
-  mutable std::size_t segment_ = 0;                ///< the one that is cut into bins
+  mutable std::size_t segment_ = 0;                ///< the segment that is divided into bins
   mutable std::int32_t bin_count_ = 0, opened_ = -1;
-  mutable double limit_ = -infinity;  ///< bins are for earlier times
+  mutable double limit_ = -infinity;  ///< bins hold events before this time
   mutable double bins_begin_ = 0, bins_per_second_ = 0;
   std::vector<double> cuts_;
   double cuts_per_second_ = 0;

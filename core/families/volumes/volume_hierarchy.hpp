@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/contract/audit_volumes.hpp"
+#include "core/contract/audited_volumes.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/geometry/volumes/bounding_volume.hpp"
 #include "core/topology/subtree_swap.hpp"
@@ -148,36 +148,6 @@ class VolumeHierarchy {
   SubtreeSwap swap_;
   TopologyEdit edit_;
   std::vector<V> carried_;
-};
-
-namespace detail {
-/// Uses the member of that name if the class has one.
-template <BoundingVolume V>
-double protrusion_of(const V& volume, const double* point) {
-  return protrusion(volume, point);
-}
-}  // namespace detail
-
-/// The volumes of a hierarchy in the form that audits query.
-template <BoundingVolume V>
-class AuditedVolumes final : public AuditVolumes {
- public:
-  explicit AuditedVolumes(std::vector<V> volumes) : volumes_(std::move(volumes)) {}
-  std::size_t size() const override { return volumes_.size(); }
-  double protrusion(std::uint32_t node, const double* point) const override {
-    return detail::protrusion_of(volumes_[node], point);
-  }
-  double surface(std::uint32_t node) const override { return surface_area(volumes_[node]); }
-  double tight_surface(std::span<const double> points) const override {
-    std::vector<VolumeScalar<V>> rounded(points.size());
-    for (std::size_t i = 0; i < rounded.size(); ++i) rounded[i] = VolumeScalar<V>(points[i]);
-    V volume;
-    fit(volume, PointSet<VolumeScalar<V>>(rounded.data(), rounded.size() / 3));
-    return surface_area(volume);
-  }
-
- private:
-  std::vector<V> volumes_;
 };
 
 }  // namespace kbvh

@@ -13,19 +13,20 @@ namespace kbvh {
 /// A direction of slabs; each component is -1, 0 or 1.
 using SlabDirection = std::array<int, 3>;
 
-/// The K / 2 directions of a k-DOP with K sides, after Klosowski et al. 1998: the axes; for 14 sides also the
-/// diagonals of the unit cube (they cut off its corners); for 18 sides instead the diagonals of its faces
-/// (they cut off its edges); for 26 sides both.
+/// The K / 2 directions of a k-DOP with K sides, after Klosowski et al. 1998. With 6 sides, those of a box:
+/// the axes. With more sides, the axes come first. With 14 sides, the diagonals of the unit cube follow (they
+/// cut off its corners); with 18 sides, the diagonals of its faces (they cut off its edges); with 26 sides,
+/// both.
 template <int K>
 constexpr std::array<SlabDirection, std::size_t(K / 2)> slab_directions() {
-  static_assert(K == 14 || K == 18 || K == 26, "k-DOPs have 14, 18 or 26 sides");
+  static_assert(K == 6 || K == 14 || K == 18 || K == 26, "k-DOPs have 6, 14, 18 or 26 sides");
   constexpr SlabDirection all[] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 0},  {1, 0, 1},
                                    {0, 1, 1},  {1, -1, 0}, {1, 0, -1}, {0, 1, -1}, {1, 1, 1},
                                    {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
   std::array<SlabDirection, std::size_t(K / 2)> result{};
   std::size_t count = 0;
   for (std::size_t i = 0; i < 13; ++i)
-    if (i < 3 || (i < 9 ? K != 14 : K != 18)) result[count++] = all[i];
+    if (i < 3 || (K != 6 && (i < 9 ? K != 14 : K != 18))) result[count++] = all[i];
   return result;
 }
 

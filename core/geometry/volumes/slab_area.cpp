@@ -28,11 +28,19 @@ class Polygon {
   }
   /// Clips the polygon to normal . p <= offset.
   void clip(const double* normal, double offset) {
+    double at[capacity];
+    bool whole = true;
+    for (int i = 0; i < count_; ++i) {
+      at[i] = scalar_product(normal, corners_[i].x) - offset;
+      whole = whole && at[i] <= 0;
+    }
+    if (whole) return;
     Point kept[capacity];
     int kept_count = 0;
     for (int i = 0; i < count_; ++i) {
-      const Point &p = corners_[i], &q = corners_[(i + 1) % count_];
-      const double at_p = scalar_product(normal, p.x) - offset, at_q = scalar_product(normal, q.x) - offset;
+      const int next = i + 1 < count_ ? i + 1 : 0;
+      const Point &p = corners_[i], &q = corners_[next];
+      const double at_p = at[i], at_q = at[next];
       if (at_p <= 0) kept[kept_count++] = p;
       if ((at_p < 0 && at_q > 0) || (at_p > 0 && at_q < 0)) {
         const double share = at_p / (at_p - at_q);
@@ -44,6 +52,7 @@ class Polygon {
     std::copy_n(kept, kept_count, corners_);
     count_ = kept_count;
   }
+  bool empty() const { return count_ == 0; }
   double area() const {
     double twice[3] = {0, 0, 0};
     for (int i = 1; i + 1 < count_; ++i) {
@@ -105,7 +114,7 @@ double slab_area(std::span<const Slab> slabs) {
       for (int d = 0; d < 3; ++d) foot.x[d] = normal[d] * offset / scalar_product(normal, normal);
       span_plane(normal, u, v);
       Polygon polygon(foot, u, v, 2.0);
-      for (std::size_t j = 0; j < slabs.size(); ++j) {
+      for (std::size_t j = 0; j < slabs.size() && !polygon.empty(); ++j) {
         if (j == i) continue;
         const double* const other = relative[j].normal;
         const double opposite[3] = {-other[0], -other[1], -other[2]};

@@ -17,30 +17,42 @@
 #include "core/families/events/observer.hpp"
 #include "core/families/events/realiser_boxes.hpp"
 #include "core/geometry/lane_box.hpp"
+#include "core/geometry/volumes/dop.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/topology/topology_edit.hpp"
 
 namespace kbvh {
 
-/// The kinetic AABB tree of one body (Z&W s.4): per node and side the vertex that realises the bound, and one
-/// certificate that it does; the earliest failure of each certificate is scheduled in a queue that several
-/// structures may share. Any width and leaf size: a leaf's certificate is the earliest overtaker among its
-/// unique vertices, an inner node's the earliest among its other children's realisers.
+/// The kinetic tree of one body (Z&W s.4) over bounding volumes whose K sides have fixed directions: 6 for
+/// boxes, 14, 18 or 26 for k-DOPs (`slab_directions`). For each node and side the tree stores the realiser of
+/// the bound, and a certificate that the realiser is extremal. The earliest failure of each certificate is
+/// scheduled in a queue, which several structures may share. Nodes have any width, leaves any size. A leaf's
+/// certificate compares the realiser with the leaf's unique vertices, an inner node's with the realisers of
+/// its children.
 ///
-/// Slots of the queue are first_slot + 6 * node + side for the nodes that there were at the start; later ones
-/// get theirs in chunks. Observer::realiser_changed(body, node, side, old, new, instant) is called at every
-/// change of a bound's realiser, deeper nodes first, and Observer::realiser_plan_changed(body, node) for a
-/// node of which a realiser has another plan from now on.
+/// The clock must have the tree's directions. Along the axes, realisers and events are exact for the flight
+/// plans; along other directions they are exact for the projected plans (projected_plan.hpp).
 ///
-/// Primitives can be inserted and removed at any time (the paper's claim): a local edit of the topology, then
-/// certificates of the few nodes whose candidates are others, and of their ancestors as far up and on as many
-/// sides as the realisers change.
-template <class S, class Queue, class Count, class Observer = NoObserver>
-class KineticAabbTree {
+/// Slots of the queue are first_slot + K * node + side for the initial nodes; later nodes get slots in
+/// chunks. Observer::realiser_changed(body, node, side, old, new, instant) is called at every change of a
+/// realiser, deeper nodes first. Observer::realiser_plan_changed(body, node) is called for every node with a
+/// realiser whose plan changed.
+///
+/// Primitives can be inserted and removed at any time (as the paper claims). The topology is edited locally.
+/// Certificates are recomputed for the few nodes whose candidates changed, and for their ancestors as long as
+/// realisers change.
+template <class S, class Queue, class Count, class Observer, int K>
+class KineticTree {
+  /// One bit for each side, and one more.
+  using SideBits = std::conditional_t<K <= 7, std::uint8_t, std::uint32_t>;
+
  public:
-  KineticAabbTree(Topology topology, const Primitives& primitives, std::uint32_t body,
-                  std::uint32_t first_slot, typename Queue::ClockType& clock, Queue& queue, Count& count,
-                  Observer observer = {})
+  static constexpr Side sides = K;
+  /// The directions of the sides: side = 2 * direction + (0 lower, 1 upper).
+  static constexpr const auto& directions = Dop<S, K>::directions;
+
+  KineticTree(Topology topology, const Primitives& primitives, std::uint32_t body, std::uint32_t first_slot,
+              typename Queue::ClockType& clock, Queue& queue, Count& count, Observer observer = {})
       : topology_(std::move(topology)),
         leaf_vertices_(topology_, primitives),
         body_(body),
@@ -50,43 +62,44 @@ class KineticAabbTree {
         count_(&count),
         observer_(observer),
         certifier_(clock, queue, count),
-        realisers_(std::size_t(6) * topology_.size(), 0) {}
+        realisers_(std::size_t(sides) * topology_.size(), 0) {}
 
-  static std::uint64_t slot_count(const Topology& topology) { return std::uint64_t(6) * topology.size(); }
-  /// After insertions or deletions it is laid out as TopologyEditor says, with ids that mean nothing.
+  static std::uint64_t slot_count(const Topology& topology) { return std::uint64_t(sides) * topology.size(); }
+  /// Returns the current topology. After insertions or deletions it has the layout of TopologyEditor, and its
+  /// ids have no order.
   const Topology& topology() const { return topology_; }
-  /// The topology as a builder lays it out, for audits: node i of it is node order[i] of the tree.
+  /// Returns the topology in a builder's layout, for audits. Its node i is node order[i] of the tree.
   Topology compacted_topology(std::vector<std::uint32_t>& order) const {
     if (editor_) return compacted(topology_, order);
     order.resize(topology_.size());
     std::iota(order.begin(), order.end(), 0u);
     return topology_;
   }
-  /// Unique vertices of a leaf, ascending.
+  /// Returns the unique vertices of a leaf, ascending.
   std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const { return leaf_vertices_[node]; }
-  std::uint32_t slot(std::uint32_t node, Side side) const { return slots_.slot(6 * node + side); }
-  /// The node that a slot of the queue belongs to.
-  std::uint32_t node_of(std::uint32_t slot) const { return slots_.place(slot) / 6; }
-  /// The node whose certificate is concerned, but for its own, when a realiser of `node` changes; not of the
+  std::uint32_t slot(std::uint32_t node, Side side) const { return slots_.slot(sides * node + side); }
+  /// Returns the node of a slot of the queue.
+  std::uint32_t node_of(std::uint32_t slot) const { return slots_.place(slot) / sides; }
+  /// Returns the other node whose certificate is affected when a realiser of `node` changes. Not for the
   /// root.
   std::uint32_t certificate_above(std::uint32_t node, Side /*side*/) const { return topology_.parents[node]; }
   std::uint32_t realiser(std::uint32_t node, Side side) const {
-    return realisers_[std::size_t(6) * node + side];
+    return realisers_[std::size_t(sides) * node + side];
   }
   const std::uint32_t* realisers(std::uint32_t node) const {
-    return realisers_.data() + std::size_t(6) * node;
+    return realisers_.data() + std::size_t(sides) * node;
   }
 
   /// Finds every realiser at t and schedules every certificate. O(nodes log nodes + vertices of leaves).
   void initialise(double t) {
     const auto now = Instant<S>::at(t);
     const auto start = [&](std::uint32_t node) {
-      for (Side side = 0; side < 6; ++side) {
-        realisers_[std::size_t(6) * node + side] = best_at(node, side, t, candidate(node, side, 0));
+      for (Side side = 0; side < sides; ++side) {
+        realisers_[std::size_t(sides) * node + side] = best_at(node, side, t, candidate(node, side, 0));
         certify(node, side, now);
       }
     };
-    if (editor_) {  // ids need not descend towards the root any more
+    if (editor_) {  // a child may have a smaller id than its parent
       std::vector<std::uint32_t> order;
       compacted(topology_, order);
       for (std::size_t i = order.size(); i-- > 0;) start(order[i]);
@@ -95,8 +108,8 @@ class KineticAabbTree {
     for (std::uint32_t node = topology_.size(); node-- > 0;) start(node);
   }
 
-  /// Handles a failure that was popped from the queue: the loser takes over, here and in every ancestor that
-  /// the winner realises (leaf and tree events, Z&W s.4). O(depth) certificates.
+  /// Handles a failure that was popped from the queue: the loser becomes the realiser here and in every
+  /// ancestor that the winner realises (leaf and tree events, Z&W s.4). O(depth) certificates.
   void handle(const Event& event) {
     KBVH_ASSERT(event.body == body_);
     Crossing<S> crossing;
@@ -114,28 +127,28 @@ class KineticAabbTree {
       count_->add(Counter::nodes_visited);
       if (realiser(node, side) != event.winner) break;
     }
-    certify(node, side, now);  // one of its challengers has changed
+    certify(node, side, now);  // one of its candidates changed
   }
 
-  /// Looks again for the next failure of a certificate, which stands at t, a keyframe.
+  /// Searches the next failure of a certificate that holds at t, a keyframe time.
   void review(const Event& event, double t) {
     count_->add(Counter::queue_operations);
     certify(node_of(event.slot), event.side, Instant<S>::at(t));
   }
-  /// Fetches what handling the event will read: first what is the node's, then what is its parent's, then the
-  /// keyframes of the other vertices that take part.
+  /// Prefetches the data that handling the event will read: in step 0 that of the node, in step 1 that of its
+  /// parent, in step 2 the keyframes of the other vertices.
   void fetch_ahead(const PackedEvent& event, std::uint32_t slot_of_event, int step) const {
     const std::uint32_t node = node_of(slot_of_event);
     const Side side = event.side;
     if (step == 0) {
-      __builtin_prefetch(realisers(node));
+      __builtin_prefetch(realisers(node) + side);
       __builtin_prefetch(topology_.nodes.data() + node);
       __builtin_prefetch(topology_.parents.data() + node);
       return;
     }
     const std::uint32_t parent = topology_.parents[node];
     if (step == 1) {
-      __builtin_prefetch(realisers(parent));
+      __builtin_prefetch(realisers(parent) + side);
       __builtin_prefetch(topology_.nodes.data() + parent);
       __builtin_prefetch(topology_.parents.data() + parent);
       if constexpr (requires { queue_->prefetch(0); }) queue_->prefetch(slot(parent, side));
@@ -153,8 +166,8 @@ class KineticAabbTree {
     if constexpr (requires { queue_->prefetch(0); }) queue_->prefetch(slot(topology_.parents[parent], side));
   }
 
-  /// The plans of `vertices` (ascending, unique) changed at t, each from its stored position: rechecks every
-  /// certificate that they, or realisers that change in consequence, take part in.
+  /// Applies new plans of `vertices` (ascending, unique) from t on, each from its stored position. Rechecks
+  /// every certificate with one of these vertices, or with a realiser that changes in consequence.
   void plans_changed(double t, std::span<const std::uint32_t> vertices) {
     leaf_vertices_.index(vertex_count());
     touched_.clear();
@@ -162,9 +175,9 @@ class KineticAabbTree {
     repair(t, vertices);
   }
 
-  /// Inserts a primitive that the body has now, at t: at the leaf whose boxes on the way down grow least.
-  /// O(depth) certificates, and O(nodes) the first time for what edits need. Where a leaf gets deeper than
-  /// 2 log2(leaves), a subtree is balanced anew: O(its leaves), amortised O(log) per insertion.
+  /// Inserts a primitive of the body at t, into the leaf whose boxes on the path from the root grow least.
+  /// O(depth) certificates, and O(nodes) at the first edit. If a leaf gets deeper than 2 log2(leaves), a
+  /// subtree is rebalanced: O(its leaves), amortised O(log) per insertion.
   void insert(double t, std::uint32_t primitive, const Primitives& primitives,
               const SampledMotion<S>& motion) {
     start_editing(primitives);
@@ -193,7 +206,7 @@ class KineticAabbTree {
     }
   }
 
-  /// Takes a primitive out at t. O(depth) certificates, and O(nodes) the first time.
+  /// Removes a primitive at t. O(depth) certificates, and O(nodes) at the first edit.
   void remove(double t, std::uint32_t primitive, const Primitives& primitives) {
     start_editing(primitives);
     const std::uint32_t leaf = editor_->leaf_of(primitive);
@@ -217,8 +230,12 @@ class KineticAabbTree {
   }
 
   std::size_t bytes() const {
-    return topology_.bytes() + leaf_vertices_.bytes() + moved_.size() + slots_.bytes() +
-           (realisers_.size() + marked_.size()) * sizeof(std::uint32_t) + (editor_ ? editor_->bytes() : 0);
+    return topology_.bytes() + leaf_vertices_.bytes() + moved_.capacity() * sizeof(SideBits) +
+           slots_.bytes() +
+           (realisers_.capacity() + touched_.capacity() + marked_.capacity() + affected_.capacity() +
+            unique_.capacity()) *
+               sizeof(std::uint32_t) +
+           (editor_ ? editor_->bytes() : 0);
   }
 
  private:
@@ -226,7 +243,7 @@ class KineticAabbTree {
     const TopologyNode n = topology_.nodes[node];
     return n.is_leaf() ? std::uint32_t(leaf_vertices_[node].size()) : n.count();
   }
-  /// A vertex that may realise the side: one of the leaf's, or a child's realiser.
+  /// Returns a candidate for a side: a vertex of the leaf, or the realiser of a child.
   std::uint32_t candidate(std::uint32_t node, Side side, std::uint32_t i) const {
     const TopologyNode n = topology_.nodes[node];
     return n.is_leaf() ? leaf_vertices_[node][i] : realiser(n.first() + i, side);
@@ -248,20 +265,20 @@ class KineticAabbTree {
   }
 
   void replace(std::uint32_t node, Side side, std::uint32_t vertex, const Instant<S>& now) {
-    std::uint32_t& realiser = realisers_[std::size_t(6) * node + side];
+    std::uint32_t& realiser = realisers_[std::size_t(sides) * node + side];
     const std::uint32_t old = realiser;
     realiser = vertex;
     count_->add(Counter::values_written);
     observer_.template realiser_changed<S>(body_, node, side, old, vertex, now);
   }
 
-  /// Schedules the earliest failure of the side's certificate from now on, in place of the one that stood.
+  /// Schedules the earliest failure of the side's certificate from `now` on, and replaces the scheduled one.
   void certify(std::uint32_t node, Side side, const Instant<S>& now) {
     Event event;
     event.winner = realiser(node, side);
     event.slot = slot(node, side);
     event.body = body_ % Event::most_bodies;
-    event.side = side & 7U;
+    event.side = side & 31U;
     event.depth = topology_.depths[node];
     const TopologyNode n = topology_.nodes[node];
     if (n.is_leaf()) return certifier_.certify(event, now, leaf_vertices_[node]);
@@ -275,18 +292,18 @@ class KineticAabbTree {
   void start_editing(const Primitives& primitives) {
     if (!editor_) editor_.emplace(topology_, primitives.count());
   }
-  /// Brings all that is kept by node in line with what the editor did, and notes which nodes to look at.
+  /// Updates all data stored per node after an edit, and collects the nodes to recheck in `touched_`.
   void follow_edit() {
     for (const std::uint32_t node : edit_.vacated) {
-      for (Side side = 0; side < 6; ++side) {
+      for (Side side = 0; side < sides; ++side) {
         certifier_.withdraw(slot(node, side));
         clock_->remember(slot(node, side), {});
-        realisers_[std::size_t(6) * node + side] = no_vertex;
+        realisers_[std::size_t(sides) * node + side] = no_vertex;
       }
     }
     const std::uint32_t nodes = topology_.size();
-    slots_.grow(6 * nodes, *queue_);
-    realisers_.resize(std::size_t(6) * nodes, no_vertex);
+    slots_.grow(sides * nodes, *queue_);
+    realisers_.resize(std::size_t(sides) * nodes, no_vertex);
     leaf_vertices_.follow(edit_, nodes, vertex_count());
     touched_ = edit_.fresh;
     touched_.insert(touched_.end(), edit_.changed.begin(), edit_.changed.end());
@@ -304,7 +321,7 @@ class KineticAabbTree {
       for (const TopologyEdit::Move& move : edit_.moved) observer_.node_moved(body_, move.from, move.to);
   }
 
-  /// Brings realisers and certificates in order at t, from `touched_` up, after changes of plans (`vertices`,
+  /// Restores realisers and certificates at t, from `touched_` upwards, after changes of plans (`vertices`,
   /// ascending) or of candidates.
   void repair(double t, std::span<const std::uint32_t> vertices) {
     const auto now = Instant<S>::at(t);
@@ -329,10 +346,10 @@ class KineticAabbTree {
     const auto changed = [&](std::uint32_t v) {
       return std::binary_search(vertices.begin(), vertices.end(), v);
     };
-    // Level by level from the root, so backwards it is bottom-up.
+    // The list goes level by level from the root; its reverse is bottom-up.
     for (std::size_t i = affected_.size(); i-- > 0;) {
       const std::uint32_t node = affected_[i];
-      for (Side side = 0; side < 6; ++side) {
+      for (Side side = 0; side < sides; ++side) {
         const std::uint32_t old = realiser(node, side);
         bool concerned = (moved_[node] & other_candidates) != 0 || changed(old);
         const TopologyNode content = topology_.nodes[node];
@@ -345,18 +362,18 @@ class KineticAabbTree {
         const std::uint32_t best = best_at(node, side, t, still_there ? old : candidate(node, side, 0));
         if (best != old) {
           replace(node, side, best, now);
-          moved_[node] = std::uint8_t(moved_[node] | (1u << side));
+          moved_[node] = SideBits(moved_[node] | (1u << side));
         }
         certify(node, side, now);
       }
-      if (!vertices.empty() && std::any_of(realisers(node), realisers(node) + 6, changed))
+      if (!vertices.empty() && std::any_of(realisers(node), realisers(node) + sides, changed))
         observer_.realiser_plan_changed(body_, node);
     }
     for (std::uint32_t node : affected_) moved_[node] = 0;
   }
   bool side_moved(std::uint32_t node, Side side) const { return (moved_[node] >> side) & 1; }
 
-  static constexpr std::uint8_t other_candidates = 1 << 6;  ///< in `moved_`
+  static constexpr SideBits other_candidates = SideBits(1u << sides);  ///< in `moved_`
 
   Topology topology_;
   LeafVertexLists leaf_vertices_;
@@ -368,14 +385,25 @@ class KineticAabbTree {
   Observer observer_;
   Certifier<S, Queue, Count> certifier_;
   std::vector<std::uint32_t> realisers_;  ///< [node][side]
-  // For changes of plans, made when the first one comes: marks of affected nodes.
+  // Allocated at the first change of plans.
   std::vector<std::uint32_t> touched_, marked_, affected_;
-  std::vector<std::uint8_t> moved_;  ///< sides whose realiser changed in this pass, one bit each
+  std::vector<SideBits> moved_;  ///< sides whose realiser changed in this pass, one bit each
   std::uint32_t mark_ = 0;
-  // For changes of geometry, made when the first one comes.
+  // Allocated at the first change of geometry.
   std::optional<TopologyEditor> editor_;
   TopologyEdit edit_;
   std::vector<std::uint32_t> unique_;
+};
+
+/// The kinetic AABB tree of the paper.
+template <class S, class Queue, class Count, class Observer = NoObserver>
+using KineticAabbTree = KineticTree<S, Queue, Count, Observer, 6>;
+
+/// The kinetic k-DOP tree, as a template argument of KineticForest: KineticDop<18>::Tree.
+template <int K>
+struct KineticDop {
+  template <class S, class Queue, class Count, class Observer = NoObserver>
+  using Tree = KineticTree<S, Queue, Count, Observer, K>;
 };
 
 }  // namespace kbvh

@@ -1,0 +1,58 @@
+// The kinetic k-DOP tree: the kinetic AABB tree (Z&W 2006, s.4) over k-DOPs (Klosowski et al. 1998). A side
+// is a direction instead of an axis; certificates, queue and events are those of the AABB tree. Sides along
+// the axes are tight. The other sides follow the projected plans (core/families/events/projected_plan.hpp),
+// with a margin for their rounding.
+
+#include "core/contract/registry.hpp"
+#include "core/families/events/kinetic_tree_strategy.hpp"
+
+namespace kbvh {
+namespace {
+
+/// In the order of the forests of OfAnyDop.
+const std::vector<std::string>& volume_words() {
+  static const std::vector<std::string> words{"dop14", "dop18", "dop26"};
+  return words;
+}
+
+template <class S, class Count, int K>
+using DopForest =
+    KineticForest<S, SegmentHeapQueue<S>, Count, BoundObserver<S>, KineticDop<K>::template Tree>;
+
+template <class S, class Count>
+using OfAnyDop = ExactKineticTreeStrategy<S, Count, DopForest<S, Count, 14>, DopForest<S, Count, 18>,
+                                          DopForest<S, Count, 26>>;
+
+template <class S, class Count>
+class KineticKdop final : public OfAnyDop<S, Count> {
+ public:
+  KineticKdop(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+              const Params& params)
+      : OfAnyDop<S, Count>(scene, motion, std::move(topologies), chosen(params.word("volume")),
+                           KineticQuery::node_pairs) {}
+
+ private:
+  static std::size_t chosen(const std::string& word) {
+    const auto& words = volume_words();
+    return std::size_t(std::find(words.begin(), words.end(), word) - words.begin());
+  }
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(kinetic_kdop) {
+  using namespace kbvh;
+  return {make_entry<KineticKdop>({
+      .id = "kinetic_kdop",
+      .title = "kinetic k-DOP tree",
+      .family = "kinetic",
+      .citation = "Zachmann & Weller 2006, s.4; Klosowski et al. 1998 (k-DOPs)",
+      .tightness = Tightness::conservative,
+      .positions = PositionUse::fetched,
+      .declares = {.continuous = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+      .parameters = {{"volume", "dop18", volume_words(),
+                      "bounding volume of every node: k-DOP with 14, 18 or 26 sides"}},
+  })};
+}
