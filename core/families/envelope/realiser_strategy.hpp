@@ -9,7 +9,7 @@
 #include "core/families/envelope/segment_envelope.hpp"
 #include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
-#include "core/families/wide/wide_hierarchy.hpp"
+#include "core/families/wide/wide_query.hpp"
 #include "core/motion/round_positions.hpp"
 
 namespace kbvh {
@@ -39,12 +39,12 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     std::uint64_t tests = 0;
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) make_visited(index);
-    const auto side_of = [&](std::uint32_t body) -> typename WideQuery<S>::LazySide {
-      return {&bodies_[body].hierarchy, body, bodies_[body].stale.data()};
+    const auto side_of = [&](std::uint32_t body) -> WideSide<S> {
+      return {.hierarchy = &bodies_[body].hierarchy, .body = body, .stale = bodies_[body].stale.data()};
     };
     const auto make = [&](std::uint32_t body, std::uint32_t node) { make_wanted(body, node); };
     const QueryStatus status =
-        query_lazily(query_, near_bodies_, this->scene_, this->sampled_, budget, side_of, make, out, tests);
+        query_lazily(query_, near_bodies_, this->scene_.pairs(), budget, side_of, make, out, tests);
     this->count_.add(Counter::box_tests, tests);
     return status;
   }
@@ -182,7 +182,7 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
     return box;
   }
 
-  WideQuery<S> query_;
+  WideQuery<S> query_{this->scene_, this->sampled_};
 };
 
 }  // namespace kbvh
