@@ -95,8 +95,8 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
       if (period_ > 0)
         tests += read(lists_of_[k], pair, out);
       else
-        query_.run(hierarchies_[pair.first], pair.first, hierarchies_[pair.second], pair.second, this->scene_,
-                   this->sampled_, {}, out, tests);
+        query_.run({&hierarchies_[pair.first], pair.first}, {&hierarchies_[pair.second], pair.second}, out,
+                   tests);
     }
     if (period_ == 0) model_.queried(double(tests), double(out.size() - before));
     this->count_.add(Counter::box_tests, tests);
@@ -447,7 +447,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
   std::vector<std::uint8_t> pair_is_near_;
   std::vector<NearPairs<S>> lists_of_;  ///< [near pair], and more if there were more before
   NearWork<S> work_;
-  WideQuery<S> query_;
+  WideQuery<S> query_{this->scene_, this->sampled_};
   DriftModel model_;
   int frames_ = 0;      ///< since positions were remembered
   int period_ = 0;      ///< frames that one search lasts; 0: refit and query at every frame

@@ -50,7 +50,6 @@ struct LazyBody {
 template <class S, class Count>
 class Hybrid final : public StoredHierarchyStrategy<S, Count> {
   using Base = StoredHierarchyStrategy<S, Count>;
-  using LazySide = typename WideQuery<S>::LazySide;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -76,10 +75,10 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
         ++status.pending;
         return;
       }
-      const LazySide a = side(pair.first), b = side(pair.second);
+      const WideSide<S> a = lazy_side(pair.first), b = lazy_side(pair.second);
       auto& query = this->query_;
       query.start_lazy(a, b, rest_of(budget, tests));
-      while (const auto wanted = query.step(a, b, this->scene_, this->sampled_, out, tests)) {
+      while (const auto wanted = query.step(a, b, out, tests)) {
         if (wanted.first != wanted.none) make_current(pair.first, wanted.first);
         if (wanted.second != wanted.none) make_current(pair.second, wanted.second);
       }
@@ -113,7 +112,9 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
  private:
   static constexpr std::uint32_t none = ~std::uint32_t(0);
 
-  LazySide side(std::uint32_t body) { return {&this->hierarchies_[body], body, bodies_[body].stale.data()}; }
+  WideSide<S> lazy_side(std::uint32_t body) {
+    return {.hierarchy = &this->hierarchies_[body], .body = body, .stale = bodies_[body].stale.data()};
+  }
   bool is_stale(const LazyBody<S>& lazy, std::uint32_t node) const {
     if (lazy.root_of[node] == none) return false;
     return lazy.stale[below_ == Below::subtree ? lazy.root_of[node] : node] != 0;

@@ -102,10 +102,9 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
         return;
       }
       std::uint64_t tests = 0;
-      status.pending += this->query_
-                            .run(this->hierarchies_[pair.first], pair.first, this->hierarchies_[pair.second],
-                                 pair.second, this->scene_, this->sampled_, rest_of(budget, all), out, tests)
-                            .pending;
+      status.pending +=
+          this->query_.run(this->side(pair.first), this->side(pair.second), out, tests, rest_of(budget, all))
+              .pending;
       bodies_[pair.first].tests += tests;
       bodies_[pair.second].tests += tests;
       all += tests;

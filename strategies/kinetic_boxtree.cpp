@@ -98,12 +98,12 @@ class KineticBox final : public CountedStrategy<S, Count>,
     std::uint64_t tests = 0;
     for (std::uint32_t body = 0; body < rows_.size(); ++body)
       this->count_.add(Counter::positions_fetched, rows_[body].make_visited(tree_of(body), motion_, body));
-    const auto side_of = [&](std::uint32_t body) -> typename WideQuery<S>::LazySide {
-      return {&rows_[body].hierarchy(), body, rows_[body].stale()};
+    const auto side_of = [&](std::uint32_t body) -> WideSide<S> {
+      return {.hierarchy = &rows_[body].hierarchy(), .body = body, .stale = rows_[body].stale()};
     };
     const auto make = [&](std::uint32_t body, std::uint32_t node) { make_wanted(body, node); };
     const QueryStatus status =
-        query_lazily(query_, near_bodies_, this->scene_, this->sampled_, budget, side_of, make, out, tests);
+        query_lazily(query_, near_bodies_, this->scene_.pairs(), budget, side_of, make, out, tests);
     this->count_.add(Counter::box_tests, tests);
     return status;
   }
@@ -251,7 +251,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
   NearBodies near_bodies_;
   LeafBoxes leaf_boxes_;
   std::vector<BoxTreeRows<S>> rows_;  ///< [body]
-  WideQuery<S> query_;
+  WideQuery<S> query_{this->scene_, this->sampled_};
   std::uint64_t first_step_ = 0;
   std::vector<std::uint32_t> order_;
   bool rebuilds_;

@@ -44,11 +44,10 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>, public Take
         ++status.pending;
         continue;
       }
-      status.pending += query_
-                            .run_at(bounds_.hierarchy(pair.first), moment(pair.first, t), pair.first,
-                                    bounds_.hierarchy(pair.second), moment(pair.second, t), pair.second,
-                                    this->scene_, this->sampled_, rest_of(budget, tests), out, tests)
-                            .pending;
+      const WideMoment<S> first = moment(pair.first, t), second = moment(pair.second, t);
+      status.pending +=
+          query_.run(side(pair.first, first), side(pair.second, second), out, tests, rest_of(budget, tests))
+              .pending;
     }
     this->count_.add(Counter::box_tests, tests);
     return status;
@@ -77,6 +76,9 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>, public Take
       std::fill(stale_[body].begin(), stale_[body].end(), 1);
     }
   }
+  WideSide<S> side(std::uint32_t body, const WideMoment<S>& moment) {
+    return {.hierarchy = &bounds_.hierarchy(body), .body = body, .moment = &moment};
+  }
   WideMoment<S> moment(std::uint32_t body, double t) {
     return {bounds_.hierarchy(body).arrays(), bounds_.side(body).ends(), stale_[body].data(),
             bounds_.fraction(t)};
@@ -86,7 +88,7 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>, public Take
   }
 
   LinearBounds<S> bounds_;
-  WideQuery<S> query_;
+  WideQuery<S> query_{this->scene_, this->sampled_};
   std::vector<std::vector<std::uint8_t>> stale_;  ///< [body][wide node]
   LinearCounts<S> updates_;
 };

@@ -16,16 +16,21 @@ std::uint32_t pair_of(const Topology& topology, std::uint32_t node) {
 }
 
 bool is_above(const Topology& topology, std::uint32_t upper, std::uint32_t node) {
-  while (node > upper) {  // parents have smaller ids
-    KBVH_ASSERT(topology.parents[node] < node);
-    node = topology.parents[node];
-  }
+  while (node != upper && node != 0) node = topology.parents[node];
   return node == upper;
 }
 
 std::invalid_argument refusal(std::uint32_t first, std::uint32_t second, const std::string& why) {
   return std::invalid_argument("cannot exchange nodes " + std::to_string(first) + " and " +
                                std::to_string(second) + ": " + why);
+}
+void check_places(const Topology& topology, std::uint32_t first, std::uint32_t second) {
+  for (const std::uint32_t node : {first, second})
+    if (node >= topology.size() || topology.parents[node] >= topology.size())
+      throw refusal(first, second,
+                    "node " + std::to_string(node) + " is none of " + std::to_string(topology.size()));
+  if (is_above(topology, first, second) || is_above(topology, second, first))
+    throw refusal(first, second, "one is the other or above it");
 }
 }  // namespace
 
@@ -42,19 +47,11 @@ void SubtreeSwap::rotate(Topology& topology, std::uint32_t child, std::uint32_t 
 void SubtreeSwap::swap(Topology& topology, std::uint32_t first, std::uint32_t second, TopologyEdit& edit) {
   if (topology.width != 2)
     throw refusal(first, second, "the topology is " + std::to_string(topology.width) + "-wide");
-  if (first >= topology.size() || second >= topology.size())
-    throw refusal(first, second, "there are " + std::to_string(topology.size()) + " nodes");
+  check_places(topology, first, second);
   if (first > second) std::swap(first, second);
-  if (is_above(topology, first, second)) throw refusal(first, second, "one is the other or above it");
   edit.clear();
   moves_.clear();
-  topology.perfect = false;
-
-  exchange(topology, first, second);
-  if (topology.depths[first] != topology.depths[second]) {
-    set_depths_below(topology, first);
-    set_depths_below(topology, second);
-  }
+  exchange_contents(topology, first, second);
   // The former subtree of the second place has larger ids than that place; at the first place the ids are
   // larger still.
   const TopologyNode lower = topology.nodes[second];
@@ -71,28 +68,29 @@ void SubtreeSwap::swap(Topology& topology, std::uint32_t first, std::uint32_t se
   if (parents[1] != parents[0]) edit.changed.push_back(parents[1]);
 }
 
-void SubtreeSwap::exchange(Topology& topology, std::uint32_t first, std::uint32_t second) {
+void SubtreeSwap::exchange(Topology& topology, std::uint32_t first, std::uint32_t second,
+                           TopologyEdit& edit) {
+  check_places(topology, first, second);
+  edit.clear();
+  exchange_contents(topology, first, second);
+  edit.moved.push_back({first, second});
+  edit.moved.push_back({second, first});
+  edit.changed.push_back(topology.parents[first]);
+  if (topology.parents[second] != topology.parents[first]) edit.changed.push_back(topology.parents[second]);
+}
+
+void SubtreeSwap::exchange_contents(Topology& topology, std::uint32_t first, std::uint32_t second) {
+  topology.perfect = false;
   std::swap(topology.nodes[first], topology.nodes[second]);
   for (const std::uint32_t node : {first, second}) {
     const TopologyNode content = topology.nodes[node];
     if (content.is_leaf()) continue;
-    topology.parents[content.first()] = topology.parents[content.first() + 1] = node;
+    for (std::uint32_t c = content.first(); c < content.first() + content.count(); ++c)
+      topology.parents[c] = node;
   }
-}
-
-void SubtreeSwap::set_depths_below(Topology& topology, std::uint32_t node) {
-  open_.assign(1, node);
-  while (!open_.empty()) {
-    const std::uint32_t parent = open_.back();
-    open_.pop_back();
-    const TopologyNode content = topology.nodes[parent];
-    if (content.is_leaf()) continue;
-    const auto depth = std::uint8_t(std::min(255, topology.depths[parent] + 1));
-    for (std::uint32_t child = content.first(); child < content.first() + 2; ++child) {
-      topology.depths[child] = depth;
-      open_.push_back(child);
-    }
-  }
+  if (topology.depths[first] == topology.depths[second]) return;
+  set_depths_below(topology, first, open_);
+  set_depths_below(topology, second, open_);
 }
 
 const SubtreeSwap::Move* SubtreeSwap::move_of(std::uint32_t node) const {

@@ -6,15 +6,17 @@
 
 namespace kbvh {
 
-/// Exchanges two subtrees of a binary topology in place. With a child and a grandchild of one node this is a
-/// tree rotation (Kopta et al. 2012). All invariants of `check_topology` are preserved: parents precede their
-/// children, and `parents` and `depths` are correct, so a reverse sweep over the nodes is still bottom-up.
+/// Exchanges two subtrees of a topology in place. With a child and a grandchild of one node this is a tree
+/// rotation (Kopta et al. 2012). `swap` takes binary topologies and preserves all invariants of
+/// `check_topology`: parents precede their children, and `parents` and `depths` are correct, so a reverse
+/// sweep over the nodes is still bottom-up. `exchange` takes any width, and changes no ids but those of the
+/// two places; parents may then have larger ids than their children.
 ///
-/// The work is proportional to the change: O(1) for the two nodes; their subtrees if their depth changes; and
-/// the nodes that would otherwise precede their parents, which exchange ids among themselves (the sibling
-/// pairs between the two places that are above one of them or below the other, Pearce & Kelly 2007). Entries
-/// of leaves stay in place, so leaves are no longer in the order of their entries. `perfect` is cleared,
-/// because positions of children are no longer implicit. `compacted` restores both.
+/// The work of `swap` is proportional to the change: O(1) for the two nodes; their subtrees if their depth
+/// changes; and the nodes that would otherwise precede their parents, which exchange ids among themselves
+/// (the sibling pairs between the two places that are above one of them or below the other, Pearce & Kelly
+/// 2007). Entries of leaves stay in place, so leaves are no longer in the order of their entries. `perfect`
+/// is cleared, because positions of children are no longer implicit. `compacted` restores both.
 ///
 /// The object only holds reusable memory: once warm, a swap allocates nothing.
 class SubtreeSwap {
@@ -32,6 +34,11 @@ class SubtreeSwap {
   /// changes nothing if the second is not a child of the first's sibling.
   void rotate(Topology& topology, std::uint32_t child, std::uint32_t grandchild, TopologyEdit& edit);
 
+  /// Exchanges the subtrees at two nodes of a topology of any width: their contents, and nothing else, lie
+  /// under other ids. Refuses what `swap` refuses, but for the width, and ids that are unused. `edit` is as
+  /// after `swap`. O(depth), and the two subtrees if their depth changes.
+  void exchange(Topology& topology, std::uint32_t first, std::uint32_t second, TopologyEdit& edit);
+
   std::size_t bytes() const {
     return (below_.capacity() + open_.capacity()) * sizeof(std::uint32_t) + moves_.capacity() * sizeof(Move);
   }
@@ -43,8 +50,7 @@ class SubtreeSwap {
     std::uint8_t depth;
     TopologyNode nodes[2];
   };
-  void exchange(Topology& topology, std::uint32_t first, std::uint32_t second);
-  void set_depths_below(Topology& topology, std::uint32_t node);
+  void exchange_contents(Topology& topology, std::uint32_t first, std::uint32_t second);
   void order(Topology& topology, std::uint32_t parent);
   const Move* move_of(std::uint32_t node) const;
   std::uint32_t moved_to(std::uint32_t node) const;

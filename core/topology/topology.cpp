@@ -24,6 +24,21 @@ LeafVertices unique_leaf_vertices(const Topology& topology, const Primitives& pr
   return result;
 }
 
+void set_depths_below(Topology& topology, std::uint32_t node, std::vector<std::uint32_t>& open) {
+  open.assign(1, node);
+  while (!open.empty()) {
+    const std::uint32_t parent = open.back();
+    open.pop_back();
+    const TopologyNode content = topology.nodes[parent];
+    if (content.is_leaf()) continue;
+    const auto depth = std::uint8_t(std::min(255, topology.depths[parent] + 1));
+    for (std::uint32_t child = content.first(); child < content.first() + content.count(); ++child) {
+      topology.depths[child] = depth;
+      open.push_back(child);
+    }
+  }
+}
+
 namespace {
 /// `ids`: number of primitive ids; `count`: number of `alive` ones.
 template <class Alive>

@@ -52,6 +52,9 @@ struct Topology {
   }
 };
 
+/// Sets the depths of all nodes below one from its depth. `open` is for temporary use. O(nodes below).
+void set_depths_below(Topology& topology, std::uint32_t node, std::vector<std::uint32_t>& open);
+
 /// The unique vertices of every leaf, ascending, as CSR lists indexed by node (inner nodes have none).
 struct LeafVertices {
   std::vector<std::uint32_t> offsets;  ///< size nodes + 1

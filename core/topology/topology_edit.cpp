@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 #include "core/base/assert.hpp"
 
@@ -54,7 +56,11 @@ void TopologyEditor::free_entries(const Topology& topology, std::uint32_t first)
 }
 
 void TopologyEditor::move(Topology& topology, std::uint32_t from, std::uint32_t to) {
-  const TopologyNode content = topology.nodes[to] = topology.nodes[from];
+  put(topology, topology.nodes[from], to);
+}
+
+void TopologyEditor::put(Topology& topology, TopologyNode content, std::uint32_t to) {
+  topology.nodes[to] = content;
   for (std::uint32_t k = content.first(); k < content.first() + content.count(); ++k)
     if (content.is_leaf())
       leaf_of_[topology.primitives[k]] = to;
@@ -140,33 +146,78 @@ void TopologyEditor::remove(Topology& topology, std::uint32_t primitive, Topolog
     packed_entries_ = 0;
     return;
   }
-  const std::uint32_t parent = topology.parents[leaf];
+  take_out(topology, leaf, edit);
+}
+
+/// Removes a node from its parent; its own content is lost.
+void TopologyEditor::take_out(Topology& topology, std::uint32_t node, TopologyEdit& edit) {
+  const std::uint32_t parent = topology.parents[node];
   const TopologyNode siblings = topology.nodes[parent];
   const std::uint32_t last = siblings.first() + siblings.count() - 1;
   edit.changed.push_back(parent);
-  const auto vacate = [&](std::uint32_t node) {
-    topology.nodes[node] = TopologyNode();
-    topology.parents[node] = none;
+  const auto vacate = [&](std::uint32_t id) {
+    topology.nodes[id] = TopologyNode();
+    topology.parents[id] = none;
   };
   if (siblings.count() > 2) {
     topology.nodes[parent] = TopologyNode::inner(siblings.first(), siblings.count() - 1);
-    if (leaf != last) {
-      move(topology, last, leaf);
-      topology.depths[leaf] = topology.depths[last];
-      edit.moved.push_back({last, leaf});
+    if (node != last) {
+      move(topology, last, node);
+      topology.depths[node] = topology.depths[last];
+      edit.moved.push_back({last, node});
       edit.vacated.push_back(last);
-      edit.fresh.push_back(leaf);
+      edit.fresh.push_back(node);
     }
     vacate(last);
     return;
   }
-  const std::uint32_t sibling = leaf == last ? siblings.first() : last;
+  const std::uint32_t sibling = node == last ? siblings.first() : last;
   move(topology, sibling, parent);
   edit.moved.push_back({sibling, parent});
   edit.vacated.push_back(sibling);
   vacate(siblings.first());
   vacate(last);
   free_pairs_.push_back(siblings.first());
+}
+
+void TopologyEditor::move_beside(Topology& topology, std::uint32_t node, std::uint32_t target,
+                                 TopologyEdit& edit) {
+  const auto check = [&](bool holds, const std::string& what) {
+    if (!holds)
+      throw std::invalid_argument("cannot move node " + std::to_string(node) + " beside node " +
+                                  std::to_string(target) + ": " + what);
+  };
+  for (const std::uint32_t id : {node, target})
+    check(id < topology.size() && topology.parents[id] < topology.size(), std::to_string(id) + " is no node");
+  for (std::uint32_t above = target; above != 0 || node == 0; above = topology.parents[above])
+    check(above != node && node != 0, "it would lie below itself");
+  const std::uint32_t parent = topology.parents[node];
+  check(topology.nodes[parent].count() > 2 || (target != parent && topology.parents[target] != parent),
+        "it lies there");
+
+  edit.clear();
+  topology.perfect = false;
+  const TopologyNode content = topology.nodes[node];
+  edit.vacated.push_back(node);
+  take_out(topology, node, edit);
+  const auto sibling = std::find_if(edit.moved.begin(), edit.moved.end(),
+                                    [&](const auto& move) { return move.from == target; });
+  const std::uint32_t place = sibling == edit.moved.end() ? target : sibling->to, pair = new_pair(topology);
+  if (sibling == edit.moved.end())
+    edit.moved.push_back({target, pair});
+  else
+    sibling->to = pair;
+  edit.moved.push_back({node, pair + 1});
+  edit.changed.push_back(place);
+  move(topology, place, pair);
+  put(topology, content, pair + 1);
+  topology.nodes[place] = TopologyNode::inner(pair, 2);
+  for (std::uint32_t child = pair; child < pair + 2; ++child) {
+    topology.parents[child] = place;
+    topology.depths[child] = below(topology.depths[place]);
+    edit.fresh.push_back(child);
+    set_depths_below(topology, child, open_);
+  }
 }
 
 void TopologyEditor::placed(const Topology& topology, std::uint32_t leaf) {

@@ -33,7 +33,7 @@ struct NodePair {
 /// B is a Box<S> or any other type for which argument-dependent lookup finds `bool overlap(bound of a, bound
 /// of b)`: every BoundingVolume (core/geometry/volumes) has one. An overlap may be false only where no point
 /// is in both. The views of the two bodies may differ. (Stored boxes have their own query:
-/// wide_hierarchy.hpp.) Two inner nodes: descend both; one leaf: descend the other. The caller owns the
+/// wide_query.hpp.) Two inner nodes: descend both; one leaf: descend the other. The caller owns the
 /// stack, which grows as needed, so that no work is dropped and a frame allocates nothing. For a body with
 /// itself, each two leaves are visited in both orders. `Count` is a counting policy.
 template <class ViewA, class ViewB, class Count, class OnLeaves>

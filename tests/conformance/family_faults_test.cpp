@@ -57,9 +57,10 @@ class Linear : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     std::uint64_t tests = 0;
     for (const std::uint32_t i : bounds_.segment().near_pairs) {
       const BodyPair& pair = this->scene_.pairs()[i];
-      query_.run_at(bounds_.hierarchy(pair.first), moment(pair.first, t), pair.first,
-                    bounds_.hierarchy(pair.second), moment(pair.second, t), pair.second, this->scene_,
-                    this->sampled_, {}, out, tests);
+      const WideMoment<S> first = moment(pair.first, t), second = moment(pair.second, t);
+      query_.run({.hierarchy = &bounds_.hierarchy(pair.first), .body = pair.first, .moment = &first},
+                 {.hierarchy = &bounds_.hierarchy(pair.second), .body = pair.second, .moment = &second}, out,
+                 tests);
     }
     return {};
   }
@@ -86,7 +87,7 @@ class Linear : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
             fault == Fault::reversed_time ? 1 - fraction : fraction};
   }
   LinearBounds<S> bounds_;
-  WideQuery<S> query_;
+  WideQuery<S> query_{this->scene_, this->sampled_};
   std::vector<std::vector<std::uint8_t>> stale_;
   std::uint64_t ends_ = 0;
 };

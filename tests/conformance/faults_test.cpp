@@ -212,9 +212,9 @@ class FaultyLazy : public StoredHierarchyStrategy<S, Count> {
   QueryStatus find_candidates(double, PairBuffer& out, const Budget& budget) override {
     std::uint64_t tests = 0;
     for (const BodyPair& pair : this->scene_.pairs()) {
-      const auto a = side(pair.first), b = side(pair.second);
+      const auto a = lazy_side(pair.first), b = lazy_side(pair.second);
       this->query_.start_lazy(a, b, budget);
-      while (const auto wanted = this->query_.step(a, b, this->scene_, this->sampled_, out, tests)) {
+      while (const auto wanted = this->query_.step(a, b, out, tests)) {
         if (wanted.first != wanted.none) make(pair.first, wanted.first);
         if (wanted.second != wanted.none) make(pair.second, wanted.second);
       }
@@ -232,10 +232,10 @@ class FaultyLazy : public StoredHierarchyStrategy<S, Count> {
   }
 
  private:
-  typename WideQuery<S>::LazySide side(std::uint32_t body) {
+  WideSide<S> lazy_side(std::uint32_t body) {
     stale_.resize(this->hierarchies_.size());
     stale_[body].resize(this->hierarchies_[body].node_count());
-    return {&this->hierarchies_[body], body, stale_[body].data()};
+    return {.hierarchy = &this->hierarchies_[body], .body = body, .stale = stale_[body].data()};
   }
   void update(std::uint32_t body) override {
     this->refit(body);  // of which only the root's box is used

@@ -15,6 +15,7 @@
 #include "core/families/wide/wide_hierarchy.hpp"
 #include "core/geometry/volumes/sphere.hpp"
 #include "core/topology/builders.hpp"
+#include "core/topology/subtree_swap.hpp"
 #include "tests/support/moving_grids.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
@@ -178,6 +179,54 @@ TEST(Allocation, NoneByRotationsOnceWarm) {
   }
   EXPECT_GT(rotations, 500u);
   EXPECT_EQ(spent, 0u);
+}
+
+/// The allocations of 2,000 random exchanges in a wide hierarchy, with new boxes, in the second of two equal
+/// rounds.
+template <class S>
+std::uint64_t allocations_of_exchanges(const BuilderConfig& config) {
+  const auto test = synthetic_scene<S>("sheets", 7);
+  const Body<S>& body = test.scene.bodies[0];
+  std::vector<S> positions(body.plans.keyframe(0),
+                           body.plans.keyframe(0) + std::size_t(3) * body.plans.vertex_count());
+  positions.push_back(0);
+  WideHierarchy<S> hierarchy;
+  hierarchy.assign(build_topology(body.primitives, positions.data(), config), body.primitives,
+                   active_kernel_set());
+  SubtreeSwap swap;
+  const auto is_above = [](const Topology& topology, std::uint32_t upper, std::uint32_t node) {
+    while (node != upper && node != 0) node = topology.parents[node];
+    return node == upper;
+  };
+  std::uint64_t spent = 0;
+  std::size_t made = 0;
+  for (int round = 0; round < 2; ++round) {
+    hierarchy.undo_edits(body.primitives);
+    hierarchy.refit(positions.data());
+    Random random(3);
+    const std::uint64_t before = allocations;
+    for (int i = 0; i < 2000; ++i) {
+      const std::uint32_t size = hierarchy.topology().size(), a = random.below(size), b = random.below(size);
+      if (is_above(hierarchy.topology(), a, b) || is_above(hierarchy.topology(), b, a)) continue;
+      hierarchy.edit([&](Topology& topology, TopologyEdit& edit) { swap.exchange(topology, a, b, edit); });
+      hierarchy.refit_edited(positions.data());
+      ++made;
+    }
+    hierarchy.refit(positions.data());
+    spent = allocations - before;
+  }
+  EXPECT_GT(made, 1000u);
+  return spent;
+}
+
+TEST(Allocation, NoneByExchangesInWideNodesOnceWarm) {
+  for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah})
+    for (const std::uint32_t width : {2u, 4u, 8u})
+      for (const std::uint32_t leaf : {1u, 4u}) {
+        const BuilderConfig config{.method = method, .width = width, .leaf_size = leaf};
+        EXPECT_EQ(allocations_of_exchanges<float>(config), 0u) << width << ", " << leaf;
+        EXPECT_EQ(allocations_of_exchanges<double>(config), 0u) << width << ", " << leaf;
+      }
 }
 
 /// Bytes of the heap in use.

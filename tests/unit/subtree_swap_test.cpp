@@ -212,6 +212,33 @@ TEST(SubtreeSwap, RefusesWhatIsNoExchange) {
   EXPECT_THROW(swapping.swap(wide, 1, 2, edit), std::invalid_argument);
 }
 
+// In topologies of any width, the primitives below exchanged places change sides, and no other id changes.
+TEST(SubtreeSwap, ExchangesInAnyWidth) {
+  Random random(21);
+  for (const std::uint32_t width : {2u, 4u, 8u}) {
+    Topology topology = random_tree(300, BuildMethod::sah, random, width);
+    SubtreeSwap swapping;
+    TopologyEdit edit;
+    std::vector<std::uint32_t> order;
+    for (int i = 0; i < 300; ++i) {
+      const auto [a, b] = two_places(topology, random);
+      const Topology before = topology;
+      swapping.exchange(topology, a, b, edit);
+      ASSERT_EQ(check_topology(compacted(topology, order), 300u), "") << a << " and " << b;
+      ASSERT_EQ(topology.nodes[a], before.nodes[b]);
+      ASSERT_EQ(topology.nodes[b], before.nodes[a]);
+      ASSERT_EQ(edit.moved.size(), 2u);
+      for (std::uint32_t node = 0; node < topology.size(); ++node) {
+        ASSERT_TRUE(node == a || node == b || topology.nodes[node] == before.nodes[node]);
+        ASSERT_EQ(topology.depths[node], node == 0 ? 0 : topology.depths[topology.parents[node]] + 1);
+      }
+    }
+    EXPECT_THROW(swapping.exchange(topology, 0, 5, edit), std::invalid_argument);
+    EXPECT_THROW(swapping.exchange(topology, 5, 5, edit), std::invalid_argument);
+    EXPECT_THROW(swapping.exchange(topology, 5, topology.size(), edit), std::invalid_argument);
+  }
+}
+
 TEST(Collapse, EditedTreesBecomeWideOnes) {
   Random random(11);
   SubtreeSwap swapping;

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <random>
 
-#include "core/families/wide/stored_hierarchy.hpp"
+#include "core/families/wide/wide_query.hpp"
 #include "core/topology/builders.hpp"
 
 namespace kbvh {
@@ -99,11 +99,10 @@ void check_all_shapes() {
           ASSERT_EQ(hierarchies[body].box(node), box_below(topology, node, boxes[body]))
               << where << ", node " << node;
       }
-      WideQuery<S> query;
+      WideQuery<S> query(view, motion);
       PairBuffer pairs;
       std::uint64_t tests = 0;
-      const QueryStatus status =
-          query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{}, pairs, tests);
+      const QueryStatus status = query.run({&hierarchies[0], 0}, {&hierarchies[1], 1}, pairs, tests);
       EXPECT_TRUE(status.complete()) << where;
       std::sort(pairs.begin(), pairs.end());
       ASSERT_EQ(pairs, expected) << where;
@@ -154,12 +153,12 @@ TEST(WideHierarchy, ABudgetLeavesWorkUndone) {
                              view.primitives(body), active_kernel_set());
     hierarchies[body].refit(playback.positions(body));
   }
-  WideQuery<float> query;
+  WideQuery<float> query(view, motion);
   PairBuffer all, some;
   std::uint64_t tests = 0;
-  query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{}, all, tests);
+  query.run({&hierarchies[0], 0}, {&hierarchies[1], 1}, all, tests);
   const QueryStatus status =
-      query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{tests / 2}, some, tests);
+      query.run({&hierarchies[0], 0}, {&hierarchies[1], 1}, some, tests, Budget{tests / 2});
   EXPECT_FALSE(status.complete());
   EXPECT_LT(some.size(), all.size());
 }
@@ -204,7 +203,7 @@ void check_overflowing_buffers(std::uint32_t leaf_size) {
         hierarchies[body].assign(build_topology<S>(boxes, {.width = width, .leaf_size = leaf_size}),
                                  view.primitives(body), set);
       }
-      WideQuery<S> query;
+      WideQuery<S> query(view, motion);
       for (const double t : {0.0, 1.0, 0.0}) {
         playback.seek(t);
         playback.evaluate_all();
@@ -214,7 +213,7 @@ void check_overflowing_buffers(std::uint32_t leaf_size) {
         }
         PairBuffer pairs;
         std::uint64_t tests = 0;
-        query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{}, pairs, tests);
+        query.run({&hierarchies[0], 0}, {&hierarchies[1], 1}, pairs, tests);
         std::sort(pairs.begin(), pairs.end());
         EXPECT_EQ(std::adjacent_find(pairs.begin(), pairs.end()), pairs.end());
         EXPECT_EQ(pairs.size(), t == 0 ? std::size_t(count) * count : 0) << name(set) << ", width " << width;
@@ -242,11 +241,10 @@ TEST(WideHierarchy, AQueryRefusesUnlikeHierarchies) {
                              view.primitives(body), active_kernel_set());
     hierarchies[body].refit(playback.positions(body));
   }
-  WideQuery<float> query;
+  WideQuery<float> query(view, motion);
   PairBuffer pairs;
   std::uint64_t tests = 0;
-  EXPECT_THROW(query.run(hierarchies[0], 0, hierarchies[1], 1, view, motion, Budget{}, pairs, tests),
-               std::invalid_argument);
+  EXPECT_THROW(query.run({&hierarchies[0], 0}, {&hierarchies[1], 1}, pairs, tests), std::invalid_argument);
 }
 
 TEST(WideHierarchy, SubtreesAndWhatIsAboveMakeAllBoxes) {

@@ -5,6 +5,7 @@
 
 #include "core/families/boxtree/boxtree_bounds.hpp"
 #include "core/families/wide/rows_on_demand.hpp"
+#include "core/scene/motion_view.hpp"
 
 namespace kbvh {
 

@@ -1,6 +1,7 @@
 #include "core/families/drift/near_pairs.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace kbvh {
 
@@ -35,7 +36,7 @@ void NearPairs<S>::build(const NearSide<S>& a, const NearSide<S>& b, std::uint32
   kernels_ = hierarchy_a.kernels();
   work.stack.resize(std::max<std::size_t>(work.stack.size(), 1024));
   work.leaf_pairs.resize(2 * leaf_pair_room);
-  const auto no_limit = Budget{}.box_tests;
+  constexpr auto no_limit = std::numeric_limits<std::uint64_t>::max();
   WideTraversal state{work.stack.data(), 0, work.stack.size(), work.leaf_pairs.data(), 0,
                       leaf_pair_room,    1, no_limit};
   if (overlap(hierarchy_a.box(0), hierarchy_b.box(0))) state.stack[state.depth++] = {0, 0};

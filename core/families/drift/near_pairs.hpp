@@ -6,6 +6,7 @@
 
 #include "core/families/drift/kernels/near_pairs.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
+#include "core/scene/pairs.hpp"
 
 namespace kbvh {
 

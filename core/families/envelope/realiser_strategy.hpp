@@ -7,7 +7,7 @@
 #include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/realiser_rows.hpp"
-#include "core/families/wide/wide_hierarchy.hpp"
+#include "core/families/wide/wide_query.hpp"
 
 namespace kbvh {
 
@@ -35,15 +35,15 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
       Body& body = bodies_[index];
       reads += body.rows.make_visited(this->sampled_, index, places_of(body));
     }
-    const auto side_of = [&](std::uint32_t body) -> typename WideQuery<S>::LazySide {
-      return {&hierarchy(body), body, bodies_[body].rows.stale()};
+    const auto side_of = [&](std::uint32_t body) -> WideSide<S> {
+      return {.hierarchy = &hierarchy(body), .body = body, .stale = bodies_[body].rows.stale()};
     };
     const auto make = [&](std::uint32_t index, std::uint32_t node) {
       Body& body = bodies_[index];
       reads += body.rows.make_wanted(node, this->sampled_, index, places_of(body));
     };
     const QueryStatus status =
-        query_lazily(query_, near_bodies_, this->scene_, this->sampled_, budget, side_of, make, out, tests);
+        query_lazily(query_, near_bodies_, this->scene_.pairs(), budget, side_of, make, out, tests);
     this->count_.add(Counter::box_tests, tests);
     this->count_.add(Counter::positions_fetched, reads);
     return status;
@@ -119,7 +119,7 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
     return box;
   }
 
-  WideQuery<S> query_;
+  WideQuery<S> query_{this->scene_, this->sampled_};
 };
 
 }  // namespace kbvh

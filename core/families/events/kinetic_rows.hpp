@@ -74,6 +74,8 @@ extern template class KineticRows<double>;
 template <class S>
 class KineticRowsQuery {
  public:
+  KineticRowsQuery(const SceneView<S>& scene, const SampledMotion<S>& motion) : query_(scene, motion) {}
+
   /// Lays out the rows of all trees. Throws std::invalid_argument if trees of a pair of bodies have different
   /// widths or leaf sizes.
   template <class Forest>
@@ -105,13 +107,14 @@ class KineticRowsQuery {
                    std::uint64_t& tests, std::uint64_t& reads) {
     for (std::uint32_t body = 0; body < rows_.size(); ++body)
       reads += rows_[body].make_visited(forest.tree(body), motion, body);
-    const auto side_of = [&](std::uint32_t body) -> typename WideQuery<S>::LazySide {
-      return {&rows_[body].rows().hierarchy(), body, rows_[body].rows().stale()};
+    const auto side_of = [&](std::uint32_t body) -> WideSide<S> {
+      RealiserRows<S>& rows = rows_[body].rows();
+      return {.hierarchy = &rows.hierarchy(), .body = body, .stale = rows.stale()};
     };
     const auto make = [&](std::uint32_t body, std::uint32_t node) {
       reads += rows_[body].make_wanted(node, forest.tree(body), motion, body);
     };
-    return query_lazily(query_, near_bodies, scene, motion, budget, side_of, make, out, tests);
+    return query_lazily(query_, near_bodies, scene.pairs(), budget, side_of, make, out, tests);
   }
 
   /// Returns the box of a node of a body's tree, stored in `room`, if a query may have read it. Returns null

@@ -55,7 +55,8 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
       : CountedStrategy<S, Count>(scene, motion),
         motion_(motion),
         near_bodies_(scene.pairs(), scene.body_count()),
-        by_rows_(query == KineticQuery::wide_rows) {
+        by_rows_(query == KineticQuery::wide_rows),
+        rows_(scene, motion) {
     std::size_t index = 0;
     (void)((index++ == kind &&
             (kind_ = std::make_unique<Kind<Forests>>(scene, motion, std::move(topologies), this->count_,

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/families/wide/leaf_slots.hpp"
+#include "core/topology/traversal.hpp"
 
 namespace kbvh {
 

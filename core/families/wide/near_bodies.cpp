@@ -80,7 +80,8 @@ void NearBodies::search(std::uint64_t& tests) {
   tree_.refit(corners_.data());
   found_.clear();
   std::uint64_t made = 0;
-  query_.run_over(tree_, 0, corners_.data(), tree_, 0, corners_.data(), found_, made);
+  const WideSide<double> bodies{&tree_, 0, corners_.data()};
+  query_.run(bodies, bodies, found_, made);
   tests += made;
   const double work = double(made) / double(found_.size() + bodies_);
   if (learn_work_) work_ = work;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/families/wide/wide_hierarchy.hpp"
+#include "core/scene/motion_view.hpp"
 
 namespace kbvh {
 

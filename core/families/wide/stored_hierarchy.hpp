@@ -4,7 +4,7 @@
 #include "core/contract/strategy.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
-#include "core/families/wide/wide_hierarchy.hpp"
+#include "core/families/wide/wide_query.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/topology/topology_edit.hpp"
 
@@ -33,10 +33,12 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
         scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
   }
 
+  /// Restarts with the initial topologies, or those of the last change of geometry.
   void reset_to(double /*t*/) override {
     plans_changed_ = false;
     near_bodies_.start_over();
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
+      hierarchies_[body].undo_edits(this->scene_.primitives(body));
       hierarchies_[body].positions_changed();
       refit(body);
     }
@@ -57,10 +59,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
       status.pending +=
           tests >= budget.box_tests
               ? 1
-              : query_
-                    .run(hierarchies_[pair.first], pair.first, hierarchies_[pair.second], pair.second,
-                         this->scene_, this->sampled_, rest_of(budget, tests), out, tests)
-                    .pending;
+              : query_.run(side(pair.first), side(pair.second), out, tests, rest_of(budget, tests)).pending;
     });
     this->count_.add(Counter::box_tests, tests);
     return status;
@@ -68,9 +67,9 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     const WideHierarchy<S>& hierarchy = hierarchies_[body];
-    AuditView view{hierarchy.topology(), {}, {}};
-    for (std::uint32_t node = 0; node < view.topology.size(); ++node)
-      view.boxes.push_back(to_double(hierarchy.box(node)));
+    std::vector<std::uint32_t> nodes;
+    AuditView view{hierarchy.built_topology(nodes), {}, {}};
+    for (const std::uint32_t node : nodes) view.boxes.push_back(to_double(hierarchy.box(node)));
     return view;
   }
 
@@ -92,10 +91,12 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
       WideHierarchy<S>& hierarchy = hierarchies_[body_change.body];
       const Primitives& primitives = this->scene_.primitives(body_change.body);
       const S* positions = this->sampled_.positions(body_change.body);
-      std::vector<Box<S>> boxes(hierarchy.topology().size());
-      for (std::uint32_t node = 0; node < boxes.size(); ++node) boxes[node] = hierarchy.box(node);
+      std::vector<std::uint32_t> nodes;
+      Topology topology = hierarchy.built_topology(nodes);
+      std::vector<Box<S>> boxes;
+      for (const std::uint32_t node : nodes) boxes.push_back(hierarchy.box(node));
       hierarchy.assign(
-          edited_topology(hierarchy.topology(), std::move(boxes), body_change, primitives, positions),
+          edited_topology(std::move(topology), std::move(boxes), body_change, primitives, positions),
           primitives, hierarchy.kernels());
       topology_changed(body_change.body);
       update(body_change.body);
@@ -129,11 +130,13 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
     };
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) work(this->scene_.pairs()[i]);
   }
+  /// Returns one side of a query of stored boxes.
+  WideSide<S> side(std::uint32_t body) { return {&hierarchies_[body], body}; }
   void refit(std::uint32_t body) { hierarchies_[body].refit(this->sampled_.positions(body)); }
 
   std::vector<WideHierarchy<S>> hierarchies_;
   NearBodies near_bodies_;
-  WideQuery<S> query_;
+  WideQuery<S> query_{this->scene_, this->sampled_};
   bool plans_changed_ = false;
   std::optional<SweptHierarchies<S>> swept_;  ///< made at the first request for contacts
 };

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/families/wide/near_bodies.hpp"
-#include "core/families/wide/wide_hierarchy.hpp"
+#include "core/families/wide/wide_query.hpp"
 
 namespace kbvh {
 
@@ -35,7 +35,8 @@ class SweptHierarchies {
       }
       twice.removed = primitives.removed;
       twice.removed_count = primitives.removed_count;
-      hierarchies_[body].assign(hierarchy.topology(), twice, hierarchy.kernels());
+      std::vector<std::uint32_t> nodes;
+      hierarchies_[body].assign(hierarchy.built_topology(nodes), twice, hierarchy.kernels());
       positions_[body].resize(std::size_t(6) * vertices + 1);
     }
   }
@@ -58,8 +59,7 @@ class SweptHierarchies {
     };
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = scene_.pairs()[i];
-      query.run_over(hierarchies_[pair.first], pair.first, positions_[pair.first].data(),
-                     hierarchies_[pair.second], pair.second, positions_[pair.second].data(), out, tests);
+      query.run(side(pair.first), side(pair.second), out, tests);
     }
   }
 
@@ -71,6 +71,8 @@ class SweptHierarchies {
   }
 
  private:
+  WideSide<S> side(std::uint32_t body) { return {&hierarchies_[body], body, positions_[body].data()}; }
+
   SceneView<S> scene_;
   NearBodies near_bodies_;
   std::vector<WideHierarchy<S>> hierarchies_;

@@ -4,23 +4,12 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/families/wide/leaf_slots.hpp"
-#include "core/scene/self_pairs.hpp"
-
 namespace kbvh {
-
-namespace {
-
-/// The number of leaf pairs that are collected before they are turned into pairs of primitives: few enough to
-/// stay in the cache.
-constexpr std::size_t leaf_pair_room = 2048;
-constexpr std::size_t chunk_room = 2048;
-
-}  // namespace
 
 template <class S>
 void WideHierarchy<S>::assign(Topology topology, const Primitives& primitives, KernelSet kernels) {
   topology_ = std::move(topology);
+  edited_ = false;
   leaf_vertices_ = unique_leaf_vertices(topology_, primitives);
   kernels_ = kernels;
   refit_ = wide_refit_kernels<S>(kernels).of(topology_.width);
@@ -72,6 +61,11 @@ void WideHierarchy<S>::place_nodes() {
     }
     nodes_.push_back(node);
   }
+  check_node_count();
+}
+
+template <class S>
+void WideHierarchy<S>::check_node_count() const {
   if (nodes_.size() > (WidePair::leaf_bit >> 3))
     throw std::length_error("a hierarchy of more than 2^28 nodes");
 }
@@ -114,30 +108,50 @@ void WideHierarchy<S>::list_vertices() {
   std::vector<std::uint32_t> leaf_of(nodes_.size() * width, none);
   for (std::uint32_t i = 0; i < topology_.size(); ++i)
     if (topology_.nodes[i].is_leaf()) leaf_of[std::size_t(places_[i].node) * width + places_[i].lane] = i;
-  std::vector<std::size_t> lengths(nodes_.size(), 0);
   listed_.assign(nodes_.size(), 0);
-  for (std::uint32_t n = 0; n < nodes_.size(); ++n)
-    for (std::uint32_t lane = 0; lane < nodes_[n].leaf_count; ++lane) {
-      const std::size_t size = leaf_vertices_[leaf_of[std::size_t(n) * width + lane]].size();
-      lengths[n] = std::max(lengths[n], size);
-      listed_[n] += std::uint32_t(size);
-    }
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
-    WideNode& node = nodes_[n];
-    if (node.leaf_count == 0) continue;
-    const std::size_t length = lengths[n];
-    if (length > std::numeric_limits<std::uint16_t>::max())
-      throw std::length_error("a leaf has " + std::to_string(length) + " vertices; 65535 are possible");
-    if (vertices_.size() + length * width > std::numeric_limits<std::uint32_t>::max())
-      throw std::length_error("the vertex lists of a hierarchy exceed 2^32 entries");
-    node.list = std::uint32_t(vertices_.size());
-    node.length = std::uint16_t(length);
-    vertices_.resize(vertices_.size() + length * width);
-    for (std::uint32_t lane = 0; lane < width; ++lane) {
-      const auto list = leaf_vertices_[leaf_of[std::size_t(n) * width + (lane < node.leaf_count ? lane : 0)]];
-      for (std::size_t i = 0; i < length; ++i)
-        vertices_[node.list + i * width + list_place(lane, width)] = 3 * list[std::min(i, list.size() - 1)];
-    }
+    if (nodes_[n].leaf_count == 0) continue;
+    LeafLists lists;
+    for (std::uint32_t lane = 0; lane < nodes_[n].leaf_count; ++lane)
+      lists[lane] = leaf_vertices_[leaf_of[std::size_t(n) * width + lane]];
+    measure_lists(n, lists);
+    nodes_[n].list = new_list(nodes_[n].length);
+    write_lists(n, lists);
+  }
+}
+
+template <class S>
+void WideHierarchy<S>::measure_lists(std::uint32_t wide, const LeafLists& lists) {
+  WideNode& node = nodes_[wide];
+  std::size_t length = 0;
+  listed_[wide] = 0;
+  for (std::uint32_t lane = 0; lane < node.leaf_count; ++lane) {
+    length = std::max(length, lists[lane].size());
+    listed_[wide] += std::uint32_t(lists[lane].size());
+  }
+  if (length > std::numeric_limits<std::uint16_t>::max())
+    throw std::length_error("a leaf has " + std::to_string(length) + " vertices; 65535 are possible");
+  node.length = std::uint16_t(length);
+}
+
+template <class S>
+std::uint32_t WideHierarchy<S>::new_list(std::size_t length) {
+  const std::size_t first = vertices_.size(), end = first + length * topology_.width;
+  if (end > std::numeric_limits<std::uint32_t>::max())
+    throw std::length_error("the vertex lists of a hierarchy exceed 2^32 entries");
+  vertices_.resize(end);
+  return std::uint32_t(first);
+}
+
+template <class S>
+void WideHierarchy<S>::write_lists(std::uint32_t wide, const LeafLists& lists) {
+  const WideNode& node = nodes_[wide];
+  if (node.leaf_count == 0) return;
+  const std::uint32_t width = topology_.width;
+  for (std::uint32_t lane = 0; lane < width; ++lane) {
+    const auto list = lists[lane < node.leaf_count ? lane : 0];
+    for (std::size_t i = 0; i < node.length; ++i)
+      vertices_[node.list + i * width + list_place(lane, width)] = 3 * list[std::min(i, list.size() - 1)];
   }
 }
 
@@ -216,219 +230,10 @@ std::size_t WideHierarchy<S>::bytes() const {
           stamps_.capacity() + fetched_.capacity() + parent_.capacity() + listed_.capacity()) *
              sizeof(std::uint32_t) +
          places_.capacity() * sizeof(Place) + subtrees_.capacity() * sizeof(Subtree) +
-         above_subtrees_.capacity() * sizeof(std::uint32_t);
-}
-
-template <class S>
-QueryStatus WideQuery<S>::run(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b,
-                              std::uint32_t body_b, const SceneView<S>& scene, const SampledMotion<S>& motion,
-                              const Budget& budget, PairBuffer& out, std::uint64_t& tests) {
-  if (a.empty() || b.empty()) return {};
-  if (!a.suits(b)) throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
-  WideTraversal state = fresh_traversal(budget);
-  if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
-  const auto& kernels = wide_overlap_kernels<S>(a.kernels());
-  const std::uint32_t width = a.topology().width;
-  const auto traverse = body_a == body_b ? kernels.self(width) : kernels.traverse(width);
-  return complete(
-      state, [&] { traverse(a.arrays(), b.arrays(), state); },
-      [&] { leaves_to_pairs(a, body_a, b, body_b, scene, motion, state.found, out, tests); }, tests);
-}
-
-template <class S>
-void WideQuery<S>::run_over(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a,
-                            WideHierarchy<S>& b, std::uint32_t body_b, const S* positions_b, PairBuffer& out,
-                            std::uint64_t& tests) {
-  if (a.empty() || b.empty()) return;
-  if (!a.suits(b)) throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
-  WideTraversal state = fresh_traversal(Budget{});
-  if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
-  const auto& kernels = wide_overlap_kernels<S>(a.kernels());
-  const std::uint32_t width = a.topology().width;
-  const auto traverse = body_a == body_b ? kernels.self(width) : kernels.traverse(width);
-  complete(
-      state, [&] { traverse(a.arrays(), b.arrays(), state); },
-      [&] {
-        leaves_to_pairs(a, body_a, positions_a, b, body_b, positions_b, nullptr, state.found, out, tests);
-      },
-      tests);
-}
-
-template <class S>
-template <class Traverse, class Take>
-QueryStatus WideQuery<S>::complete(WideTraversal& state, const Traverse& traverse, const Take& take,
-                                   std::uint64_t& tests) {
-  while (state.depth > 0 && state.tests < state.test_limit) {
-    traverse();
-    take();
-    state.found = 0;
-    grow(state);
-  }
-  tests += state.tests;
-  return {state.depth};
-}
-
-template <class S>
-QueryStatus WideQuery<S>::run_at(WideHierarchy<S>& a, const WideMoment<S>& moment_a, std::uint32_t body_a,
-                                 WideHierarchy<S>& b, const WideMoment<S>& moment_b, std::uint32_t body_b,
-                                 const SceneView<S>& scene, const SampledMotion<S>& motion,
-                                 const Budget& budget, PairBuffer& out, std::uint64_t& tests) {
-  if (a.empty() || b.empty()) return {};
-  const std::uint32_t width = a.topology().width;
-  const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(a.kernels());
-  WideTraversal state = fresh_traversal(budget);
-  for (const WideMoment<S>* moment : {&moment_a, &moment_b})
-    if (moment->stale[0] != 0) {
-      kernels.make(width)(*moment, 0);
-      moment->stale[0] = 0;
-    }
-  if (overlap(a.box(0), b.box(0))) stack_[state.depth++] = {0, 0};
-  return complete(
-      state, [&] { kernels.at(width)(moment_a, moment_b, state); },
-      [&] { leaves_to_pairs(a, body_a, b, body_b, scene, motion, state.found, out, tests); }, tests);
-}
-
-template <class S>
-WideTraversal WideQuery<S>::fresh_traversal(const Budget& budget) {
-  stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
-  leaf_pairs_.resize(2 * leaf_pair_room);
-  return {stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pair_room, 1, budget.box_tests};
-}
-
-template <class S>
-void WideQuery<S>::grow(WideTraversal& state) {
-  if (state.depth + max_pairs_per_step < state.stack_room) return;
-  stack_.resize(2 * stack_.size());
-  state.stack = stack_.data();
-  state.stack_room = stack_.size();
-}
-
-template <class S>
-void WideQuery<S>::start_lazy(const LazySide& a, const LazySide& b, const Budget& budget) {
-  lazy_ = fresh_traversal(budget);
-  lazy_.stale_a = a.stale;
-  lazy_.stale_b = b.stale;
-  if (a.hierarchy->empty() || b.hierarchy->empty()) {
-    lazy_.tests = 0;
-    return;
-  }
-  if (!a.hierarchy->suits(*b.hierarchy))
-    throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
-  if (overlap(a.hierarchy->box(0), b.hierarchy->box(0))) lazy_.stack[lazy_.depth++] = {0, 0};
-}
-
-template <class S>
-typename WideQuery<S>::Wanted WideQuery<S>::step(const LazySide& a, const LazySide& b,
-                                                 const SceneView<S>& scene, const SampledMotion<S>& motion,
-                                                 PairBuffer& out, std::uint64_t& tests) {
-  const auto traverse = wide_overlap_kernels<S>(a.hierarchy->kernels()).lazy(a.hierarchy->topology().width);
-  while (lazy_.depth > 0 && lazy_.tests < lazy_.test_limit) {
-    traverse(a.hierarchy->arrays(), b.hierarchy->arrays(), lazy_);
-    if (lazy_.depth > 0 && lazy_.tests < lazy_.test_limit) {
-      Wanted wanted;
-      if (lazy_.first_is_stale()) wanted.first = lazy_.stack[lazy_.depth - 1].first;
-      if (lazy_.second_is_stale()) wanted.second = lazy_.stack[lazy_.depth - 1].second;
-      if (wanted) return wanted;
-    }
-    leaves_to_pairs(*a.hierarchy, a.body, *b.hierarchy, b.body, scene, motion, lazy_.found, out, tests);
-    lazy_.found = 0;
-    grow(lazy_);
-  }
-  // Processes the pairs found just before a pause, if no other work followed.
-  if (lazy_.found != 0)
-    leaves_to_pairs(*a.hierarchy, a.body, *b.hierarchy, b.body, scene, motion, lazy_.found, out, tests);
-  lazy_.found = 0;
-  tests += lazy_.tests;
-  return {};
-}
-
-template <class S>
-void WideQuery<S>::fetch_leaves(WideHierarchy<S>& h, std::uint32_t body, std::size_t side, std::size_t count,
-                                const SceneView<S>& scene, const SampledMotion<S>& motion) {
-  // Fetches missing positions all at once: calls with a few vertices each cost more than the vertices.
-  if (h.padded_leaf_size() == 1 || motion.all_current(body)) return;
-  to_fetch_.clear();
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t leaf = h.leaf_number(leaf_pairs_[2 * i + side]);
-    if (!h.to_be_fetched(leaf)) continue;
-    for (const std::uint32_t primitive : h.leaf_primitives(leaf)) {
-      const auto vertices = scene.primitives(body)[primitive];
-      to_fetch_.insert(to_fetch_.end(), vertices.begin(), vertices.end());
-    }
-  }
-  motion.fetch(body, to_fetch_);
-}
-
-template <class S>
-void WideQuery<S>::leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b,
-                                   std::uint32_t body_b, const SceneView<S>& scene,
-                                   const SampledMotion<S>& motion, std::size_t count, PairBuffer& out,
-                                   std::uint64_t& tests) {
-  fetch_leaves(a, body_a, 0, count, scene, motion);
-  fetch_leaves(b, body_b, 1, count, scene, motion);
-  const Primitives* neighbours = body_a == body_b ? &scene.primitives(body_a) : nullptr;
-  leaves_to_pairs(a, body_a, motion.positions(body_a), b, body_b, motion.positions(body_b), neighbours, count,
-                  out, tests);
-}
-
-template <class S>
-void WideQuery<S>::leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a,
-                                   WideHierarchy<S>& b, std::uint32_t body_b, const S* positions_b,
-                                   const Primitives* neighbours, std::size_t count, PairBuffer& out,
-                                   std::uint64_t& tests) {
-  if (body_a != body_b) {
-    append_pairs(a, body_a, positions_a, b, body_b, positions_b, 0, count, out, tests);
-    return;
-  }
-  const std::size_t different = different_leaves_first(leaf_pairs_.data(), count);
-  const auto append = [&](LeavesOf leaves, std::size_t begin, std::size_t end) {
-    const std::size_t before = out.size();
-    append_pairs(a, body_a, positions_a, b, body_b, positions_b, begin, end, out, tests);
-    out.resize(before + keep_self_pairs(neighbours, leaves, out.data() + before, out.size() - before));
-  };
-  append(LeavesOf::two, 0, different);
-  append(LeavesOf::one, different, count);
-}
-
-template <class S>
-void WideQuery<S>::append_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a,
-                                WideHierarchy<S>& b, std::uint32_t body_b, const S* positions_b,
-                                std::size_t begin, std::size_t end, PairBuffer& out, std::uint64_t& tests) {
-  if (a.padded_leaf_size() == 1) {
-    for (std::size_t i = begin; i < end; ++i)
-      out.push_back({body_a, a.leaf_primitives(a.leaf_number(leaf_pairs_[2 * i]))[0], body_b,
-                     b.leaf_primitives(b.leaf_number(leaf_pairs_[2 * i + 1]))[0]});
-    return;
-  }
-  chunk_.resize(chunk_room);
-  WideLeafPairs<S> state{a.arrays(),
-                         b.arrays(),
-                         a.leaves(positions_a),
-                         b.leaves(positions_b),
-                         leaf_pairs_.data(),
-                         begin,
-                         end,
-                         body_a,
-                         body_b,
-                         chunk_.data(),
-                         0,
-                         chunk_room,
-                         0};
-  const auto kernel = wide_overlap_kernels<S>(a.kernels()).pairs(a.topology().width, a.padded_leaf_size());
-  while (state.next < state.count) {
-    kernel(state);
-    const std::size_t before = out.size();
-    out.resize(before + state.found);
-    for (std::size_t i = 0; i < state.found; ++i)
-      out[before + i] = {chunk_[i].body_a, chunk_[i].primitive_a, chunk_[i].body_b, chunk_[i].primitive_b};
-    state.found = 0;
-  }
-  tests += state.tests;
+         above_subtrees_.capacity() * sizeof(std::uint32_t) + edits_.bytes();
 }
 
 template class WideHierarchy<float>;
 template class WideHierarchy<double>;
-template class WideQuery<float>;
-template class WideQuery<double>;
 
 }  // namespace kbvh

@@ -1,50 +1,69 @@
 #pragma once
-#include <boost/align/aligned_allocator.hpp>
+#include <algorithm>
 #include <cstdint>
 #include <span>
-#include <stdexcept>
 #include <vector>
 
-#include "core/base/counters.hpp"
-#include "core/families/wide/kernels/wide_linear.hpp"
 #include "core/families/wide/kernels/wide_overlap.hpp"
 #include "core/families/wide/kernels/wide_refit.hpp"
+#include "core/families/wide/wide_edits.hpp"
 #include "core/kernels/kernel_set.hpp"
-#include "core/scene/motion_view.hpp"
-#include "core/scene/pairs.hpp"
 #include "core/topology/topology.hpp"
-#include "core/topology/traversal.hpp"
 
 namespace kbvh {
-
-/// An array that starts on a cache line.
-template <class T>
-using AlignedArray = std::vector<T, boost::alignment::aligned_allocator<T, 64>>;
 
 /// One body's hierarchy with stored boxes, laid out for refits and queries that process all children of a
 /// node at once: structure of arrays per node, -upper instead of upper, the unique vertices of a node's
 /// leaves in lists of equal length (core/families/wide/kernels/wide_layout.hpp). Any topology fits; perfect
 /// ones are fastest.
+///
+/// The topology may be edited. Wide nodes keep their numbers as far as possible then, so parents may have
+/// larger numbers than their children, and refits follow a list of nodes; without edits there is none.
 template <class S>
 class WideHierarchy {
  public:
-  /// Takes a topology over the primitives; boxes are invalid until they are computed. Only this function
-  /// allocates. Throws std::length_error beyond 2^28 nodes, 65,535 vertices in a leaf, or 2^32 entries of
-  /// vertex lists.
+  /// Takes a topology over the primitives, in built layout; boxes are invalid until they are computed. Throws
+  /// std::length_error beyond 2^28 nodes, 65,535 vertices in a leaf, or 2^32 entries of vertex lists.
   void assign(Topology topology, const Primitives& primitives, KernelSet kernels);
 
+  /// Returns the topology. After edits, ids may be unused, and parents may have larger ids than their
+  /// children.
   const Topology& topology() const { return topology_; }
   bool empty() const { return topology_.empty(); }
 
+  /// Edits the topology in place: change(topology, edit) changes it and lists the changes, as SubtreeSwap and
+  /// TopologyEditor do. Leaves may move, but their primitives must stay the same. The layout follows: nodes
+  /// with other children are written anew, and subtrees that moved are not touched below their roots.
+  /// O(width + greatest height) per changed node. Boxes move along; those of changed nodes, and all above,
+  /// are to be computed by `refit_edited` or `refit`. The first edit after `assign` is O(nodes). Allocates
+  /// only where it needs more nodes, leaves or longer lists of one size than ever before.
+  template <class Change>
+  void edit(Change&& change) {
+    begin_edits();
+    edits_.edit.clear();
+    change(topology_, edits_.edit);
+    follow_edit();
+  }
+  /// Recomputes the boxes of the nodes that the last edit changed, and of all nodes above them; all others
+  /// must be current.
+  void refit_edited(const S* positions);
+  /// Returns whether the topology was edited since `assign`.
+  bool edited() const { return edited_; }
+  /// Restores the topology of the last `assign`; boxes are invalid until they are computed. O(nodes).
+  void undo_edits(const Primitives& primitives);
+  /// Returns the topology in built layout, and in nodes[i] the node of `topology` that is its node i.
+  Topology built_topology(std::vector<std::uint32_t>& nodes) const;
+
   /// Recomputes every box from positions [vertex][3], children first. O(nodes + vertices of leaves).
-  void refit(const S* positions) { refit_nodes(positions, 0, node_count()); }
-  /// Recomputes the boxes of the wide nodes [begin, end); children must be current or in the range.
+  void refit(const S* positions) { refit_all(arrays(), positions); }
+  /// Recomputes the boxes of the wide nodes [begin, end); children must be current, or in the range and
+  /// behind their parents. (After edits, they need not be behind them, and nodes may be unused.)
   void refit_nodes(const S* positions, std::uint32_t begin, std::uint32_t end) {
     refit_(arrays(), positions, begin, end);
   }
   /// Refits into rows and node boxes stored elsewhere, in the layout of `arrays`.
   void refit_into(S* child_bounds, S* node_bounds, const S* positions) const {
-    refit_into(child_bounds, node_bounds, positions, 0, node_count());
+    refit_all({nodes_.data(), child_bounds, node_bounds, vertices_.data()}, positions);
   }
   void refit_into(S* child_bounds, S* node_bounds, const S* positions, std::uint32_t begin,
                   std::uint32_t end) const {
@@ -80,7 +99,11 @@ class WideHierarchy {
   Box<S> box_in(const S* child_bounds, const S* node_bounds, std::uint32_t node) const;
   void set_box(std::uint32_t node, const Box<S>& box);
   /// Returns the unique vertices of a leaf, ascending; nothing for an inner node.
-  std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const { return leaf_vertices_[node]; }
+  std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const {
+    if (!edited_) return leaf_vertices_[node];
+    if (!topology_.nodes[node].is_leaf()) return {};
+    return leaf_vertices_[edits_.home[nodes_[places_[node].node].first_leaf + places_[node].lane]];
+  }
   std::size_t leaf_vertex_count() const { return leaf_vertices_.vertices.size(); }
 
   /// Invalidates the boxes of primitives, because positions changed; queries recompute them on demand.
@@ -99,7 +122,7 @@ class WideHierarchy {
     return {leaf_lists(), rows_.data(), stamps_.data(), stamp_, positions};
   }
   WideLeafLists leaf_lists() const {
-    return {first_entry_.data(), first_corner_.data(), corners_.data(), primitives_.data()};
+    return {first_entry_.data(), end_entries(), first_corner_.data(), corners_.data(), primitives_.data()};
   }
   std::uint32_t leaf_count() const { return std::uint32_t(stamps_.size()); }
   /// Returns true at the first call since `positions_changed` for a leaf, numbered as by
@@ -111,7 +134,7 @@ class WideHierarchy {
   }
   std::uint32_t leaf_number(LeafSlot slot) const { return nodes_[slot.node()].first_leaf + slot.lane(); }
   std::span<const std::uint32_t> leaf_primitives(std::uint32_t leaf) const {
-    return {primitives_.data() + first_entry_[leaf], primitives_.data() + first_entry_[leaf + 1]};
+    return {primitives_.data() + first_entry_[leaf], primitives_.data() + end_entries()[leaf]};
   }
   /// Returns the number of lanes for the primitives of a leaf in a query; 1: the leaf's box is that of its
   /// primitive.
@@ -131,18 +154,39 @@ class WideHierarchy {
   std::size_t listed_vertices() const { return vertices_.size(); }
 
  private:
-  struct Place {
-    std::uint32_t node = none, lane = 0;  // place in the parent; the root has none
-    std::uint32_t wide = none;            // of inner nodes
-  };
-  static constexpr std::uint32_t none = ~std::uint32_t(0);
+  template <class>
+  friend class WideFollower;
+  using Place = WidePlace;
+  static constexpr std::uint32_t none = WidePlace::none;
   void place_nodes();
   void find_subtrees();
   void list_vertices();
   void list_leaves(const Primitives& primitives);
+  void check_node_count() const;
+  /// Sets the length of a node's vertex lists, and the sum of their vertices.
+  void measure_lists(std::uint32_t wide, const LeafLists& lists);
+  /// Returns the place of new lists of one length for all lanes.
+  std::uint32_t new_list(std::size_t length);
+  void write_lists(std::uint32_t wide, const LeafLists& lists);
+  void begin_edits();
+  void follow_edit();
+  void refit_all(const WideArrays<S>& arrays, const S* positions) const {
+    if (edited_)
+      refit_listed(arrays, positions, edits_.order.nodes());
+    else
+      refit_(arrays, positions, 0, node_count());
+  }
+  void refit_listed(const WideArrays<S>& arrays, const S* positions,
+                    std::span<const std::uint32_t> nodes) const {
+    wide_refit_kernels<S>(kernels_).listed(topology_.width)(arrays, positions, nodes.data(),
+                                                            std::uint32_t(nodes.size()));
+  }
+  const std::uint32_t* end_entries() const {
+    return edited_ ? edits_.end_entry.data() : first_entry_.data() + 1;
+  }
 
   Topology topology_;
-  LeafVertices leaf_vertices_;
+  LeafVertices leaf_vertices_;  // by node of the topology as assigned
   KernelSet kernels_ = KernelSet::portable;
   typename WideRefitKernels<S>::Refit refit_ = nullptr;
   std::vector<Place> places_;          // of the topology's nodes
@@ -156,102 +200,11 @@ class WideHierarchy {
   std::vector<std::uint32_t> first_entry_, first_corner_, corners_, primitives_, stamps_, fetched_;
   AlignedArray<S> rows_;
   std::uint32_t stamp_ = 1;
+  WideEdits<S> edits_;
+  bool edited_ = false;
 };
-
-/// Queries two wide hierarchies; keeps its buffers from frame to frame.
-template <class S>
-class WideQuery {
- public:
-  /// Appends the pairs of primitives whose boxes, and those of all nodes above them, overlap. Both
-  /// hierarchies need the same width and leaf size. If both bodies are the same, the hierarchies must be the
-  /// same, too; the result is the pairs within the body, without those that share a vertex. Returns the work
-  /// that the budget left undone; adds the box tests made to `tests`.
-  QueryStatus run(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
-                  const SceneView<S>& scene, const SampledMotion<S>& motion, const Budget& budget,
-                  PairBuffer& out, std::uint64_t& tests);
-
-  /// Queries hierarchies over primitives and positions that are not a scene's, and keeps pairs that share a
-  /// vertex.
-  void run_over(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a, WideHierarchy<S>& b,
-                std::uint32_t body_b, const S* positions_b, PairBuffer& out, std::uint64_t& tests);
-
-  /// Queries the boxes of one moment of a segment in which they are linear in time: boxes that the query
-  /// reads are computed from the moments' ends, into the hierarchies. The caller marks all nodes as stale
-  /// first.
-  QueryStatus run_at(WideHierarchy<S>& a, const WideMoment<S>& moment_a, std::uint32_t body_a,
-                     WideHierarchy<S>& b, const WideMoment<S>& moment_b, std::uint32_t body_b,
-                     const SceneView<S>& scene, const SampledMotion<S>& motion, const Budget& budget,
-                     PairBuffer& out, std::uint64_t& tests);
-
-  /// One side of a lazy query: `stale[wide node]` is not 0 while the boxes of the node's children are not
-  /// current. The boxes of the roots must be current.
-  struct LazySide {
-    WideHierarchy<S>* hierarchy;
-    std::uint32_t body;
-    const std::uint8_t* stale;
-  };
-  /// Wide nodes whose boxes a lazy query waits for; `none`: no wait on that side.
-  struct Wanted {
-    static constexpr std::uint32_t none = ~std::uint32_t(0);
-    std::uint32_t first = none, second = none;
-    explicit operator bool() const { return first != none || second != none; }
-  };
-  /// Starts the same query for hierarchies whose boxes are computed at their first use:
-  ///   query.start_lazy(a, b, budget);
-  ///   while (const auto wanted = query.step(a, b, scene, motion, out, tests))
-  ///     compute the boxes of their children, and clear the marks
-  /// The query reads no marked box. It costs `run` nothing, because it uses a separate traversal.
-  void start_lazy(const LazySide& a, const LazySide& b, const Budget& budget);
-  Wanted step(const LazySide& a, const LazySide& b, const SceneView<S>& scene, const SampledMotion<S>& motion,
-              PairBuffer& out, std::uint64_t& tests);
-  /// Returns the work that the budget left undone, once `step` waits for nothing.
-  QueryStatus lazy_status() const { return {lazy_.depth}; }
-
-  /// Returns the memory of the buffers in bytes.
-  std::size_t bytes() const {
-    return stack_.capacity() * sizeof(WidePair) + leaf_pairs_.capacity() * sizeof(LeafSlot) +
-           chunk_.capacity() * sizeof(FoundPair) + to_fetch_.capacity() * sizeof(std::uint32_t);
-  }
-
- private:
-  /// Returns an empty traversal in this query's buffers.
-  WideTraversal fresh_traversal(const Budget& budget);
-  void grow(WideTraversal& state);
-  /// Traverses and processes the found pairs until nothing is left or the budget is used up.
-  template <class Traverse, class Take>
-  QueryStatus complete(WideTraversal& state, const Traverse& traverse, const Take& take,
-                       std::uint64_t& tests);
-  void leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, WideHierarchy<S>& b, std::uint32_t body_b,
-                       const SceneView<S>& scene, const SampledMotion<S>& motion, std::size_t count,
-                       PairBuffer& out, std::uint64_t& tests);
-  void fetch_leaves(WideHierarchy<S>& h, std::uint32_t body, std::size_t side, std::size_t count,
-                    const SceneView<S>& scene, const SampledMotion<S>& motion);
-  /// Leaves out pairs within one body that share a vertex, unless `neighbours` is null.
-  void leaves_to_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a, WideHierarchy<S>& b,
-                       std::uint32_t body_b, const S* positions_b, const Primitives* neighbours,
-                       std::size_t count, PairBuffer& out, std::uint64_t& tests);
-  void append_pairs(WideHierarchy<S>& a, std::uint32_t body_a, const S* positions_a, WideHierarchy<S>& b,
-                    std::uint32_t body_b, const S* positions_b, std::size_t begin, std::size_t end,
-                    PairBuffer& out, std::uint64_t& tests);
-  std::vector<WidePair> stack_;
-  std::vector<LeafSlot> leaf_pairs_;
-  std::vector<FoundPair> chunk_;
-  std::vector<std::uint32_t> to_fetch_;
-  WideTraversal lazy_{};
-};
-
-/// Checks that queries of two bodies have one layout: throws std::invalid_argument unless, for each pair of
-/// bodies, the hierarchies hierarchy_of(body) have one width and leaf size.
-template <class HierarchyOf>
-void check_layouts(std::span<const BodyPair> pairs, HierarchyOf&& hierarchy_of) {
-  for (const BodyPair& pair : pairs)
-    if (!hierarchy_of(pair.first).suits(hierarchy_of(pair.second)))
-      throw std::invalid_argument("topologies of all bodies need one width and leaf size");
-}
 
 extern template class WideHierarchy<float>;
 extern template class WideHierarchy<double>;
-extern template class WideQuery<float>;
-extern template class WideQuery<double>;
 
 }  // namespace kbvh

@@ -81,8 +81,8 @@ void near(LeafNear<S>& shared) {
     const S* rows_a = near_rows<S, padded>(state.leaves_a, leaf_a);
     const S* rows_b = near_rows<S, padded>(state.leaves_b, leaf_b);
     const std::uint32_t begin_a = lists_a.first_entry[leaf_a], begin_b = lists_b.first_entry[leaf_b];
-    const std::uint32_t count_a = lists_a.first_entry[leaf_a + 1] - begin_a;
-    const std::uint32_t count_b = lists_b.first_entry[leaf_b + 1] - begin_b;
+    const std::uint32_t count_a = lists_a.end_entry[leaf_a] - begin_a;
+    const std::uint32_t count_b = lists_b.end_entry[leaf_b] - begin_b;
     // The leaf box of b is inflated by the margin of b, the rows of a are not.
     const Bounds<S> box_b = bounds_of(
         lane_box(state.b.child_bounds + slot_b.node() * std::size_t(6) * width, width, slot_b.lane()));

@@ -11,7 +11,7 @@ template <class S, std::size_t padded>
 [[gnu::noinline]] void fit_leaf(const WideLeafLists& lists, std::uint32_t leaf, const S* positions, S* rows) {
   using P = Points<S, 1>;
   using Pack = typename P::Pack;
-  const std::uint32_t begin = lists.first_entry[leaf], end = lists.first_entry[leaf + 1];
+  const std::uint32_t begin = lists.first_entry[leaf], end = lists.end_entry[leaf];
   for (std::uint32_t quad = 0; quad < padded; quad += 4) {
     Pack lower[4], upper[4];
     for (std::uint32_t j = 0; j < 4; ++j) {

@@ -208,7 +208,7 @@ class RowMaker {
     for (std::size_t w = 0; w < count_; ++w) {
       const Wanted& wanted = wanted_[w];
       const WideLeafLists& lists = wanted.leaves->lists;
-      for (std::uint32_t entry = lists.first_entry[wanted.leaf]; entry < lists.first_entry[wanted.leaf + 1];
+      for (std::uint32_t entry = lists.first_entry[wanted.leaf]; entry < lists.end_entry[wanted.leaf];
            ++entry)
         __builtin_prefetch(wanted.leaves->positions[wanted.end] + lists.corners[lists.first_corner[entry]]);
     }
@@ -373,7 +373,7 @@ void leaf_join(WideLeafJoin<S>& shared) {
   };
   const auto rows_of = [](const WideLinearLeaves<S>& leaves, std::uint32_t leaf) {
     const std::size_t place = std::size_t(leaf) * 6 * padded;
-    const std::uint32_t begin = leaves.lists.first_entry[leaf], end = leaves.lists.first_entry[leaf + 1];
+    const std::uint32_t begin = leaves.lists.first_entry[leaf], end = leaves.lists.end_entry[leaf];
     return LeafRows<S>{leaves.rows[0] + place, leaves.rows[1] + place, leaves.lists.primitives + begin,
                        end - begin};
   };

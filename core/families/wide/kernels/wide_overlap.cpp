@@ -52,8 +52,8 @@ void leaf_pairs(WideLeafPairs<S>& shared) {
     const S* rows_b = leaf_rows<S, padded>(state.leaves_b, leaf_b);
     const WideLeafLists &lists_a = state.leaves_a.lists, &lists_b = state.leaves_b.lists;
     const std::uint32_t begin_a = lists_a.first_entry[leaf_a], begin_b = lists_b.first_entry[leaf_b];
-    const std::uint32_t count_a = lists_a.first_entry[leaf_a + 1] - begin_a;
-    const std::uint32_t count_b = lists_b.first_entry[leaf_b + 1] - begin_b;
+    const std::uint32_t count_a = lists_a.end_entry[leaf_a] - begin_a;
+    const std::uint32_t count_b = lists_b.end_entry[leaf_b] - begin_b;
     const SixSides<S> box_b =
         lane_box(state.b.child_bounds + slot_b.node() * std::size_t(6) * width, width, slot_b.lane());
     unsigned first = overlapping<S, padded>(rows_a, box_b);

@@ -32,7 +32,8 @@ inline constexpr std::size_t max_pairs_per_step = 64;
 
 /// The primitives of a hierarchy's leaves.
 struct WideLeafLists {
-  const std::uint32_t* first_entry;   ///< [leaf + 1]: entries of a leaf
+  const std::uint32_t* first_entry;   ///< [leaf]: entries of a leaf
+  const std::uint32_t* end_entry;     ///< [leaf]: one past its last
   const std::uint32_t* first_corner;  ///< [entry + 1]: corners of an entry's primitive
   const std::uint32_t* corners;       ///< vertices, times 3
   const std::uint32_t* primitives;    ///< [entry]

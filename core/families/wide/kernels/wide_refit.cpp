@@ -23,11 +23,29 @@ void refit(WideArrays<S> h, const S* positions, std::uint32_t begin, std::uint32
   }
 }
 
+template <class S, std::uint32_t width>
+void refit_listed(WideArrays<S> h, const S* positions, const std::uint32_t* order, std::uint32_t count) {
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const std::uint32_t i = order[k];
+    const WideNode& node = h.nodes[i];
+    S* const rows = h.child_bounds + std::size_t(i) * 6 * width;
+    S* const node_bounds = h.node_bounds + std::size_t(8) * i;
+    if (node.leaf_count == node.count)
+      fit_leaves<S, width>(h, node, positions, rows, node_bounds);
+    else
+      fit_above<S, width>(h, node, positions, rows, node_bounds);
+  }
+}
+
+template <class S>
+constexpr WideRefitKernels<S> table{&refit<S, 2>,        &refit<S, 4>,        &refit<S, 8>,
+                                    &refit_listed<S, 2>, &refit_listed<S, 4>, &refit_listed<S, 8>};
+
 }  // namespace
 
 namespace kernels::KBVH_KERNELS {
-const WideRefitKernels<float> wide_refit_float{&refit<float, 2>, &refit<float, 4>, &refit<float, 8>};
-const WideRefitKernels<double> wide_refit_double{&refit<double, 2>, &refit<double, 4>, &refit<double, 8>};
+const WideRefitKernels<float> wide_refit_float = table<float>;
+const WideRefitKernels<double> wide_refit_double = table<double>;
 }  // namespace kernels::KBVH_KERNELS
 
 }  // namespace kbvh

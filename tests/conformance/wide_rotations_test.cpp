@@ -1,0 +1,154 @@
+// A refit over wide nodes whose topologies are edited at every frame conforms on every synthetic scene.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/families/wide/stored_hierarchy.hpp"
+#include "core/topology/subtree_swap.hpp"
+#include "tests/conformance/check.hpp"
+
+namespace kbvh::test {
+namespace {
+
+enum class Boxes : std::uint8_t { recomputed, as_before_the_edit };
+
+/// Edits every moving body at each frame, after the refit: rotates random nodes, regrows a subtree, and moves
+/// another one. The query reads the edited layout.
+template <class S, class Count, Boxes boxes>
+class Restructuring : public StoredHierarchyStrategy<S, Count>,
+                      public AnswersSelfPairs,
+                      public TakesGeometryChanges<S> {
+  using Base = StoredHierarchyStrategy<S, Count>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  using Base::Base;
+  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
+    this->edit_geometry(change);
+  }
+  static inline std::uint64_t edits = 0;
+
+ private:
+  void update(std::uint32_t body) override {
+    this->refit(body);
+    WideHierarchy<S>& hierarchy = this->hierarchies_[body];
+    const Topology& topology = hierarchy.topology();
+    if (topology.size() < 5) return;
+    for (int i = 0; i < 6; ++i) rotate(body);
+    const std::uint32_t node = any_node(topology), target = any_node(topology);
+    const auto with_editor = [&](const auto& change) {
+      edit(body, [&](Topology& edited, TopologyEdit& list) {
+        TopologyEditor editor(edited, this->scene_.primitives(body).count());
+        change(editor, edited, list);
+      });
+    };
+    if (!topology.nodes[node].is_leaf())
+      with_editor([&](TopologyEditor& editor, Topology& edited, TopologyEdit& list) {
+        editor.rebalance(edited, node, list, [&](std::uint32_t n) { return to_double(hierarchy.box(n)); });
+      });
+    else if (!is_above(topology, node, target) && topology.parents[target] != topology.parents[node] &&
+             topology.parents[node] != target)
+      with_editor([&](TopologyEditor& editor, Topology& edited, TopologyEdit& list) {
+        editor.move_beside(edited, node, target, list);
+      });
+  }
+  /// Exchanges a child of a random node with a child of one of its siblings.
+  void rotate(std::uint32_t body) {
+    const Topology& topology = this->hierarchies_[body].topology();
+    const std::uint32_t node = any_node(topology);
+    if (node == 0) return;
+    const TopologyNode siblings = topology.nodes[topology.parents[node]];
+    const std::uint32_t sibling = siblings.first() + random_.below(siblings.count());
+    const TopologyNode content = topology.nodes[sibling];
+    if (sibling == node || content.is_leaf()) return;
+    const std::uint32_t grandchild = content.first() + random_.below(content.count());
+    edit(body, [&](Topology& edited, TopologyEdit& list) { swap_.exchange(edited, node, grandchild, list); });
+  }
+  template <class Change>
+  void edit(std::uint32_t body, const Change& change) {
+    this->hierarchies_[body].edit(change);
+    if (boxes == Boxes::recomputed) this->hierarchies_[body].refit_edited(this->sampled_.positions(body));
+    ++edits;
+  }
+  std::uint32_t any_node(const Topology& topology) {
+    for (;;) {
+      const std::uint32_t node = random_.below(topology.size());
+      if (topology.parents[node] < topology.size()) return node;
+    }
+  }
+  static bool is_above(const Topology& topology, std::uint32_t upper, std::uint32_t node) {
+    while (node != upper && node != 0) node = topology.parents[node];
+    return node == upper;
+  }
+
+  Random random_{97};
+  SubtreeSwap swap_;
+};
+template <class S, class C>
+using Sound = Restructuring<S, C, Boxes::recomputed>;
+template <class S, class C>
+using Faulty = Restructuring<S, C, Boxes::as_before_the_edit>;
+
+template <template <class, class> class T>
+StrategyEntry restructuring() {
+  Info info;
+  info.id = "restructuring";
+  info.declares = {.restructures = true, .time_budget = true};
+  return make_entry<T>(std::move(info));
+}
+
+std::vector<std::string> every_scene() {
+  std::vector<std::string> names = synthetic_scene_names();
+  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
+  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
+  return names;
+}
+
+class WideRotations : public testing::TestWithParam<std::string> {};
+
+TEST_P(WideRotations, AtEveryFrameKeepEveryGuarantee) {
+  Sound<float, Counting>::edits = 0;
+  const StrategyEntry entry = restructuring<Sound>();
+  for (const std::uint32_t width : {2u, 4u, 8u})
+    for (const std::uint32_t leaf : {1u, 4u}) {
+      const BuilderConfig builder{
+          .method = leaf == 1 ? BuildMethod::sah : BuildMethod::median, .width = width, .leaf_size = leaf};
+      const std::string where = "width " + std::to_string(width) + ", leaf " + std::to_string(leaf);
+      EXPECT_EQ(check(entry, synthetic_scene<float>(GetParam(), 3), 3, {}, builder), "") << where;
+      EXPECT_EQ(check(entry, synthetic_scene<double>(GetParam(), 3), 3, {}, builder), "") << where;
+    }
+  if (GetParam() == "soups" || GetParam() == "sheets") {
+    EXPECT_GT((Sound<float, Counting>::edits), 100u);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Synthetic, WideRotations, testing::ValuesIn(every_scene()),
+                         [](const auto& test) { return test.param; });
+
+TEST(WideRotation, WithoutNewBoxesIsSeen) {
+  const BuilderConfig builder{.method = BuildMethod::sah, .width = 8, .leaf_size = 1};
+  EXPECT_NE(check(restructuring<Faulty>(), synthetic_scene<float>("soups", 3), 3, {}, builder), "");
+}
+
+TEST(WideRotation, IsTakenBackByReset) {
+  const auto test = synthetic_scene<float>("sheets", 3);
+  const StrategyEntry entry = restructuring<Sound>();
+  Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  PhaseTimes times;
+  session.reset(test.frames[0]);
+  const Topology start = session.strategy().audit_view(0)->topology;
+  for (const double t : test.frames) session.advance(t, times);
+  EXPECT_FALSE(session.strategy().audit_view(0)->topology == start);
+  session.reset(test.frames[0]);
+  EXPECT_TRUE(session.strategy().audit_view(0)->topology == start);
+  PairBuffer pairs;
+  session.query(pairs, times);
+  std::sort(pairs.begin(), pairs.end());
+  Playback<float> playback(test.scene);
+  playback.seek(test.frames[0]);
+  EXPECT_EQ(pairs, brute_force_pairs(test.scene, playback));
+}
+
+}  // namespace
+}  // namespace kbvh::test
