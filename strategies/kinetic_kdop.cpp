@@ -51,7 +51,7 @@ KBVH_STRATEGY(kinetic_kdop) {
       .tightness = Tightness::conservative,
       .positions = PositionUse::fetched,
       .declares = {.continuous = true, .time_budget = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"volume", "dop18", volume_words(),
                       "bounding volume of every node: k-DOP with 14, 18 or 26 sides"}},
   })};
