@@ -62,6 +62,9 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     const std::size_t before = out.size();
     on_collision([&](auto& collision) {
       for_body_pairs(collision, [&](std::uint32_t i, const BodyPair& pair) {
+        const auto primitives = collision.list().primitive_pairs(i);
+        out.insert(out.end(), primitives.begin(), primitives.end());
+        if (!primitives.empty()) return;
         LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first,
                                    collision.forest().tree(pair.first).topology(), pair.second,
                                    collision.forest().tree(pair.second).topology(), this->count_, out);

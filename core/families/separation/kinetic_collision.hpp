@@ -55,7 +55,7 @@ class KineticCollision {
   }
   /// Handles every event up to and including t.
   void advance(double t) {
-    while (due(t)) handle_next();
+    for (Part part = first_part(); is_due(part, t); part = first_part()) handle(part);
   }
   bool due(double t) const {
     return forest_.due(t) || list_.due(t) || list_.segment_end() <= t || window_end_ < t;
@@ -126,18 +126,7 @@ class KineticCollision {
     return std::nextafter(window_end_, never);
   }
   /// Handles the earliest event. Requires that `due` holds for some time.
-  void handle_next() {
-    switch (first_part()) {
-      case Part::trees:
-        return handle_tree_event();
-      case Part::list:
-        return list_.handle_next();
-      case Part::segment:
-        return list_.open_segment();
-      case Part::window:
-        return open_window(window_end_);
-    }
-  }
+  void handle_next() { handle(first_part()); }
 
   /// Prefetches for the queue of the trees: the data that the forest reads at `event`, and the data that the
   /// list reads.
@@ -145,8 +134,8 @@ class KineticCollision {
     forest_.fetch_ahead(event, slot, step);
     const auto& tree = forest_.tree(event.body);
     const std::uint32_t node = tree.node_of(slot);
-    list_.fetch_ahead(event.body, node, step);
-    if (step > 0) list_.fetch_ahead(event.body, tree.topology().parents[node], step - 1);
+    list_.fetch_ahead(event.body, node, event.loser, step);
+    if (step > 0) list_.fetch_ahead(event.body, tree.topology().parents[node], event.loser, step - 1);
   }
   void review(const Event& event, double t) { forest_.review(event, t); }
 
@@ -154,6 +143,8 @@ class KineticCollision {
   void plans_changed(double t, std::span<const PlanChange<S>> changes) {
     changed_.clear();
     forest_.plans_changed(t, changes);
+    // With other plans, a new realiser may be behind the former one.
+    for (auto& box : changed_) box.side = ChangedBoxes::all_sides;
     if (list_.take_over(changed_)) list_.boxes_changed(changed_, Moment<S>::at(t));
     if (near_bodies_.searches()) open_window(t);
   }
@@ -200,6 +191,32 @@ class KineticCollision {
     if (tree.hint + error < pair.hint) return Part::trees;
     if (pair.hint + error < tree.hint) return Part::list;
     return compare_crossings(forest_.clock().crossing(tree), pair.crossing) <= 0 ? Part::trees : Part::list;
+  }
+  /// Returns whether the first event of `first`, which owns the earliest event, is due.
+  bool is_due(Part first, double t) const {
+    switch (first) {
+      case Part::trees:
+        return forest_.due(t);
+      case Part::list:
+        return list_.due(t);
+      case Part::segment:
+        return list_.segment_end() <= t;
+      case Part::window:
+        return window_end_ < t;
+    }
+    return false;
+  }
+  void handle(Part part) {
+    switch (part) {
+      case Part::trees:
+        return handle_tree_event();
+      case Part::list:
+        return list_.handle_next();
+      case Part::segment:
+        return list_.open_segment();
+      case Part::window:
+        return open_window(window_end_);
+    }
   }
   bool tree_is_before(double t) const {
     const Event& event = forest_.queue().top();

@@ -22,20 +22,30 @@ struct EndedOverlap {
 /// Stores the overlapping leaves of each body pair, from which a separation list answers queries. While spans
 /// are recorded, also stores the overlaps that have ended. `BoxPair::place` is the index of a pair among the
 /// overlapping leaves of its body pair.
+///
+/// If all leaves of two bodies have one primitive each, also stores the primitive pairs of the overlapping
+/// leaves, contiguous and in the same order. Pairs within one body are left out: they need a filter.
 class LeafOverlaps {
  public:
-  void resize(std::size_t body_pairs) { leaves_.resize(body_pairs); }
+  void resize(std::size_t body_pairs) {
+    leaves_.resize(body_pairs);
+    primitives_.resize(body_pairs);
+  }
   void clear() {
     for (auto& leaves : leaves_) leaves.clear();
+    for (auto& primitives : primitives_) primitives.clear();
   }
   /// Returns the overlapping leaves of one body pair, unordered.
   std::span<const OverlappingLeaves> of(std::size_t body_pair) const { return leaves_[body_pair]; }
+  /// Returns the primitive pairs of the overlapping leaves, in the same order, or nothing.
+  std::span<const PrimitivePair> primitives_of(std::size_t body_pair) const { return primitives_[body_pair]; }
 
   void begin(PairTree& tree, std::uint32_t slot, double since) {
     BoxPair& pair = tree[slot];
     auto& leaves = leaves_[pair.bodies];
     pair.place = std::uint32_t(leaves.size());
     leaves.push_back({pair.a, pair.b, slot, since});
+    if (stores_primitives(tree, pair.bodies)) primitives_[pair.bodies].push_back(primitives(tree, pair));
   }
   void end(PairTree& tree, std::uint32_t slot, double until) {
     BoxPair& pair = tree[slot];
@@ -44,7 +54,21 @@ class LeafOverlaps {
     tree[leaves.back().slot].place = pair.place;
     leaves[pair.place] = leaves.back();
     leaves.pop_back();
+    if (auto& stored = primitives_[pair.bodies]; !stored.empty()) {
+      stored[pair.place] = stored.back();
+      stored.pop_back();
+    }
     pair.place = PairTree::none;
+  }
+
+  /// Rereads the primitives of all leaves, after a change of geometry.
+  void reread_primitives(const PairTree& tree) {
+    for (std::uint32_t bodies = 0; bodies < leaves_.size(); ++bodies) {
+      primitives_[bodies].clear();
+      if (leaves_[bodies].empty() || !stores_primitives(tree, bodies)) continue;
+      for (const OverlappingLeaves& leaf : leaves_[bodies])
+        primitives_[bodies].push_back(primitives(tree, tree[leaf.slot]));
+    }
   }
 
   /// Starts recording ended overlaps. Overlaps that last already count from t.
@@ -62,11 +86,28 @@ class LeafOverlaps {
   std::size_t bytes() const {
     std::size_t total = leaves_.capacity() * sizeof(leaves_[0]) + ended_.capacity() * sizeof(EndedOverlap);
     for (const auto& leaves : leaves_) total += leaves.capacity() * sizeof(OverlappingLeaves);
+    for (const auto& primitives : primitives_)
+      total += sizeof primitives + primitives.capacity() * sizeof(PrimitivePair);
     return total;
   }
 
  private:
+  static bool stores_primitives(const PairTree& tree, std::uint32_t bodies) {
+    const BodyPair& pair = tree.body_pair(bodies);
+    return pair.first != pair.second && tree.topology(pair.first).leaf_size == 1 &&
+           tree.topology(pair.second).leaf_size == 1;
+  }
+  static PrimitivePair primitives(const PairTree& tree, const BoxPair& pair) {
+    const auto primitive = [&](int side) {
+      const TopologyNode leaf = tree.node(pair, side);
+      KBVH_ASSERT(leaf.count() == 1);
+      return tree.topology(tree.body_of(pair, side)).primitives[leaf.first()];
+    };
+    return {tree.body_of(pair, 0), primitive(0), tree.body_of(pair, 1), primitive(1)};
+  }
+
   std::vector<std::vector<OverlappingLeaves>> leaves_;  ///< [body pair]
+  std::vector<std::vector<PrimitivePair>> primitives_;  ///< [body pair]
   bool recording_ = false;
   std::vector<EndedOverlap> ended_;
 };

@@ -63,8 +63,7 @@ class PairOutlook {
   double open_segment() {
     boxes_.go_on();
     for (std::uint32_t body = 0; body < bodies_.size(); ++body)
-      boxes_.make_all(body,
-                      [&](std::uint32_t node) { return tree_->first_of(body, node) != PairTree::none; });
+      boxes_.make_all(body, [&](std::uint32_t node) { return tree_->has_pairs(body, node); });
     return boxes_.begin();
   }
   /// Updates the boxes whose realisers, or whose realisers' plans, have changed.
@@ -82,13 +81,54 @@ class PairOutlook {
     boxes_.prefetch(tree_->body_of(pair, 0), BoxRole::first, pair.a);
     boxes_.prefetch(tree_->body_of(pair, 1), BoxRole::second, pair.b);
   }
-
-  /// Prefetches the boxes of a node.
-  void prefetch(std::uint32_t body, std::uint32_t node) const {
-    if (!by_segments_) return;
-    boxes_.prefetch(body, BoxRole::first, node);
-    boxes_.prefetch(body, BoxRole::second, node);
+  /// Prefetches the data that an event of a pair will read: in step 0 the pair; in step 1 its boxes, and its
+  /// nodes or the pairs below it; in step 2 the boxes and rows of the pairs that it will make, or the rows of
+  /// the pairs below it.
+  void fetch_ahead(std::uint32_t slot, int step) const {
+    if (step == 0) return tree_->prefetch(slot);
+    const BoxPair& pair = (*tree_)[slot];
+    if (!pair.used) return;
+    if (step == 1) {
+      prefetch(pair);
+      pair.children != PairTree::none ? tree_->prefetch_block(pair.children) : tree_->prefetch_nodes(pair);
+    } else if (pair.children != PairTree::none) {
+      tree_->for_block(pair.children, [&](std::uint32_t child) { tree_->prefetch_rows((*tree_)[child]); });
+    } else if (!pair.overlapping) {
+      tree_->for_children(pair, [&](std::uint32_t body, std::uint32_t node) { fetch_ahead(body, node, 0); });
+    }
   }
+  /// Prefetches the data that a change of a node's box will read: in step 0 its boxes and its rows of pairs,
+  /// in step 1 the pairs in the rows.
+  void fetch_ahead(std::uint32_t body, std::uint32_t node, int step) const {
+    if (!by_segments_) return;
+    if (step == 0) {
+      tree_->prefetch_rows(body, node);
+      boxes_.prefetch(body, BoxRole::first, node);
+      boxes_.prefetch(body, BoxRole::second, node);
+    } else {
+      for (const int side : {0, 1}) __builtin_prefetch(tree_->row(body, side, node).data());
+    }
+  }
+  /// Prefetches the positions of a vertex at the ends of the segment.
+  void prefetch_vertex(std::uint32_t body, std::uint32_t vertex) const {
+    if (by_segments_) boxes_.prefetch_vertex(body, vertex);
+  }
+
+  /// Makes room for pairs.
+  void grow(std::uint32_t slots) {
+    if (slots > gaps_.size()) gaps_.resize(slots, all_reasons);
+  }
+  /// Returns the gaps (SegmentOverlap) that a changed box may have shrunk, seen from the pairs that have the
+  /// box on the given side. Between changes of plans, a new realiser is ahead of the old one until the
+  /// segment ends. It can therefore shrink a gap only by the rounding of the inflation, or before the present
+  /// time. In a body with plans of its own, any gap may shrink or grow.
+  std::uint8_t changed_gaps(const ChangedBoxes::Box& box, int side) const {
+    if (!by_segments_ || box.side == ChangedBoxes::all_sides || bodies_[box.body].plans->has_own_plans())
+      return all_reasons;
+    return std::uint8_t(1U << SegmentBoxes<S>::lane_of(BoxRole(side), box.side));
+  }
+  /// Returns whether the last decision about a pair depends on one of the given gaps.
+  bool depends_on(std::uint32_t slot, std::uint8_t gaps) const { return (gaps_[slot] & gaps) != 0; }
 
   /// Finds the state of a pair right after `now`, unless `known` gives it, and the next change of that state.
   Outlook look(std::uint32_t slot, const Moment<S>& now, State known) {
@@ -98,7 +138,8 @@ class PairOutlook {
     if (by_segments_) {
       const SegmentBox<S>&a = boxes_.box(body_a, BoxRole::first, pair.a),
             &b = boxes_.box(body_b, BoxRole::second, pair.b);
-      const Kind kind = SegmentOverlap<S>::kind(a, b);
+      const auto [kind, gaps] = SegmentOverlap<S>::decide(a, b);
+      gaps_[slot] = gaps | other_reasons;
       if (kind == Kind::apart || kind == Kind::overlapping)
         return {known == State::unknown ? kind == Kind::overlapping : known == State::overlapping, false};
       if (kind == Kind::changes) {
@@ -119,7 +160,7 @@ class PairOutlook {
   /// Returns the event of the last pair that `look` examined. Valid only if the state of the pair changes.
   const OverlapEvent<S>& event() const { return event_; }
 
-  std::size_t bytes() const { return boxes_.bytes(); }
+  std::size_t bytes() const { return boxes_.bytes() + gaps_.capacity(); }
 
  private:
   struct BodyPlans {
@@ -148,6 +189,11 @@ class PairOutlook {
   SegmentBoxes<S> boxes_;
   bool by_segments_ = false;
   std::vector<BodyPlans> bodies_;
+  /// In a set of gaps: the bit of all other reasons to decide a pair anew; every decision depends on it.
+  static constexpr std::uint8_t other_reasons = 0x40;
+  static constexpr std::uint8_t all_reasons = other_reasons | SegmentOverlap<S>::all_gaps;
+
+  std::vector<std::uint8_t> gaps_;  ///< [slot] on which the last decision about a pair depends
   OverlapEvent<S> event_;
 };
 

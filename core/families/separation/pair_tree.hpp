@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -8,53 +9,63 @@
 
 #include "core/base/assert.hpp"
 #include "core/families/separation/changed_boxes.hpp"
+#include "core/families/separation/pair_rows.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/topology/topology.hpp"
 
 namespace kbvh {
 
-/// Two boxes of a body pair, and their position in the tree of pairs. 48 bytes.
+/// Two boxes of a body pair, and their position in the tree of pairs. 40 bytes.
 struct BoxPair {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
-  std::uint32_t a, b;                  ///< nodes of the first and the second body
-  std::uint32_t parent = none;         ///< slot of the parent
-  std::uint32_t children = none;       ///< first of a block of slots, none of which may be in use
-  std::uint32_t next[2], previous[2];  ///< in the lists of pairs linked from a, and from b
-  std::uint32_t place = none;          ///< index among the overlapping leaves of the body pair
-  std::uint32_t bodies = 0;            ///< number of the body pair
-  std::uint32_t depth = 0;             ///< depth below the pair of roots
+  std::uint32_t a, b;             ///< nodes of the first and the second body
+  std::uint32_t parent = none;    ///< slot of the parent
+  std::uint32_t children = none;  ///< first of a block of slots, none of which may be in use
+  std::uint32_t row_index[2];     ///< index in the row of a, and in the row of b (PairTree::row)
+  std::uint32_t place = none;     ///< index among the overlapping leaves of the body pair
+  std::uint32_t bodies = 0;       ///< number of the body pair
+  std::uint32_t depth = 0;        ///< depth below the pair of roots
   bool used = false, overlapping = false;
   bool scheduled = false;  ///< has an event in the queue
   bool dirty = false;      ///< has a node with other children, during a change of geometry
 };
-static_assert(sizeof(BoxPair) == 48);
+static_assert(sizeof(BoxPair) == 40);
 
 /// The tree of pairs of a separation list (separation_list.hpp). Stores pairs in blocks of siblings,
-/// addressed by slot, and links each pair from both of its boxes. Also numbers the body pairs. Uses
+/// addressed by slot. Each node has one row for each position (first or second) that it can have in a pair:
+/// the slots of the pairs in which it has that position, contiguous. Also numbers the body pairs. Uses
 /// topologies only; motion and bounds are not stored here.
 class PairTree {
  public:
   static constexpr std::uint32_t none = BoxPair::none;
 
-  /// Refers to the topologies of a scene's bodies; every call reads their current state.
-  explicit PairTree(const std::vector<const Topology*>& topologies) {
+  /// Refers to the topologies of a scene's bodies; every call reads their current state. `pairs` are all body
+  /// pairs that will ever be entered.
+  PairTree(const std::vector<const Topology*>& topologies, std::span<const BodyPair> pairs) {
     for (const Topology* topology : topologies) {
-      bodies_.push_back({topology, {}, {}});
+      bodies_.push_back({topology, {}, {}, {}});
       block_ = std::max(block_, topology->width * topology->width);
+    }
+    for (const BodyPair& pair : pairs) {
+      bodies_[pair.first].takes_part[0] = true;
+      bodies_[pair.second].takes_part[1] = true;
     }
   }
   const Topology& topology(std::uint32_t body) const { return *bodies_[body].topology; }
-  /// Makes room for links from all current nodes. The room never shrinks, because ids are never given up.
+  /// Makes rows for all current nodes. The number of rows never shrinks, because ids are never given up.
   void follow_topologies() {
     for (Body& body : bodies_)
-      if (body.first_pair.size() < body.topology->size()) body.first_pair.resize(body.topology->size(), none);
+      for (const int side : {0, 1})
+        if (body.takes_part[side] && body.rows[side].keys() < body.topology->size())
+          body.rows[side].grow(body.topology->size());
   }
   /// Removes all pairs. Body pairs keep their numbers.
   void clear() {
     pairs_.clear();
     free_blocks_.clear();
-    for (Body& body : bodies_) std::fill(body.first_pair.begin(), body.first_pair.end(), none);
+    for (Body& body : bodies_)
+      for (PairRows& rows : body.rows) rows.clear();
   }
 
   // ---- Body pairs
@@ -105,18 +116,44 @@ class PairTree {
   }
   bool both_leaves(const BoxPair& pair) const { return node(pair, 0).is_leaf() && node(pair, 1).is_leaf(); }
 
-  /// Returns the first pair that has the node, or none.
-  std::uint32_t first_of(std::uint32_t body, std::uint32_t node) const {
-    return bodies_[body].first_pair[node];
+  /// Returns the slots of the pairs that have the node on a side: 0 for the first node, 1 for the second.
+  std::span<const std::uint32_t> row(std::uint32_t body, int side, std::uint32_t node) const {
+    const PairRows& rows = bodies_[body].rows[side];
+    return node < rows.keys() ? rows[node] : std::span<const std::uint32_t>();
   }
-  /// Returns the pair after `slot` that has the node, or none.
-  std::uint32_t next_of(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
-    return pairs_[slot].next[side_of(slot, body, node)];
+  /// Returns whether any pair has the node.
+  bool has_pairs(std::uint32_t body, std::uint32_t node) const {
+    return !row(body, 0, node).empty() || !row(body, 1, node).empty();
   }
-  void prefetch_first_of(std::uint32_t body, std::uint32_t node) const {
-    __builtin_prefetch(bodies_[body].first_pair.data() + node);
+  void prefetch_rows(const BoxPair& pair) const {
+    for (const int side : {0, 1}) {
+      const PairRows& rows = bodies_[body_of(pair, side)].rows[side];
+      rows.prefetch(side == 0 ? pair.a : pair.b);
+    }
+  }
+  void prefetch_rows(std::uint32_t body, std::uint32_t node) const {
+    for (const PairRows& rows : bodies_[body].rows)
+      if (node < rows.keys()) rows.prefetch(node);
   }
   void prefetch(std::uint32_t slot) const { __builtin_prefetch(pairs_.data() + slot); }
+  void prefetch_block(std::uint32_t block) const {
+    constexpr std::uint32_t line = 64 / sizeof(BoxPair);
+    for (std::uint32_t slot = block; slot < block + block_; slot += line) prefetch(slot);
+  }
+  void prefetch_nodes(const BoxPair& pair) const {
+    for (const int side : {0, 1})
+      __builtin_prefetch(&topology(body_of(pair, side)).nodes[side == 0 ? pair.a : pair.b]);
+  }
+  /// Calls work(body, node) for each node of the pairs that an overlap of the pair would make.
+  template <class Work>
+  void for_children(const BoxPair& pair, const Work& work) const {
+    for (const int side : {0, 1}) {
+      const TopologyNode own = node(pair, side);
+      if (own.is_leaf()) continue;
+      for (std::uint32_t child = own.first(); child < own.first() + own.count(); ++child)
+        work(body_of(pair, side), child);
+    }
+  }
   bool has_node(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
     const BodyPair& bodies = body_pairs_[pairs_[slot].bodies];
     return (bodies.first == body && pairs_[slot].a == node) ||
@@ -140,7 +177,7 @@ class PairTree {
   void free_block(std::uint32_t block) { free_blocks_.push_back(block); }
   /// Calls work(slot) for each pair of a block. `work` may remove that pair.
   template <class Work>
-  void for_block(std::uint32_t block, const Work& work) {
+  void for_block(std::uint32_t block, const Work& work) const {
     for (std::uint32_t slot = block; slot < block + block_ && pairs_[slot].used; ++slot) work(slot);
   }
 
@@ -156,12 +193,9 @@ class PairTree {
     pair.bodies = bodies;
     pair.used = true;
     for (const int side : {0, 1}) {
+      PairRows& rows = bodies_[body_of(pair, side)].rows[side];
       const std::uint32_t own = side == 0 ? a : b;
-      std::uint32_t& first = bodies_[body_of(pair, side)].first_pair[own];
-      pair.previous[side] = none;
-      pair.next[side] = first;
-      if (first != none) pairs_[first].previous[side_of(first, body_of(pair, side), own)] = slot;
-      first = slot;
+      pair.row_index[side] = rows.push(own, slot);
     }
   }
   /// Makes the pairs of a pair's children in a new block, and calls made(slot) for each. A leaf stands for
@@ -208,13 +242,9 @@ class PairTree {
   void remove(std::uint32_t slot) {
     BoxPair& pair = pairs_[slot];
     for (const int side : {0, 1}) {
-      const std::uint32_t body = body_of(pair, side), next = pair.next[side], previous = pair.previous[side];
-      const std::uint32_t own = side == 0 ? pair.a : pair.b;
-      if (next != none) pairs_[next].previous[side_of(next, body, own)] = previous;
-      if (previous != none)
-        pairs_[previous].next[side_of(previous, body, own)] = next;
-      else
-        bodies_[body].first_pair[own] = next;
+      PairRows& rows = bodies_[body_of(pair, side)].rows[side];
+      const std::uint32_t moved = rows.erase_at(side == 0 ? pair.a : pair.b, pair.row_index[side]);
+      pairs_[moved].row_index[side] = pair.row_index[side];
     }
     pair.used = false;
   }
@@ -228,19 +258,18 @@ class PairTree {
     for (const auto& changed : nodes) {
       if (!changed.gone) continue;
       Body& body = bodies_[changed.body];
-      body.gone.resize(body.first_pair.size(), 0);
+      body.gone.resize(std::max<std::size_t>(body.gone.size(), changed.node + 1), 0);
       body.gone[changed.node] = 1;
     }
     changed_.clear();
     for (const auto& node : nodes)
-      for (std::uint32_t slot = first_of(node.body, node.node); slot != none;
-           slot = next_of(slot, node.body, node.node)) {
-        std::uint32_t top = slot;
-        while (pairs_[top].parent != none && has_gone_node(pairs_[top])) top = pairs_[top].parent;
-        if (pairs_[top].dirty) continue;
-        pairs_[top].dirty = true;
-        changed_.push_back(top);
-      }
+      for (const int side : {0, 1})
+        for (std::uint32_t top : row(node.body, side, node.node)) {
+          while (pairs_[top].parent != none && has_gone_node(pairs_[top])) top = pairs_[top].parent;
+          if (pairs_[top].dirty) continue;
+          pairs_[top].dirty = true;
+          changed_.push_back(top);
+        }
     tops.clear();
     for (const std::uint32_t slot : changed_) {
       std::uint32_t above = pairs_[slot].parent;
@@ -255,8 +284,7 @@ class PairTree {
   std::size_t bytes() const {
     std::size_t total = pairs_.capacity() * sizeof(BoxPair) + body_pairs_.capacity() * sizeof(BodyPair) +
                         (free_blocks_.capacity() + changed_.capacity()) * sizeof(std::uint32_t);
-    for (const Body& body : bodies_)
-      total += body.first_pair.size() * sizeof(std::uint32_t) + body.gone.size();
+    for (const Body& body : bodies_) total += body.rows[0].bytes() + body.rows[1].bytes() + body.gone.size();
     return total;
   }
 
@@ -265,15 +293,11 @@ class PairTree {
 
   struct Body {
     const Topology* topology;
-    std::vector<std::uint32_t> first_pair;  ///< first pair linked from each node, or none
-    std::vector<std::uint8_t> gone;         ///< [node] is gone, during a change of geometry
+    std::array<PairRows, 2> rows;    ///< [side] rows of the nodes, if the body takes part on that side
+    std::array<bool, 2> takes_part;  ///< [side]
+    std::vector<std::uint8_t> gone;  ///< [node] is gone, during a change of geometry
   };
 
-  /// Returns which of the pair's two nodes the given node is: 0 for the first, 1 for the second. Requires
-  /// that the pair has the node.
-  int side_of(std::uint32_t slot, std::uint32_t body, std::uint32_t node) const {
-    return body_pairs_[pairs_[slot].bodies].first == body && pairs_[slot].a == node ? 0 : 1;
-  }
   bool has_gone_node(const BoxPair& pair) const {
     const auto gone = [&](std::uint32_t body, std::uint32_t node) {
       return node < bodies_[body].gone.size() && bodies_[body].gone[node] != 0;

@@ -112,6 +112,15 @@ class SegmentBoxes {
     const auto& boxes = bodies_[body].boxes[std::size_t(role)];
     if (node < boxes.size()) __builtin_prefetch(&boxes[node]);
   }
+  /// Prefetches the positions of a vertex at the ends of the segment.
+  void prefetch_vertex(std::uint32_t body, std::uint32_t vertex) const {
+    const Body& own = bodies_[body];
+    if (vertex >= own.plans->keyframed_count()) return;
+    __builtin_prefetch(own.first + 3 * std::size_t(vertex));
+    __builtin_prefetch(own.last + 3 * std::size_t(vertex));
+  }
+  /// Returns the lane of a side.
+  static std::size_t lane_of(BoxRole role, Side side) { return role == BoxRole::first ? side ^ 1U : side; }
   /// Updates one side of a node, which has a new realiser.
   void side_changed(std::uint32_t body, std::uint32_t node, Side side) {
     Body& own = bodies_[body];
@@ -121,7 +130,7 @@ class SegmentBoxes {
       if (box.at[1][SegmentBox<S>::stamp_lane] != stamp(own) || own.plans->has_own_plans())
         forget(box);
       else
-        read_lane(own, BoxRole(role), node, role == 0 ? side ^ 1U : side, box);
+        read_lane(own, BoxRole(role), node, lane_of(BoxRole(role), side), box);
     }
   }
   /// Invalidates the boxes of a node, whose realisers or plans may have changed.

@@ -7,6 +7,10 @@
 
 #include "core/families/separation/segment_boxes.hpp"
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 namespace kbvh {
 
 /// An instant and a double near it: |instant - hint| <= error.
@@ -27,25 +31,38 @@ template <class S>
 class SegmentOverlap {
  public:
   enum class Kind : std::uint8_t { apart, overlapping, changes, unsure };
+  static constexpr std::uint8_t all_gaps = 0x3f;
+
+  /// The kind of two boxes, and the gaps that decide it (one bit each): the boxes keep their events in the
+  /// segment while no other gap than these shrinks. `apart`: one gap that separates them throughout. All
+  /// other kinds: the gaps that are not far above zero at both ends (`far`).
+  struct Decision {
+    Kind kind;
+    std::uint8_t gaps;
+  };
 
   /// Classifies two boxes by the signs of their gaps at the ends of the segment. `apart`: one gap is negative
   /// at both ends. `overlapping`: all gaps are positive at both ends. `unsure`: a gap is zero or NaN at an
   /// end. `changes`: all other cases.
-  static Kind kind(const SegmentBox<S>& a, const SegmentBox<S>& b) {
-    Mask separates{}, positive = ~Mask{}, sure = ~Mask{};
+  static Decision decide(const SegmentBox<S>& a, const SegmentBox<S>& b) {
+    std::uint8_t separating = 0, positive = 0, sure = 0, clear = 0;
     for (std::size_t lane = 0; lane < SegmentBox<S>::lanes; lane += width) {
-      const Lanes first = load(a.at[0] + lane) + load(b.at[0] + lane),
-                  last = load(a.at[1] + lane) + load(b.at[1] + lane);
+      const Lanes a0 = load(a.at[0] + lane), a1 = load(a.at[1] + lane);
+      const Lanes first = a0 + load(b.at[0] + lane), last = a1 + load(b.at[1] + lane);
       const Lanes zero{};
       const Mask negative_first = first < zero, negative_last = last < zero;
       const Mask positive_first = first > zero, positive_last = last > zero;
-      separates |= negative_first & negative_last;
-      positive &= positive_first & positive_last;
-      sure &= (negative_first | positive_first) & (negative_last | positive_last);
+      const Lanes margin = (absolute(a0) + absolute(a1)) * far + least;
+      separating |= bits(negative_first & negative_last, lane);
+      positive |= bits(positive_first & positive_last, lane);
+      sure |= bits((negative_first | positive_first) & (negative_last | positive_last), lane);
+      clear |= bits((first > margin) & (last > margin), lane);
     }
-    if (any(separates)) return Kind::apart;
-    if (!any(~positive)) return Kind::overlapping;
-    return any(~sure) ? Kind::unsure : Kind::changes;
+    separating &= all_gaps;
+    if (separating != 0) return {Kind::apart, std::uint8_t(separating & -separating)};
+    const auto near = std::uint8_t(~clear & all_gaps);
+    if ((positive & all_gaps) == all_gaps) return {Kind::overlapping, near};
+    return (sure & all_gaps) == all_gaps ? Decision{Kind::changes, near} : Decision{Kind::unsure, all_gaps};
   }
 
   /// Takes two boxes of the kind `changes`.
@@ -97,6 +114,10 @@ class SegmentOverlap {
   using Lanes [[gnu::vector_size(16)]] = S;
   using Mask = decltype(Lanes{} < Lanes{});
   static constexpr std::uint8_t no_side = 6;
+  /// A gap is far above zero if it exceeds this share of the first box's bounds: some 16 times the largest
+  /// inflation (Widening).
+  static constexpr S far = sizeof(S) == 4 ? S(0x1p-16) : S(0x1p-45);
+  static constexpr S least = 64 * std::numeric_limits<S>::min();
   enum class Turn : std::uint8_t { closes, opens };
 
   /// The approximate time at which a gap is zero.
@@ -110,10 +131,21 @@ class SegmentOverlap {
     std::memcpy(&lanes, from, sizeof lanes);
     return lanes;
   }
-  static bool any(Mask mask) {
-    std::uint64_t words[2];
-    std::memcpy(words, &mask, sizeof words);
-    return (words[0] | words[1]) != 0;
+  static Lanes absolute(Lanes x) { return x < 0 ? -x : x; }
+  /// Returns one bit per lane, shifted to the lane's number.
+  static std::uint8_t bits(Mask mask, std::size_t lane) {
+#if defined(__SSE2__)
+    int found;
+    if constexpr (sizeof(S) == 4)
+      found = _mm_movemask_ps(__m128(mask));
+    else
+      found = _mm_movemask_pd(__m128d(mask));
+    return std::uint8_t(found << lane);
+#else
+    unsigned found = 0;
+    for (std::size_t i = 0; i < width; ++i) found |= mask[i] != 0 ? 1U << i : 0U;
+    return std::uint8_t(found << lane);
+#endif
   }
 
   Crossing<S> crossing(std::uint8_t side, Turn turn) const {

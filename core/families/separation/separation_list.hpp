@@ -7,6 +7,7 @@
 #include "core/base/assert.hpp"
 #include "core/families/events/kinetic_forest.hpp"
 #include "core/families/separation/overlapping_leaves.hpp"
+#include "core/families/separation/pair_events.hpp"
 #include "core/families/separation/pair_outlook.hpp"
 #include "core/families/separation/pair_tree.hpp"
 
@@ -32,8 +33,8 @@ struct ListEdit {
 ///   leaves, overlapping: the boxes separate ("leaves do not overlap").
 /// If the event is too far ahead, the pair has a review instead, at which only its next event is searched
 /// (OverlapClock). A review counts as an operation on the queue.
-/// When a box changes ("BV change": a new realiser, or a new plan of a realiser), the pairs that are linked
-/// from the box are decided anew.
+/// When a box changes ("BV change": a new realiser, or a new plan of a realiser), the pairs that have the box
+/// are decided anew, unless the change cannot affect their decision.
 ///
 /// Insertions and deletions change the trees below a few nodes. The pairs of such a node stay, the pairs
 /// below them are removed, and the remaining pairs are decided anew on the changed trees. A pair of a removed
@@ -68,7 +69,7 @@ class SeparationList {
   template <class Forest>
   SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count, int look_ahead,
                  BodyPairs pairs)
-      : tree_(forest_topologies(scene, forest)),
+      : tree_(forest_topologies(scene, forest), scene.pairs()),
         outlook_(scene, forest, tree_, by_segments ? LookAhead::segment : LookAhead::pieces, look_ahead),
         queue_(outlook_.clock(), 0),
         count_(&count) {
@@ -151,22 +152,17 @@ class SeparationList {
     turn(event.slot, now, look(event.slot, now, pair.overlapping ? State::apart : State::overlapping));
   }
 
-  /// Prefetches the data that an event of a pair will read: in step 0 the pair, in step 1 its boxes.
+  /// Prefetches the data that an event of a pair will read (PairOutlook).
   void fetch_ahead(const Event& /*event*/, std::uint32_t slot, int step) const {
-    if (step == 0) tree_.prefetch(slot);
-    if (step == 1) outlook_.prefetch(tree_[slot]);
+    outlook_.fetch_ahead(slot, step);
   }
   /// Does nothing: pairs without an event are checked again at the begin of the next segment.
   void review(const Event& /*event*/, double /*t*/) {}
-  /// Prefetches the data that a change of a node's box will read: in step 0 its boxes and the link to its
-  /// first pair, in step 1 that pair, then the boxes of that pair.
-  void fetch_ahead(std::uint32_t body, std::uint32_t node, int step) const {
-    if (step == 0) {
-      tree_.prefetch_first_of(body, node);
-      outlook_.prefetch(body, node);
-    } else if (const std::uint32_t slot = tree_.first_of(body, node); slot != none) {
-      step == 1 ? tree_.prefetch(slot) : outlook_.prefetch(tree_[slot]);
-    }
+  /// Prefetches the data that a change of a node's box will read; in step 0 also the positions of the vertex
+  /// that will realise a bound.
+  void fetch_ahead(std::uint32_t body, std::uint32_t node, std::uint32_t vertex, int step) const {
+    outlook_.fetch_ahead(body, node, step);
+    if (step == 0) outlook_.prefetch_vertex(body, vertex);
   }
 
   /// Returns the end of the current segment; infinite if there is none. `open_segment` is due at that time,
@@ -189,26 +185,31 @@ class SeparationList {
   bool take_over(std::span<const ChangedBoxes::Box> boxes) {
     outlook_.take_over(boxes);
     return std::any_of(boxes.begin(), boxes.end(),
-                       [&](const auto& box) { return tree_.first_of(box.body, box.node) != none; });
+                       [&](const auto& box) { return tree_.has_pairs(box.body, box.node); });
   }
-  /// Decides anew the pairs of boxes that have changed at `now`. Boxes may be listed twice.
+  /// Decides anew the pairs of boxes that have changed at `now`, if the change affects their decision. Boxes
+  /// may be listed twice.
   void boxes_changed(std::span<const ChangedBoxes::Box> boxes, const Moment<S>& now) {
     time_ = now.instant.begin;
     end_ = now.instant.end;
     // A node that a change of geometry removed has no pairs any more.
     for (const auto& box : boxes) {
-      linked_.clear();
-      for (std::uint32_t slot = tree_.first_of(box.body, box.node); slot != none;
-           slot = tree_.next_of(slot, box.body, box.node)) {
-        linked_.push_back(slot);
-        outlook_.prefetch(tree_[slot]);
+      affected_.clear();
+      std::size_t pairs = 0;
+      for (const int side : {0, 1}) {
+        const auto row = tree_.row(box.body, side, box.node);
+        const std::uint8_t gaps = outlook_.changed_gaps(box, side);
+        pairs += row.size();
+        for (const std::uint32_t slot : row)
+          if (outlook_.depends_on(slot, gaps)) affected_.push_back(slot);
       }
-      if (linked_.empty()) continue;
+      if (pairs == 0) continue;
       count_->add(Counter::bound_change_events);
-      for (const std::uint32_t slot : linked_) {
+      count_->add(Counter::nodes_visited, pairs);
+      for (const std::uint32_t slot : affected_) outlook_.prefetch(tree_[slot]);
+      for (const std::uint32_t slot : affected_) {
         // Skips a pair that a collapse has removed, and a slot that an expansion has reused for other nodes.
         if (!tree_[slot].used || !tree_.has_node(slot, box.body, box.node)) continue;
-        count_->add(Counter::nodes_visited);
         ++work_done_.decided;
         const Outlook outlook = look(slot, now, State::unknown);
         if (outlook.overlapping != tree_[slot].overlapping)
@@ -245,37 +246,22 @@ class SeparationList {
     std::sort(boxes.begin(), boxes.end());
     boxes.erase(std::unique(boxes.begin(), boxes.end()), boxes.end());
     boxes_changed(boxes, now);
+    leaves_.reread_primitives(tree_);
     return work_done_;
   }
 
   /// Describes an event of the list in the contract's terms.
-  ScheduledEvent<S> described(const Event& event) const {
-    const BoxPair& pair = tree_[event.slot];
-    ScheduledEvent<S> out;
-    out.kind = event.review       ? EventKind::review
-               : pair.overlapping ? EventKind::boxes_separate
-                                  : EventKind::boxes_meet;
-    out.body = tree_.body_of(pair, 0);
-    out.node = pair.a;
-    out.other_body = tree_.body_of(pair, 1);
-    out.other_node = pair.b;
-    out.time = {event.hint, event.error};
-    out.has_crossing = !event.review;
-    if (out.has_crossing) out.crossing = event.crossing;
-    return out;
-  }
+  ScheduledEvent<S> described(const Event& event) const { return kbvh::described(tree_, event); }
   /// Appends all scheduled events, earliest first.
-  void list_events(std::vector<ScheduledEvent<S>>& out) const {
-    std::vector<Event> events;
-    for (std::uint32_t slot = 0; slot < queue_.slots(); ++slot)
-      if (queue_.scheduled(slot)) events.push_back(queue_.event(slot));
-    std::sort(events.begin(), events.end(),
-              [&](const Event& a, const Event& b) { return clock().earlier(a, b); });
-    for (const Event& event : events) out.push_back(described(event));
-  }
+  void list_events(std::vector<ScheduledEvent<S>>& out) const { append_events(queue_, clock(), tree_, out); }
 
   /// Returns the overlapping leaves of one body pair, unordered.
   std::span<const OverlappingLeaves> leaf_pairs(std::size_t body_pair) const { return leaves_.of(body_pair); }
+  /// Returns the primitive pairs of these leaves, in the same order, if every leaf of both bodies has exactly
+  /// one primitive; otherwise nothing.
+  std::span<const PrimitivePair> primitive_pairs(std::size_t body_pair) const {
+    return leaves_.primitives_of(body_pair);
+  }
   /// Returns the number of pairs in the list: pairs that are apart, and overlapping leaves.
   std::size_t size() const { return list_size_; }
   /// Returns all pairs by slot, for audits.
@@ -292,7 +278,7 @@ class SeparationList {
   std::uint64_t steps() const { return queue_.steps(); }
   std::size_t bytes() const {
     return queue_.bytes() + tree_.bytes() + outlook_.bytes() + leaves_.bytes() +
-           (work_.capacity() + linked_.capacity() + roots_.capacity() + tops_.capacity()) *
+           (work_.capacity() + affected_.capacity() + roots_.capacity() + tops_.capacity()) *
                sizeof(std::uint32_t) +
            self_roots_.capacity() * sizeof(self_roots_[0]);
   }
@@ -408,7 +394,7 @@ class SeparationList {
 
   /// Decides the new pairs in `work_`, and makes all pairs below them that have to exist.
   void settle_new(const Moment<S>& now) {
-    queue_.grow(tree_.slot_capacity());
+    grow();
     while (!work_.empty()) {
       const std::uint32_t slot = work_.back();
       work_.pop_back();
@@ -424,13 +410,10 @@ class SeparationList {
   /// Marks a pair of the list as overlapping. Leaves its new children, if there are any, in `work_`.
   void begin_overlap(std::uint32_t slot) {
     tree_[slot].overlapping = true;
-    if (tree_.both_leaves(tree_[slot])) {
-      leaves_.begin(tree_, slot, time_);
-      return;
-    }
+    if (tree_.both_leaves(tree_[slot])) return leaves_.begin(tree_, slot, time_);
     list_changed(-1);
     tree_.insert_children(slot, [&](std::uint32_t child) { work_.push_back(child); });
-    queue_.grow(tree_.slot_capacity());
+    grow();
   }
 
   /// Switches a pair between apart and overlapping at `now`, and schedules its next event from `outlook`.
@@ -484,6 +467,11 @@ class SeparationList {
     count_->peak(Counter::queue_peak, queue_.size());
   }
 
+  /// Makes room for all pairs of the tree.
+  void grow() {
+    queue_.grow(tree_.slot_capacity());
+    outlook_.grow(tree_.slot_capacity());
+  }
   void list_changed(int by) {
     list_size_ += std::size_t(by);
     count_->peak(Counter::list_peak, list_size_);
@@ -497,7 +485,7 @@ class SeparationList {
   std::size_t list_size_ = 0;
   std::vector<std::uint32_t> roots_;                    ///< slot of each body pair's root pair, or none
   std::vector<std::vector<std::uint32_t>> self_roots_;  ///< [body pair] blocks of roots within one body
-  std::vector<std::uint32_t> work_, linked_, tops_;
+  std::vector<std::uint32_t> work_, affected_, tops_;
   ListEdit work_done_;         ///< since the last change of geometry began
   double time_ = 0, end_ = 0;  ///< doubles before and after the current event
 };
