@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "core/contract/registry.hpp"
+#include "core/families/events/kinetic_rows.hpp"
 #include "core/families/events/realiser_boxes.hpp"
 #include "core/families/separation/kinetic_collision.hpp"
 #include "core/scene/self_pairs.hpp"
@@ -30,7 +31,8 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
 
   KineticSeparationList(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                         const Params& params)
-      : CountedStrategy<S, Count>(scene, motion) {
+      : CountedStrategy<S, Count>(scene, motion), motion_(motion), rows_(scene, motion) {
+    for (const Topology& topology : topologies) by_rows_ = by_rows_ || topology.leaf_size > 1;
     const int look_ahead = std::stoi(params.word("look_ahead"));
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       vertices_ += motion.plans(body).vertex_count();
@@ -43,15 +45,19 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     else
       collision_ = std::make_unique<Collision<BinaryHeapEventQueue>>(scene, motion, std::move(topologies),
                                                                      this->count_, look_ahead);
+    if (by_rows_) on_collision([&](auto& collision) { rows_.assign(collision.forest(), scene); });
   }
 
   void reset_to(double t) override {
     many_candidates_ = false;
     on_collision([&](auto& collision) { collision.reset(t); });
+    rows_.start_over();
+    rows_.new_frame(motion_);
   }
 
   void advance_to(double t) override {
     on_collision([&](auto& collision) { collision.advance(t); });
+    rows_.new_frame(motion_);
   }
 
   /// Returns whether the last frame had many candidates. Their vertices are then most of all vertices, and
@@ -60,8 +66,17 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
     const std::size_t before = out.size();
+    std::uint64_t tests = 0, reads = 0;
     on_collision([&](auto& collision) {
       for_body_pairs(collision, [&](std::uint32_t i, const BodyPair& pair) {
+        if (by_rows_) {
+          const auto for_leaves = [&](const auto& add) {
+            for (const auto& leaf : collision.list().leaf_pairs(i)) add(leaf.a, leaf.b);
+            for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) { add(leaf, leaf); });
+          };
+          rows_.find_in_leaves(collision.forest(), pair, for_leaves, this->sampled_, out, tests, reads);
+          return;
+        }
         const auto primitives = collision.list().primitive_pairs(i);
         out.insert(out.end(), primitives.begin(), primitives.end());
         if (!primitives.empty()) return;
@@ -72,6 +87,8 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
         for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) { leaves(leaf, leaf); });
       });
     });
+    this->count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::positions_fetched, reads);
     many_candidates_ = 4 * (out.size() - before) > vertices_;
     return {};
   }
@@ -119,12 +136,19 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
 
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
     on_collision([&](auto& collision) { collision.plans_changed(t, changes); });
+    if (!by_rows_) return;
+    for (const PlanChange<S>& change : changes) rows_.plans_changed(change.body);
+    rows_.new_frame(motion_);  // realisers may differ now
   }
 
   void follow_geometry(double t, const GeometryChange<S>& change) override {
     const std::vector<BodyChange> changes = body_changes(this->scene_, change);
     on_collision(
         [&](auto& collision) { collision.geometry_changed(t, this->scene_, this->sampled_, changes); });
+    if (!by_rows_) return;
+    for (const BodyChange& changed : changes)
+      on_collision([&](auto& collision) { rows_.follow(collision.forest(), this->scene_, changed.body); });
+    rows_.new_frame(motion_);
   }
 
   std::optional<ScheduledEvent<S>> next_event() const override {
@@ -149,14 +173,20 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
       const auto& tree = collision.forest().tree(body);
       std::vector<std::uint32_t> order;
       AuditView view{tree.compacted_topology(order), {}, {}};
-      for (const std::uint32_t node : order)
-        view.boxes.push_back(to_double(box_of_realisers(tree.realisers(node), this->sampled_, body)));
+      for (const std::uint32_t node : order) {
+        // Reports the box that a query has read, if there is one.
+        Box<S> room;
+        const Box<S>* read = by_rows_ ? rows_.read_box(body, node, room) : nullptr;
+        view.boxes.push_back(to_double(
+            read != nullptr ? *read : box_of_realisers(tree.realisers(node), this->sampled_, body)));
+      }
       return view;
     });
   }
 
   std::size_t bytes() const override {
-    return on_collision([](auto& collision) { return collision.bytes(); });
+    return rows_.bytes() + open_.capacity() * sizeof(std::uint32_t) +
+           on_collision([](auto& collision) { return collision.bytes(); });
   }
 
  protected:
@@ -199,14 +229,14 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     if (pair.first != pair.second) return;
     const Topology& topology = collision.forest().tree(pair.first).topology();
     if (topology.empty() || topology.leaf_size == 1) return;
-    std::vector<std::uint32_t> nodes{0};  // traverses from the root, because changes of geometry leave gaps
-    while (!nodes.empty()) {
-      const std::uint32_t node = nodes.back();
-      nodes.pop_back();
+    open_.assign(1, 0);  // traverses from the root, because changes of geometry leave gaps
+    while (!open_.empty()) {
+      const std::uint32_t node = open_.back();
+      open_.pop_back();
       const TopologyNode own = topology.nodes[node];
       if (own.is_leaf()) work(node);
       for (std::uint32_t child = own.first(); !own.is_leaf() && child < own.first() + own.count(); ++child)
-        nodes.push_back(child);
+        open_.push_back(child);
     }
   }
 
@@ -246,9 +276,13 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   }
 
   std::vector<SweptLeaves> swept_leaves_;
+  mutable std::vector<std::uint32_t> open_;  ///< nodes of a traversal
   std::variant<std::unique_ptr<Collision<SegmentHeapEventQueue>>, std::unique_ptr<Collision<AvlEventQueue>>,
                std::unique_ptr<Collision<BinaryHeapEventQueue>>>
       collision_;
+  ClipMotion<S> motion_;
+  bool by_rows_ = false;      ///< leaves have several primitives
+  KineticRowsQuery<S> rows_;  ///< empty unless by_rows_
   std::uint64_t first_step_ = 0;
   std::size_t vertices_ = 0;      ///< of the initial scene
   bool many_candidates_ = false;  ///< in the last frame
@@ -266,7 +300,7 @@ KBVH_STRATEGY(kinetic_separation_list) {
       .citation = "Zachmann & Weller 2006, s.7",
       .positions = PositionUse::varying,
       .declares = {.continuous = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"queue",
                       "segment_heap",
                       {"segment_heap", "avl", "binary_heap"},

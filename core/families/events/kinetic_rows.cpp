@@ -24,11 +24,13 @@ void KineticRows<S>::lay_out(Topology topology, const std::vector<std::uint32_t>
   }
   rows_.assign(std::move(topology), primitives, active_kernel_set());
   const Topology& wide = hierarchy().topology();
+  slots_.assign(wide_of_.size(), LeafSlot{0});
   lane_nodes_.assign(std::size_t(hierarchy().node_count()) * wide.width, 0);
   for (std::uint32_t i = 0; i < wide.size(); ++i) {
     if (hierarchy().wide_parent(i) == WideHierarchy<S>::no_node) continue;
     const std::size_t scalars = lane_scalars(wide.width), place = hierarchy().row_place(i, 0);
     lane_nodes_[place / scalars * wide.width + place % scalars] = node_of[i];
+    slots_[node_of[i]] = {LeafSlot::of(std::uint32_t(place / scalars), std::uint32_t(place % scalars))};
   }
 }
 

@@ -23,6 +23,9 @@ class KineticRows {
   RealiserRows<S>& rows() { return rows_; }
   const WideHierarchy<S>& hierarchy() const { return rows_.hierarchy(); }
 
+  /// Returns the slot of a leaf of the tree.
+  LeafSlot leaf_slot(std::uint32_t leaf) const { return slots_[leaf]; }
+
   /// Computes boxes as RealiserRows does. Returns the same.
   template <class Tree>
   std::uint64_t make_visited(const Tree& tree, const SampledMotion<S>& motion, std::uint32_t body) {
@@ -39,7 +42,8 @@ class KineticRows {
   const Box<S>* read_box(std::uint32_t node, Box<S>& room) const;
 
   std::size_t bytes() const {
-    return rows_.bytes() + (lane_nodes_.capacity() + wide_of_.capacity()) * sizeof(std::uint32_t);
+    return rows_.bytes() +
+           (lane_nodes_.capacity() + wide_of_.capacity() + slots_.capacity()) * sizeof(std::uint32_t);
   }
 
  private:
@@ -65,6 +69,7 @@ class KineticRows {
   RealiserRows<S> rows_;
   std::vector<std::uint32_t> lane_nodes_;  ///< [wide node][width]: nodes of the tree; the root in empty lanes
   std::vector<std::uint32_t> wide_of_;     ///< by node of the tree: node of the wide topology, or none
+  std::vector<LeafSlot> slots_;            ///< by node of the tree, of leaves
 };
 
 extern template class KineticRows<float>;
@@ -117,6 +122,27 @@ class KineticRowsQuery {
     return query_lazily(query_, near_bodies, scene.pairs(), budget, side_of, make, out, tests);
   }
 
+  /// Appends the pairs of primitives whose boxes overlap in pairs of leaves of two bodies' trees:
+  /// for_leaves(add) calls add(leaf of the first body, leaf of the second). Within one body, each two leaves
+  /// are given once, and each leaf with itself. Counts as `find` does.
+  template <class Forest, class ForLeaves>
+  void find_in_leaves(const Forest& forest, const BodyPair& pair, const ForLeaves& for_leaves,
+                      const SampledMotion<S>& motion, PairBuffer& out, std::uint64_t& tests,
+                      std::uint64_t& reads) {
+    KineticRows<S>&a = rows_[pair.first], &b = rows_[pair.second];
+    reads += b.make_visited(forest.tree(pair.second), motion, pair.second);
+    leaves_.clear();
+    for_leaves([&](std::uint32_t leaf_a, std::uint32_t leaf_b) {
+      const LeafSlot slot = b.leaf_slot(leaf_b);
+      if (b.rows().stale()[slot.node()] != 0)
+        reads += b.make_wanted(slot.node(), forest.tree(pair.second), motion, pair.second);
+      leaves_.push_back(a.leaf_slot(leaf_a));
+      leaves_.push_back(slot);
+    });
+    query_.run_leaves({.hierarchy = &a.rows().hierarchy(), .body = pair.first},
+                      {.hierarchy = &b.rows().hierarchy(), .body = pair.second}, leaves_, out, tests);
+  }
+
   /// Returns the box of a node of a body's tree, stored in `room`, if a query may have read it. Returns null
   /// otherwise.
   const Box<S>* read_box(std::uint32_t body, std::uint32_t node, Box<S>& room) const {
@@ -124,13 +150,15 @@ class KineticRowsQuery {
   }
 
   std::size_t bytes() const {
-    std::size_t total = query_.bytes() + rows_.capacity() * sizeof(KineticRows<S>);
+    std::size_t total =
+        query_.bytes() + rows_.capacity() * sizeof(KineticRows<S>) + leaves_.capacity() * sizeof(LeafSlot);
     for (const auto& rows : rows_) total += rows.bytes();
     return total;
   }
 
  private:
   std::vector<KineticRows<S>> rows_;  ///< [body]
+  std::vector<LeafSlot> leaves_;      ///< of the present pair of bodies
   WideQuery<S> query_;
 };
 

@@ -40,6 +40,19 @@ QueryStatus WideQuery<S>::run(const Side& a, const Side& b, PairBuffer& out, std
 }
 
 template <class S>
+void WideQuery<S>::run_leaves(const Side& a, const Side& b, std::span<const LeafSlot> pairs, PairBuffer& out,
+                              std::uint64_t& tests) {
+  WideTraversal state = fresh_traversal({});
+  while (!pairs.empty()) {
+    const auto some = pairs.first(std::min(pairs.size(), leaf_pairs_.size()));
+    std::copy(some.begin(), some.end(), leaf_pairs_.begin());
+    state.found = some.size() / 2;
+    take_leaves(a, b, state, out, tests);
+    pairs = pairs.subspan(some.size());
+  }
+}
+
+template <class S>
 void WideQuery<S>::traverse(const Side& a, const Side& b, WideTraversal& state) const {
   const std::uint32_t width = a.hierarchy->topology().width;
   const KernelSet set = a.hierarchy->kernels();

@@ -48,6 +48,12 @@ class WideQuery {
   QueryStatus run(const Side& a, const Side& b, PairBuffer& out, std::uint64_t& tests,
                   const Budget& budget = {});
 
+  /// Appends the pairs of primitives whose boxes overlap in the given pairs of leaves, of which the leaves of
+  /// side a are pairs[2 i]. The boxes of the leaves of side b must be current. Within one body, each two
+  /// leaves are given once. Adds the box tests made to `tests`.
+  void run_leaves(const Side& a, const Side& b, std::span<const LeafSlot> pairs, PairBuffer& out,
+                  std::uint64_t& tests);
+
   /// Wide nodes whose boxes a lazy query waits for; `none`: no wait on that side.
   struct Wanted {
     static constexpr std::uint32_t none = ~std::uint32_t(0);
