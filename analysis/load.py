@@ -245,6 +245,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "params": params,
         "builder": builder,
         "over_time": _over_time(record),
+        "times_over_time": _times_over_time(record),
         "events_at_depth": _list(record, "events_at_depth"),
         "holds": holds,
         "violation": violation,
@@ -292,6 +293,15 @@ def _over_time(record: _Record) -> list[dict[str, float]]:
         if sample["sah"] > 0 and sample["sah_rebuilt"] > 0:
             samples.append(sample)
     return samples
+
+
+def _times_over_time(record: _Record) -> list[dict[str, float]]:
+    """Returns the times of equal parts of the clip; empty for results of older programs."""
+    parts = []
+    for entry in _list(record, "times.over_time"):
+        one = _Record(entry if isinstance(entry, dict) else {}, f"{record.place}, times.over_time")
+        parts.append({name: one.number(name) for name in ("begin", "update", "query")})
+    return parts
 
 
 def _changes(record: _Record) -> str:

@@ -358,6 +358,12 @@ def _group_pictures(
             lambda: tree_figures.over_time(group, all_looks),
         ),
         picture(
+            folder, f"{slug}-pace", f"Does the query slow down? {place}",
+            "Mean times of equal parts of the clip. A rising line is a tree whose age costs time, or a clip with more to find."
+            + fastest_only,
+            lambda: tree_figures.times_over_time(group, all_looks),
+        ),
+        picture(
             folder, f"{slug}-latency", f"Distribution of frame times: {place}",
             "The dot is the median frame, the bar the 99th percentile, the cross the worst frame; motion "
             "evaluation is not included. A long line means that work is concentrated in a few frames, which is visible as a "

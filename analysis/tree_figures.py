@@ -64,6 +64,35 @@ def over_time(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
     return figure
 
 
+def times_over_time(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
+    """Draws the query time, and update and query together, of equal parts of the clip."""
+    rows = without_oracles(thinned(group[group["times_over_time"].map(len) > 1]))
+    if rows.empty:
+        return None
+    drawn = []
+    for _, row in rows.iterrows():
+        curve = pd.DataFrame(row["times_over_time"])
+        curve["total"] = curve["update"] + curve["query"]
+        drawn.append((row, curve.rename(columns={"begin": "t"}), 0))
+    drawn.sort(key=lambda entry: -float(entry[1]["query"].iloc[-1]))
+    entries = [(str(row["label"]), looks[row["contestant"]]) for row, _, _ in drawn]
+    side, tall = key_size([label for label, _ in entries])
+    figure = Figure(figsize=(WIDTH, max(3.8, tall)), layout="constrained")
+    grid = figure.add_gridspec(1, 3, width_ratios=[(WIDTH - side) / 2] * 2 + [side])
+    for place, (column, title) in enumerate((("query", "query, ms"), ("total", "update and query, ms"))):
+        values = [value for _, curve, _ in drawn for value in curve[column] if value > 0]
+        if not values:
+            return None
+        axes = figure.add_subplot(grid[0, place])
+        log_axis(axes, "y", values)
+        axes.set_title(title)
+        _lines(axes, drawn, looks, column)
+        axes.set_xlabel("part of the clip")
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.0f} %"))
+    key(figure.add_subplot(grid[0, 2]), entries, KeyLines.shown)
+    return figure
+
+
 def _agree(a: pd.DataFrame, b: pd.DataFrame) -> bool:
     if len(a) != len(b):
         return False

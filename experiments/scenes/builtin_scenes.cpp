@@ -7,6 +7,7 @@
 #include "experiments/common/progress.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh_cache.hpp"
+#include "experiments/scenes/ageing.hpp"
 #include "experiments/scenes/garment.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/scenes/tablecloth.hpp"
@@ -136,6 +137,33 @@ Meshes random_soups(const BuiltinOptions& options, const MakeProgress&) {
           scenes::random_soup(obstacle_triangles(options), options.seed + 1, options.keyframes)};
 }
 
+scenes::AgeingConfig ageing(const BuiltinOptions& options) {
+  return {.triangles = options.triangles, .seed = options.seed, .keyframes = options.keyframes};
+}
+
+/// Makes a scene of two moving bodies, by default of the same size.
+template <std::pair<io::AnimatedMesh, io::AnimatedMesh> (*make)(const scenes::AgeingConfig&, std::uint32_t)>
+Meshes two_alike(const BuiltinOptions& options, const MakeProgress&) {
+  auto [first, second] =
+      make(ageing(options), options.obstacle_triangles > 0 ? options.obstacle_triangles : options.triangles);
+  return {std::move(first), std::move(second)};
+}
+
+/// Makes a scene of one body.
+template <io::AnimatedMesh (*make)(const scenes::AgeingConfig&)>
+Meshes alone(const BuiltinOptions& options, const MakeProgress&) {
+  return {make(ageing(options))};
+}
+
+Meshes flowing_soup(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::flowing_soup(ageing(options)),
+          scenes::icosphere(obstacle_triangles(options), {0.46, 0.53, 0.51}, 0.2)};
+}
+
+Meshes funnel_cloth(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::funnel_cloth(ageing(options)), scenes::funnel(obstacle_triangles(options))};
+}
+
 }  // namespace
 
 const std::vector<BuiltinScene>& builtin_scenes() {
@@ -152,6 +180,23 @@ const std::vector<BuiltinScene>& builtin_scenes() {
       {"passing_spheres", "two rigid spheres pass through each other", &passing_spheres},
       {"turning_box", "a box rotates inside a sphere at rest", &turning_box},
       {"random_soups", "two clouds of separate drifting triangles in the same cube", &random_soups},
+      {"mixing_swarms", "two swarms of hundreds of soft bodies fall into each other and mix",
+       &two_alike<scenes::mixing_swarms>},
+      {"crossing_crowd", "people cross a square in four directions, again and again; pairs within the crowd",
+       &alone<scenes::crossing_crowd>, nullptr, BodiesOf::one},
+      {"shattering_balls", "two balls collide and burst into their triangles",
+       &two_alike<scenes::shattering_balls>},
+      {"flowing_soup", "separate triangles drift in a stirred flow, through a sphere at rest", &flowing_soup},
+      {"twisted_rod",
+       "a rod is twisted until it buckles and winds up into a double helix; pairs within the rod",
+       &alone<scenes::twisted_rod>, nullptr, BodiesOf::one},
+      {"tightening_knot", "a rope slides out of its knot, which is pulled tight; pairs within the rope",
+       &alone<scenes::tightening_knot>, nullptr, BodiesOf::one},
+      {"unrolling_yarns", "two balls of yarn roll over a floor and leave their threads there",
+       &two_alike<scenes::unrolling_yarns>},
+      {"funnel_cloth", "a cloth is pulled through a funnel and gathers into pleats", &funnel_cloth},
+      {"running_figures", "two people run on the spot, 25 keyframes per second: steps as large as triangles",
+       &two_alike<scenes::running_figures>},
   };
   return list;
 }

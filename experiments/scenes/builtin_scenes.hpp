@@ -35,6 +35,12 @@ struct ReversalRule {
   std::uint32_t frames = 0;
 };
 
+/// The bodies that a scene's pairs are between.
+enum class BodiesOf : std::uint8_t {
+  several,  ///< pairs between bodies
+  one,      ///< the scene has one body: pairs within it; the option `obstacle` is refused
+};
+
 /// A scene that needs no files.
 struct BuiltinScene {
   std::string name;
@@ -42,6 +48,7 @@ struct BuiltinScene {
   std::vector<io::AnimatedMesh> (*make)(const BuiltinOptions& options, const MakeProgress& progress);
   /// For scenes whose plans change at run time: they are played at the rule's frames. Else nullptr.
   ReversalRule (*reversal)(const BuiltinOptions& options) = nullptr;
+  BodiesOf bodies = BodiesOf::several;
 };
 
 const std::vector<BuiltinScene>& builtin_scenes();

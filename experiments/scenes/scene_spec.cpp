@@ -255,6 +255,8 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
   base.options.keyframes =
       std::uint32_t(keys.whole("keyframes", ranges::keyframes).value_or(base.options.keyframes));
   base.options.obstacle_triangles = std::uint32_t(keys.whole("obstacle", ranges::triangles).value_or(0));
+  if (base.options.obstacle_triangles > 0 && find_builtin_scene(base.builtin).bodies == BodiesOf::one)
+    keys.fail("obstacle", "the scene '" + base.builtin + "' has one body");
   keys.finish();
   if (triangles.empty()) triangles = {base.options.triangles};
   if (seeds.empty()) seeds = {base.options.seed};
@@ -360,6 +362,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     const BuiltinScene& builtin = find_builtin_scene(spec.builtin);
     loaded.origin = SceneOrigin::built_in;
     loaded.meshes = builtin.make(spec.options, progress);
+    if (builtin.bodies == BodiesOf::one) loaded.self.assign(loaded.meshes.size(), true);
     if (builtin.reversal != nullptr) loaded.reversal = builtin.reversal(spec.options);
     loaded.name = spec.builtin;
     // Shapes end their names with the number of triangles that their pattern allowed.

@@ -5,45 +5,10 @@
 #include <numbers>
 #include <utility>
 
+#include "experiments/scenes/mesh_parts.hpp"
+
 namespace kbvh::scenes {
 namespace {
-
-constexpr std::uint32_t max_triangles = 1u << 27;
-
-void check_triangles(std::uint32_t triangles, const char* shape) {
-  if (triangles > max_triangles)
-    throw io::InputError(std::string(shape) + ": " + std::to_string(triangles) +
-                         " triangles asked for, at most " + std::to_string(max_triangles) + " are possible");
-}
-
-void check_length(double value, const char* what) {
-  if (!(value > 0.0) || !(value < 1e6))
-    throw io::InputError(std::string(what) + " is " + std::to_string(value) + ", must be in (0, 1e6)");
-}
-
-/// Returns the f >= 1 for which per_square * f^2 is nearest to the request.
-std::uint32_t nearest_frequency(std::uint32_t triangles, std::uint32_t per_square) {
-  const double ideal = double(triangles) / double(per_square);
-  const auto f = std::uint64_t(std::sqrt(ideal));
-  const double below = ideal - double(f * f);
-  const double above = double((f + 1) * (f + 1)) - ideal;
-  return std::uint32_t(std::max<std::uint64_t>(1, above < below ? f + 1 : f));
-}
-
-io::AnimatedMesh triangle_mesh(const std::string& shape, std::vector<std::uint32_t> corners,
-                               std::vector<double> positions) {
-  io::AnimatedMesh mesh;
-  const std::size_t count = corners.size() / 3;
-  mesh.name = shape + "-" + std::to_string(count);
-  mesh.vertex_count = std::uint32_t(positions.size() / 3);
-  mesh.primitive_offsets.resize(count + 1);
-  for (std::size_t i = 0; i <= count; ++i) mesh.primitive_offsets[i] = std::uint32_t(3 * i);
-  mesh.primitive_vertices = std::move(corners);
-  mesh.keyframe_times = {0.0};
-  for (double& x : positions) x = rounded_to_float(x);
-  mesh.positions = std::move(positions);
-  return mesh;
-}
 
 /// Maps corners named by 64-bit keys to vertex ids; returns the distinct keys in rising order. Sorting
 /// instead of hashing gives the same order of vertices on every platform.
@@ -56,43 +21,6 @@ std::vector<std::uint64_t> weld(const std::vector<std::uint64_t>& corner_keys,
   for (std::size_t i = 0; i < corner_keys.size(); ++i)
     corners[i] = std::uint32_t(std::lower_bound(keys.begin(), keys.end(), corner_keys[i]) - keys.begin());
   return keys;
-}
-
-struct ProfilePoint {
-  double r, z;
-};
-
-/// Revolves a profile (from the upper to the lower pole; both poles lie on the axis and are given separately)
-/// around the vertical axis through (x, y): one ring of `segments` vertices per profile point.
-io::AnimatedMesh revolve(const std::string& shape, double x, double y, double top_z, double bottom_z,
-                         const std::vector<ProfilePoint>& profile, std::uint32_t segments) {
-  const auto rings = std::uint32_t(profile.size());
-  std::vector<double> positions;
-  positions.reserve(3 * (std::size_t(rings) * segments + 2));
-  for (const ProfilePoint& p : profile)
-    for (std::uint32_t s = 0; s < segments; ++s) {
-      const double turns = double(s) / double(segments);
-      positions.insert(positions.end(),
-                       {x + p.r * cosine_of_turns(turns), y + p.r * sine_of_turns(turns), p.z});
-    }
-  const std::uint32_t top = rings * segments;
-  const std::uint32_t bottom = top + 1;
-  positions.insert(positions.end(), {x, y, top_z, x, y, bottom_z});
-  std::vector<std::uint32_t> corners;
-  corners.reserve(6 * std::size_t(rings) * segments);
-  for (std::uint32_t s = 0; s < segments; ++s) {
-    const std::uint32_t next = (s + 1) % segments;
-    corners.insert(corners.end(), {top, s, next});
-    for (std::uint32_t ring = 0; ring + 1 < rings; ++ring) {
-      const std::uint32_t upper = ring * segments;
-      const std::uint32_t lower = upper + segments;
-      corners.insert(corners.end(), {upper + s, lower + s, lower + next});
-      corners.insert(corners.end(), {upper + s, lower + next, upper + next});
-    }
-    const std::uint32_t last = (rings - 1) * segments;
-    corners.insert(corners.end(), {bottom, last + next, last + s});
-  }
-  return triangle_mesh(shape, std::move(corners), std::move(positions));
 }
 
 /// Returns the rings between the poles and the segments around whose 2 s r triangles are nearest to the

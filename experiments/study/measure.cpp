@@ -22,6 +22,9 @@ constexpr double warm_up_seconds = 0.05;
 /// The number of frames at which the quality of a contestant's boxes is recorded.
 constexpr std::uint64_t quality_samples = 16;
 
+/// The number of equal parts of a clip whose times are recorded.
+constexpr std::size_t time_parts = 16;
+
 template <class S>
 ClipTimes play_clip(Session<S>& session, std::span<const double> frames, const PlanScript<S>* script,
                     PairBuffer& pairs) {
@@ -174,13 +177,29 @@ json times_record(const Measured& measured) {
     const auto rank = std::size_t(std::ceil(share * double(totals.size())));
     return totals[std::max<std::size_t>(rank, 1) - 1];
   };
+  // The clip in equal parts, so that a structure that ages shows.
+  const std::size_t parts = std::min<std::size_t>(time_parts, totals.size());
+  json over_time = json::array();
+  for (std::size_t part = 0; part < parts; ++part) {
+    const std::size_t begin = part * totals.size() / parts, end = (part + 1) * totals.size() / parts;
+    double update = 0, query = 0;
+    for (std::size_t f = begin; f < end; ++f) {
+      update += median.frames[f].update;
+      query += median.frames[f].traversal + median.frames[f].triangle_tests;
+    }
+    const double frames = double(end - begin);
+    over_time.push_back({{"begin", double(begin) / double(totals.size())},
+                         {"update", ms * update / frames},
+                         {"query", ms * query / frames}});
+  }
   return {{"unit", "ms"},
           {"frames", totals.size()},
           {"repetitions", repetitions},
           {"total_p50", quantile(0.5)},
           {"total_p99", quantile(0.99)},
           {"total_worst", totals.back()},
-          {"build_ms", ms * measured.build_seconds}};
+          {"build_ms", ms * measured.build_seconds},
+          {"over_time", over_time}};
 }
 
 namespace {

@@ -78,7 +78,7 @@ class TestPage(ReportCase):
     def test_figures_come_as_png_and_pdf(self) -> None:
         self.page(small(), figures="main")
         names = {file.name for file in (self.folder / "figures").iterdir()}
-        for figure in ("cost", "error", "counters", "depth", "quality", "latency", "l"):
+        for figure in ("cost", "error", "counters", "depth", "quality", "pace", "latency", "l"):
             self.assertIn(f"tablecloth-{figure}.png", names)
             self.assertIn(f"tablecloth-{figure}.pdf", names)
         self.assertNotIn("tablecloth-n.png", names, "one size only: no figure over sizes")
@@ -88,7 +88,7 @@ class TestPage(ReportCase):
         for line in lines:
             line["verified"].update(looseness=0.0, candidates=line["verified"]["pairs"])
             del line["counters"], line["bytes"], line["events_at_depth"], line["verified"]["over_time"]
-            for name in ("total_p50", "total_p99", "total_worst"):
+            for name in ("total_p50", "total_p99", "total_worst", "over_time"):
                 del line["times"][name]
         self.page(lines, figures="main")
         self.assertEqual({file.stem for file in (self.folder / "figures").iterdir()}, {"tablecloth-cost"})

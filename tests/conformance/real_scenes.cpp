@@ -20,6 +20,9 @@ const std::vector<std::string> sequences{"diffcloth-tshirt-iter0", "codimipc-Rum
                                          "mannequiny-run",         "robot-Dance",
                                          "MorphStressTest",        "AnimatedMorphSphere"};
 const std::vector<std::string> blender_scenes{"tablecloth-2k", "tablecloth-16k", "dancer-skirt"};
+const std::vector<std::string> ageing_scenes{"mixing_swarms",   "crossing_crowd", "shattering_balls",
+                                             "flowing_soup",    "twisted_rod",    "tightening_knot",
+                                             "unrolling_yarns", "funnel_cloth",   "running_figures"};
 
 io::AnimatedMesh sequence(const std::string& name) {
   const fs::path folder = data_folder() / "sequences" / name;
@@ -79,6 +82,7 @@ std::vector<RealScene> real_scenes() {
   std::vector<RealScene> scenes{{"tablecloth", false}, {"shirt", false}, {"dress", false}};
   for (const std::string& name : sequences) scenes.push_back({name + "+sphere", true});
   scenes.push_back({"robot-Dance+MorphStressTest", true});
+  for (const std::string& name : ageing_scenes) scenes.push_back({name, false});
   for (const std::string& name : blender_scenes) scenes.push_back({"blender:" + name, true});
   return scenes;
 }
@@ -97,6 +101,12 @@ experiments::LoadedScene load_real_scene(const std::string& name, std::size_t ke
     config.triangles = keyframes != 0 ? 500 : 2000;
     config.avatar_triangles = keyframes != 0 ? 300 : 1000;
     scene.meshes = scenes::simulate_garment(config);
+  } else if (std::find(ageing_scenes.begin(), ageing_scenes.end(), name) != ageing_scenes.end()) {
+    experiments::SceneSpec spec;
+    spec.builtin = name;
+    spec.options.triangles = keyframes != 0 ? 160 : 2000;
+    scene = experiments::load(spec);
+    scene.sources.clear();
   } else if (name.rfind("blender:", 0) == 0) {
     scene.meshes = several_bodies(data_folder() / "blender" / name.substr(8));
   } else {

@@ -16,7 +16,7 @@ struct RealScene {
   bool needs_data = false;
 };
 /// The tablecloth with its table; garments on their figures; each sequence cut by a sphere; two sequences
-/// overlapping; the scenes of several bodies.
+/// overlapping; the scenes of several bodies; the built-in scenes that age trees.
 std::vector<RealScene> real_scenes();
 
 /// Loads one. `keyframes` 0: all; otherwise that many from the middle of the clip. Large scenes are left out

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "core/scene/self_pairs.hpp"
 #include "tests/conformance/check.hpp"
 #include "tests/conformance/real_scenes.hpp"
 
@@ -33,6 +34,7 @@ class RealScenes : public testing::TestWithParam<RealScene> {
     std::uint64_t contestants = 0, pairs = 0;
     for (const StrategyEntry& entry : registry()) {
       if (entry.factory<S>() == nullptr) continue;
+      if (has_self_pairs(scene.pairs) && !entry.info.can.self_pairs) continue;
       if (entry.info.max_primitive_pairs != 0 && slow()) continue;  // quadratic: quick scenes only
       Session<S> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
       const Verification result = verify(session, std::span<const double>(frames), oracle);

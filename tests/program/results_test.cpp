@@ -141,6 +141,14 @@ TEST(Times, QuantilesAreOfTheMedianRepetition) {
   EXPECT_DOUBLE_EQ(record.at("total_worst"), 200);
   EXPECT_EQ(record.at("repetitions").size(), 3u);
   EXPECT_DOUBLE_EQ(record.at("repetitions")[0].at("update"), 151.5);
+  // 16 parts of 6 or 7 frames each, of the median repetition: its frames take 2, 4, 6... ms.
+  const json& parts = record.at("over_time");
+  ASSERT_EQ(parts.size(), 16u);
+  EXPECT_EQ(parts[0].at("begin"), 0);
+  EXPECT_DOUBLE_EQ(parts[0].at("update"), 7);
+  EXPECT_EQ(parts[0].at("query"), 0);
+  EXPECT_DOUBLE_EQ(parts[15].at("begin"), 0.93);
+  EXPECT_DOUBLE_EQ(parts[15].at("update"), 194);
 }
 
 TEST(Times, MeansHaveEveryPhase) {
@@ -157,6 +165,11 @@ TEST(Times, MeansHaveEveryPhase) {
   Measured measured;
   measured.repetitions = {clip};
   EXPECT_DOUBLE_EQ(times_record(measured).at("repetitions")[0].at("geometry_changes"), 7e3);
+  const json parts = times_record(measured).at("over_time");
+  ASSERT_EQ(parts.size(), 2u);
+  EXPECT_EQ(parts[1].at("begin"), 0.5);
+  EXPECT_DOUBLE_EQ(parts[1].at("update"), 4e3);
+  EXPECT_DOUBLE_EQ(parts[1].at("query"), 11e3);
 }
 
 json example_record(const std::string& id, const std::string& family, double update) {
