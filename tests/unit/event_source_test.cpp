@@ -152,8 +152,10 @@ template <class S>
 std::vector<ScheduledEvent<S>> log_of(const StrategyEntry& entry, const TestScene<S>& test,
                                       const std::string& queue, std::vector<PairBuffer>& answers) {
   const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 2) : test.frames;
-  Session<S> session(test.scene, {&entry, {{"queue", queue}}, entry.info.topology.preferred},
-                     CountingPolicy::silent);
+  Session<S> session(
+      test.scene,
+      {&entry, {{"queue", queue}}, BuilderConfig{.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+      CountingPolicy::silent);
   ScriptCursor<S> cursor(test.script.empty() ? nullptr : &test.script);
   PhaseTimes times;
   std::vector<ScheduledEvent<S>> log;
