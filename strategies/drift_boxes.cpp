@@ -82,7 +82,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     const double last = this->previous_time();
     ++frames_;
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) observe(index, last, t);
-    bring_up_to_date();
+    listed() ? advance_listed() : advance_plain();
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) count_skipped(index);
   }
 
@@ -92,13 +92,13 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     if (search_due_) search(tests);
     for (std::size_t k = 0; k < near_pairs_.size(); ++k) {
       const BodyPair pair = this->scene_.pairs()[near_pairs_[k]];
-      if (period_ > 0)
+      if (listed())
         tests += read(lists_of_[k], pair, out);
       else
         query_.run({&hierarchies_[pair.first], pair.first}, {&hierarchies_[pair.second], pair.second}, out,
                    tests);
     }
-    if (period_ == 0) model_.queried(double(tests), double(out.size() - before));
+    if (!listed()) model_.queried(double(tests), double(out.size() - before));
     this->count_.add(Counter::box_tests, tests);
     return {};
   }
@@ -121,7 +121,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     const Body& body = bodies_[index];
     const auto& hierarchy = hierarchies_[index];
     AuditView view{hierarchy.topology(), {}, {}};
-    const bool old = period_ > 0 && body.watch == Watch::drift;
+    const bool old = listed() && body.watch == Watch::drift;
     for (std::uint32_t node = 0; node < view.topology.size(); ++node) {
       const Box<double> box = to_double(hierarchy.box(node));
       view.boxes.push_back(old ? body.moved_on(box) : box);
@@ -151,7 +151,6 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
   }
 
   // ---- Reads of a frame
-  // ------------------------------------------------------------------------------------
 
   void observe(std::uint32_t index, double last, double t) {
     Body& body = bodies_[index];
@@ -160,7 +159,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     if constexpr (bounded) {
       const double way = motion_.displacement_bound(index, last, t);
       if (way > 0) body.moved_by_at_most(way);
-    } else if (period_ > 0 || plain_left_ <= 1 || !body.near) {
+    } else if (listed() || plain_left_ <= 1 || !body.near) {
       if (body.watch == Watch::box) {
         const Box<double> before = body.box;
         take_box(index);
@@ -200,15 +199,21 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     this->count_.add(Counter::vertex_reads, 2 * std::uint64_t(count));
   }
 
-  // ---- Work shared by a period of frames
-  // -------------------------------------------------------------------
+  // ---- Two states: listed frames read the lists of one search, plain frames refit and query. The transition
+  // chooses the next state from the last observations (DriftModel).
 
-  /// Does nothing if the old boxes are still valid for this frame.
-  void bring_up_to_date() {
-    const bool listed = period_ > 0;
-    if (listed && !search_due_ && !plans_changed_ && covered()) return;
+  bool listed() const { return period_ > 0; }
+
+  /// Keeps boxes and lists as long as they are valid.
+  void advance_listed() {
+    const bool valid = !search_due_ && !plans_changed_ && covered();
     plans_changed_ = false;
-    if (!listed && --plain_left_ > 0) {
+    if (!valid) change_state();
+  }
+  /// Makes boxes anew, until lists are to be tried again.
+  void advance_plain() {
+    plans_changed_ = false;
+    if (--plain_left_ > 0) {
       // Remembers the frame before lists are tried again, so that there is a motion to judge by.
       for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
         if (!bodies_[index].near || bodies_[index].watch == Watch::nothing) continue;
@@ -217,7 +222,46 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
       }
       if (!meets_newly()) return;
     }
-    begin_period();
+    change_state();
+  }
+
+  void change_state() {
+    choose_state();
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) set_margin(index);
+    find_near();
+    if (bounded && take_late_boxes()) find_near();
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) enter_state(index);
+    frames_ = 0;
+    search_due_ = listed();
+  }
+  void choose_state() {
+    if (lists_ == Lists::tuned && (listed() || plain_left_ <= 0)) {
+      period_ = model_.period(step());
+      plain_left_ = listed() ? 0 : model_.rest();
+    }
+    if (lists_ == Lists::never) plain_left_ = std::numeric_limits<int>::max();
+    for (const Body& body : bodies_)
+      for (int axis = 0; axis < 3; ++axis)
+        if (!(std::abs(body.rate_low[axis]) + std::abs(body.rate_high[axis]) <
+              double(admissible_magnitude<S>) / 1024))
+          period_ = 0;
+    if (!listed()) plain_left_ = std::max(plain_left_, 1);
+  }
+  void enter_state(std::uint32_t index) {
+    Body& body = bodies_[index];
+    if (!may_move(index)) {
+      if (listed() && body.near && !body.widened) widen(index);
+      return;
+    }
+    if (!body.near) {
+      body.watch = bounded ? Watch::drift : Watch::box;
+      return;
+    }
+    body.watch = Watch::drift;
+    make_boxes(index);
+    if (!listed() && plain_left_ > 1) return;
+    remember(index);
+    if (listed()) widen(index);
   }
 
   bool covered() {
@@ -256,43 +300,6 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     }
   }
 
-  void begin_period() {
-    if (lists_ == Lists::tuned && (period_ > 0 || plain_left_ <= 0)) {
-      period_ = model_.period(step());
-      plain_left_ = period_ > 0 ? 0 : model_.rest();
-    } else if (period_ == 0) {
-      plain_left_ = std::max(plain_left_, 1);
-    }
-    if (lists_ == Lists::never) plain_left_ = std::numeric_limits<int>::max();
-    for (const Body& body : bodies_)
-      for (int axis = 0; axis < 3; ++axis)
-        if (!(std::abs(body.rate_low[axis]) + std::abs(body.rate_high[axis]) <
-              double(admissible_magnitude<S>) / 1024))
-          period_ = 0;
-    if (period_ == 0) plain_left_ = std::max(plain_left_, 1);
-    for (std::uint32_t index = 0; index < bodies_.size(); ++index) set_margin(index);
-    find_near();
-    if (bounded && take_late_boxes()) find_near();
-    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
-      Body& body = bodies_[index];
-      if (!may_move(index)) {
-        if (period_ > 0 && body.near && !body.widened) widen(index);
-        continue;
-      }
-      if (!body.near) {
-        body.watch = bounded ? Watch::drift : Watch::box;
-        continue;
-      }
-      body.watch = Watch::drift;
-      make_boxes(index);
-      if (period_ == 0 && plain_left_ > 1) continue;
-      remember(index);
-      if (period_ > 0) widen(index);
-    }
-    frames_ = 0;
-    search_due_ = period_ > 0;
-  }
-
   /// Computes the actual boxes of bodies that are near only if they moved as far as possible. Returns whether
   /// there were any.
   bool take_late_boxes() {
@@ -308,20 +315,11 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     return any;
   }
 
-  /// Returns the mean closing per frame of a side of the gap between two bodies, relative to the sides of two
-  /// leaves; the largest of all pairs.
+  /// Returns the largest `step_of` of all pairs of bodies, or of each body with an equal one, which is no
+  /// less.
   double step() const {
     double largest = 0;
-    const auto step_of = [](const Body& a, const Body& b) {
-      double sum = 0;
-      for (int axis = 0; axis < 3; ++axis)
-        sum += std::max(0.0, a.rate_high[axis]) + std::max(0.0, -a.rate_low[axis]) +
-               std::max(0.0, b.rate_high[axis]) + std::max(0.0, -b.rate_low[axis]);
-      const double size = a.leaf_size + b.leaf_size;
-      return size > 0 ? sum / 6 / size : 0;
-    };
-    if (near_bodies_.searches())  // each pair's value is at most the larger of its bodies' values against an
-                                  // equal body
+    if (near_bodies_.searches())
       for (const Body& body : bodies_) largest = std::max(largest, step_of(body, body));
     else
       for (const BodyPair& pair : this->scene_.pairs())

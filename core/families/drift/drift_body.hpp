@@ -133,6 +133,17 @@ template <class S>
 double closing(const DriftBody<S>& a, const DriftBody<S>& b, std::size_t k) {
   return k < 3 ? a.high[k] - b.low[k] : b.high[k - 3] - a.low[k - 3];
 }
+/// Returns the mean closing per frame of a side of the gap between two bodies, relative to the sides of two
+/// leaves; 0 if leaves have no size.
+template <class S>
+double step_of(const DriftBody<S>& a, const DriftBody<S>& b) {
+  double sum = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    sum += std::max(0.0, a.rate_high[axis]) + std::max(0.0, -a.rate_low[axis]) +
+           std::max(0.0, b.rate_high[axis]) + std::max(0.0, -b.rate_low[axis]);
+  const double size = a.leaf_size + b.leaf_size;
+  return size > 0 ? sum / 6 / size : 0;
+}
 /// Returns the admissible closing: the sum of both margins.
 template <class S>
 S reach(const DriftBody<S>& a, const DriftBody<S>& b, std::size_t k) {
