@@ -45,6 +45,8 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
     ForestType forest;
     std::vector<Volumes> volumes;  ///< [body]; boxes: sized for queries by node pairs only
   };
+  template <class KindType>
+  static constexpr bool of_boxes = std::remove_cvref_t<KindType>::boxes;
 
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
@@ -64,7 +66,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
              true)) ||
            ...);
     on_kind([&](auto& selected) {
-      if constexpr (selected.boxes) {
+      if constexpr (of_boxes<decltype(selected)>) {
         if (by_rows_) rows_.assign(selected.forest, scene);
         for (std::uint32_t body = 0; !by_rows_ && body < scene.body_count(); ++body)
           selected.volumes[body].resize(selected.forest.tree(body).topology().size());
@@ -76,7 +78,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
     near_bodies_.start_over();
     on_kind([&](auto& kind) {
       kind.forest.reset(t);
-      if constexpr (!kind.boxes)
+      if constexpr (!of_boxes<decltype(kind)>)
         for (auto& volumes : kind.volumes) volumes.start_over();
     });
     rows_.start_over();
@@ -92,7 +94,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
     QueryStatus status;
     BoxTests tests;
     on_kind([&](auto& kind) {
-      if constexpr (kind.boxes)
+      if constexpr (of_boxes<decltype(kind)>)
         if (by_rows_) {
           std::uint64_t reads = 0;
           status = rows_.find(kind.forest, near_bodies_, this->scene_, this->sampled_, budget, out,
@@ -120,7 +122,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
                                      rest_of(budget, tests.made), leaves)
                                 .pending;
         };
-        if constexpr (!kind.boxes)
+        if constexpr (!of_boxes<decltype(kind)>)
           if (answered_by_boxes(pair)) {
             compare(BoxesOfDops(kind.volumes[pair.first]), BoxesOfDops(kind.volumes[pair.second]));
             continue;
@@ -138,7 +140,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
       const auto& volumes = kind.volumes[body];
       std::vector<std::uint32_t> order;
       AuditView view{tree.compacted_topology(order), {}, {}};
-      if constexpr (kind.boxes) {
+      if constexpr (of_boxes<decltype(kind)>) {
         for (const std::uint32_t node : order) {
           // Reports the box that a query has read, if there is one.
           Box<S> room;
@@ -149,9 +151,13 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
               read != nullptr ? *read : box_of_realisers(tree.realisers(node), this->sampled_, body)));
         }
       } else {
-        std::vector<Dop<S, kind.sides>> dops;
-        for (const std::uint32_t node : order) dops.push_back(volumes.current_or_computed(node));
-        view.volumes = std::make_shared<AuditedVolumes<Dop<S, kind.sides>>>(std::move(dops));
+        std::vector<Dop<S, std::remove_cvref_t<decltype(kind)>::sides>> dops;
+        for (const std::uint32_t node : order) {
+          dops.push_back(volumes.current_or_computed(node));
+          view.boxes.push_back(enclosing_box(dops.back()));  // for callers who know boxes alone
+        }
+        view.volumes = std::make_shared<AuditedVolumes<Dop<S, std::remove_cvref_t<decltype(kind)>::sides>>>(
+            std::move(dops));
       }
       return view;
     });
@@ -170,7 +176,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
   void change_plans(double t, std::span<const PlanChange<S>> changes) {
     on_kind([&](auto& kind) {
       kind.forest.plans_changed(t, changes);
-      if constexpr (!kind.boxes)
+      if constexpr (!of_boxes<decltype(kind)>)
         for (const PlanChange<S>& change : changes) kind.volumes[change.body].include(change.vertex, t);
       else if (by_rows_)
         for (const PlanChange<S>& change : changes) rows_.plans_changed(change.body);
@@ -186,7 +192,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
       for (const BodyChange& body_change : changes) {
         auto& volumes = kind.volumes[body_change.body];
         if (!by_rows_) volumes.resize(kind.forest.tree(body_change.body).topology().size());
-        if constexpr (!kind.boxes)
+        if constexpr (!of_boxes<decltype(kind)>)
           for (std::uint32_t v = body_change.first_vertex; v < this->scene_.vertex_count(body_change.body);
                ++v)
             volumes.include(v, t);
@@ -232,7 +238,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
   void new_frame(double t) {
     on_kind([&](auto& kind) {
       for (std::uint32_t body = 0; body < kind.volumes.size(); ++body)
-        if constexpr (kind.boxes)
+        if constexpr (of_boxes<decltype(kind)>)
           kind.volumes[body].new_frame();
         else
           kind.volumes[body].new_frame(t, kind.forest.tree(body).realisers(0));
