@@ -300,7 +300,7 @@ KBVH_STRATEGY(kinetic_separation_list) {
       .citation = "Zachmann & Weller 2006, s.7",
       .positions = PositionUse::varying,
       .declares = {.continuous = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 16}},
       .parameters = {{"queue",
                       "segment_heap",
                       {"segment_heap", "avl", "binary_heap"},

@@ -27,6 +27,7 @@ class ListPool {
     return {values_.data() + list.begin, list.count};
   }
   std::uint32_t keys() const { return std::uint32_t(lists_.size()); }
+  void prefetch(std::uint32_t key) const { __builtin_prefetch(&lists_[key]); }
   /// Appends empty lists, or drops the last lists.
   void resize(std::uint32_t keys) {
     for (std::uint32_t key = keys; key < lists_.size(); ++key) release(lists_[key]);
@@ -42,7 +43,8 @@ class ListPool {
     std::copy(list.begin(), list.end(), values_.begin() + lists_[key].begin);
     lists_[key].count = std::uint32_t(list.size());
   }
-  void push(std::uint32_t key, std::uint32_t value) {
+  /// Appends a value and returns its index in the list.
+  std::uint32_t push(std::uint32_t key, std::uint32_t value) {
     List list = lists_[key];
     if (list.count == room(list)) {
       List larger = reserve(list.count + 1);
@@ -51,17 +53,22 @@ class ListPool {
       release(list);
       list = larger;
     }
-    values_[list.begin + list.count++] = value;
-    lists_[key] = list;
+    values_[list.begin + list.count] = value;
+    lists_[key] = {list.begin, list.count + 1, list.room};
+    return list.count;
   }
   /// Removes one occurrence of a value, if there is one; the order may change.
   void erase(std::uint32_t key, std::uint32_t value) {
+    const std::span<const std::uint32_t> list = (*this)[key];
+    const auto at = std::find(list.begin(), list.end(), value);
+    if (at != list.end()) erase_at(key, std::uint32_t(at - list.begin()));
+  }
+  /// Removes the value at an index. The list's last value takes its place; returns that value.
+  std::uint32_t erase_at(std::uint32_t key, std::uint32_t index) {
     List& list = lists_[key];
-    const auto begin = values_.begin() + list.begin, end = begin + list.count;
-    const auto at = std::find(begin, end, value);
-    if (at == end) return;
-    *at = *(end - 1);
-    --list.count;
+    const std::uint32_t last = values_[list.begin + --list.count];
+    values_[list.begin + index] = last;
+    return last;
   }
   /// Replaces one occurrence of `value` by `by`.
   void replace(std::uint32_t key, std::uint32_t value, std::uint32_t by) {
@@ -72,6 +79,13 @@ class ListPool {
   void clear(std::uint32_t key) {
     release(lists_[key]);
     lists_[key] = {};
+  }
+
+  /// Empties all lists.
+  void clear() {
+    for (List& list : lists_) list = {};
+    values_.clear();
+    for (auto& begins : free_) begins.clear();
   }
 
   std::size_t value_count() const { return values_.size(); }

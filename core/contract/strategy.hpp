@@ -106,7 +106,7 @@ struct Info {
 /// One body's hierarchy after a query, as seen by audits: bounds in double (exact for float), per node.
 struct AuditView {
   Topology topology;               ///< a copy of the strategy's current topology
-  std::vector<Box<double>> boxes;  ///< one per node; empty if `volumes` is set
+  std::vector<Box<double>> boxes;  ///< one per node; those around `volumes`, if set
   std::vector<std::uint8_t>
       stale;  ///< nodes whose bound was not updated because no query read it; may be empty
   std::shared_ptr<const AuditVolumes> volumes{};  ///< one per node, for bounds that are not boxes; else null

@@ -140,12 +140,13 @@ Audit audit(const AuditView& view, const Primitives& primitives, const S* positi
   if (sound == nullptr || !(view.topology == *sound))
     result.topology_error = check_topology(view.topology, primitives);
   if (!result.topology_error.empty()) return result;
-  const std::size_t bounds = view.volumes ? view.volumes->size() : view.boxes.size();
-  if (bounds != view.topology.size()) {
-    result.topology_error = std::to_string(bounds) + (view.volumes ? " volumes for " : " boxes for ") +
-                            std::to_string(view.topology.size()) + " nodes";
-    return result;
-  }
+  const auto one_per_node = [&](std::size_t bounds, const char* kind) {
+    if (bounds != view.topology.size())
+      result.topology_error = std::to_string(bounds) + kind + std::to_string(view.topology.size()) + " nodes";
+    return bounds == view.topology.size();
+  };
+  if (!one_per_node(view.boxes.size(), " boxes for ")) return result;
+  if (view.volumes && !one_per_node(view.volumes->size(), " volumes for ")) return result;
   if (view.volumes) {
     audit_volumes(view, primitives, positions, result);
     return result;

@@ -240,11 +240,11 @@ TEST(ListPool, KeepsListsApart) {
   for (int i = 0; i < 20'000; ++i) {
     const std::uint32_t key = random.below(pool.keys());
     std::vector<std::uint32_t>& list = expected[key];
-    switch (random.below(6)) {
+    switch (random.below(7)) {
       case 0:
       case 1:
         list.push_back(std::uint32_t(i));
-        pool.push(key, std::uint32_t(i));
+        ASSERT_EQ(pool.push(key, std::uint32_t(i)), list.size() - 1);
         break;
       case 2:
         if (list.empty()) break;
@@ -264,11 +264,22 @@ TEST(ListPool, KeepsListsApart) {
         expected.resize(1 + random.below(40));
         pool.resize(std::uint32_t(expected.size()));
         break;
+      case 6:
+        if (list.empty()) break;
+        const std::uint32_t index = random.below(std::uint32_t(list.size()));
+        ASSERT_EQ(pool.erase_at(key, index), list.back());
+        list[index] = list.back();
+        list.pop_back();
+        break;
     }
     for (std::uint32_t k = 0; k < pool.keys(); ++k)
       ASSERT_TRUE(std::equal(pool[k].begin(), pool[k].end(), expected[k].begin(), expected[k].end())) << i;
   }
   EXPECT_LT(pool.value_count(), 40u * 2 * 64);  // abandoned room is used again
+  pool.clear();
+  EXPECT_EQ(pool.keys(), expected.size());
+  for (std::uint32_t k = 0; k < pool.keys(); ++k) EXPECT_TRUE(pool[k].empty());
+  EXPECT_EQ(pool.value_count(), 0u);
 }
 
 // Subtrees move anywhere, between insertions and removals; a refusal changes nothing.

@@ -33,14 +33,18 @@ World world_of(const Scene<S>& scene) {
 }
 
 template <class S>
-void expect_the_same(const StrategyEntry& entry, const char* name) {
+void expect_the_same(const StrategyEntry& entry, const char* name,
+                     const std::map<std::string, std::string>& params = {}) {
   SCOPED_TRACE(entry.info.id + " on " + name);
   const TestScene<S> test = synthetic_scene<S>(name, 3);
   if (!unsuitable_bodies(entry.info, test.scene).empty() || entry.factory<S>() == nullptr) return;
   const std::vector<double> frames = frame_times(test.scene, 3);
-  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+  Session<S> session(
+      test.scene,
+      {&entry, Params(entry.info.id, entry.info.parameters, params), entry.info.topology.preferred},
+      CountingPolicy::counting);
   World world = world_of(test.scene);
-  world.start(entry.info.id, {}, frames[0]);
+  world.start(entry.info.id, params, frames[0]);
   session.reset(frames[0]);
   PairBuffer expected;
   std::vector<WorldPair> pairs;
@@ -61,11 +65,17 @@ void expect_the_same(const StrategyEntry& entry, const char* name) {
       const auto view = session.strategy().audit_view(body);
       ASSERT_EQ(world.hierarchy(body, hierarchy), view.has_value());
       if (!view) continue;
-      ASSERT_EQ(hierarchy.nodes.size(), view->boxes.size());
+      ASSERT_EQ(hierarchy.nodes.size(), view->topology.size());
+      ASSERT_EQ(view->boxes.size(), view->topology.size());
+      const std::vector<Box<double>> tight =
+          tight_boxes(view->topology, test.scene.bodies[body].primitives, session.playback().positions(body));
       for (std::size_t node = 0; node < view->boxes.size(); ++node)
         for (int axis = 0; axis < 3; ++axis) {
           ASSERT_EQ(hierarchy.nodes[node].lower[axis], view->boxes[node].lower[axis]);
           ASSERT_EQ(hierarchy.nodes[node].upper[axis], view->boxes[node].upper[axis]);
+          if (!view->volumes) continue;
+          ASSERT_LE(hierarchy.nodes[node].lower[axis], tight[node].lower[axis]);
+          ASSERT_GE(hierarchy.nodes[node].upper[axis], tight[node].upper[axis]);
         }
     }
   }
@@ -84,6 +94,23 @@ TEST(World, AnswersWhatTheLibraryAnswers) {
       expect_the_same<float>(entry, scene);
       expect_the_same<double>(entry, scene);
     }
+}
+
+// Of volumes of every kind, the hierarchy shows the boxes around them.
+TEST(World, ShowsBoxesAroundVolumes) {
+  for (const char* id : {"bottom_up_volumes", "kinetic_kdop"}) {
+    const StrategyEntry& entry = find_strategy(id);
+    const auto is_volume = [](const Parameter& parameter) { return parameter.name == "volume"; };
+    const auto& parameters = entry.info.parameters;
+    const auto volume = std::find_if(parameters.begin(), parameters.end(), is_volume);
+    ASSERT_NE(volume, parameters.end()) << id;
+    ASSERT_GE(volume->allowed.size(), 3u) << id;
+    for (const std::string& kind : volume->allowed) {
+      SCOPED_TRACE(kind);
+      expect_the_same<float>(entry, "soups", {{"volume", kind}});
+      expect_the_same<double>(entry, "soups", {{"volume", kind}});
+    }
+  }
 }
 
 const std::vector<std::uint32_t> triangle{0, 1, 2};

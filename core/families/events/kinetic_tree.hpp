@@ -146,6 +146,9 @@ class KineticTree {
       __builtin_prefetch(topology_.parents.data() + node);
       return;
     }
+    if (step == 2 && topology_.nodes[node].is_leaf())
+      for (const std::uint32_t vertex : leaf_vertices_[node]) clock_->fetch_ahead(event, vertex);
+    if (node == 0) return;
     const std::uint32_t parent = topology_.parents[node];
     if (step == 1) {
       __builtin_prefetch(realisers(parent) + side);
@@ -154,8 +157,6 @@ class KineticTree {
       if constexpr (requires { queue_->prefetch(0); }) queue_->prefetch(slot(parent, side));
       return;
     }
-    if (topology_.nodes[node].is_leaf())
-      for (const std::uint32_t vertex : leaf_vertices_[node]) clock_->fetch_ahead(event, vertex);
     if (realiser(parent, side) != event.winner) {
       clock_->fetch_ahead(event, realiser(parent, side));
       return;

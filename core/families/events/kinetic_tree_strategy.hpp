@@ -154,7 +154,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
         std::vector<Dop<S, std::remove_cvref_t<decltype(kind)>::sides>> dops;
         for (const std::uint32_t node : order) {
           dops.push_back(volumes.current_or_computed(node));
-          view.boxes.push_back(enclosing_box(dops.back()));  // for callers who know boxes alone
+          view.boxes.push_back(enclosing_box(dops.back()));
         }
         view.volumes = std::make_shared<AuditedVolumes<Dop<S, std::remove_cvref_t<decltype(kind)>::sides>>>(
             std::move(dops));

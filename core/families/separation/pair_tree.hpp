@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/base/assert.hpp"
+#include "core/base/list_pool.hpp"
 #include "core/families/separation/changed_boxes.hpp"
-#include "core/families/separation/pair_rows.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/topology/topology.hpp"
 
@@ -58,14 +58,14 @@ class PairTree {
     for (Body& body : bodies_)
       for (const int side : {0, 1})
         if (body.takes_part[side] && body.rows[side].keys() < body.topology->size())
-          body.rows[side].grow(body.topology->size());
+          body.rows[side].resize(body.topology->size());
   }
   /// Removes all pairs. Body pairs keep their numbers.
   void clear() {
     pairs_.clear();
     free_blocks_.clear();
     for (Body& body : bodies_)
-      for (PairRows& rows : body.rows) rows.clear();
+      for (ListPool& rows : body.rows) rows.clear();
   }
 
   // ---- Body pairs
@@ -118,7 +118,7 @@ class PairTree {
 
   /// Returns the slots of the pairs that have the node on a side: 0 for the first node, 1 for the second.
   std::span<const std::uint32_t> row(std::uint32_t body, int side, std::uint32_t node) const {
-    const PairRows& rows = bodies_[body].rows[side];
+    const ListPool& rows = bodies_[body].rows[side];
     return node < rows.keys() ? rows[node] : std::span<const std::uint32_t>();
   }
   /// Returns whether any pair has the node.
@@ -127,12 +127,12 @@ class PairTree {
   }
   void prefetch_rows(const BoxPair& pair) const {
     for (const int side : {0, 1}) {
-      const PairRows& rows = bodies_[body_of(pair, side)].rows[side];
+      const ListPool& rows = bodies_[body_of(pair, side)].rows[side];
       rows.prefetch(side == 0 ? pair.a : pair.b);
     }
   }
   void prefetch_rows(std::uint32_t body, std::uint32_t node) const {
-    for (const PairRows& rows : bodies_[body].rows)
+    for (const ListPool& rows : bodies_[body].rows)
       if (node < rows.keys()) rows.prefetch(node);
   }
   void prefetch(std::uint32_t slot) const { __builtin_prefetch(pairs_.data() + slot); }
@@ -193,7 +193,7 @@ class PairTree {
     pair.bodies = bodies;
     pair.used = true;
     for (const int side : {0, 1}) {
-      PairRows& rows = bodies_[body_of(pair, side)].rows[side];
+      ListPool& rows = bodies_[body_of(pair, side)].rows[side];
       const std::uint32_t own = side == 0 ? a : b;
       pair.row_index[side] = rows.push(own, slot);
     }
@@ -242,7 +242,7 @@ class PairTree {
   void remove(std::uint32_t slot) {
     BoxPair& pair = pairs_[slot];
     for (const int side : {0, 1}) {
-      PairRows& rows = bodies_[body_of(pair, side)].rows[side];
+      ListPool& rows = bodies_[body_of(pair, side)].rows[side];
       const std::uint32_t moved = rows.erase_at(side == 0 ? pair.a : pair.b, pair.row_index[side]);
       pairs_[moved].row_index[side] = pair.row_index[side];
     }
@@ -293,7 +293,7 @@ class PairTree {
 
   struct Body {
     const Topology* topology;
-    std::array<PairRows, 2> rows;    ///< [side] rows of the nodes, if the body takes part on that side
+    std::array<ListPool, 2> rows;    ///< [side] rows of the nodes, if the body takes part on that side
     std::array<bool, 2> takes_part;  ///< [side]
     std::vector<std::uint8_t> gone;  ///< [node] is gone, during a change of geometry
   };

@@ -172,9 +172,8 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
   template <class V>
   static AuditView view_of(const VolumeHierarchy<V>& hierarchy) {
     AuditView view{hierarchy.topology(), {}, {}};
-    if constexpr (std::is_same_v<V, Box<S>>)
-      for (const Box<S>& box : hierarchy.volumes()) view.boxes.push_back(to_double(box));
-    else
+    for (const V& volume : hierarchy.volumes()) view.boxes.push_back(enclosing_box(volume));
+    if constexpr (!std::is_same_v<V, Box<S>>)
       view.volumes = std::make_shared<AuditedVolumes<V>>(hierarchy.volumes());
     return view;
   }
