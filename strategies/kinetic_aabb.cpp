@@ -8,7 +8,7 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count>
-using OnAnyQueue = ExactKineticAabbStrategy<S, Count, SegmentHeapQueue<S>, AvlQueue<S>, BinaryHeapQueue<S>>;
+using OnAnyQueue = ExactKineticAabbStrategy<S, Count, SegmentHeapQueue<S>, AvlOrHeapQueue<S>>;
 
 template <class S, class Count>
 class KineticAabb final : public OnAnyQueue<S, Count> {
@@ -16,11 +16,10 @@ class KineticAabb final : public OnAnyQueue<S, Count> {
   KineticAabb(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
               const Params& params)
       : OnAnyQueue<S, Count>(
-            scene, motion, std::move(topologies),
-            params.word("queue") == SegmentHeapQueue<S>::name ? 0
-            : params.word("queue") == AvlQueue<S>::name       ? 1
-                                                              : 2,
-            params.word("query") == "rows" ? KineticQuery::wide_rows : KineticQuery::node_pairs) {}
+            scene, motion, std::move(topologies), params.word("queue") == SegmentHeapQueue<S>::name ? 0 : 1,
+            params.word("query") == "rows" ? KineticQuery::wide_rows : KineticQuery::node_pairs) {
+    this->on_forest([&](auto& forest) { forest.choose_queue(params.word("queue")); });
+  }
 };
 
 }  // namespace

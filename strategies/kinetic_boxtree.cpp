@@ -55,14 +55,12 @@ class KineticBox final : public CountedStrategy<S, Count>,
     if (params.word("queue") == SegmentHeapQueue<S>::name)
       forest_ = std::make_unique<Forest<SegmentHeapQueue<S>>>(scene, motion, std::move(topologies),
                                                               this->count_, observer);
-    else if (params.word("queue") == AvlQueue<S>::name)
-      forest_ =
-          std::make_unique<Forest<AvlQueue<S>>>(scene, motion, std::move(topologies), this->count_, observer);
     else
-      forest_ = std::make_unique<Forest<BinaryHeapQueue<S>>>(scene, motion, std::move(topologies),
-                                                             this->count_, observer);
+      forest_ = std::make_unique<Forest<AvlOrHeapQueue<S>>>(scene, motion, std::move(topologies),
+                                                            this->count_, observer);
     const BoxTreeConstruction made = construction(params, leaf_boxes_, BoxTreeRows<S>::width);
     on_forest([&](auto& forest) {
+      forest.choose_queue(params.word("queue"));
       for (std::uint32_t body = 0; body < forest.size(); ++body) forest.tree(body).construct_as(made);
     });
   }
@@ -244,8 +242,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
   }
 
   BoundWatch<S> watch_;
-  std::variant<std::unique_ptr<Forest<SegmentHeapQueue<S>>>, std::unique_ptr<Forest<AvlQueue<S>>>,
-               std::unique_ptr<Forest<BinaryHeapQueue<S>>>>
+  std::variant<std::unique_ptr<Forest<SegmentHeapQueue<S>>>, std::unique_ptr<Forest<AvlOrHeapQueue<S>>>>
       forest_;
   ClipMotion<S> motion_;
   NearBodies near_bodies_;

@@ -39,12 +39,10 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     if (params.word("queue") == SegmentHeapQueue<S>::name)
       collision_ = std::make_unique<Collision<SegmentHeapEventQueue>>(scene, motion, std::move(topologies),
                                                                       this->count_, look_ahead);
-    else if (params.word("queue") == AvlQueue<S>::name)
-      collision_ = std::make_unique<Collision<AvlEventQueue>>(scene, motion, std::move(topologies),
-                                                              this->count_, look_ahead);
     else
-      collision_ = std::make_unique<Collision<BinaryHeapEventQueue>>(scene, motion, std::move(topologies),
-                                                                     this->count_, look_ahead);
+      collision_ = std::make_unique<Collision<AvlOrHeapEventQueue>>(scene, motion, std::move(topologies),
+                                                                    this->count_, look_ahead);
+    on_collision([&](auto& collision) { collision.choose_queue(params.word("queue")); });
     if (by_rows_) on_collision([&](auto& collision) { rows_.assign(collision.forest(), scene); });
   }
 
@@ -277,8 +275,8 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
 
   std::vector<SweptLeaves> swept_leaves_;
   mutable std::vector<std::uint32_t> open_;  ///< nodes of a traversal
-  std::variant<std::unique_ptr<Collision<SegmentHeapEventQueue>>, std::unique_ptr<Collision<AvlEventQueue>>,
-               std::unique_ptr<Collision<BinaryHeapEventQueue>>>
+  std::variant<std::unique_ptr<Collision<SegmentHeapEventQueue>>,
+               std::unique_ptr<Collision<AvlOrHeapEventQueue>>>
       collision_;
   ClipMotion<S> motion_;
   bool by_rows_ = false;      ///< leaves have several primitives

@@ -223,11 +223,12 @@ TEST(GeometryChange, KineticTreeRepairsLocally) {
 // ------------------------------------------------------------------------------------------------
 
 template <class Queue>
-void expect_growth_keeps_order() {
+void expect_growth_keeps_order(std::string_view kind = {}) {
   const auto test = synthetic_scene<double>("soups");
   Playback<double> playback(test.scene);
   EventClock<double> clock({&playback.plans(0), &playback.plans(1)});
   Queue queue(clock, 10);
+  if constexpr (requires { queue.choose(kind); }) queue.choose(kind);
   Random random(4);
   std::map<std::uint32_t, double> expected;  // time by slot
   std::uint32_t slots = 10;
@@ -263,6 +264,8 @@ TEST(GeometryChange, QueuesGrow) {
   expect_growth_keeps_order<AvlQueue<double>>();
   expect_growth_keeps_order<BinaryHeapQueue<double>>();
   expect_growth_keeps_order<SegmentHeapQueue<double>>();
+  expect_growth_keeps_order<AvlOrHeapQueue<double>>();
+  expect_growth_keeps_order<AvlOrHeapQueue<double>>(BinaryHeapQueue<double>::name);
 }
 
 }  // namespace

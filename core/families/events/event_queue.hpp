@@ -3,8 +3,11 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <string_view>
+#include <variant>
 #include <vector>
 
+#include "core/base/assert.hpp"
 #include "core/base/counters.hpp"
 #include "core/families/events/event.hpp"
 #include "core/families/events/segment_queue.hpp"
@@ -206,11 +209,93 @@ class BinaryHeapEventQueue {
   std::uint64_t steps_ = 0;
 };
 
+/// An AVL tree or a binary heap, chosen at run time: structures are compiled once for both. The operations
+/// that compare events are calls, not inlined; what they cost beside their comparisons cannot be measured.
+template <class Clock>
+class AvlOrHeapEventQueue {
+  using Event = typename Clock::Event;
+  using Avl = AvlEventQueue<Clock>;
+  using Heap = BinaryHeapEventQueue<Clock>;
+
+ public:
+  using ClockType = Clock;
+  static constexpr std::size_t look_ahead = 0;
+  AvlOrHeapEventQueue(const Clock& clock, std::uint32_t slots)
+      : clock_(&clock), queue_(std::in_place_type<Avl>, clock, slots) {}
+
+  /// Chooses the kind by its name: Avl::name (as at the start) or Heap::name. The queue must be empty.
+  void choose(std::string_view name) {
+    KBVH_ASSERT(empty());
+    const std::uint32_t wanted = slots();
+    if (name == Heap::name)
+      queue_.template emplace<Heap>(*clock_, wanted);
+    else
+      queue_.template emplace<Avl>(*clock_, wanted);
+  }
+
+  [[gnu::noinline]] void schedule(const Event& event) {
+    on_queue([&](auto& queue) { queue.schedule(event); });
+  }
+  [[gnu::noinline]] bool cancel(std::uint32_t slot) {
+    return on_queue([&](auto& queue) { return queue.cancel(slot); });
+  }
+  [[gnu::noinline]] void pop() {
+    on_queue([](auto& queue) { queue.pop(); });
+  }
+  [[gnu::noinline]] void grow(std::uint32_t slots) {
+    on_queue([&](auto& queue) { queue.grow(slots); });
+  }
+  [[gnu::noinline]] void clear() {
+    on_queue([](auto& queue) { queue.clear(); });
+  }
+  bool scheduled(std::uint32_t slot) const {
+    return on_queue([&](auto& queue) { return queue.scheduled(slot); });
+  }
+  const Event& event(std::uint32_t slot) const {
+    return on_queue([&](auto& queue) -> const Event& { return queue.event(slot); });
+  }
+  const Event& top() const {
+    return on_queue([](auto& queue) -> const Event& { return queue.top(); });
+  }
+  bool empty() const {
+    return on_queue([](auto& queue) { return queue.empty(); });
+  }
+  std::size_t size() const {
+    return on_queue([](auto& queue) { return queue.size(); });
+  }
+  std::uint32_t slots() const {
+    return on_queue([](auto& queue) { return queue.slots(); });
+  }
+  std::uint64_t steps() const {
+    return on_queue([](auto& queue) { return queue.steps(); });
+  }
+  std::size_t bytes() const {
+    return on_queue([](auto& queue) { return queue.bytes(); });
+  }
+
+ private:
+  template <class Work>
+  decltype(auto) on_queue(Work&& work) {
+    if (Avl* avl = std::get_if<Avl>(&queue_)) return work(*avl);
+    return work(*std::get_if<Heap>(&queue_));
+  }
+  template <class Work>
+  decltype(auto) on_queue(Work&& work) const {
+    if (const Avl* avl = std::get_if<Avl>(&queue_)) return work(*avl);
+    return work(*std::get_if<Heap>(&queue_));
+  }
+
+  const Clock* clock_;
+  std::variant<Avl, Heap> queue_;
+};
+
 /// The event queues of kinetic trees.
 template <class S>
 using AvlQueue = AvlEventQueue<EventClock<S>>;
 template <class S>
 using BinaryHeapQueue = BinaryHeapEventQueue<EventClock<S>>;
+template <class S>
+using AvlOrHeapQueue = AvlOrHeapEventQueue<EventClock<S>>;
 template <class S>
 using SegmentHeapQueue = SegmentHeapEventQueue<EventClock<S>>;
 

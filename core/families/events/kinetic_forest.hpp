@@ -40,6 +40,10 @@ class KineticForest {
   KineticForest(const KineticForest&) = delete;  // trees point to the clock and the queue
   KineticForest& operator=(const KineticForest&) = delete;
 
+  /// Chooses the kind of queue, where `Queue` offers a choice; before the first reset.
+  void choose_queue(std::string_view name) {
+    if constexpr (requires { queue_.choose(name); }) queue_.choose(name);
+  }
   /// Restarts at t.
   void reset(double t) {
     queue_.clear();

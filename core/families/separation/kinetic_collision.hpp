@@ -39,6 +39,11 @@ class KineticCollision {
   KineticCollision(const KineticCollision&) = delete;  // the trees point to `changed_` and `nodes_`
   KineticCollision& operator=(const KineticCollision&) = delete;
 
+  /// Chooses the kind of both queues, where `Queue` offers a choice; before the first reset.
+  void choose_queue(std::string_view name) {
+    forest_.choose_queue(name);
+    list_.choose_queue(name);
+  }
   void reset(double t) {
     forest_.reset(t);
     changed_.clear();

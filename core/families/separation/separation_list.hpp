@@ -84,6 +84,10 @@ class SeparationList {
   SeparationList(const SeparationList&) = delete;
   SeparationList& operator=(const SeparationList&) = delete;
 
+  /// Chooses the kind of queue, where `Queue` offers a choice; before the first reset.
+  void choose_queue(std::string_view name) {
+    if constexpr (requires { queue_.choose(name); }) queue_.choose(name);
+  }
   /// Restarts at t, by one traversal per body pair.
   void reset(double t) {
     clear(t);
