@@ -1,4 +1,7 @@
 #pragma once
+#include <gtest/gtest.h>
+
+#include <algorithm>
 #include <list>
 
 #include "core/judge/verify.hpp"
@@ -64,6 +67,26 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
   if (result.audited && entry.info.guarantee != Guarantee::approximate && result.audit.protrusion != 0)
     return "protrusion " + std::to_string(result.audit.protrusion);
   return {};
+}
+
+/// Requires that a strategy that changes its topology during the clip has its first topology, and answers,
+/// after a reset.
+inline void expect_reset_restores_topology(const StrategyEntry& entry) {
+  const auto test = synthetic_scene<float>("sheets", 3);
+  Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  PhaseTimes times;
+  session.reset(test.frames[0]);
+  const Topology start = session.strategy().audit_view(0)->topology;
+  for (const double t : test.frames) session.advance(t, times);
+  EXPECT_FALSE(session.strategy().audit_view(0)->topology == start);
+  session.reset(test.frames[0]);
+  EXPECT_TRUE(session.strategy().audit_view(0)->topology == start);
+  PairBuffer pairs;
+  session.query(pairs, times);
+  std::sort(pairs.begin(), pairs.end());
+  Playback<float> playback(test.scene);
+  playback.seek(test.frames[0]);
+  EXPECT_EQ(pairs, brute_force_pairs(test.scene, playback));
 }
 
 }  // namespace kbvh::test

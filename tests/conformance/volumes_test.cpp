@@ -177,22 +177,7 @@ INSTANTIATE_TEST_SUITE_P(Synthetic, Rotations, testing::ValuesIn(every_scene()),
                          [](const auto& test) { return test.param; });
 
 TEST(Rotations, AreTakenBackByReset) {
-  const auto test = synthetic_scene<float>("sheets", 3);
-  const StrategyEntry entry = rotating<RotatingDops>(Tightness::tight);
-  Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
-  PhaseTimes times;
-  session.reset(test.frames[0]);
-  const Topology start = session.strategy().audit_view(0)->topology;
-  for (const double t : test.frames) session.advance(t, times);
-  EXPECT_FALSE(session.strategy().audit_view(0)->topology == start);
-  session.reset(test.frames[0]);
-  EXPECT_TRUE(session.strategy().audit_view(0)->topology == start);
-  PairBuffer pairs;
-  session.query(pairs, times);
-  std::sort(pairs.begin(), pairs.end());
-  Playback<float> playback(test.scene);
-  playback.seek(test.frames[0]);
-  EXPECT_EQ(pairs, brute_force_pairs(test.scene, playback));
+  expect_reset_restores_topology(rotating<RotatingDops>(Tightness::tight));
 }
 
 }  // namespace

@@ -132,22 +132,7 @@ TEST(WideRotation, WithoutNewBoxesIsSeen) {
 }
 
 TEST(WideRotation, IsTakenBackByReset) {
-  const auto test = synthetic_scene<float>("sheets", 3);
-  const StrategyEntry entry = restructuring<Sound>();
-  Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
-  PhaseTimes times;
-  session.reset(test.frames[0]);
-  const Topology start = session.strategy().audit_view(0)->topology;
-  for (const double t : test.frames) session.advance(t, times);
-  EXPECT_FALSE(session.strategy().audit_view(0)->topology == start);
-  session.reset(test.frames[0]);
-  EXPECT_TRUE(session.strategy().audit_view(0)->topology == start);
-  PairBuffer pairs;
-  session.query(pairs, times);
-  std::sort(pairs.begin(), pairs.end());
-  Playback<float> playback(test.scene);
-  playback.seek(test.frames[0]);
-  EXPECT_EQ(pairs, brute_force_pairs(test.scene, playback));
+  expect_reset_restores_topology(restructuring<Sound>());
 }
 
 }  // namespace

@@ -10,45 +10,17 @@
 #include "core/families/wide/wide_query.hpp"
 #include "core/topology/builders.hpp"
 #include "core/topology/subtree_swap.hpp"
-#include "tests/support/synthetic_scenes.hpp"
+#include "tests/support/polygon_soups.hpp"
 
 namespace kbvh::test {
 namespace {
-
-/// Two soups of polygons with 1 to 5 vertices, some of them shared.
-template <class S>
-Scene<S> soups(std::uint32_t primitives, Random& random) {
-  Scene<S> scene;
-  for (int body = 0; body < 2; ++body) {
-    Body<S> made;
-    std::vector<S> positions;
-    std::uint32_t count = 0;
-    for (std::uint32_t p = 0; p < primitives; ++p) {
-      std::vector<std::uint32_t> corners;
-      const double centre[3] = {random.unit(), random.unit(), random.unit()};
-      for (std::uint32_t k = 1 + random.below(5); k-- > 0;) {
-        if (count > 0 && random.below(8) == 0) {
-          corners.push_back(random.below(count));
-          continue;
-        }
-        for (const double c : centre) positions.push_back(S(c + random.unit() / 8));
-        corners.push_back(count++);
-      }
-      made.primitives.add(corners);
-    }
-    made.plans = FlightPlans<S>(count, {0}, std::move(positions));
-    scene.bodies.push_back(std::move(made));
-  }
-  scene.pairs = all_pairs(scene.bodies);
-  return scene;
-}
 
 /// A hierarchy of the first body, edited, and one of the second body.
 template <class S>
 class Edited {
  public:
   Edited(std::uint32_t primitives, const BuilderConfig& config, std::uint64_t seed)
-      : random_(seed), scene_(soups<S>(primitives, random_)) {
+      : random_(seed), scene_(polygon_soups<S>(primitives, random_)) {
     for (std::uint32_t body = 0; body < 2; ++body) {
       const FlightPlans<S>& plans = scene_.bodies[body].plans;
       positions_[body].assign(plans.keyframe(0), plans.keyframe(0) + std::size_t(3) * plans.vertex_count());

@@ -5,44 +5,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <random>
 
 #include "core/families/wide/wide_query.hpp"
 #include "core/topology/builders.hpp"
+#include "tests/support/polygon_soups.hpp"
 
 namespace kbvh {
 namespace {
 
-/// A scene of two soups of polygons with 1 to 5 vertices, some of them shared.
 template <class S>
 Scene<S> soups(std::uint32_t primitives, std::uint32_t seed) {
-  Scene<S> scene;
-  scene.name = "soups";
-  std::mt19937 random(seed);
-  const auto unit = [&] { return S(random() % 4096) / S(2048) - S(1); };
-  for (int body = 0; body < 2; ++body) {
-    Body<S> made;
-    made.name = "soup";
-    std::vector<S> positions;
-    std::uint32_t count = 0;
-    for (std::uint32_t p = 0; p < primitives; ++p) {
-      std::vector<std::uint32_t> corners;
-      const S centre[3] = {unit(), unit(), unit()};
-      for (std::uint32_t k = 0; k < 1 + random() % 5; ++k) {
-        if (count > 0 && random() % 4 == 0) {
-          corners.push_back(random() % count);
-          continue;
-        }
-        for (S c : centre) positions.push_back(c + unit() / S(8) + S(0));
-        corners.push_back(count++);
-      }
-      made.primitives.add(corners);
-    }
-    made.plans = FlightPlans<S>(count, {0}, std::move(positions));
-    scene.bodies.push_back(std::move(made));
-  }
-  scene.pairs = all_pairs(scene.bodies);
-  return scene;
+  test::Random random(seed);
+  return test::polygon_soups<S>(primitives, random);
 }
 
 template <class S>

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/families/wide/leaf_slots.hpp"
+
 namespace kbvh {
 
 namespace {
-/// The number of leaf pairs that are collected before they are turned into pairs of primitives: few enough to
-/// stay in the cache.
-constexpr std::size_t leaf_pair_room = 2048;
 /// The smallest allocation for pairs of primitives.
 constexpr std::size_t chunk_room = 2048;
 }  // namespace

@@ -6,6 +6,10 @@
 
 namespace kbvh {
 
+/// The number of leaf pairs that queries collect before they turn them into pairs of primitives: few enough to
+/// stay in the cache.
+inline constexpr std::size_t leaf_pair_room = 2048;
+
 /// Moves pairs of two different leaves before pairs of a leaf with itself; returns the number of the former.
 inline std::size_t different_leaves_first(LeafSlot* pairs, std::size_t count) {
   std::size_t different = 0;

@@ -11,9 +11,6 @@ namespace kbvh {
 
 namespace {
 
-/// The number of leaf pairs that are collected before they are turned into pairs of primitives: few enough to
-/// stay in the cache.
-constexpr std::size_t leaf_pair_room = 2048;
 constexpr std::size_t chunk_room = 2048;
 
 }  // namespace
