@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "core/contract/registry.hpp"
+#include "core/judge/audit.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
@@ -39,10 +40,7 @@ void expect_the_same(const StrategyEntry& entry, const char* name,
   const TestScene<S> test = synthetic_scene<S>(name, 3);
   if (!unsuitable_bodies(entry.info, test.scene).empty() || entry.factory<S>() == nullptr) return;
   const std::vector<double> frames = frame_times(test.scene, 3);
-  Session<S> session(
-      test.scene,
-      {&entry, Params(entry.info.id, entry.info.parameters, params), entry.info.topology.preferred},
-      CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred}, CountingPolicy::counting);
   World world = world_of(test.scene);
   world.start(entry.info.id, params, frames[0]);
   session.reset(frames[0]);
