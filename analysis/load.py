@@ -25,7 +25,7 @@ PHASES = ("motion", "update", "traversal", "triangle_tests", "plan_changes")
 #: Counters that tables and figures read. Others become columns, too, if the results have them.
 READ_COUNTERS = ("certificates_failed", "values_written", "positions_fetched")
 #: Counters that are a level, not a sum over the clip.
-LEVELS = ("queue_peak", "list_peak")
+LEVELS = ("queue_peak", "list_peak", "most_nodes_searched")
 GUARANTEES = ("exact", "candidate_superset", "approximate")
 
 

@@ -183,10 +183,20 @@ class KineticBox final : public CountedStrategy<S, Count>,
   }
   void counts_cleared() override {
     first_step_ = on_forest([](auto& forest) { return forest.queue().steps(); });
+    on_forest([](auto& forest) {
+      for (std::uint32_t body = 0; body < forest.size(); ++body) forest.tree(body).search_cost().forget();
+    });
   }
   void add_counts(Counters& table) const override {
     table[Counter::queue_steps] =
         on_forest([](auto& forest) { return forest.queue().steps(); }) - first_step_;
+    SearchCost cost;
+    on_forest([&](auto& forest) {
+      for (std::uint32_t body = 0; body < forest.size(); ++body) cost.add(forest.tree(body).search_cost());
+    });
+    table.add("certificate_searches", cost.searches);
+    table.add("nodes_searched", cost.nodes);
+    table.add("most_nodes_searched", cost.most_nodes);
   }
 
  private:

@@ -165,6 +165,22 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   void watch_bounds(std::vector<BoundNotice<S>>* log) override {
     on_collision([&](auto& collision) { collision.watch().log = log; });
   }
+  void watched_pairs(std::vector<WatchedPair>& out) const override {
+    out.clear();
+    on_collision([&](auto& collision) {
+      const auto& list = collision.list();
+      for (const BoxPair& pair : list.pairs()) {
+        if (!pair.used) continue;
+        const BodyPair& bodies = list.body_pair(pair.bodies);
+        out.push_back({.body = bodies.first,
+                       .node = pair.a,
+                       .other_body = bodies.second,
+                       .other_node = pair.b,
+                       .overlapping = pair.overlapping,
+                       .listed = pair.children == BoxPair::none});
+      }
+    });
+  }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     return on_collision([&](auto& collision) {

@@ -68,6 +68,18 @@ struct EventDescription {
   std::vector<ScheduledEvent<S>> rescheduled;
 };
 
+/// Two boxes that a separation list watches.
+struct WatchedPair {
+  std::uint32_t body = 0, node = 0;              ///< the first box
+  std::uint32_t other_body = 0, other_node = 0;  ///< the second box
+  bool overlapping = false;
+  /// Whether the pair is in the list: its boxes are apart, or are overlapping leaves. Otherwise it is an
+  /// inner pair above the list, whose boxes overlap.
+  bool listed = false;
+
+  auto operator<=>(const WatchedPair&) const = default;
+};
+
 template <class S>
 class Strategy;
 
@@ -94,6 +106,9 @@ class EventSource {
   /// Starts to append every change of a bound to `log`, for any cause (events, changes of plans) except
   /// `reset`. Null stops the logging.
   virtual void watch_bounds(std::vector<BoundNotice<S>>* log) = 0;
+  /// Replaces `out` by all pairs of boxes that the strategy watches, in no particular order; by nothing if it
+  /// has no separation list.
+  virtual void watched_pairs(std::vector<WatchedPair>& out) const { out.clear(); }
 
  protected:
   friend class Strategy<S>;

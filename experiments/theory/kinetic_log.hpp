@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/families/events/kinetic_tree_strategy.hpp"
+#include "core/contract/registry.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/theory/envelope.hpp"
 
@@ -182,20 +182,6 @@ Recording<S> record_events(const Scene<S>& scene, const PlanScript<S>& script, c
   recording.events = counters[Counter::certificates_failed];
   recording.values_written = counters[Counter::values_written];
   return recording;
-}
-
-/// Records kinetic AABB trees on a given event queue.
-template <class S, template <class> class Queue, class Watcher = NoWatcher>
-Recording<S> record(const Scene<S>& scene, const PlanScript<S>& script, const Play& play,
-                    Watcher&& watcher = {}) {
-  using Recorded = ExactKineticAabbStrategy<S, Counting, Queue<S>>;
-  return record_events(
-      scene, script, play,
-      [](const SceneView<S>& view, Playback<S>& playback, const Topologies& topologies) {
-        return std::make_unique<Recorded>(view, ClipMotion<S>(playback), topologies, 0,
-                                          KineticQuery::node_pairs);
-      },
-      watcher);
 }
 
 /// Records a registered strategy that is an event source.

@@ -2,40 +2,19 @@
 
 #include <algorithm>
 
-#include "core/contract/registry.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/theory/kinetic_log.hpp"
+#include "experiments/theory/stepped_strategy.hpp"
 
 namespace kbvh::theory {
 
 namespace {
 
-/// The paper's kinetic AABB tree on its own queue, as the program runs it, event by event.
-class PaperTree {
- public:
-  PaperTree(const SceneView<float>& view, Playback<float>& playback, const Topologies& topologies, double t) {
-    const StrategyEntry& entry = find_strategy("kinetic_aabb");
-    strategy_ = create(entry, view, playback, topologies,
-                       Params(entry.info.id, entry.info.parameters, {{"queue", "avl"}, {"query", "nodes"}}),
-                       CountingPolicy::counting);
-    strategy_->reset(t);
-    source().watch_bounds(&notices_);
-  }
-  Strategy<float>& strategy() { return *strategy_; }
-  EventSource<float>& source() { return *strategy_->events(); }
-  std::uint64_t counted(Counter counter) const { return strategy_->counters()[counter]; }
-  /// Performs the next event until t, if there is one.
-  bool step(double t) {
-    notices_.clear();
-    return strategy_->step_event(t, done_);
-  }
-  /// Number of bounds that the last event changed.
-  std::uint64_t touched() const { return notices_.size(); }
-
- private:
-  std::unique_ptr<Strategy<float>> strategy_;
-  std::vector<BoundNotice<float>> notices_;
-  EventDescription<float> done_;
+/// The paper's kinetic AABB tree on its own queue.
+struct PaperTree : SteppedStrategy {
+  PaperTree(const SceneView<float>& view, Playback<float>& playback, const Topologies& topologies, double t)
+      : SteppedStrategy("kinetic_aabb", {{"queue", "avl"}, {"query", "nodes"}}, view, playback, topologies,
+                        t) {}
 };
 
 /// A sum and a maximum of differences of a counter that only grows.
@@ -55,7 +34,7 @@ void for_all_certificates(const EventSource<float>& source, const LeafVertices& 
   const Topology& topology = source.tree(body);
   std::vector<std::uint32_t> members;
   for (std::uint32_t node = 0; node < topology.size(); ++node)
-    for (Side side = 0; side < 6; ++side) {
+    for (std::uint32_t side = 0; side < 6; ++side) {
       members.clear();
       const TopologyNode n = topology.nodes[node];
       if (n.is_leaf())
@@ -207,8 +186,8 @@ CountRun measure_counts(const Scene<float>& scene) {
       operations.add(before, after, Counter::queue_operations);
       certificates.add(before, after, Counter::certificates_made);
       steps.add(before, after, Counter::queue_steps);
-      run.values += paper.touched();
-      run.silent_events += paper.touched() == 0;
+      run.values += paper.touched().size();
+      run.silent_events += paper.touched().empty();
       ++run.events;
     }
     paper.strategy().advance(keyframes[k]);

@@ -12,11 +12,11 @@ namespace {
 
 /// Returns whether `vertex` is further out than `realiser`.
 template <class Where>
-bool ahead(const ExactMotion& motion, const Where& where, Side side, std::uint32_t vertex,
+bool ahead(const ExactMotion& motion, const Where& where, std::uint32_t side, std::uint32_t vertex,
            std::uint32_t realiser) {
   if (vertex == realiser) return false;
-  const int sign = motion.compare(where, axis_of(side), vertex, realiser);
-  return (is_upper(side) ? sign : -sign) > 0;
+  const int sign = motion.compare(where, int(side / 2), vertex, realiser);
+  return (side % 2 == 1 ? sign : -sign) > 0;
 }
 
 /// Counts candidates of a bound that are further out than its realiser, or returns 1 if the realiser is not a
@@ -25,7 +25,7 @@ bool ahead(const ExactMotion& motion, const Where& where, Side side, std::uint32
 template <class Where>
 std::uint64_t exceeded(const EventSource<float>& source, const LeafVertices& leaves,
                        const ExactMotion& motion, const Where& where, std::uint32_t body, std::uint32_t node,
-                       Side side, std::uint64_t& compared) {
+                       std::uint32_t side, std::uint64_t& compared) {
   const std::uint32_t realiser = source.realiser(body, node, side);
   std::uint64_t faults = 0;
   bool known = false;
@@ -73,7 +73,7 @@ class Auditor {
     for (std::uint32_t body = 0; body < motions_.size(); ++body) {
       const When when = motions_[body].locate(exact(std::min(t, last_time(body))));
       for (std::uint32_t node = 0; node < source.tree(body).size(); ++node)
-        for (Side side = 0; side < 6; ++side)
+        for (std::uint32_t side = 0; side < 6; ++side)
           run_->faults +=
               exceeded(source, leaves_[body], motions_[body], when, body, node, side, run_->audited);
     }
@@ -158,7 +158,7 @@ std::uint64_t exceeded_anywhere(const ExactMotion& motion, const When& when, con
                                 const std::vector<std::uint32_t>& realisers) {
   std::uint64_t faults = 0;
   for (std::size_t node = 0; node < below.size(); ++node)
-    for (Side side = 0; side < 6; ++side)
+    for (std::uint32_t side = 0; side < 6; ++side)
       for (const std::uint32_t v : below[node])
         if (ahead(motion, when, side, v, realisers[6 * node + side])) {
           ++faults;

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "core/families/events/kinetic_forest.hpp"
 #include "core/judge/audit.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "experiments/theory/measure_counts.hpp"
@@ -29,7 +28,7 @@ struct FrameCount {
   std::uint64_t values = 0;
   std::uint32_t most = 0;
 
-  void add(std::uint32_t body, std::uint32_t node, Side side) {
+  void add(std::uint32_t body, std::uint32_t node, std::uint32_t side) {
     const std::uint32_t bound = 6 * node + side;
     touched.emplace_back(body, bound);
     most = std::max(most, ++of_bound[body][bound]);
@@ -83,7 +82,7 @@ struct Classify {
     const ScheduledEvent<float>& event = done.event;
     const FlightPlans<float>& plans = scene->bodies[event.body].plans;
     const float* stored = plans.keyframe(plans.segment_at(event.crossing.winner.t0));
-    const auto axis = std::size_t(axis_of(event.side));
+    const auto axis = std::size_t(event.side / 2);
     run->separated_ties +=
         stored[3 * std::size_t(event.winner) + axis] == stored[3 * std::size_t(event.loser) + axis];
   }

@@ -2,18 +2,22 @@
 
 #include <algorithm>
 #include <set>
-#include <tuple>
 
-#include "core/families/separation/kinetic_collision.hpp"
+#include "core/families/separation/overlap_clock.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "experiments/theory/measure_counts.hpp"
+#include "experiments/theory/stepped_strategy.hpp"
 
 namespace kbvh::theory {
 
 namespace {
 
-using Collision = KineticCollision<float, AvlEventQueue, Counting>;
+/// The paper's separation list on its own queue.
+struct PaperList : SteppedStrategy {
+  PaperList(const SceneView<float>& view, Playback<float>& playback, const Topologies& topologies, double t)
+      : SteppedStrategy("kinetic_separation_list", {{"queue", "avl"}}, view, playback, topologies, t) {}
+};
 
 /// Computes a side of a box at t, widened as in the list: at the knots of its piece.
 Rational side_at(const FlightPlans<float>& plans, std::uint32_t vertex, int axis, Widening widening,
@@ -31,81 +35,101 @@ Rational side_at(const FlightPlans<float>& plans, std::uint32_t vertex, int axis
 /// Compares the list with the result of a simultaneous traversal at one time.
 class ListAudit {
  public:
-  ListAudit(const Collision& collision, const SceneView<float>& view, double t)
-      : collision_(&collision), view_(view), t_(t) {}
+  /// The strategy must stand at t.
+  ListAudit(PaperList& paper, const Scene<float>& scene, double t)
+      : strategy_(&paper.strategy()), source_(&paper.source()), scene_(&scene), t_(t) {}
 
-  /// Counts entries that are in only one of the two.
+  /// Counts entries that are in only one of the two, and overlapping leaves that only one of list and query
+  /// has. Adds the number of entries of the list to `entries`.
   std::uint64_t differences(std::uint64_t& entries) {
-    std::uint64_t wrong = 0;
-    for (std::uint32_t i = 0; i < view_.pairs().size(); ++i) {
-      fresh_.clear();
-      std::set<Entry> kept, leaves;
-      descend(view_.pairs()[i], 0, 0);
-      for (const auto& pair : collision_->list().pairs())
-        if (pair.used && pair.children == Collision::List::none && pair.bodies == i)
-          kept.insert({pair.a, pair.b, pair.overlapping});
-      for (const auto& leaf : collision_->list().leaf_pairs(i)) leaves.insert({leaf.a, leaf.b, true});
-      std::vector<Entry> off;
-      std::set_symmetric_difference(fresh_.begin(), fresh_.end(), kept.begin(), kept.end(),
-                                    std::back_inserter(off));
-      wrong += off.size();
-      for (const Entry& entry : kept) wrong += std::get<2>(entry) != leaves.contains(entry);
-      entries += kept.size();
-    }
-    return wrong;
+    fresh_.clear();
+    for (const BodyPair& bodies : scene_->pairs) descend({bodies.first, 0, bodies.second, 0});
+    std::vector<WatchedPair> watched;
+    source_->watched_pairs(watched);
+    std::set<WatchedPair> kept;
+    for (const WatchedPair& pair : watched)
+      if (pair.listed) kept.insert(pair);
+    entries += kept.size();
+    std::vector<WatchedPair> off;
+    std::set_symmetric_difference(fresh_.begin(), fresh_.end(), kept.begin(), kept.end(),
+                                  std::back_inserter(off));
+    return off.size() + differences_of_query(kept);
   }
 
  private:
-  using Entry =
-      std::tuple<std::uint32_t, std::uint32_t, bool>;  // nodes, and whether they are overlapping leaves
+  /// Counts pairs of primitives that only one of query and overlapping leaves of the list has. Each leaf has
+  /// one primitive.
+  std::uint64_t differences_of_query(const std::set<WatchedPair>& kept) const {
+    PairBuffer expected, found, off;
+    for (const WatchedPair& pair : kept)
+      if (pair.overlapping) expected.push_back(primitives_of(pair));
+    strategy_->candidates_at(t_, found, {});
+    std::sort(expected.begin(), expected.end());
+    std::sort(found.begin(), found.end());
+    std::set_symmetric_difference(expected.begin(), expected.end(), found.begin(), found.end(),
+                                  std::back_inserter(off));
+    return off.size();
+  }
+  PrimitivePair primitives_of(const WatchedPair& pair) const {
+    const auto primitive = [&](std::uint32_t body, std::uint32_t node) {
+      const Topology& topology = source_->tree(body);
+      const TopologyNode n = topology.nodes[node];
+      return n.is_leaf() ? topology.primitives[n.first()] : no_vertex;  // no primitive: a fault of the list
+    };
+    return {pair.body, primitive(pair.body, pair.node), pair.other_body,
+            primitive(pair.other_body, pair.other_node)};
+  }
 
-  void descend(const BodyPair& bodies, std::uint32_t a, std::uint32_t b) {
-    const TopologyNode na = tree(bodies.first).topology().nodes[a],
-                       nb = tree(bodies.second).topology().nodes[b];
-    const bool meet = overlap(bodies, a, b);
-    if (!meet || (na.is_leaf() && nb.is_leaf())) {
-      fresh_.insert({a, b, meet});
+  void descend(WatchedPair pair) {
+    const TopologyNode a = source_->tree(pair.body).nodes[pair.node],
+                       b = source_->tree(pair.other_body).nodes[pair.other_node];
+    pair.overlapping = overlap(pair);
+    if (!pair.overlapping || (a.is_leaf() && b.is_leaf())) {
+      pair.listed = true;
+      fresh_.insert(pair);
       return;
     }
-    const std::uint32_t first_a = na.is_leaf() ? a : na.first(),
-                        end_a = na.is_leaf() ? a + 1 : first_a + na.count();
-    const std::uint32_t first_b = nb.is_leaf() ? b : nb.first(),
-                        end_b = nb.is_leaf() ? b + 1 : first_b + nb.count();
+    const std::uint32_t first_a = a.is_leaf() ? pair.node : a.first(),
+                        end_a = a.is_leaf() ? first_a + 1 : first_a + a.count();
+    const std::uint32_t first_b = b.is_leaf() ? pair.other_node : b.first(),
+                        end_b = b.is_leaf() ? first_b + 1 : first_b + b.count();
     for (std::uint32_t i = first_a; i < end_a; ++i)
-      for (std::uint32_t j = first_b; j < end_b; ++j) descend(bodies, i, j);
+      for (std::uint32_t j = first_b; j < end_b; ++j) descend({pair.body, i, pair.other_body, j});
   }
-  bool overlap(const BodyPair& bodies, std::uint32_t a, std::uint32_t b) const {
-    const auto &plans_a = plans(bodies.first), &plans_b = plans(bodies.second);
-    const std::uint32_t *ra = tree(bodies.first).realisers(a), *rb = tree(bodies.second).realisers(b);
-    for (int axis = 0; axis < 3; ++axis)
-      if (side_at(plans_a, ra[2 * axis + 1], axis, Widening::up, t_) <
-              side_at(plans_b, rb[2 * axis], axis, Widening::none, t_) ||
-          side_at(plans_b, rb[2 * axis + 1], axis, Widening::none, t_) <
-              side_at(plans_a, ra[2 * axis], axis, Widening::down, t_))
+  bool overlap(const WatchedPair& pair) const {
+    const auto side_of_a = [&](std::uint32_t side, Widening widening) {
+      return side_at(plans(pair.body), source_->realiser(pair.body, pair.node, side), int(side / 2), widening,
+                     t_);
+    };
+    const auto side_of_b = [&](std::uint32_t side) {
+      return side_at(plans(pair.other_body), source_->realiser(pair.other_body, pair.other_node, side),
+                     int(side / 2), Widening::none, t_);
+    };
+    for (std::uint32_t lower = 0; lower < 6; lower += 2) {
+      const std::uint32_t upper = lower + 1;
+      if (side_of_a(upper, Widening::up) < side_of_b(lower) ||
+          side_of_b(upper) < side_of_a(lower, Widening::down))
         return false;
+    }
     return true;
   }
-  const Collision::Forest::Tree& tree(std::uint32_t body) const { return collision_->forest().tree(body); }
-  const FlightPlans<float>& plans(std::uint32_t body) const {
-    return collision_->forest().clock().plans(body);
-  }
+  const FlightPlans<float>& plans(std::uint32_t body) const { return scene_->bodies[body].plans; }
 
-  const Collision* collision_;
-  SceneView<float> view_;
+  Strategy<float>* strategy_;
+  const EventSource<float>* source_;
+  const Scene<float>* scene_;
   double t_;
-  std::set<Entry> fresh_;
+  std::set<WatchedPair> fresh_;
 };
 
-std::uint64_t most_pairs_of_a_box(const Collision& collision, const SceneView<float>& view) {
+std::uint64_t most_pairs_of_a_box(const EventSource<float>& source, std::uint32_t bodies) {
   std::vector<std::vector<std::uint64_t>> pairs;
-  for (std::uint32_t body = 0; body < view.body_count(); ++body)
-    pairs.emplace_back(collision.forest().tree(body).topology().size(), 0);
+  for (std::uint32_t body = 0; body < bodies; ++body) pairs.emplace_back(source.tree(body).size(), 0);
+  std::vector<WatchedPair> watched;
+  source.watched_pairs(watched);
   std::uint64_t most = 0;
-  for (const auto& pair : collision.list().pairs()) {
-    if (!pair.used) continue;
-    const BodyPair& bodies = view.pairs()[pair.bodies];
-    most = std::max({most, ++pairs[bodies.first][pair.a], ++pairs[bodies.second][pair.b]});
-  }
+  for (const WatchedPair& pair : watched)
+    most = std::max({most, ++pairs[pair.body][pair.node], ++pairs[pair.other_body][pair.other_node]});
   return most;
 }
 
@@ -116,15 +140,10 @@ SeparationRun measure_separation(const Scene<float>& scene, std::uint32_t instan
   const std::vector<double> keyframes = overlaid_keyframes(scene);
   Playback<float> playback(scene);
   playback.seek(keyframes.front());
-  Counting count;
-  Collision collision(view, ClipMotion<float>(playback), build_topologies(view, playback, paper_builder),
-                      count);
-  collision.reset(keyframes.front());
-  count.table = {};
+  PaperList paper(view, playback, build_topologies(view, playback, paper_builder), keyframes.front());
   SeparationRun run;
   run.scene = scene.name;
   run.polygons = scene.primitive_count();
-  run.list_peak = collision.list().size();
 
   std::vector<double> stops = keyframes;
   const scenes::SeededNoise noise(13);
@@ -136,11 +155,12 @@ SeparationRun measure_separation(const Scene<float>& scene, std::uint32_t instan
   stops.insert(stops.end(), audits.begin(), audits.end());
   std::sort(stops.begin(), stops.end());
   for (const double t : stops) {
-    while (collision.due(t)) {
-      const Counters before = count.table;
-      const std::uint64_t steps = collision.queue_steps();
-      collision.handle_next();
-      const auto added = [&](Counter c) { return count.table[c] - before[c]; };
+    playback.seek(t);
+    for (;;) {
+      const Counters before = paper.strategy().counters();
+      if (!paper.step(t)) break;
+      const Counters after = paper.strategy().counters();
+      const auto added = [&](Counter c) { return after[c] - before[c]; };
       SeparationRun::Kind& kind = added(Counter::overlap_events) > 0         ? run.overlap
                                   : added(Counter::fathers_apart_events) > 0 ? run.fathers
                                   : added(Counter::leaves_apart_events) > 0  ? run.leaves
@@ -148,23 +168,24 @@ SeparationRun measure_separation(const Scene<float>& scene, std::uint32_t instan
       ++kind.events;
       kind.pairs += added(Counter::nodes_visited);
       kind.most_pairs = std::max(kind.most_pairs, added(Counter::nodes_visited));
-      kind.steps += collision.queue_steps() - steps;
-      const std::uint64_t operations = added(Counter::queue_operations);
+      const std::uint64_t steps = added(Counter::queue_steps), operations = added(Counter::queue_operations);
+      kind.steps += steps;
       kind.operations += operations;
       if (operations > 0)
-        kind.most_steps_per_operation = std::max(
-            kind.most_steps_per_operation, double(collision.queue_steps() - steps) / double(operations));
-      run.list_peak = std::max<std::uint64_t>(run.list_peak, collision.list().size());
+        kind.most_steps_per_operation =
+            std::max(kind.most_steps_per_operation, double(steps) / double(operations));
     }
+    paper.strategy().advance(t);
     if (!std::binary_search(audits.begin(), audits.end(), t)) {
-      run.most_of_box = std::max(run.most_of_box, most_pairs_of_a_box(collision, view));
+      run.most_of_box = std::max(run.most_of_box, most_pairs_of_a_box(paper.source(), view.body_count()));
       continue;
     }
-    run.differences += ListAudit(collision, view, t).differences(run.entries);
+    run.differences += ListAudit(paper, scene, t).differences(run.entries);
     ++run.audits;
   }
-  run.queue_peak = count.table[Counter::queue_peak];
-  run.bytes = collision.list().bytes();
+  run.list_peak = paper.counted(Counter::list_peak);
+  run.queue_peak = paper.counted(Counter::queue_peak);
+  run.bytes = paper.strategy().bytes();
   return run;
 }
 
@@ -173,19 +194,21 @@ ListSizeRun measure_list_size(const Scene<float>& scene) {
   const std::vector<double> keyframes = overlaid_keyframes(scene);
   Playback<float> playback(scene);
   playback.seek(keyframes.front());
-  Counting count;
-  Collision collision(view, ClipMotion<float>(playback), build_topologies(view, playback, paper_builder),
-                      count);
+  PaperList paper(view, playback, build_topologies(view, playback, paper_builder), keyframes.front());
   ListSizeRun run;
   run.scene = scene.name;
   run.polygons = scene.primitive_count();
+  std::vector<WatchedPair> watched;
   for (const std::size_t k : {std::size_t(0), keyframes.size() / 2, keyframes.size() - 1}) {
     playback.seek(keyframes[k]);
-    collision.reset(keyframes[k]);
-    std::uint64_t overlapping = 0;
-    for (std::size_t i = 0; i < view.pairs().size(); ++i)
-      overlapping += collision.list().leaf_pairs(i).size();
-    run.list = std::max<std::uint64_t>(run.list, collision.list().size());
+    paper.strategy().reset(keyframes[k]);
+    paper.source().watched_pairs(watched);
+    std::uint64_t list = 0, overlapping = 0;
+    for (const WatchedPair& pair : watched) {
+      list += pair.listed;
+      overlapping += pair.listed && pair.overlapping;
+    }
+    run.list = std::max(run.list, list);
     run.overlapping = std::max(run.overlapping, overlapping);
   }
   return run;

@@ -31,15 +31,6 @@ struct BoxTreeRecorder {
   }
 };
 
-/// A forest of BoxTrees with rules of a test's own.
-template <class Rules>
-struct RuledBoxTrees {
-  template <class S, class Queue, class Count, class Observer>
-  using Tree = KineticBoxTree<S, Queue, Count, Observer, Rules>;
-  template <class S, class Queue, class Observer = NoObserver>
-  using Forest = KineticForest<S, Queue, Counting, Observer, Tree>;
-};
-
 /// The realisers of all bounds a tree stores, [6 * node + side]; `no_bound` elsewhere.
 template <class Tree>
 std::vector<std::uint32_t> stored_bounds(const Tree& tree) {
@@ -81,8 +72,10 @@ struct BoxTreeReport {
 };
 
 /// Plays a scene through a forest of BoxTrees and proves, from one change of plans or rebuilding to the next,
-/// that all it stores is the exact envelope of what lies below (check_envelopes).
-template <class S, template <class> class Queue, class Rules = BoxTreeRules>
+/// that all it stores is the exact envelope of what lies below (check_envelopes). `BoxTree` is the kind of
+/// tree: faulty ones derive from KineticBoxTree.
+template <class S, template <class> class Queue,
+          template <class, class, class, class> class BoxTree = KineticBoxTree>
 class BoxTreeProof {
  public:
   static BoxTreeReport run(const TestScene<S>& test, const BoxTreePlay& play) {
@@ -90,7 +83,7 @@ class BoxTreeProof {
   }
 
  private:
-  using Forest = typename RuledBoxTrees<Rules>::template Forest<S, Queue<S>, BoxTreeRecorder<S>>;
+  using Forest = KineticForest<S, Queue<S>, Counting, BoxTreeRecorder<S>, BoxTree>;
   using Bounds = std::vector<std::vector<std::uint32_t>>;  // [body][6 * node + side]
 
   BoxTreeProof(const TestScene<S>& test, const BoxTreePlay& play)

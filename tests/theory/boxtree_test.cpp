@@ -133,13 +133,26 @@ TEST(BoxTree, EventsDoNotDependOnTheNumberOfFrames) {
 
 // ---- Seeded faults that the proof must catch -------------------------------------------------------------
 
-/// A certificate search that does not go down to children that are split on another axis.
-struct ForgetsOtherAxes : BoxTreeRules {
-  static bool descends(Side own, Side sought) { return axis_of(own) == axis_of(sought); }
+/// A tree whose lists of candidates lack the vertices of leaves, as after a search that does not go down to
+/// the leaves below other sides.
+template <class S, class Queue, class Count, class Observer>
+class ForgetsLeaves : public KineticBoxTree<S, Queue, Count, Observer> {
+ public:
+  using KineticBoxTree<S, Queue, Count, Observer>::KineticBoxTree;
+  void initialise(double t) {
+    KineticBoxTree<S, Queue, Count, Observer>::initialise(t);
+    for (auto& bound : this->bounds_) bound.last = bound.vertices;
+  }
 };
-/// One that takes a child split to the other side for answered.
-struct ForgetsTheOtherChild : BoxTreeRules {
-  static bool descends(Side own, Side sought) { return axis_of(own) != axis_of(sought); }
+/// A tree whose lists of candidates lack one bound below, as after a search that leaves out one child.
+template <class S, class Queue, class Count, class Observer>
+class ForgetsAChild : public KineticBoxTree<S, Queue, Count, Observer> {
+ public:
+  using KineticBoxTree<S, Queue, Count, Observer>::KineticBoxTree;
+  void initialise(double t) {
+    KineticBoxTree<S, Queue, Count, Observer>::initialise(t);
+    for (auto& bound : this->bounds_) bound.first = std::min(bound.first + 1, bound.vertices);
+  }
 };
 template <class S>
 class LosesEvents : public BinaryHeapQueue<S> {
@@ -156,10 +169,11 @@ class LosesEvents : public BinaryHeapQueue<S> {
 TEST(BoxTreeFaults, AreCaught) {
   for (const char* name : {"soups", "sheets", "integer_ties"}) {
     const auto test = synthetic_scene<float>(name);
+    const BoxTreePlay listed{.construction = {.candidates = Candidates::listed}};
     EXPECT_TRUE((BoxTreeProof<float, AvlQueue>::run(test, {}).envelope.holds())) << name;
-    EXPECT_FALSE((BoxTreeProof<float, AvlQueue, ForgetsOtherAxes>::run(test, {}).envelope.holds())) << name;
-    EXPECT_FALSE((BoxTreeProof<float, AvlQueue, ForgetsTheOtherChild>::run(test, {}).envelope.holds()))
-        << name;
+    EXPECT_TRUE((BoxTreeProof<float, AvlQueue>::run(test, listed).envelope.holds())) << name;
+    EXPECT_FALSE((BoxTreeProof<float, AvlQueue, ForgetsLeaves>::run(test, listed).envelope.holds())) << name;
+    EXPECT_FALSE((BoxTreeProof<float, AvlQueue, ForgetsAChild>::run(test, listed).envelope.holds())) << name;
     EXPECT_FALSE((BoxTreeProof<float, LosesEvents>::run(test, {}).envelope.holds())) << name;
   }
 }
@@ -314,16 +328,11 @@ TEST(BoxTreeRows, AreTheInheritedBoxes) {
   use_kernel_set(before);
 }
 
-// ---- The cost of certificate searches (T12)
-// -----------------------------------------------------------------
+// ---- The cost of certificate searches (T12) --------------------------------------------------------------
 
-struct OneAxis : BoxTreeRules {
-  static int split_axis(int) { return 0; }
-};
+constexpr BoxTreeConstruction one_axis{.root_axis = 0, .inner_axis = 0};
 /// The root is split on x, all else on y (Z&W fig. 10).
-struct Adversarial : BoxTreeRules {
-  static int split_axis(int depth) { return depth == 0 ? 0 : 1; }
-};
+constexpr BoxTreeConstruction adversarial{.root_axis = 0, .inner_axis = 1};
 
 /// Points that wander on the first `axes` axes from keyframe to keyframe; the others stay 0.
 TestScene<double> wandering_points(std::uint32_t count, int axes) {
@@ -351,17 +360,18 @@ struct EventCost {
 };
 
 /// What the events cost that happen at `node` (none: at any).
-template <class Rules>
-EventCost cost_of_events(const TestScene<double>& test, std::optional<std::uint32_t> at_node = {}) {
+EventCost cost_of_events(const TestScene<double>& test, const BoxTreeConstruction& construction,
+                         std::optional<std::uint32_t> at_node = {}) {
   const SceneView<double> view(test.scene);
   Playback<double> playback(test.scene);
   playback.seek(0);
   Counting count;
-  typename RuledBoxTrees<Rules>::template Forest<double, AvlQueue<double>> forest(
+  KineticBoxForest<double, AvlQueue<double>, Counting> forest(
       view, ClipMotion<double>(playback), build_topologies(view, playback, {.width = 2, .leaf_size = 1}),
       count);
-  forest.reset(0);
   auto& tree = forest.tree(0);
+  tree.construct_as(construction);
+  forest.reset(0);
   EventCost cost;
   while (forest.due(3)) {
     const std::uint32_t slot = forest.queue().top().slot, node = slot < 6 ? 0 : slot - 5;
@@ -378,7 +388,7 @@ EventCost cost_of_events(const TestScene<double>& test, std::optional<std::uint3
 
 TEST(BoxTreeSearch, IsLogarithmicOnOneAxis) {
   for (const std::uint32_t n : {64u, 256u, 1024u, 4096u}) {
-    const EventCost cost = cost_of_events<OneAxis>(wandering_points(n, 1));
+    const EventCost cost = cost_of_events(wandering_points(n, 1), one_axis);
     std::printf("one axis, %u leaves: %llu events, %.2f nodes per search, at most %llu\n", n,
                 (unsigned long long)cost.events, cost.per_search(), (unsigned long long)cost.most_per_search);
     EXPECT_GT(cost.events, n / 2);
@@ -391,7 +401,7 @@ TEST(BoxTreeSearch, TakesTheWholeSubtreeWhereOnlyTheRootIsSplitOnItsAxis) {
   for (const std::uint32_t n : {64u, 256u, 1024u, 4096u}) {
     const TestScene<double> test = wandering_points(n, 2);
     // Node 1 is a child of the root: n / 2 leaves below it, none of whose inner nodes is split on x.
-    const EventCost cost = cost_of_events<Adversarial>(test, 1);
+    const EventCost cost = cost_of_events(test, adversarial, 1);
     std::printf("root x, else y, %u leaves: %llu events at the root's child, %llu nodes per search\n", n,
                 (unsigned long long)cost.events, (unsigned long long)cost.most_per_search);
     EXPECT_GT(cost.events, 3u);
@@ -402,7 +412,7 @@ TEST(BoxTreeSearch, TakesTheWholeSubtreeWhereOnlyTheRootIsSplitOnItsAxis) {
 
 TEST(BoxTreeSearch, OnMixedAxesLiesBetween) {
   for (const std::uint32_t n : {64u, 256u, 1024u, 4096u}) {
-    const EventCost cost = cost_of_events<BoxTreeRules>(wandering_points(n, 3));
+    const EventCost cost = cost_of_events(wandering_points(n, 3), {});
     std::printf("mixed axes, %u leaves: %llu events, %.2f nodes per search, at most %llu\n", n,
                 (unsigned long long)cost.events, cost.per_search(), (unsigned long long)cost.most_per_search);
     EXPECT_LT(cost.most_per_search, 2 * n);
@@ -412,8 +422,10 @@ TEST(BoxTreeSearch, OnMixedAxesLiesBetween) {
 TEST(BoxTreeSearch, AdversarialTreesAreSoundToo) {
   for (const char* name : {"soups", "integer_ties", "plan_changes"}) {
     const auto test = synthetic_scene<float>(name);
-    EXPECT_EQ((BoxTreeProof<float, AvlQueue, Adversarial>::run(test, {}).envelope.violation), "") << name;
-    EXPECT_EQ((BoxTreeProof<float, AvlQueue, OneAxis>::run(test, {}).envelope.violation), "") << name;
+    for (const BoxTreeConstruction& construction : {adversarial, one_axis})
+      EXPECT_EQ((BoxTreeProof<float, AvlQueue>::run(test, {.construction = construction}).envelope.violation),
+                "")
+          << name;
   }
 }
 

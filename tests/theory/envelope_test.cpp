@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "core/families/events/kinetic_tree_strategy.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 #ifdef KBVH_TEST_HAS_IO
@@ -16,11 +17,19 @@ namespace {
 
 using namespace kbvh::theory;
 
+/// Records kinetic AABB trees on a given event queue.
 template <class S, template <class> class Queue>
 Recording<S> record(const TestScene<S>& test, const Play& play) {
+  using Recorded = ExactKineticAabbStrategy<S, Counting, Queue<S>>;
   Play with_frames = play;
   if (!test.script.steps.empty()) with_frames.frames = test.frames;  // changes are at frames
-  return theory::record<S, Queue>(test.scene, test.script, with_frames);
+  return record_events(
+      test.scene, test.script, with_frames,
+      [](const SceneView<S>& view, Playback<S>& playback, const Topologies& topologies) {
+        return std::make_unique<Recorded>(view, ClipMotion<S>(playback), topologies, 0,
+                                          KineticQuery::node_pairs);
+      },
+      NoWatcher{});
 }
 
 std::string summary(const EnvelopeReport& r) {

@@ -227,12 +227,12 @@ void prove_boxtree(const std::string& name) {
   for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah})
     for (const std::uint32_t leaf_size : {1u, 4u}) {
       const EnvelopeReport report =
-          Prover<S, PlainBoxTree>(test, {.method = method, .width = 2, .leaf_size = leaf_size}).run();
+          Prover<S, KineticBoxTree>(test, {.method = method, .width = 2, .leaf_size = leaf_size}).run();
       EXPECT_EQ(report.violation, "") << name << ", " << kbvh::name(method) << ", leaf size " << leaf_size;
       EXPECT_EQ(report.net, report.envelope);
       total.add(report);
       const EnvelopeReport rebuilt =
-          Prover<S, PlainBoxTree>(test, {.method = method, .width = 2, .leaf_size = leaf_size}, 5).run();
+          Prover<S, KineticBoxTree>(test, {.method = method, .width = 2, .leaf_size = leaf_size}, 5).run();
       EXPECT_EQ(rebuilt.violation, "")
           << name << " with rebuilding, " << kbvh::name(method) << ", leaf size " << leaf_size;
       EXPECT_EQ(rebuilt.net, rebuilt.envelope);
@@ -261,17 +261,29 @@ INSTANTIATE_TEST_SUITE_P(Scenes, GeometryEnvelopes, testing::ValuesIn(geometry_s
 
 // ---- Seeded fault: the proof must catch it ---------------------------------------------------------------
 
-/// A repair that makes the certificates where the edit was, and none further up.
-struct ForgetsAbove : BoxTreeRules {
-  static bool carries_up() { return false; }
-};
+/// A tree that does not carry an insertion up to the root: the root keeps its realisers.
 template <class S, class Queue, class Count, class Observer>
-using ForgetfulBoxTree = KineticBoxTree<S, Queue, Count, Observer, ForgetsAbove>;
+class ForgetfulBoxTree : public KineticBoxTree<S, Queue, Count, Observer> {
+ public:
+  using Base = KineticBoxTree<S, Queue, Count, Observer>;
+  using Base::Base;
+  void insert(double t, std::uint32_t primitive, const Primitives& primitives,
+              const SampledMotion<S>& motion) {
+    if (this->topology().empty()) return Base::insert(t, primitive, primitives, motion);
+    const std::array<std::uint32_t, 6> before = this->root_realisers();
+    Base::insert(t, primitive, primitives, motion);
+    for (Side side = 0; side < 6; ++side) {
+      if (this->bounds_[side].realiser == before[side]) continue;
+      this->bounds_[side].realiser = before[side];
+      this->certifier_.withdraw(this->slot(0, side));
+    }
+  }
+};
 
 TEST(GeometryEnvelopeFaults, ABoxTreeThatDoesNotLookFurtherUpIsCaught) {
   const auto test = synthetic_scene<double>("geometry_changes", 2);
   const BuilderConfig builder{.width = 2, .leaf_size = 1};
-  EXPECT_TRUE((Prover<double, PlainBoxTree>(test, builder).run().holds()));
+  EXPECT_TRUE((Prover<double, KineticBoxTree>(test, builder).run().holds()));
   EXPECT_FALSE((Prover<double, ForgetfulBoxTree>(test, builder).run().holds()));
 }
 

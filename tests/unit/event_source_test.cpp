@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <map>
 
 #include "core/contract/registry.hpp"
 #include "core/judge/follow_script.hpp"
@@ -207,6 +209,147 @@ TEST(EventSource, QueuesDoNotChangeTheEventsOfTheSeparationList) {
     compare_queues<float>("kinetic_separation_list", scene);
   for (const char* scene : {"soups", "integer_ties", "coincident_intervals", "plan_changes"})
     compare_queues<double>("kinetic_separation_list", scene);
+}
+
+// ---- The pairs that a separation list watches -------------------------------------------------------------
+
+/// Holds the watched pairs against boxes, trees and answers at the session's time: they form trees of pairs
+/// whose roots are pairs of roots. Each leaf has one primitive, and no body is paired with itself. Returns
+/// the number of pairs.
+template <class S>
+std::size_t check_watched_pairs(Session<S>& session) {
+  using Nodes = std::array<std::uint32_t, 4>;
+  const EventSource<S>& source = *session.strategy().events();
+  std::vector<WatchedPair> watched(3);  // old content, which has to go
+  source.watched_pairs(watched);
+  std::map<Nodes, WatchedPair> pairs;
+  std::vector<WatchedPair> open;
+  for (const WatchedPair& pair : watched) {
+    EXPECT_TRUE(pairs.emplace(Nodes{pair.body, pair.node, pair.other_body, pair.other_node}, pair).second)
+        << "a pair twice";
+    if (pair.node == 0 && pair.other_node == 0) open.push_back(pair);
+  }
+  PairBuffer expected, found;
+  session.strategy().candidates_at(session.playback().time(), found, {});
+  session.playback().evaluate_all();
+  std::vector<AuditView> views;
+  for (std::uint32_t body = 0; body < session.scene().bodies.size(); ++body)
+    views.push_back(*session.strategy().audit_view(body));
+  std::size_t reached = 0;
+  while (!open.empty()) {
+    const WatchedPair pair = open.back();
+    open.pop_back();
+    ++reached;
+    const AuditView &a = views[pair.body], &b = views[pair.other_body];
+    const TopologyNode na = a.topology.nodes[pair.node], nb = b.topology.nodes[pair.other_node];
+    if (!pair.overlapping) {
+      EXPECT_FALSE(overlap(a.boxes[pair.node], b.boxes[pair.other_node])) << "said to be apart";
+    }
+    if (na.is_leaf() && nb.is_leaf()) {
+      EXPECT_TRUE(pair.listed);
+      if (pair.overlapping)
+        expected.push_back({pair.body, a.topology.primitives[na.first()], pair.other_body,
+                            b.topology.primitives[nb.first()]});
+      continue;
+    }
+    EXPECT_EQ(pair.listed, !pair.overlapping);
+    if (pair.listed) continue;
+    const std::uint32_t first_a = na.is_leaf() ? pair.node : na.first(),
+                        end_a = na.is_leaf() ? first_a + 1 : first_a + na.count();
+    const std::uint32_t first_b = nb.is_leaf() ? pair.other_node : nb.first(),
+                        end_b = nb.is_leaf() ? first_b + 1 : first_b + nb.count();
+    for (std::uint32_t i = first_a; i < end_a; ++i)
+      for (std::uint32_t j = first_b; j < end_b; ++j) {
+        const auto child = pairs.find({pair.body, i, pair.other_body, j});
+        EXPECT_NE(child, pairs.end()) << "a pair without all of its children";
+        if (child != pairs.end()) open.push_back(child->second);
+      }
+  }
+  EXPECT_EQ(reached, watched.size()) << "pairs that belong to no tree of pairs";
+  std::sort(expected.begin(), expected.end());
+  std::sort(found.begin(), found.end());
+  EXPECT_EQ(expected, found) << "the query reads other leaves";
+  return watched.size();
+}
+
+TEST(EventSource, WatchedPairsAreThoseOfTheSeparationList) {
+  for (const char* scene : {"soups", "sheets", "four_bodies_own_keyframes", "plan_changes"}) {
+    SCOPED_TRACE(scene);
+    const TestScene<float> test = synthetic_scene<float>(scene, 3);
+    const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 3) : test.frames;
+    Session<float> session(test.scene,
+                           {&find_strategy("kinetic_separation_list"),
+                            {},
+                            BuilderConfig{.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
+                           CountingPolicy::silent);
+    ScriptCursor<float> cursor(test.script.empty() ? nullptr : &test.script);
+    PhaseTimes times;
+    std::size_t most = 0;
+    for (std::size_t f = 0; f < frames.size(); ++f) {
+      if (f == 0)
+        session.reset(frames[0]);
+      else
+        session.advance(frames[f], times);
+      most = std::max(most, check_watched_pairs(session));
+      follow(session, cursor.at(frames[f]), times);
+    }
+    EXPECT_GT(most, 50u);
+  }
+}
+
+TEST(EventSource, OtherStrategiesWatchNoPairs) {
+  const TestScene<float> test = synthetic_scene<float>("soups", 1);
+  for (const StrategyEntry* entry : sources()) {
+    if (entry->info.id == "kinetic_separation_list") continue;
+    Session<float> session(test.scene, {entry, {}, entry->info.topology.preferred}, CountingPolicy::silent);
+    session.reset(frame_times(test.scene, 1).front());
+    std::vector<WatchedPair> watched(3);
+    session.strategy().events()->watched_pairs(watched);
+    EXPECT_TRUE(watched.empty()) << entry->info.id;
+  }
+}
+
+// ---- Counters of the BoxTree's searches -------------------------------------------------------------------
+
+TEST(BoxTreeCounters, CountSearchesSinceTheReset) {
+  const TestScene<float> test = synthetic_scene<float>("soups", 1);
+  const std::vector<double> frames = frame_times(test.scene, 1);
+  const Contestant contestant{&find_strategy("kinetic_boxtree"),
+                              {{"candidates", "searched"}},
+                              BuilderConfig{.method = BuildMethod::median, .width = 2, .leaf_size = 1}};
+  Session<float> session(test.scene, contestant, CountingPolicy::counting);
+  const auto named = [&] {
+    std::map<std::string, std::uint64_t> values;
+    for (const Counters::Named& counter : session.strategy().counters().named)
+      values[std::string(counter.name)] = counter.value;
+    return values;
+  };
+  using Values = std::map<std::string, std::uint64_t>;
+  const Values none{{"certificate_searches", 0}, {"most_nodes_searched", 0}, {"nodes_searched", 0}};
+  session.reset(frames.front());
+  EXPECT_EQ(named(), none);
+  EventDescription<float> done;
+  std::uint64_t events = 0;
+  Values before = named();
+  for (; session.step_event(frames.back(), done); ++events) {
+    const Values after = named();
+    // An event searches the candidates of each bound that changes; further searches may follow above.
+    EXPECT_GE(after.at("certificate_searches"), before.at("certificate_searches") + done.touched.size());
+    EXPECT_LE(after.at("most_nodes_searched"), after.at("nodes_searched"));
+    EXPECT_GE(after.at("most_nodes_searched") * after.at("certificate_searches"), after.at("nodes_searched"));
+    before = after;
+  }
+  EXPECT_GT(events, 100u);
+  const std::uint32_t largest =
+      std::max(session.strategy().events()->tree(0).size(), session.strategy().events()->tree(1).size());
+  EXPECT_GT(before.at("most_nodes_searched"), 4u);
+  EXPECT_LE(before.at("most_nodes_searched"), 2 * largest);
+  session.reset(frames.front());
+  EXPECT_EQ(named(), none);
+
+  Session<float> silent(test.scene, contestant, CountingPolicy::silent);
+  silent.reset(frames.front());
+  EXPECT_TRUE(silent.strategy().counters().named.empty());
 }
 
 }  // namespace

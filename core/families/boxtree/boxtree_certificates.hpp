@@ -31,7 +31,7 @@ namespace kbvh {
 /// Slots of the queue are first_slot + place for the initial bounds; later bounds get slots in chunks. Events
 /// are handled as by KineticAabbTree. Observers receive realiser_changed for own sides only, and no
 /// realiser_plan_changed.
-template <class S, class Queue, class Count, class Observer, class Rules>
+template <class S, class Queue, class Count, class Observer>
 class BoxTreeCertificates : public BoxTreeBounds {
  public:
   BoxTreeCertificates(Topology topology, const Primitives& primitives, std::uint32_t body,
@@ -45,6 +45,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
         certifier_(clock, queue, count),
         search_(clock.plans(body).vertex_count()) {}
 
+  /// Returns the cost of all searches; counted only if `Count` counts.
   SearchCost& search_cost() { return search_cost_; }
 
   /// Handles a failure that was popped from the queue. The loser becomes the realiser of this bound, and of
@@ -165,7 +166,8 @@ class BoxTreeCertificates : public BoxTreeBounds {
       if (order > 0 || (order == 0 && challenger == preferred)) best = challenger;
     }
     count_->add(Counter::vertex_reads, all.size());
-    return best == no_vertex ? preferred : best;  // no candidate: only with faulty Rules
+    KBVH_ASSERT(best != no_vertex);
+    return best;
   }
 
   /// Finds the realisers of a node's own sides and schedules their certificates. Requires the realisers
@@ -210,7 +212,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
   Count* count_;
   Observer observer_;
   Certifier<S, Queue, Count> certifier_;
-  CandidateSearch<Rules> search_;
+  CandidateSearch search_;
   SearchCost search_cost_;
 
  private:

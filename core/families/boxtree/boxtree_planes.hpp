@@ -14,6 +14,9 @@
 
 namespace kbvh {
 
+/// The split axis of an inner node that is split on the axis with the best boxes.
+inline constexpr int best_axis = 3;
+
 /// Chooses the planes of a subtree. For each inner node, chooses the axis and the left child such that the
 /// children's inherited boxes have the least summed area x primitives (the local surface-area cost). Of equal
 /// areas the least summed edge length x primitives counts, then the first choice. Parents are cut before
@@ -32,7 +35,7 @@ class BoxTreePlanes {
   }
 
   /// Sets own_sides[node] for all nodes but the first. The first node has the box `box`, or its tight box if
-  /// null. axis(node) forces a split axis (0, 1, 2), or returns 3 for a free choice. O(nodes log nodes).
+  /// null. axis(node) returns the split axis (0, 1, 2) of an inner node, or `best_axis`. O(nodes log nodes).
   template <class Axis>
   void choose(const Box<S>* box, Axis&& axis, std::vector<std::uint8_t>& own_sides) {
     for (std::size_t i = nodes_.size(); i-- > 0;) {
@@ -59,7 +62,8 @@ class BoxTreePlanes {
     const auto pair = children(i);
     std::pair<double, double> best;
     bool found = false;
-    for (int axis = forced == 3 ? 0 : forced; axis < (forced == 3 ? 3 : forced + 1); ++axis)
+    const bool free = forced == best_axis;
+    for (int axis = free ? 0 : forced; axis < (free ? 3 : forced + 1); ++axis)
       for (const std::size_t left : {0, 1}) {
         const std::array<Box<S>, 2> boxes =
             cut(inherited_[i], axis, tight_[pair[left]], tight_[pair[1 - left]]);

@@ -9,20 +9,6 @@
 
 namespace kbvh {
 
-/// The replaceable rules of a kinetic BoxTree, for trees with forced axes (Z&W fig. 10) and for seeded
-/// faults.
-struct BoxTreeRules {
-  /// Returns the axis (0, 1, 2) on which all inner nodes of a depth are split, or 3 for the axis with the
-  /// best boxes of the children.
-  static int split_axis(int /*depth*/) { return 3; }
-  /// Returns whether a certificate search for side `sought` descends to a child that owns another side. Must
-  /// be true for a correct tree.
-  static bool descends(Side /*own*/, Side /*sought*/) { return true; }
-  /// Returns whether a certificate is checked again after a change of a realiser among its candidates. Must
-  /// be true for a correct tree.
-  static bool carries_up() { return true; }
-};
-
 /// The cost of a BoxTree's certificate searches since construction or the last call of `forget`.
 struct SearchCost {
   std::uint64_t searches = 0;
@@ -33,13 +19,18 @@ struct SearchCost {
     nodes += visited;
     most_nodes = std::max(most_nodes, visited);
   }
+  /// Adds the cost of the searches of another tree.
+  void add(const SearchCost& other) {
+    searches += other.searches;
+    nodes += other.nodes;
+    most_nodes = std::max(most_nodes, other.most_nodes);
+  }
   void forget() { *this = {}; }
 };
 
 /// Finds the candidates of a BoxTree's certificates (Z&W figs. 8, 9). The search is depth first. It stops at
 /// children with the same own side, whose realisers stand for all vertices below. At a leaf every vertex is a
 /// candidate.
-template <class Rules>
 class CandidateSearch {
  public:
   explicit CandidateSearch(std::uint32_t vertex_count) : seen_(vertex_count, 0) {}
@@ -73,7 +64,7 @@ class CandidateSearch {
         if (own_sides[child] == side) {
           ++visited;
           on_child(child);
-        } else if (Rules::descends(own_sides[child], side)) {
+        } else {
           open_.push_back(child);
         }
     }

@@ -33,6 +33,9 @@ struct BoxTreeConstruction {
   std::uint32_t bare_leaves = 0;
   /// Maximum number of moments of the clip that PlaneChoice::clip evaluates.
   std::uint32_t moments = 16;
+  /// PlaneChoice::start: the split axis (0, 1, 2) of the root, and that of all other inner nodes; `best_axis`
+  /// for the best one. Given axes make the trees of Z&W Theorem 5 and fig. 10.
+  int root_axis = best_axis, inner_axis = best_axis;
 };
 
 /// The own side of a node that owns none.

@@ -19,9 +19,11 @@ namespace kbvh {
 /// certificates of new nodes are made, and, for each side, the one certificate whose search covers the edited
 /// place is recomputed. Further up, a certificate is recomputed if a realiser among its candidates has
 /// changed.
-template <class S, class Queue, class Count, class Observer = NoObserver, class Rules = BoxTreeRules>
-class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rules> {
-  using Base = BoxTreeCertificates<S, Queue, Count, Observer, Rules>;
+template <class S, class Queue, class Count, class Observer = NoObserver>
+class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer> {
+  using Base = BoxTreeCertificates<S, Queue, Count, Observer>;
+
+ protected:
   using Base::body_, Base::bounds_, Base::clock_, Base::count_, Base::editor_, Base::leaves_,
       Base::own_sides_, Base::place, Base::queue_, Base::search_, Base::sides_of, Base::slots_,
       Base::topology_, Base::version_;
@@ -183,7 +185,9 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
         construction_.planes == PlaneChoice::start
             ? choose_own_sides<S>(
                   topology_, ids, [&](TopologyNode leaf) { return leaf_box(leaf, 0); }, box,
-                  [&](std::uint32_t node) { return Rules::split_axis(topology_.depths[node]); })
+                  [&](std::uint32_t node) {
+                    return node == 0 ? construction_.root_axis : construction_.inner_axis;
+                  })
             : ExpectedOverlap<S>(topology_, ids, clip.count(), leaf_box, box)
                   .choose(construction_.bare_leaves);
     for (std::size_t i = 1; i < ids.size(); ++i) own_sides_[ids[i]] = own_sides[i];
@@ -260,8 +264,7 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
         const std::uint32_t old = bounds_[at].realiser, best = this->best_at(at, side, t, old);
         if (best != old) this->replace(at, side, best, now);
         this->certify(at, side, now);
-        if (node != 0 && Rules::carries_up() && (best != old || changed(old)))
-          concern(this->node_at(this->above(at, side)), side);
+        if (node != 0 && (best != old || changed(old))) concern(this->node_at(this->above(at, side)), side);
       }
     }
   }
@@ -321,12 +324,8 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer, Rul
   std::vector<std::uint32_t> unique_;
 };
 
-/// The plain tree, as a template argument of KineticForest.
-template <class S, class Queue, class Count, class Observer>
-using PlainBoxTree = KineticBoxTree<S, Queue, Count, Observer>;
-
 /// The kinetic BoxTrees of all bodies of a scene on one event queue.
 template <class S, class Queue, class Count, class Observer = NoObserver>
-using KineticBoxForest = KineticForest<S, Queue, Count, Observer, PlainBoxTree>;
+using KineticBoxForest = KineticForest<S, Queue, Count, Observer, KineticBoxTree>;
 
 }  // namespace kbvh
