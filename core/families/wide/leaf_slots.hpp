@@ -6,8 +6,8 @@
 
 namespace kbvh {
 
-/// The number of leaf pairs that queries collect before they turn them into pairs of primitives: few enough to
-/// stay in the cache.
+/// The number of leaf pairs that queries collect before they turn them into pairs of primitives: few enough
+/// to stay in the cache.
 inline constexpr std::size_t leaf_pair_room = 2048;
 
 /// Moves pairs of two different leaves before pairs of a leaf with itself; returns the number of the former.
