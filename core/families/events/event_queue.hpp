@@ -210,7 +210,7 @@ class BinaryHeapEventQueue {
 };
 
 /// An AVL tree or a binary heap, chosen at run time: structures are compiled once for both. The operations
-/// that compare events are calls, not inlined; what they cost beside their comparisons cannot be measured.
+/// that compare events are calls, not inlined.
 template <class Clock>
 class AvlOrHeapEventQueue {
   using Event = typename Clock::Event;
