@@ -56,13 +56,6 @@ class ReportCase(unittest.TestCase):
 
 
 class TestPage(ReportCase):
-    def test_is_self_contained(self) -> None:
-        page = self.page(small(), figures="main")
-        self.assertIn("data:image/svg+xml;base64,", page)
-        for attribute in re.findall(r'(?:src|href)="([^"]*)"', page):
-            self.assertTrue(attribute.startswith(("data:", "#")), attribute[:60])
-        self.assertNotRegex(page, r"@import|url\(")
-
     def test_a_refit_that_is_no_baseline_is_shown_and_is_no_denominator(self) -> None:
         lines = small()
         for l in (1, 30):
@@ -74,14 +67,6 @@ class TestPage(ReportCase):
         glance = page[page.index('id="glance"') : page.index("</table>", page.index('id="glance"'))]
         self.assertIn("My own refit", glance, "the fastest that is no baseline stands in the summary")
         self.assertIn("Bottom-up refit", glance)
-
-    def test_figures_come_as_png_and_pdf(self) -> None:
-        self.page(small(), figures="main")
-        names = {file.name for file in (self.folder / "figures").iterdir()}
-        for figure in ("cost", "error", "counters", "depth", "quality", "pace", "latency", "l"):
-            self.assertIn(f"tablecloth-{figure}.png", names)
-            self.assertIn(f"tablecloth-{figure}.pdf", names)
-        self.assertNotIn("tablecloth-n.png", names, "one size only: no figure over sizes")
 
     def test_figures_without_data_are_left_out(self) -> None:
         lines = [line for line in small() if line["strategy"]["id"] == "bottom_up" and line["scene"]["per_keyframe"] == 1]
@@ -114,9 +99,21 @@ class TestPage(ReportCase):
         self.assertNotIn("<script>alert", page)
         self.assertIn("A &amp; B &lt;i&gt;", page)
 
-    def test_two_runs_give_the_same_page(self) -> None:
-        lines = [line for line in small() if line["scene"]["per_keyframe"] == 1]
-        self.assertEqual(self.page(lines, figures="main"), self.page(lines, figures="main"))
+    def test_pages_with_figures_are_self_contained_and_the_same_again(self) -> None:
+        page = self.page(small(), figures="main")
+        with self.subTest("self-contained"):
+            self.assertIn("data:image/svg+xml;base64,", page)
+            for attribute in re.findall(r'(?:src|href)="([^"]*)"', page):
+                self.assertTrue(attribute.startswith(("data:", "#")), attribute[:60])
+            self.assertNotRegex(page, r"@import|url\(")
+        with self.subTest("figures are PNG and PDF"):
+            names = {file.name for file in (self.folder / "figures").iterdir()}
+            for figure in ("cost", "error", "counters", "depth", "quality", "pace", "latency", "l"):
+                self.assertIn(f"tablecloth-{figure}.png", names)
+                self.assertIn(f"tablecloth-{figure}.pdf", names)
+            self.assertNotIn("tablecloth-n.png", names, "one size only: no figure over sizes")
+        with self.subTest("a second run gives the same page"):
+            self.assertEqual(self.page(small(), figures="main"), page)
 
     def test_results_are_never_written(self) -> None:
         synthetic.write(self.folder, small(), '{"schema": 1, "ki')
