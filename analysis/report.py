@@ -1,6 +1,6 @@
 """Turns a folder of results into report.html and figures/.
 
-usage: report.py RESULTS_DIR [--title TEXT] [--figures main|all|none] [--print]
+usage: report.py RESULTS_DIR [--title TEXT] [--figures main|all|paper|none] [--print]
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ def main(arguments: Optional[list[str]] = None) -> int:
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
     parser.add_argument("--title", default="BVH update strategies, measured", help="heading of the report")
     parser.add_argument(
-        "--figures", choices=("main", "all", "none"), default="main",
-        help="figures of one group per scene (default), of every group, or none",
+        "--figures", choices=("main", "all", "paper", "none"), default="main",
+        help="figures of one group per scene (default), of every group, only those of the paper and its claims, or none",
     )  # fmt: skip
     parser.add_argument("--print", dest="printed", action="store_true", help="also print the tables as text")
     options = parser.parse_args(arguments)
@@ -251,6 +251,7 @@ def _sections(
     ordered = pd.concat(study.groups())
     of_group = dict(zip(ordered["group"].unique(), groups))
     written = scene_pictures.written_out(folder.parent)
+    of_scenes = which in ("main", "all")
     study.notes += written.notes
     result = []
     for number, (scene, rows) in enumerate(ordered.groupby("scene", sort=False)):
@@ -262,13 +263,13 @@ def _sections(
         if (shown := written.of(rows.sort_values("primitives"))) is not None:
             card += scene_cards.violence(shown)
             try:
-                view = scene_cards.view(shown, folder, str(scene)) if which != "none" else None
+                view = scene_cards.view(shown, folder, str(scene)) if of_scenes else None
             except scene_pictures.MeshError as problem:
                 study.notes.append(f"{scene} has no picture: {problem}.")
         section = Section(str(scene), f"scene-{number + 1}", scene_cards.bodies(rows), card, view, own, sizes, mine)
         timed = rows[rows["refused"] == ""]
         slug = re.sub(r"[^a-z0-9]+", "-", str(scene).lower()).strip("-") or f"scene-{number + 1}"
-        if len(timed) and which != "none":
+        if len(timed) and of_scenes:
             head = headline(timed)
             section.pictures += _group_pictures(timed[timed["group"] == head], timed, all_looks, folder, slug)
             section.errors = [one for one in section.pictures if one.name == f"{slug}-error"]

@@ -351,9 +351,9 @@ class TestFiles(ClaimsCase):
 
 
 class TestPage(ClaimsCase):
-    def page(self, lines: list[Line], *arguments: str) -> str:
+    def page(self, lines: list[Line]) -> str:
         synthetic.write(self.folder, lines)
-        self.assertEqual(report.main([str(self.folder), *arguments]), 0)
+        self.assertEqual(report.main([str(self.folder), "--figures", "paper"]), 0)
         return (self.folder / "report.html").read_text(encoding="utf-8")
 
     def test_shows_verdicts_and_every_link_leads_somewhere(self) -> None:
