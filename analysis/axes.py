@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Callable, Sequence
 from enum import Enum
+from typing import Optional
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -107,14 +108,16 @@ def mark(axes: Axes, x: float, y: float, look: Look, size: float = 7.5, zorder: 
               markeredgewidth=1.5, linestyle="none", zorder=zorder, clip_on=False)  # fmt: skip
 
 
-def contestants_on_y(axes: Axes, labels: Sequence[str], looks: Sequence[Look]) -> None:
-    """Draws a row per contestant from top to bottom, named at the left with its marker."""
+def contestants_on_y(axes: Axes, labels: Sequence[str], looks: Sequence[Optional[Look]]) -> None:
+    """Draws a row per contestant from top to bottom, named at the left with its marker; without a look, a row is a heading."""
     axes.set_yticks(range(len(labels)))
     axes.set_yticklabels([textwrap.fill(label, WRAP) for label in labels], linespacing=0.95)
     axes.set_ylim(len(labels) - 0.4, -0.6)
     axes.tick_params(axis="y", length=0, pad=19)
     beside = offset_copy(axes.get_yaxis_transform(), axes.figure, x=-11, y=0, units="points")
     for row, look in enumerate(looks):
+        if look is None:
+            continue
         axes.plot([0], [row], marker=look.marker, color=look.colour, markerfacecolor=look.face, markersize=6.5,
                   markeredgewidth=1.4, linestyle="none", clip_on=False, transform=beside)  # fmt: skip
 

@@ -153,8 +153,17 @@ def figure(found: Sequence[Place], names: Sequence[str], looks: dict[str, Look])
     listed = [(place, row) for place in found for row in place.rows if (row.family, row.quantity) == (FAMILY, DRAWN[0][0])]
     if not listed:
         return None
-    labels = [f"{place.scene} {text.size(place.size)}: {_name(row.label)}" for place, row in listed]
-    rows_high, key_high = 0.9 + 0.24 * len(labels), 0.55
+    names_of = short_names([row.label for _, row in listed])
+    labels: list[str] = []  # from top to bottom: each scene and size, and under it its strategies
+    heads: list[int] = []
+    at: dict[tuple[str, float, str], int] = {}
+    for number, (place, row) in enumerate(listed):
+        if number == 0 or listed[number - 1][0] is not place:
+            heads.append(len(labels))
+            labels.append(f"{place.scene} {text.size(place.size)}")
+        at[place.scene, place.size, row.contestant] = len(labels)
+        labels.append(names_of[row.label])
+    rows_high, key_high = 0.9 + 0.21 * len(labels), 0.55
     made = Figure(figsize=(WIDTH, rows_high + key_high), layout="constrained")
     grid = made.add_gridspec(2, len(DRAWN), height_ratios=[rows_high, key_high])
     panels = [made.add_subplot(grid[0, column]) for column in range(len(DRAWN))]
@@ -165,17 +174,25 @@ def figure(found: Sequence[Place], names: Sequence[str], looks: dict[str, Look])
         axes.set_xlim(depths[0] / 1.45, depths[-1] * 1.45)
         axes.set_title(title)
         axes.set_xlabel("frames per keyframe, l")
-        for number, (place, row) in enumerate(listed):
+        for place, row in listed:
             same = next((one for one in place.rows if (one.contestant, one.quantity) == (row.contestant, quantity)), None)
             for step, (name, colour) in enumerate(zip(names[:2], colours)):
                 one = same.found.get(name) if same is not None else None
                 if one is not None:
-                    _draw(axes, one, number + (step - 0.5) * 0.34, colour)
-    contestants_on_y(panels[0], labels, [replace(looks[row.contestant], filled=True) for _, row in listed])
+                    _draw(axes, one, at[place.scene, place.size, row.contestant] + (step - 0.5) * 0.34, colour)
+    rows_of = {number: row for (_, row), number in zip(listed, at.values())}
+    contestants_on_y(
+        panels[0], labels,
+        [replace(looks[rows_of[i].contestant], filled=True) if i in rows_of else None for i in range(len(labels))],
+    )  # fmt: skip
+    for head in heads:
+        panels[0].get_yticklabels()[head].set_fontweight("bold")
     for axes in panels[1:]:
         axes.set_ylim(panels[0].get_ylim())
         axes.set_yticks([])
-    _lines_between(panels, listed)
+    for axes in panels:
+        for head in heads[1:]:
+            axes.axhline(head - 0.5, color="#888888", linewidth=0.6)
     below = made.add_subplot(grid[1, :])
     below.set_axis_off()
     below.legend(handles=_key(names, colours), loc="center", ncols=3, frameon=False, fontsize=8)
@@ -183,8 +200,23 @@ def figure(found: Sequence[Place], names: Sequence[str], looks: dict[str, Look])
     return made
 
 
-def _name(label: str) -> str:
-    return label.removeprefix("kinetic ").replace("\u00a0", " ")
+def short_names(labels: Sequence[str]) -> dict[str, str]:
+    """Returns names for a narrow margin: a title without "kinetic", and of several settings of one strategy only the shortest that
+    no other has, unless that leaves two names equal.
+    """
+    settings: dict[str, dict[str, list[str]]] = {}
+    for label in labels:
+        title, _, told = label.replace("\u00a0", " ").partition(" (")
+        settings.setdefault(title.removeprefix("kinetic "), {})[label] = told.rstrip(")").split(", ") if told else []
+    names = {}
+    for title, variants in settings.items():
+        for label, own in variants.items():
+            others = {one for other, told in variants.items() if other != label for one in told}
+            only = [one for one in own if one not in others] or own
+            names[label] = title if len(variants) == 1 or not own else f"{title} ({min(only, key=len)})"
+    if len(set(names.values())) < len(names):
+        return {label: label.replace("\u00a0", " ").removeprefix("kinetic ") for label in names}
+    return names
 
 
 def _draw(axes: Axes, one: BreakEven, y: float, colour: str) -> None:
@@ -199,14 +231,6 @@ def _draw(axes: Axes, one: BreakEven, y: float, colour: str) -> None:
         return
     axes.plot([one.l, high], [y, y], color=colour, linewidth=2.4, solid_capstyle="butt", zorder=2)
     axes.plot([one.l], [y], marker="<" if one.kind == AHEAD else "o", color=colour, markersize=5, linestyle="none", zorder=3)
-
-
-def _lines_between(panels: Sequence[Axes], listed: Sequence[tuple[Place, Row]]) -> None:
-    """Draws a thin line between scenes and sizes."""
-    for number in range(1, len(listed)):
-        if listed[number][0] is not listed[number - 1][0]:
-            for axes in panels:
-                axes.axhline(number - 0.5, color="#888888", linewidth=0.6)
 
 
 def _key(names: Sequence[str], colours: Sequence[str]) -> list[Line2D]:

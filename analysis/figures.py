@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import Optional
 
@@ -57,13 +58,22 @@ CROWD = 20
 
 
 def _rows_figure(labels: Sequence[str], legend: float = 0.0) -> Figure:
-    each = 0.35 if max(map(len, labels)) > WRAP else 0.27
+    lines = max(len(textwrap.wrap(label, WRAP)) for label in labels)
+    each = 0.27 if lines == 1 else 0.11 + 0.12 * lines
     return Figure(figsize=(WIDTH, 0.9 + legend + each * len(labels)), layout="constrained")
 
 
 def thinned(rows: pd.DataFrame) -> pd.DataFrame:
-    """Returns all rows, or the fastest configuration of each strategy if there are too many."""
-    return fastest_configurations(rows) if len(rows) > CROWD else rows
+    """Returns all rows, or the fastest configuration of each strategy if there are too many. Names that take more than two lines
+    go without their settings then: no other configuration of the strategy is left.
+    """
+    if len(rows) <= CROWD:
+        return rows
+    chosen = fastest_configurations(rows)
+    short = [
+        label if len(textwrap.wrap(label, WRAP)) <= 2 else title for label, title in zip(chosen["label"], chosen["title"])
+    ]
+    return chosen.assign(label=short)
 
 
 def cost_split(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:

@@ -173,7 +173,8 @@ def _break_even(
     names, places, single = break_even.places(Table(study, "float"), claims.baselines)
     reading = (
         "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. An open arrow "
-        "marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown."
+        "marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown. A name has only "
+        "the setting that tells it from the others of its strategy; the tables have all."
     )
     made = picture(
         folder, "break-even", "From which l on kinetic contestants are faster", reading,

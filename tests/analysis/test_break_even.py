@@ -129,5 +129,18 @@ class TestStudies(unittest.TestCase):
         self.assertTrue((self.folder / "figures" / "break-even.pdf").exists())
 
 
+
+class TestNames(unittest.TestCase):
+    def test_only_the_shortest_setting_that_differs_is_told(self) -> None:
+        labels = ["kinetic AABB tree (leaf\u00a01, queue\u00a0avl)", "kinetic AABB tree (leaf\u00a016, queue\u00a0avl)", "kinetic BoxTree (leaf\u00a01)"]
+        self.assertEqual(
+            list(break_even.short_names(labels).values()), ["AABB tree (leaf 1)", "AABB tree (leaf 16)", "BoxTree"]
+        )
+
+    def test_names_that_would_be_equal_keep_all_settings(self) -> None:
+        labels = ["kinetic X (a\u00a01, b\u00a01)", "kinetic X (a\u00a01, b\u00a02)", "kinetic X (a\u00a02, b\u00a01)", "kinetic X (a\u00a02, b\u00a02)"]
+        self.assertEqual(len(set(break_even.short_names(labels).values())), 4)
+
+
 if __name__ == "__main__":
     unittest.main()

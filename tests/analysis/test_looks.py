@@ -6,7 +6,11 @@ import unittest
 
 import paths  # noqa: F401  (finds the modules under test)
 
+import pandas as pd
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
 import colours
+import figures
 import text
 
 
@@ -39,6 +43,32 @@ class TestLooks(unittest.TestCase):
         for colour, marker in [*colours.FAMILIES.values(), *colours.FREE]:
             shape = colours.symbol(colours.Look(colour, marker, "-", True))
             self.assertIn("<circle" if marker == "o" else "<polygon", shape)
+
+
+class TestRows(unittest.TestCase):
+    SETTINGS = " (candidates listed, leaf 16, leaf boxes tight, planes clip, queue segment heap, rebuild never)"
+
+    def rows(self, count: int) -> pd.DataFrame:
+        """Contestants of which each third has a name of four lines."""
+        names = [f"kinetic BoxTree {i}" for i in range(count)]
+        phases = {f"middle_{phase}": 1.0 for phase in figures.PHASES}
+        return pd.DataFrame(
+            {
+                "id": names, "contestant": names, "title": names, "group": "g", "total_motion": 4.0, **phases,
+                "label": [name + (self.SETTINGS if i % 3 == 0 else "") for i, name in enumerate(names)],
+            }
+        )  # fmt: skip
+
+    def test_names_of_rows_do_not_overlap(self) -> None:
+        for count in (4, figures.CROWD + 1):
+            with self.subTest(count):
+                rows = self.rows(count)
+                figure = figures.cost_split(rows, colours.looks((name, name, "kinetic") for name in rows["id"]))
+                canvas = FigureCanvasAgg(figure)
+                canvas.draw()
+                boxes = [label.get_window_extent(canvas.get_renderer()) for label in figure.axes[0].get_yticklabels()]
+                for upper, lower in zip(boxes, boxes[1:]):
+                    self.assertGreaterEqual(upper.y0, lower.y1)
 
 
 class TestText(unittest.TestCase):
