@@ -1,0 +1,30 @@
+#include "core/contract/registry.hpp"
+#include "core/families/build/built_strategy.hpp"
+#include "core/families/build/curve_builders.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S>
+struct ImplicitTreeBuilder : ImplicitBuilder<S> {
+  explicit ImplicitTreeBuilder(const Params& params)
+      : ImplicitBuilder<S>(params.word("curve") == "morton" ? Curve::morton : Curve::hilbert) {}
+};
+template <class S, class Count>
+using ImplicitTree = BuiltStrategy<S, Count, ImplicitTreeBuilder<S>>;
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(implicit_tree) {
+  using namespace kbvh;
+  return {make_entry<ImplicitTree>({
+      .id = "implicit_tree",
+      .title = "implicit tree",
+      .family = "rebuild",
+      .citation = "Chitalu et al. 2020; Kamel & Faloutsos 1993 (Hilbert order)",
+      .declares = {.restructures = true, .time_budget = true},
+      .topology = {.widths = {8}, .preferred = {.method = BuildMethod::morton, .width = 8, .leaf_size = 16}},
+      .parameters = {{"curve", "hilbert", {"hilbert", "morton"}, "the order in which leaves are filled"}},
+  })};
+}
