@@ -1,3 +1,7 @@
+// Binned SAH. The surface-area heuristic from the top down: the best trees for queries of this family. What
+// it is, when it wins: like `ploc`, which builds a little faster and whose queries test about as many boxes;
+// both lose to `lbvh` in total where a frame asks one query. Four to five times as fast as `rebuild` with
+// method=sah, which makes a tree of the same kind.
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_strategy.hpp"
 #include "core/families/build/cluster_builders.hpp"

@@ -1,6 +1,7 @@
 #include "core/families/sweep/sorted_boxes.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace kbvh {
@@ -15,6 +16,8 @@ void SortedBoxes<S>::start(const PrimitiveList& list, KernelSet kernels) {
   }
   const std::size_t blocks = (primitives_.size() + sweep_block - 1) / sweep_block;
   keys_.resize(primitives_.size());
+  sorted_.resize(primitives_.size());
+  codes_.resize(primitives_.size());
   begins_.resize(blocks);
   ends_.resize(blocks);
   for (std::uint32_t block = 0; block < blocks; ++block) {
@@ -27,22 +30,48 @@ void SortedBoxes<S>::start(const PrimitiveList& list, KernelSet kernels) {
 }
 
 template <class S>
-void SortedBoxes<S>::sort() {
-  // Insertion sort, until it takes more steps than sorting anew.
-  std::size_t steps = 16 * keys_.size();
+bool SortedBoxes<S>::insertion_sort(std::size_t most_steps) {
   for (std::size_t i = 1; i < keys_.size(); ++i) {
     const Key key = keys_[i];
     std::size_t place = i;
     for (; place > 0 && key.lower < keys_[place - 1].lower; --place) keys_[place] = keys_[place - 1];
     keys_[place] = key;
-    if (i - place > steps) {
-      std::sort(keys_.begin(), keys_.end(), [](const Key& a, const Key& b) {
-        return a.lower != b.lower ? a.lower < b.lower : a.primitive < b.primitive;
-      });
-      return;
-    }
-    steps -= i - place;
+    if (i - place > most_steps) return false;
+    most_steps -= i - place;
   }
+  return true;
+}
+
+template <class S>
+void SortedBoxes<S>::radix_sort() {
+  S least = keys_[0].lower, most = least;
+  for (const Key& key : keys_) {
+    least = std::min(least, key.lower);
+    most = std::max(most, key.lower);
+  }
+  const double scale = double((1U << 30) - 1) / (double(most) - double(least));
+  if (!std::isfinite(scale)) return;
+  std::uint32_t* const counts = radix_.counts();
+  for (std::size_t k = 0; k < keys_.size(); ++k) {
+    const auto code = std::uint32_t((double(keys_[k].lower) - double(least)) * scale);
+    codes_[k] = std::uint64_t(code) << 32 | k;
+    for (std::uint32_t digit = 0; digit < RadixSort::digits; ++digit)
+      ++counts[digit * RadixSort::bins + (code >> (digit * RadixSort::digit_bits) & (RadixSort::bins - 1))];
+  }
+  radix_.sort(codes_);
+  for (std::size_t k = 0; k < keys_.size(); ++k) sorted_[k] = keys_[std::uint32_t(codes_[k])];
+  keys_.swap(sorted_);
+}
+
+template <class S>
+void SortedBoxes<S>::sort() {
+  if (keys_.empty() || insertion_sort(4 * keys_.size())) return;
+  radix_sort();
+  // Repairs what the codes do not tell apart.
+  if (insertion_sort(16 * keys_.size())) return;
+  std::sort(keys_.begin(), keys_.end(), [](const Key& a, const Key& b) {
+    return a.lower != b.lower ? a.lower < b.lower : a.primitive < b.primitive;
+  });
 }
 
 template <class S>
@@ -86,8 +115,8 @@ Box<double> SortedBoxes<S>::box() const {
 template <class S>
 std::size_t SortedBoxes<S>::bytes() const {
   return (primitives_.capacity() + begins_.capacity() + ends_.capacity()) * sizeof(std::uint32_t) +
-         keys_.capacity() * sizeof(Key) +
-         (rows_.capacity() + block_boxes_.capacity() + reach_.capacity()) * sizeof(S);
+         (keys_.capacity() + sorted_.capacity()) * sizeof(Key) + codes_.capacity() * sizeof(std::uint64_t) +
+         radix_.bytes() + (rows_.capacity() + block_boxes_.capacity() + reach_.capacity()) * sizeof(S);
 }
 
 template class SortedBoxes<float>;

@@ -32,10 +32,16 @@ class SortedBoxes {
     std::uint32_t primitive;
   };
   void sort();
+  /// Returns false if it gave up after that many steps.
+  bool insertion_sort(std::size_t most_steps);
+  /// Sorts by the lower sides rounded to 30 bits of their range.
+  void radix_sort();
 
   KernelSet kernels_ = KernelSet::portable;
   std::vector<std::uint32_t> primitives_;
-  std::vector<Key> keys_;
+  std::vector<Key> keys_, sorted_;
+  std::vector<std::uint64_t> codes_;
+  RadixSort radix_;
   std::vector<std::uint32_t> begins_, ends_;  ///< [block]
   AlignedArray<S> rows_, block_boxes_, reach_;
   std::array<S, 8> box_{};
