@@ -1,7 +1,6 @@
-// Binned SAH. The surface-area heuristic from the top down: the best trees for queries of this family. What
-// it is, when it wins: like `ploc`, which builds a little faster and whose queries test about as many boxes;
-// both lose to `lbvh` in total where a frame asks one query. Four to five times as fast as `rebuild` with
-// method=sah, which makes a tree of the same kind.
+// Binned SAH: the surface-area heuristic from the top down, which gives the best trees of this family. As
+// many box tests as `ploc` or fewer, and a somewhat longer building time: wins only where a frame asks many
+// queries of one tree. Five times as fast as `rebuild` with method=sah, which builds such trees, too.
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_strategy.hpp"
 #include "core/families/build/cluster_builders.hpp"

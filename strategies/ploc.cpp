@@ -1,8 +1,7 @@
-// PLOC. Clusters along a curve merge with their best neighbour until one is left: a tree of nearly the
-// quality of the surface-area heuristic from the bottom up. What it is, when it wins: half the box tests of
-// `lbvh` and less for five to eight times its building time, so it pays where a frame asks several queries of
-// one tree. With one query, `lbvh` wins in total on all scenes that were measured. grain=16 clusters full
-// leaves instead of primitives: cheap, and no better than `lbvh`.
+// PLOC: clusters along a curve merge with their best neighbour until one is left, which gives trees of nearly
+// the quality of the surface-area heuristic. Half to a third of the box tests of `lbvh`, for about ten times
+// its building time: wins only where a frame asks many queries of one tree. grain=16 clusters full leaves
+// instead of primitives, which is cheap and no better than `lbvh`.
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_strategy.hpp"
 #include "core/families/build/cluster_builders.hpp"

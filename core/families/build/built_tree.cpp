@@ -83,19 +83,6 @@ Box<double> box_at(const S* corners) {
 }  // namespace
 
 template <class S>
-double BuiltTree<S>::surface_cost() const {
-  if (this->empty()) return 0;
-  double sum = 0;
-  for (std::uint32_t n = 0; n < node_count(); ++n)
-    sum += surface_area(box_at(this->node_bounds_.data() + std::size_t(8) * n)) * this->nodes_[n].count;
-  for (std::uint32_t leaf = 0; leaf < leaves_; ++leaf)
-    sum += surface_area(box_at(leaf_boxes_.data() + std::size_t(8) * leaf)) *
-           (this->end_entry_[leaf] - this->first_entry_[leaf]);
-  const double root = surface_area(box_at(this->node_bounds_.data()));
-  return root > 0 ? sum / root : 0;
-}
-
-template <class S>
 Topology BuiltTree<S>::topology(std::vector<Box<double>>& boxes) const {
   boxes.clear();
   if (this->empty()) {

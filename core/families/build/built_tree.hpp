@@ -34,9 +34,6 @@ class BuiltTree : public WideTree<S> {
   /// unused.
   void fit(const S* primitive_boxes);
 
-  /// Returns the sum over all nodes and leaves of the box's surface, in units of the root's, nodes times
-  /// their children, leaves times their primitives: the surface-area heuristic.
-  double surface_cost() const;
   /// Returns the tree as a topology, and the box of each node: for audits.
   Topology topology(std::vector<Box<double>>& boxes) const;
 

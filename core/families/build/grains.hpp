@@ -1,7 +1,6 @@
 #pragma once
+#include <algorithm>
 #include <cstdint>
-#include <utility>
-#include <vector>
 
 #include "core/families/build/built_tree.hpp"
 #include "core/families/build/curve_order.hpp"
