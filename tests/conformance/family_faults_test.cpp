@@ -1,13 +1,17 @@
 // The suite can fail for the families beyond refits: linear bounds, the interval join with its span filter,
-// near pairs and sweeps, each in its simplest form, sound and with one seeded fault. (faults_test.cpp: the
+// near pairs, sweeps of contacts, trees built at every frame and the sweep
+// on one axis, each in its simplest form, sound and with one seeded fault. (faults_test.cpp: the
 // others.)
 
 #include <gtest/gtest.h>
 
+#include "core/families/build/built_strategy.hpp"
+#include "core/families/build/curve_builders.hpp"
 #include "core/families/drift/near_pairs.hpp"
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/linear_bounds.hpp"
 #include "core/families/linear/triangle_span_filter.hpp"
+#include "core/families/sweep/sorted_boxes.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
 #include "tests/conformance/check.hpp"
 
@@ -26,6 +30,11 @@ enum class Fault : std::uint8_t {
   small_closing,    // bodies are taken to close in by a tenth of what they can
   stale_rows,       // a search reads the leaves of the search before
   ends_only,        // a sweep looks at where the motion ends
+  lost_primitive,   // a sort loses a primitive: another one is there twice
+  short_leaf,       // a leaf ends one primitive early
+  unmade_tree,      // every eighth tree is not built: the one before is used on
+  unsorted_boxes,   // boxes are swept on another axis than the one that they are sorted on
+  unmade_boxes,     // boxes are those of the first frame
 };
 
 /// Boxes linear in time, one query a frame.
@@ -243,6 +252,95 @@ class Sweep : public StoredHierarchyStrategy<S, Count>, public AnswersSweeps<S> 
   }
 };
 
+/// Splits ranges in the middle.
+struct Halves {
+  using Part = KeyRange;
+  std::uint32_t shortened = 0;
+  static std::uint32_t count(const Part& part) { return part.end - part.begin; }
+  static double weight(const Part& part) { return count(part); }
+  static std::pair<Part, Part> split(const Part& part) {
+    const std::uint32_t middle = part.begin + count(part) / 2;
+    return {{part.begin, middle}, {middle, part.end}};
+  }
+  std::pair<std::uint32_t, std::uint32_t> leaf(const Part& part) {
+    return {part.begin, part.end - (shortened-- == 1 ? 1 : 0)};
+  }
+};
+
+/// A tree built at every frame, by halves along the curve.
+template <class S, Fault fault>
+struct HalvesBuilder {
+  explicit HalvesBuilder(const Params&) {}
+  void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list) {
+    if (fault == Fault::unmade_tree && ++builds % 8 == 0) return;
+    tree.clear(order.count());
+    if (order.count() == 0) return;
+    order.sort(list, Curve::hilbert);
+    Halves halves{fault == Fault::short_leaf ? 3U : 0U};
+    lay_out(tree, halves, KeyRange{0, order.count()}, parts);
+    for (std::uint32_t k = 0; k < order.count(); ++k)
+      tree.entries()[k] = CurveOrder<S>::primitive(order.keys()[k]);
+    if (fault == Fault::lost_primitive) tree.entries()[order.count() / 2] = tree.entries()[0];
+    tree.fit(order.boxes());
+  }
+  std::size_t bytes() const { return parts.capacity() * sizeof(KeyRange); }
+  std::uint32_t builds = 0;
+  std::vector<KeyRange> parts;
+};
+template <class S, class Count, Fault fault>
+using Built = BuiltStrategy<S, Count, HalvesBuilder<S, fault>>;
+
+/// A sweep on one axis.
+template <class S, class Count, Fault fault>
+class AxisSweep : public CountedStrategy<S, Count> {
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  AxisSweep(const SceneView<S>& scene, const SampledMotion<S>& motion, const Topologies&, const Params&)
+      : CountedStrategy<S, Count>(scene, motion), bodies_(scene.body_count()), found_(sweep_block) {}
+  void reset_to(double /*t*/) override {
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
+      bodies_[body].start(PrimitiveList(this->scene_.primitives(body)), active_kernel_set());
+      update(body);
+    }
+  }
+  void advance_to(double /*t*/) override {
+    if (fault == Fault::unmade_boxes) return;
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
+  }
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
+    for (const BodyPair& pair : this->scene_.pairs()) {
+      SweepJob<S> job{bodies_[pair.first].side(pair.first),
+                      bodies_[pair.second].side(pair.second),
+                      fault == Fault::unsorted_boxes ? 1U : 0U,
+                      0,
+                      0,
+                      SweepJob<S>::no_block,
+                      found_.data(),
+                      0,
+                      found_.size(),
+                      0};
+      while (job.next < job.a.count) {
+        sweep_kernels<S>(active_kernel_set()).two(job);
+        for (std::size_t i = 0; i < job.found; ++i)
+          out.push_back({found_[i].body_a, found_[i].primitive_a, found_[i].body_b, found_[i].primitive_b});
+        job.found = 0;
+      }
+    }
+    return {};
+  }
+  std::size_t bytes() const override { return 0; }
+
+ private:
+  void update(std::uint32_t body) {
+    const Primitives& primitives = this->scene_.primitives(body);
+    boxes_.take(primitives, PrimitiveList(primitives), this->sampled_.positions(body), active_kernel_set());
+    bodies_[body].update(boxes_.boxes(), 0);
+  }
+  std::vector<SortedBoxes<S>> bodies_;
+  CurveOrder<S> boxes_;
+  std::vector<FoundPair> found_;
+};
+
 template <template <class, class, Fault> class Family, Fault fault>
 struct With {
   template <class S, class Count>
@@ -324,6 +422,29 @@ TEST(FamilyFaults, ClosingTakenForLess) {
 }
 TEST(FamilyFaults, RowsOfTheSearchBefore) {
   expect_caught<Near, Fault::stale_rows>("soups", "not among the candidates");
+}
+
+TEST(FamilyFaults, SoundBuiltTreesPass) {
+  expect_sound<Built>({"soups", "sheets", "four_bodies_own_keyframes"});
+}
+TEST(FamilyFaults, APrimitiveLostBySorting) {
+  expect_caught<Built, Fault::lost_primitive>("soups", "reported more than once");
+}
+TEST(FamilyFaults, ALeafThatEndsEarly) {
+  expect_caught<Built, Fault::short_leaf>("soups", "primitive");
+}
+TEST(FamilyFaults, ATreeThatIsNotBuilt) {
+  expect_caught<Built, Fault::unmade_tree>("soups", "protrudes");
+}
+
+TEST(FamilyFaults, SoundSweepsOnAnAxisPass) {
+  expect_sound<AxisSweep>({"soups", "sheets", "four_bodies_own_keyframes"});
+}
+TEST(FamilyFaults, SweptOnAnotherAxisThanSorted) {
+  expect_caught<AxisSweep, Fault::unsorted_boxes>("soups", "not among the candidates");
+}
+TEST(FamilyFaults, SweptBoxesOfTheFirstFrame) {
+  expect_caught<AxisSweep, Fault::unmade_boxes>("soups", "not among the candidates");
 }
 
 /// Contacts that a strategy's sweeps miss on a scene.

@@ -17,8 +17,8 @@ QueryStatus query_lazily(WideQuery<S>& query, NearBodies& near_bodies, std::span
   using Wanted = typename WideQuery<S>::Wanted;
   QueryStatus status;
   const auto box_of = [&](std::uint32_t body) {
-    const WideHierarchy<S>& hierarchy = *side_of(body).hierarchy;
-    return hierarchy.empty() ? Box<double>{} : to_double(hierarchy.box(0));
+    const WideTree<S>& hierarchy = *side_of(body).hierarchy;
+    return hierarchy.empty() ? Box<double>{} : to_double(hierarchy.root_box());
   };
   for (const std::uint32_t i : near_bodies.find(box_of, tests)) {
     const BodyPair& pair = pairs[i];

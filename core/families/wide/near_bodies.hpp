@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "core/families/wide/wide_hierarchy.hpp"
 #include "core/families/wide/wide_query.hpp"
 
 namespace kbvh {

@@ -141,7 +141,7 @@ class WideFollower {
       KBVH_ASSERT(place.node != none);  // edits keep the leaves
       child.number = h_.nodes_[place.node].first_leaf + place.lane;
       child.first_entry = h_.first_entry_[child.number];
-      child.end_entry = e_.end_entry[child.number];
+      child.end_entry = h_.end_entry_[child.number];
       child.home = e_.home[child.number];
     }
     e_.children.push_back(child);
@@ -190,7 +190,7 @@ class WideFollower {
     std::uint32_t& free = e_.free_leaves[count];  // of none, nothing was released
     if (free != none) return std::exchange(free, h_.first_entry_[free]);
     const auto first = std::uint32_t(h_.stamps_.size());
-    for (auto* const list : {&h_.first_entry_, &e_.end_entry, &e_.home, &h_.stamps_, &h_.fetched_})
+    for (auto* const list : {&h_.first_entry_, &h_.end_entry_, &e_.home, &h_.stamps_, &h_.fetched_})
       list->resize(first + count, 0);
     if (h_.padded_leaf_size() != 1)
       h_.rows_.resize((first + count) * lane_scalars(h_.padded_leaf_size()), S(0));
@@ -229,7 +229,7 @@ class WideFollower {
     layout.count = std::uint8_t(changed.leaves + changed.inner);
     seat_each(leaves(changed), layout.first_leaf, [&](const Child& leaf, std::uint32_t number) {
       h_.first_entry_[number] = leaf.first_entry;
-      e_.end_entry[number] = leaf.end_entry;
+      h_.end_entry_[number] = leaf.end_entry;
       e_.home[number] = leaf.home;
       if (number != leaf.number) h_.stamps_[number] = h_.fetched_[number] = 0;
     });
@@ -331,8 +331,8 @@ template <class S>
 std::size_t WideEdits<S>::bytes() const {
   const auto of = [](const auto& list) { return list.capacity() * sizeof(list[0]); };
   return start.bytes() + order.bytes() + of(edit.moved) + of(edit.vacated) + of(edit.fresh) +
-         of(edit.changed) + of(end_entry) + of(home) + of(list_room) + of(free_lists) + of(changed) +
-         of(children) + of(contents) + of(gone) + of(places) + of(nodes) + of(node_marks) + of(wide_marks);
+         of(edit.changed) + of(home) + of(list_room) + of(free_lists) + of(changed) + of(children) +
+         of(contents) + of(gone) + of(places) + of(nodes) + of(node_marks) + of(wide_marks);
 }
 
 template <class S>
@@ -342,7 +342,7 @@ void WideHierarchy<S>::begin_edits() {
   edits_.start = topology_;
   subtrees_.clear();
   above_subtrees_.clear();
-  edits_.end_entry.assign(first_entry_.begin() + 1, first_entry_.end());
+  end_entry_.assign(first_entry_.begin() + 1, first_entry_.end());
   first_entry_.resize(leaf_count());
   edits_.home.resize(leaf_count());
   for (std::uint32_t node = 0; node < topology_.size(); ++node)
@@ -378,7 +378,7 @@ void WideHierarchy<S>::refit_edited(const S* positions) {
   const HeightOrder& order = edits_.order;
   std::sort(nodes.begin(), nodes.end(),
             [&](std::uint32_t a, std::uint32_t b) { return order.height(a) < order.height(b); });
-  refit_listed(arrays(), positions, nodes);
+  refit_listed(this->arrays(), positions, nodes);
 }
 
 template <class S>

@@ -1,6 +1,5 @@
 #pragma once
 #include <array>
-#include <boost/align/aligned_allocator.hpp>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -10,10 +9,6 @@
 #include "core/topology/topology_edit.hpp"
 
 namespace kbvh {
-
-/// An array that starts on a cache line.
-template <class T>
-using AlignedArray = std::vector<T, boost::alignment::aligned_allocator<T, 64>>;
 
 /// The place of a topology node in a wide hierarchy.
 struct WidePlace {
@@ -34,7 +29,6 @@ struct WideEdits {
   Topology start;  ///< as assigned
   TopologyEdit edit;
   HeightOrder order;
-  std::vector<std::uint32_t> end_entry;  ///< [leaf]: one past its last entry
   std::vector<std::uint32_t> home;       ///< [leaf]: its node in `start`
   std::vector<std::uint16_t> list_room;  ///< [wide node]: largest length of its vertex lists in their place
   std::array<std::uint32_t, 9> free_nodes{}, free_leaves{};  ///< [count]: first of that many

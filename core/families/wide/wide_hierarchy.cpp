@@ -9,7 +9,10 @@ namespace kbvh {
 template <class S>
 void WideHierarchy<S>::assign(Topology topology, const Primitives& primitives, KernelSet kernels) {
   topology_ = std::move(topology);
+  this->width_ = topology_.width;
+  this->leaf_size_ = topology_.leaf_size;
   edited_ = false;
+  end_entry_.clear();
   leaf_vertices_ = unique_leaf_vertices(topology_, primitives);
   kernels_ = kernels;
   refit_ = wide_refit_kernels<S>(kernels).of(topology_.width);
@@ -223,11 +226,9 @@ void WideHierarchy<S>::set_box(std::uint32_t node, const Box<S>& box) {
 
 template <class S>
 std::size_t WideHierarchy<S>::bytes() const {
-  return topology_.bytes() + nodes_.capacity() * sizeof(WideNode) +
-         (child_bounds_.capacity() + node_bounds_.capacity() + rows_.capacity()) * sizeof(S) +
-         (vertices_.capacity() + leaf_vertices_.offsets.capacity() + leaf_vertices_.vertices.capacity() +
-          first_entry_.capacity() + first_corner_.capacity() + corners_.capacity() + primitives_.capacity() +
-          stamps_.capacity() + fetched_.capacity() + parent_.capacity() + listed_.capacity()) *
+  return this->tree_bytes() + topology_.bytes() +
+         (leaf_vertices_.offsets.capacity() + leaf_vertices_.vertices.capacity() + parent_.capacity() +
+          listed_.capacity()) *
              sizeof(std::uint32_t) +
          places_.capacity() * sizeof(Place) + subtrees_.capacity() * sizeof(Subtree) +
          above_subtrees_.capacity() * sizeof(std::uint32_t) + edits_.bytes();

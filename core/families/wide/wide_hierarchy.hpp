@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "core/families/wide/kernels/wide_overlap.hpp"
 #include "core/families/wide/kernels/wide_refit.hpp"
 #include "core/families/wide/wide_edits.hpp"
+#include "core/families/wide/wide_tree.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "core/topology/topology.hpp"
 
@@ -20,8 +20,12 @@ namespace kbvh {
 /// The topology may be edited. Wide nodes keep their numbers as far as possible then, so parents may have
 /// larger numbers than their children, and refits follow a list of nodes; without edits there is none.
 template <class S>
-class WideHierarchy {
+class WideHierarchy : public WideTree<S> {
  public:
+  using WideTree<S>::empty;
+  using WideTree<S>::leaf_count;
+  using WideTree<S>::padded_leaf_size;
+
   /// Takes a topology over the primitives, in built layout; boxes are invalid until they are computed. Throws
   /// std::length_error beyond 2^28 nodes, 65,535 vertices in a leaf, or 2^32 entries of vertex lists.
   void assign(Topology topology, const Primitives& primitives, KernelSet kernels);
@@ -29,7 +33,6 @@ class WideHierarchy {
   /// Returns the topology. After edits, ids may be unused, and parents may have larger ids than their
   /// children.
   const Topology& topology() const { return topology_; }
-  bool empty() const { return topology_.empty(); }
 
   /// Edits the topology in place: change(topology, edit) changes it and lists the changes, as SubtreeSwap and
   /// TopologyEditor do. Leaves may move, but their primitives must stay the same. The layout follows: nodes
@@ -55,11 +58,11 @@ class WideHierarchy {
   Topology built_topology(std::vector<std::uint32_t>& nodes) const;
 
   /// Recomputes every box from positions [vertex][3], children first. O(nodes + vertices of leaves).
-  void refit(const S* positions) { refit_all(arrays(), positions); }
+  void refit(const S* positions) { refit_all(this->arrays(), positions); }
   /// Recomputes the boxes of the wide nodes [begin, end); children must be current, or in the range and
   /// behind their parents. (After edits, they need not be behind them, and nodes may be unused.)
   void refit_nodes(const S* positions, std::uint32_t begin, std::uint32_t end) {
-    refit_(arrays(), positions, begin, end);
+    refit_(this->arrays(), positions, begin, end);
   }
   /// Refits into rows and node boxes stored elsewhere, in the layout of `arrays`.
   void refit_into(S* child_bounds, S* node_bounds, const S* positions) const {
@@ -106,48 +109,6 @@ class WideHierarchy {
   }
   std::size_t leaf_vertex_count() const { return leaf_vertices_.vertices.size(); }
 
-  /// Invalidates the boxes of primitives, because positions changed; queries recompute them on demand.
-  void positions_changed() {
-    if (++stamp_ == 0) {
-      std::fill(stamps_.begin(), stamps_.end(), 0);
-      std::fill(fetched_.begin(), fetched_.end(), 0);
-      stamp_ = 1;
-    }
-  }
-
-  WideArrays<S> arrays() {
-    return {nodes_.data(), child_bounds_.data(), node_bounds_.data(), vertices_.data()};
-  }
-  WideLeaves<S> leaves(const S* positions) {
-    return {leaf_lists(), rows_.data(), stamps_.data(), stamp_, positions};
-  }
-  WideLeafLists leaf_lists() const {
-    return {first_entry_.data(), end_entries(), first_corner_.data(), corners_.data(), primitives_.data()};
-  }
-  std::uint32_t leaf_count() const { return std::uint32_t(stamps_.size()); }
-  /// Returns true at the first call since `positions_changed` for a leaf, numbered as by
-  /// `WideNode::first_leaf`.
-  bool to_be_fetched(std::uint32_t leaf) {
-    const bool first = fetched_[leaf] != stamp_;
-    fetched_[leaf] = stamp_;
-    return first;
-  }
-  std::uint32_t leaf_number(LeafSlot slot) const { return nodes_[slot.node()].first_leaf + slot.lane(); }
-  std::span<const std::uint32_t> leaf_primitives(std::uint32_t leaf) const {
-    return {primitives_.data() + first_entry_[leaf], primitives_.data() + end_entries()[leaf]};
-  }
-  /// Returns the number of lanes for the primitives of a leaf in a query; 1: the leaf's box is that of its
-  /// primitive.
-  std::uint32_t padded_leaf_size() const {
-    return topology_.leaf_size == 1 ? 1 : topology_.leaf_size <= 4 ? 4 : topology_.leaf_size <= 8 ? 8 : 16;
-  }
-  KernelSet kernels() const { return kernels_; }
-  /// Returns whether one query can take both hierarchies.
-  bool suits(const WideHierarchy& other) const {
-    return empty() || other.empty() ||
-           (topology_.width == other.topology_.width && padded_leaf_size() == other.padded_leaf_size());
-  }
-
   /// Returns the memory in bytes.
   std::size_t bytes() const;
   /// Returns the number of entries of the padded vertex lists.
@@ -181,25 +142,30 @@ class WideHierarchy {
     wide_refit_kernels<S>(kernels_).listed(topology_.width)(arrays, positions, nodes.data(),
                                                             std::uint32_t(nodes.size()));
   }
-  const std::uint32_t* end_entries() const {
-    return edited_ ? edits_.end_entry.data() : first_entry_.data() + 1;
-  }
+
+  using WideTree<S>::kernels_;
+  using WideTree<S>::nodes_;
+  using WideTree<S>::child_bounds_;
+  using WideTree<S>::node_bounds_;
+  using WideTree<S>::vertices_;
+  using WideTree<S>::first_entry_;
+  using WideTree<S>::end_entry_;
+  using WideTree<S>::first_corner_;
+  using WideTree<S>::corners_;
+  using WideTree<S>::primitives_;
+  using WideTree<S>::stamps_;
+  using WideTree<S>::fetched_;
+  using WideTree<S>::rows_;
+  using WideTree<S>::stamp_;
 
   Topology topology_;
   LeafVertices leaf_vertices_;  // by node of the topology as assigned
-  KernelSet kernels_ = KernelSet::portable;
   typename WideRefitKernels<S>::Refit refit_ = nullptr;
   std::vector<Place> places_;          // of the topology's nodes
   std::vector<std::uint32_t> parent_;  // of wide nodes
   std::vector<std::uint32_t> listed_;  // of wide nodes: vertices of their leaves
   std::vector<Subtree> subtrees_;
   std::vector<std::uint32_t> above_subtrees_;
-  AlignedArray<WideNode> nodes_;
-  AlignedArray<S> child_bounds_, node_bounds_;
-  AlignedArray<std::uint32_t> vertices_;
-  std::vector<std::uint32_t> first_entry_, first_corner_, corners_, primitives_, stamps_, fetched_;
-  AlignedArray<S> rows_;
-  std::uint32_t stamp_ = 1;
   WideEdits<S> edits_;
   bool edited_ = false;
 };

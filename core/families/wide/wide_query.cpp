@@ -22,7 +22,7 @@ QueryStatus WideQuery<S>::run(const Side& a, const Side& b, PairBuffer& out, std
   if (a.hierarchy->empty() || b.hierarchy->empty()) return {};
   for (const WideMoment<S>* moment : {a.moment, b.moment})
     if (moment != nullptr && moment->stale[0] != 0) {
-      wide_linear_kernels<S>(a.hierarchy->kernels()).make(a.hierarchy->topology().width)(*moment, 0);
+      wide_linear_kernels<S>(a.hierarchy->kernels()).make(a.hierarchy->width())(*moment, 0);
       moment->stale[0] = 0;
     }
   WideTraversal state = fresh_traversal(budget);
@@ -51,7 +51,7 @@ void WideQuery<S>::run_leaves(const Side& a, const Side& b, std::span<const Leaf
 
 template <class S>
 void WideQuery<S>::traverse(const Side& a, const Side& b, WideTraversal& state) const {
-  const std::uint32_t width = a.hierarchy->topology().width;
+  const std::uint32_t width = a.hierarchy->width();
   const KernelSet set = a.hierarchy->kernels();
   if (a.moment != nullptr) return wide_linear_kernels<S>(set).at(width)(*a.moment, *b.moment, state);
   const auto& kernels = wide_overlap_kernels<S>(set);
@@ -70,7 +70,7 @@ template <class S>
 void WideQuery<S>::push_roots(const Side& a, const Side& b, WideTraversal& state) {
   if (!a.hierarchy->suits(*b.hierarchy))
     throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
-  if (overlap(a.hierarchy->box(0), b.hierarchy->box(0))) state.stack[state.depth++] = {0, 0};
+  if (overlap(a.hierarchy->root_box(), b.hierarchy->root_box())) state.stack[state.depth++] = {0, 0};
 }
 
 template <class S>
@@ -95,7 +95,7 @@ void WideQuery<S>::start_lazy(const Side& a, const Side& b, const Budget& budget
 template <class S>
 typename WideQuery<S>::Wanted WideQuery<S>::step(const Side& a, const Side& b, PairBuffer& out,
                                                  std::uint64_t& tests) {
-  const auto kernel = wide_overlap_kernels<S>(a.hierarchy->kernels()).lazy(a.hierarchy->topology().width);
+  const auto kernel = wide_overlap_kernels<S>(a.hierarchy->kernels()).lazy(a.hierarchy->width());
   while (lazy_.depth > 0 && lazy_.tests < lazy_.test_limit) {
     kernel(a.hierarchy->arrays(), b.hierarchy->arrays(), lazy_);
     if (lazy_.depth > 0 && lazy_.tests < lazy_.test_limit) {
@@ -116,7 +116,7 @@ typename WideQuery<S>::Wanted WideQuery<S>::step(const Side& a, const Side& b, P
 template <class S>
 void WideQuery<S>::fetch_leaves(const Side& side, std::size_t which, std::size_t count) {
   if (side.positions != nullptr || !motion_) return;
-  WideHierarchy<S>& h = *side.hierarchy;
+  WideTree<S>& h = *side.hierarchy;
   // Fetches missing positions all at once: calls with a few vertices each cost more than the vertices.
   if (h.padded_leaf_size() == 1 || motion_->all_current(side.body)) return;
   to_fetch_.clear();
@@ -153,7 +153,7 @@ void WideQuery<S>::take_leaves(const Side& a, const Side& b, WideTraversal& stat
 template <class S>
 void WideQuery<S>::append_pairs(const Side& side_a, const Side& side_b, std::size_t begin, std::size_t end,
                                 PairBuffer& out, std::uint64_t& tests) {
-  WideHierarchy<S>&a = *side_a.hierarchy, &b = *side_b.hierarchy;
+  WideTree<S>&a = *side_a.hierarchy, &b = *side_b.hierarchy;
   if (a.padded_leaf_size() == 1) {
     for (std::size_t i = begin; i < end; ++i)
       out.push_back({side_a.body, a.leaf_primitives(a.leaf_number(leaf_pairs_[2 * i]))[0], side_b.body,
@@ -174,7 +174,7 @@ void WideQuery<S>::append_pairs(const Side& side_a, const Side& side_b, std::siz
                          0,
                          chunk_room,
                          0};
-  const auto kernel = wide_overlap_kernels<S>(a.kernels()).pairs(a.topology().width, a.padded_leaf_size());
+  const auto kernel = wide_overlap_kernels<S>(a.kernels()).pairs(a.width(), a.padded_leaf_size());
   while (state.next < state.count) {
     kernel(state);
     const std::size_t before = out.size();

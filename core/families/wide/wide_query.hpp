@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/families/wide/kernels/wide_linear.hpp"
-#include "core/families/wide/wide_hierarchy.hpp"
+#include "core/families/wide/wide_tree.hpp"
 #include "core/scene/motion_view.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/topology/traversal.hpp"
@@ -16,7 +16,7 @@ namespace kbvh {
 /// One of the two bodies of a query.
 template <class S>
 struct WideSide {
-  WideHierarchy<S>* hierarchy;
+  WideTree<S>* hierarchy;
   std::uint32_t body;  ///< its id in the pairs found
   /// Positions [vertex][3] of the hierarchy's primitives, readable up to one scalar past the end. Null: those
   /// of the scene's body, which the query fetches where they are not current.

@@ -1,0 +1,105 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/families/build/kernels/build_wide.hpp"
+#include "core/families/wide/wide_tree.hpp"
+#include "core/topology/topology.hpp"
+
+namespace kbvh {
+
+/// An 8-wide tree that is built anew at every frame, in the layout that queries read and without a topology.
+/// Keeps its memory: a build allocates only where it needs more nodes or leaves than ever before.
+template <class S>
+class BuiltTree : public WideTree<S> {
+ public:
+  static constexpr std::uint32_t most_children = 8;
+
+  /// Sets the largest number of primitives of a leaf, 1 to 16.
+  void start(std::uint32_t leaf_size, KernelSet kernels);
+
+  /// Begins a tree over `primitives` primitives, without any node.
+  void clear(std::uint32_t primitives);
+  /// Returns room for the primitives in the order of the leaves.
+  std::uint32_t* entries() { return this->primitives_.data(); }
+  /// Adds a leaf with the entries [begin, end).
+  void add_leaf(std::uint32_t begin, std::uint32_t end);
+  std::uint32_t leaf_count() const { return leaves_; }
+  /// Adds nodes, to be set by `node`, in one row; returns the first. Children come after their parents.
+  std::uint32_t add_nodes(std::uint32_t count);
+  WideNode& node(std::uint32_t index) { return this->nodes_[index]; }
+  std::uint32_t node_count() const { return std::uint32_t(this->nodes_.size()); }
+  /// Computes all boxes from those of the primitives, [primitive][8]: lower x, y, z, unused, upper x, y, z,
+  /// unused.
+  void fit(const S* primitive_boxes);
+
+  /// Returns the tree as a topology, and the box of each node: for audits.
+  Topology topology(std::vector<Box<double>>& boxes) const;
+
+  std::size_t bytes() const { return this->tree_bytes() + leaf_boxes_.capacity() * sizeof(S); }
+
+ private:
+  std::uint32_t leaves_ = 0;
+  AlignedArray<S> leaf_boxes_;
+};
+
+/// A binary tree that a builder makes from above, laid out with 8 children per node: a node takes the two
+/// children of its binary node, then replaces the heaviest child that is not a leaf by that child's own two
+/// until it is full (Wald et al. 2008). `Source` has
+///   Part               a subtree: a range of primitives, or a node
+///   count(part)        primitives below
+///   weight(part)       of parts that are not leaves
+///   split(part)        the two children, as a std::pair
+///   leaf(part)         the range of entries of a leaf, as a std::pair
+/// A part of at most `leaf_size` primitives is a leaf. `parts` is for temporary use. O(nodes).
+template <class S, class Source>
+void lay_out(BuiltTree<S>& tree, Source& source, const typename Source::Part& root,
+             std::vector<typename Source::Part>& parts) {
+  using Part = typename Source::Part;
+  const std::uint32_t leaf_size = tree.leaf_size();
+  const auto is_leaf = [&](const Part& part) { return source.count(part) <= leaf_size; };
+  const auto keep = [&](std::uint32_t node, const Part& part) {
+    if (parts.size() <= node) parts.resize(node + 1);
+    parts[node] = part;
+  };
+  keep(tree.add_nodes(1), root);
+  for (std::uint32_t n = 0; n < tree.node_count(); ++n) {
+    std::array<Part, BuiltTree<S>::most_children> children;
+    std::array<double, BuiltTree<S>::most_children> weights;
+    const auto put = [&](std::uint32_t place, const Part& part) {
+      children[place] = part;
+      weights[place] = is_leaf(part) ? -1.0 : source.weight(part);
+    };
+    std::uint32_t count = 1;
+    put(0, parts[n]);
+    while (count < BuiltTree<S>::most_children) {
+      std::uint32_t heaviest = 0;
+      for (std::uint32_t c = 1; c < count; ++c)
+        if (weights[c] > weights[heaviest]) heaviest = c;
+      if (weights[heaviest] < 0) break;
+      const auto [first, second] = source.split(children[heaviest]);
+      put(heaviest, first);
+      put(count++, second);
+    }
+    WideNode node;
+    node.first_leaf = tree.leaf_count();
+    node.count = std::uint8_t(count);
+    for (std::uint32_t c = 0; c < count; ++c)
+      if (weights[c] < 0) {
+        const auto [begin, end] = source.leaf(children[c]);
+        tree.add_leaf(begin, end);
+        ++node.leaf_count;
+      }
+    if (node.leaf_count != count) node.first_child = tree.add_nodes(count - node.leaf_count);
+    std::uint32_t next = node.first_child;
+    for (std::uint32_t c = 0; c < count; ++c)
+      if (weights[c] >= 0) keep(next++, children[c]);
+    tree.node(n) = node;
+  }
+}
+
+extern template class BuiltTree<float>;
+extern template class BuiltTree<double>;
+
+}  // namespace kbvh

@@ -1,0 +1,109 @@
+#include "core/families/build/curve_builders.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+namespace kbvh {
+namespace {
+
+/// Splits ranges of keys between cells of the curve's grid.
+template <class S>
+struct CellSource {
+  using Part = KeyRange;
+  CurveOrder<S>& order;
+  std::uint32_t leaf_size;
+
+  static std::uint32_t count(const Part& part) { return part.end - part.begin; }
+  static double weight(const Part& part) { return count(part); }
+  static std::pair<std::uint32_t, std::uint32_t> leaf(const Part& part) { return {part.begin, part.end}; }
+  std::pair<Part, Part> split(const Part& part) {
+    const std::uint32_t middle = middle_of(part);
+    return {{part.begin, middle}, {middle, part.end}};
+  }
+  std::uint32_t middle_of(const Part& part) {
+    const std::uint32_t leaves = (count(part) + leaf_size - 1) / leaf_size;
+    if (leaves <= BuiltTree<S>::most_children)
+      return part.begin + std::uint32_t(std::uint64_t(count(part)) * (leaves / 2) / leaves);
+    const std::uint64_t* const keys = order.keys().data();
+    const auto differing = [&] { return std::uint32_t((keys[part.begin] ^ keys[part.end - 1]) >> 32); };
+    // A code shared by more primitives than a leaf holds.
+    if (differing() == 0 && !order.refine(part.begin, part.end)) return part.begin + count(part) / 2;
+    const std::uint64_t bit = std::uint64_t(1) << (32 + std::bit_width(differing()) - 1);
+    return std::uint32_t(std::partition_point(keys + part.begin, keys + part.end,
+                                              [bit](std::uint64_t key) { return (key & bit) == 0; }) -
+                         keys);
+  }
+};
+
+/// Writes the primitives in the order of the keys.
+template <class S>
+void write_entries(BuiltTree<S>& tree, const CurveOrder<S>& order) {
+  std::uint32_t* const entries = tree.entries();
+  const std::uint64_t* const keys = order.keys().data();
+  for (std::uint32_t k = 0; k < order.count(); ++k) entries[k] = CurveOrder<S>::primitive(keys[k]);
+}
+
+/// Lays out a tree of equal leaves and full nodes, level by level from the root.
+template <class S>
+void lay_out_evenly(BuiltTree<S>& tree, std::uint32_t primitives) {
+  constexpr std::uint32_t width = BuiltTree<S>::most_children;
+  const std::uint32_t leaves = (primitives + tree.leaf_size() - 1) / tree.leaf_size();
+  // The first of `whole` things that the i-th of `parts` gets.
+  const auto share = [](std::uint32_t i, std::uint32_t parts, std::uint32_t whole) {
+    return std::uint32_t(std::uint64_t(i) * whole / parts);
+  };
+  for (std::uint32_t leaf = 0; leaf < leaves; ++leaf)
+    tree.add_leaf(share(leaf, leaves, primitives), share(leaf + 1, leaves, primitives));
+  std::array<std::uint32_t, 32> level{leaves};  // number of nodes, from the leaves up
+  std::uint32_t top = 0;
+  do {
+    level[top + 1] = (level[top] + width - 1) / width;
+    ++top;
+  } while (level[top] > 1);
+  std::uint32_t first = tree.add_nodes(1);
+  for (; top > 0; --top) {
+    const std::uint32_t nodes = level[top], below = level[top - 1];
+    const std::uint32_t first_below = top > 1 ? tree.add_nodes(below) : 0;
+    for (std::uint32_t n = 0; n < nodes; ++n) {
+      const std::uint32_t begin = share(n, nodes, below), end = share(n + 1, nodes, below);
+      WideNode node;
+      node.count = std::uint8_t(end - begin);
+      node.leaf_count = top > 1 ? 0 : node.count;
+      (top > 1 ? node.first_child : node.first_leaf) = first_below + begin;
+      tree.node(first + n) = node;
+    }
+    first = first_below;
+  }
+}
+
+}  // namespace
+
+template <class S>
+void LinearBuilder<S>::build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list) {
+  tree.clear(order.count());
+  if (order.count() == 0) return;
+  order.sort(list, Curve::morton);
+  CellSource<S> source{order, tree.leaf_size()};
+  lay_out(tree, source, KeyRange{0, order.count()}, parts_);
+  write_entries(tree, order);
+  tree.fit(order.boxes());
+}
+
+template <class S>
+void ImplicitBuilder<S>::build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list) {
+  tree.clear(order.count());
+  if (order.count() == 0) return;
+  order.sort(list, curve_);
+  order.refine_runs(tree.leaf_size());
+  lay_out_evenly(tree, order.count());
+  write_entries(tree, order);
+  tree.fit(order.boxes());
+}
+
+template class LinearBuilder<float>;
+template class LinearBuilder<double>;
+template class ImplicitBuilder<float>;
+template class ImplicitBuilder<double>;
+
+}  // namespace kbvh

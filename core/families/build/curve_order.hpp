@@ -1,0 +1,72 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/families/build/kernels/build_wide.hpp"
+#include "core/families/build/radix_sort.hpp"
+#include "core/families/wide/wide_tree.hpp"
+#include "core/scene/scene.hpp"
+
+namespace kbvh {
+
+/// The living primitives of a body, and whether all have the same number of corners: does not change unless
+/// the geometry does.
+struct PrimitiveList {
+  explicit PrimitiveList(const Primitives& primitives);
+  const std::uint32_t* ids() const { return living.empty() ? nullptr : living.data(); }
+  std::uint32_t count;
+  std::uint32_t corners_each;         ///< 0: it varies
+  std::vector<std::uint32_t> living;  ///< empty if all primitives live
+  std::size_t bytes() const { return living.capacity() * sizeof(std::uint32_t); }
+};
+
+/// The primitives of one body at one time, as builders read them: boxes, and the order along a space-filling
+/// curve. One object serves all bodies in turn and keeps its memory.
+template <class S>
+class CurveOrder {
+ public:
+  /// Computes boxes and centres of all living primitives. O(corners).
+  void take(const Primitives& primitives, const PrimitiveList& list, const S* positions, KernelSet kernels);
+  /// Sorts the primitives along a curve through the grid over their centres. O(primitives).
+  void sort(const PrimitiveList& list, Curve curve);
+
+  std::uint32_t count() const { return count_; }
+  /// Returns the boxes, [primitive][8]: lower x, y, z, unused, upper x, y, z, unused.
+  const S* boxes() const { return boxes_.data(); }
+  /// Returns the keys in ascending order of their codes.
+  std::span<const std::uint64_t> keys() const { return {keys_.data(), count_}; }
+  static std::uint32_t primitive(std::uint64_t key) { return std::uint32_t(key); }
+  static std::uint32_t code(std::uint64_t key) { return std::uint32_t(key >> 32); }
+
+  /// Sorts the keys [begin, end), which have one code, along the curve through a grid over their own centres.
+  /// Their codes are comparable with each other only, afterwards. Returns false, and does nothing, if all
+  /// centres are the same. O(n log n).
+  bool refine(std::uint32_t begin, std::uint32_t end);
+  /// Refines all runs of more than `most` keys of one code, until there are none but of equal centres.
+  void refine_runs(std::uint32_t most);
+
+  std::size_t bytes() const;
+
+ private:
+  CurveKeysJob<S> keys_job(const S* extent);
+
+  KernelSet kernels_ = KernelSet::portable;
+  std::uint32_t count_ = 0;
+  Curve curve_ = Curve::morton;
+  AlignedArray<S> boxes_, centres_;
+  std::size_t stride_ = 0;
+  S extent_[8] = {};
+  std::vector<std::uint64_t> keys_;
+  RadixSort radix_;
+  // For temporary use by `refine`.
+  std::vector<std::uint32_t> ids_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> runs_;
+  AlignedArray<S> few_centres_;
+};
+
+extern template class CurveOrder<float>;
+extern template class CurveOrder<double>;
+
+}  // namespace kbvh

@@ -1,0 +1,35 @@
+// Binned SAH: the surface-area heuristic from the top down, which gives the best trees of this family. As
+// many box tests as `ploc` or fewer, and a somewhat longer building time: wins only where a frame asks many
+// queries of one tree. Five times as fast as `rebuild` with method=sah, which builds such trees, too.
+#include "core/contract/registry.hpp"
+#include "core/families/build/built_strategy.hpp"
+#include "core/families/build/cluster_builders.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S>
+struct BinnedSahBuilder : BinnedBuilder<S> {
+  explicit BinnedSahBuilder(const Params& params) : BinnedBuilder<S>(std::uint32_t(params.number("grain"))) {}
+};
+template <class S, class Count>
+using BinnedSah = BuiltStrategy<S, Count, BinnedSahBuilder<S>>;
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(binned_sah) {
+  using namespace kbvh;
+  return {make_entry<BinnedSah>({
+      .id = "binned_sah",
+      .title = "binned SAH",
+      .family = "rebuild",
+      .citation = "Wald 2007",
+      .declares = {.restructures = true, .time_budget = true},
+      .topology = {.widths = {8}, .preferred = {.method = BuildMethod::sah, .width = 8, .leaf_size = 16}},
+      .parameters = {{"grain",
+                      "1",
+                      {"1", "16"},
+                      "primitives that stay together, neighbours on a Hilbert curve; 16: full leaves"}},
+  })};
+}

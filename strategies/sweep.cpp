@@ -1,0 +1,164 @@
+// Sweep on one axis, without a hierarchy: boxes stay sorted by their lower sides on the axis on which they
+// overlap least, and each is compared with the run of boxes that begin before it ends, sixteen at a time.
+// Needs no tree and tolerates any motion: 6 times faster in total than a refit on mixing swarms. `lbvh` won
+// on all measured scenes, because a run along one axis holds many boxes that are far away on the others.
+#include <cmath>
+
+#include "core/contract/registry.hpp"
+#include "core/families/sweep/sorted_boxes.hpp"
+#include "core/families/wide/near_bodies.hpp"
+#include "core/scene/self_pairs.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class Count>
+class Sweep final : public CountedStrategy<S, Count>,
+                    public AnswersSelfPairs,
+                    public TakesPlanChanges<S>,
+                    public TakesGeometryChanges<S> {
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  Sweep(const SceneView<S>& scene, const SampledMotion<S>& motion, const Topologies& /*topologies*/,
+        const Params& /*params*/)
+      : CountedStrategy<S, Count>(scene, motion),
+        bodies_(scene.body_count()),
+        near_bodies_(scene.pairs(), scene.body_count()),
+        found_(room) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      lists_.emplace_back(scene.primitives(body));
+  }
+
+  void reset_to(double /*t*/) override {
+    plans_changed_ = false;
+    near_bodies_.start_over();
+    axis_ = best_axis();
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
+      bodies_[body].start(lists_[body], kernels_);
+      update(body);
+    }
+  }
+  void advance_to(double /*t*/) override {
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
+      if (this->scene_.moving(body) || plans_changed_) update(body);
+  }
+  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
+    std::uint64_t tests = 0;
+    const auto box_of = [&](std::uint32_t body) { return bodies_[body].box(); };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      if (!bodies_[pair.first].empty() && !bodies_[pair.second].empty()) sweep(pair, out, tests);
+    }
+    this->count_.add(Counter::box_tests, tests);
+    return {};
+  }
+  std::size_t bytes() const override {
+    std::size_t total = boxes_.bytes() + near_bodies_.bytes() + found_.capacity() * sizeof(FoundPair) +
+                        bodies_.capacity() * sizeof(bodies_[0]) + lists_.capacity() * sizeof(lists_[0]);
+    for (const auto& body : bodies_) total += body.bytes();
+    for (const PrimitiveList& list : lists_) total += list.bytes();
+    return total;
+  }
+
+ private:
+  static constexpr std::size_t room = 4096;
+
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
+    plans_changed_ = true;
+  }
+  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
+    plans_changed_ = true;  // new vertices have their own plans
+    for (const BodyChange& body_change : body_changes(this->scene_, change)) {
+      const std::uint32_t body = body_change.body;
+      lists_[body] = PrimitiveList(this->scene_.primitives(body));
+      bodies_[body].start(lists_[body], kernels_);
+      update(body);
+    }
+  }
+  void take_boxes(std::uint32_t body) {
+    boxes_.take(this->scene_.primitives(body), lists_[body], this->sampled_.positions(body), kernels_);
+  }
+  void update(std::uint32_t body) {
+    if (lists_[body].count == 0) return;
+    take_boxes(body);
+    bodies_[body].update(boxes_.boxes(), axis_);
+    this->count_.add(Counter::values_written, std::uint64_t(6) * lists_[body].count);
+    this->count_.add(Counter::vertex_reads, this->scene_.primitives(body).vertices.size());
+  }
+  /// Finds the axis on which the fewest boxes overlap, as far as their mean length and the standard deviation
+  /// of their centres tell.
+  std::uint32_t best_axis() {
+    double length[3] = {}, sum[3] = {}, squares[3] = {};
+    double count = 0;
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
+      if (lists_[body].count == 0) continue;
+      take_boxes(body);
+      for (std::uint32_t k = 0; k < lists_[body].count; ++k, ++count) {
+        const std::uint32_t primitive = lists_[body].ids() == nullptr ? k : lists_[body].ids()[k];
+        const S* const box = boxes_.boxes() + std::size_t(8) * primitive;
+        for (int axis = 0; axis < 3; ++axis) {
+          const double lower = box[axis], upper = box[axis + 4], centre = 0.5 * (lower + upper);
+          length[axis] += upper - lower;
+          sum[axis] += centre;
+          squares[axis] += centre * centre;
+        }
+      }
+    }
+    std::uint32_t best = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      const double overlaps = length[axis] / std::sqrt(squares[axis] * count - sum[axis] * sum[axis]);
+      if (overlaps < least) least = overlaps, best = axis;
+    }
+    return best;
+  }
+  void sweep(const BodyPair& pair, PairBuffer& out, std::uint64_t& tests) {
+    const bool within = pair.first == pair.second;
+    SweepJob<S> job{bodies_[pair.first].side(pair.first),
+                    bodies_[pair.second].side(pair.second),
+                    axis_,
+                    0,
+                    0,
+                    SweepJob<S>::no_block,
+                    found_.data(),
+                    0,
+                    room,
+                    0};
+    const auto kernel = within ? sweep_kernels<S>(kernels_).one : sweep_kernels<S>(kernels_).two;
+    while (job.next < job.a.count) {
+      kernel(job);
+      for (std::size_t i = 0; i < job.found; ++i) {
+        FoundPair& found = found_[i];
+        if (!within || keep_self_pair(&this->scene_.primitives(pair.first), LeavesOf::two, found.primitive_a,
+                                      found.primitive_b))
+          out.push_back({found.body_a, found.primitive_a, found.body_b, found.primitive_b});
+      }
+      job.found = 0;
+    }
+    tests += job.tests;
+  }
+
+  const KernelSet kernels_ = active_kernel_set();
+  std::vector<SortedBoxes<S>> bodies_;
+  std::vector<PrimitiveList> lists_;
+  CurveOrder<S> boxes_;
+  NearBodies near_bodies_;
+  std::vector<FoundPair> found_;
+  std::uint32_t axis_ = 0;
+  bool plans_changed_ = false;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(sweep) {
+  using namespace kbvh;
+  return {make_entry<Sweep>({
+      .id = "sweep",
+      .title = "sweep on one axis",
+      .family = "sweep",
+      .citation = "Baraff 1992; Belgrod et al. 2023 (Scalable CCD)",
+      .tightness = Tightness::none,
+      .topology = {.own = true},
+  })};
+}
