@@ -9,8 +9,9 @@ namespace kbvh {
 template <class S>
 void WideHierarchy<S>::assign(Topology topology, const Primitives& primitives, KernelSet kernels) {
   topology_ = std::move(topology);
-  edited_ = false;
+  edited_ = refilled_ = false;
   leaf_vertices_ = unique_leaf_vertices(topology_, primitives);
+  listed_total_ = leaf_vertices_.vertices.size();
   kernels_ = kernels;
   refit_ = wide_refit_kernels<S>(kernels).of(topology_.width);
   place_nodes();
@@ -230,7 +231,7 @@ std::size_t WideHierarchy<S>::bytes() const {
           stamps_.capacity() + fetched_.capacity() + parent_.capacity() + listed_.capacity()) *
              sizeof(std::uint32_t) +
          places_.capacity() * sizeof(Place) + subtrees_.capacity() * sizeof(Subtree) +
-         above_subtrees_.capacity() * sizeof(std::uint32_t) + edits_.bytes();
+         above_subtrees_.capacity() * sizeof(std::uint32_t) + edits_.bytes() + refill_.bytes();
 }
 
 template class WideHierarchy<float>;
