@@ -1,10 +1,15 @@
-// Refit until the tree has drifted, then rebuild (Lauterbach, Yoon & Manocha 2006).
+// Refit until the tree has drifted, then rebuild (Lauterbach, Yoon & Manocha 2006). A rebuild here sorts the
+// primitives by medians into the leaves that exist, so that nothing is allocated and nodes stay where they
+// are. By default a tree is rebuilt when its queries have made as many box tests beyond those of a new tree
+// as a rebuild is worth: where bodies are apart, an old tree costs nothing, and stays.
+//
+// When it wins: wherever a tree ages within a clip and queries feel it. It needs no tuning to the scene, and
+// costs what a refit costs where nothing ages. A frame that rebuilds is the slowest of all: `spread` divides
+// its sort among several frames, in which queries still meet the old tree.
 
 #include "core/contract/registry.hpp"
-#include "core/families/restructure/leaf_contents.hpp"
+#include "core/families/restructure/leaf_strategy.hpp"
 #include "core/families/restructure/surface_sums.hpp"
-#include "core/families/restructure/tree_age.hpp"
-#include "core/families/wide/stored_hierarchy.hpp"
 
 namespace kbvh {
 namespace {
@@ -16,10 +21,9 @@ enum class Measure : std::uint8_t {
 };
 
 template <class S, class Count>
-class DriftRebuild final : public StoredHierarchyStrategy<S, Count>,
-                           public AnswersSelfPairs,
-                           public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+class DriftRebuild final : public LeafStrategy<S, Count> {
+  using Base = LeafStrategy<S, Count>;
+  using Body = typename Base::Body;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -29,112 +33,69 @@ class DriftRebuild final : public StoredHierarchyStrategy<S, Count>,
         measure_(params.word("measure") == "work" ? Measure::work : Measure::surface),
         drift_(params.number("drift")),
         price_(params.number("price")),
-        frames_(std::uint32_t(params.number("spread"))),
-        bodies_(scene.body_count()) {
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) topology_changed(body);
-  }
+        frames_(std::uint64_t(params.number("spread"))),
+        fresh_(scene.body_count(), unknown) {}
 
   void reset_to(double t) override {
     Base::reset_to(t);
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
-      bodies_[body].contents.stop();
-      bodies_[body].age = {};
-      bodies_[body].fresh = measure_ == Measure::surface ? surface_ratio(this->hierarchies_[body]) : 0;
-    }
+    std::fill(fresh_.begin(), fresh_.end(), unknown);
+    if (measure_ == Measure::surface)
+      for (std::uint32_t body = 0; body < fresh_.size(); ++body)
+        fresh_[body] = surface_ratio(this->hierarchies_[body]);
   }
 
-  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
-    QueryStatus status;
-    std::uint64_t tests = 0;
-    this->for_near_bodies(tests, [&](const BodyPair& pair) {
-      if (tests >= budget.box_tests) {
-        ++status.pending;
-        return;
-      }
-      const std::uint64_t tests_before = tests, found_before = out.size();
-      status.pending +=
-          this->query_
-              .run(this->side(pair.first), this->side(pair.second), out, tests, rest_of(budget, tests))
-              .pending;
-      bodies_[pair.first].age.add(tests - tests_before, out.size() - found_before);
-      if (pair.second != pair.first)
-        bodies_[pair.second].age.add(tests - tests_before, out.size() - found_before);
-    });
-    this->count_.add(Counter::box_tests, tests);
-    return status;
-  }
-
-  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
-    this->edit_geometry(change);
-  }
-
-  std::size_t bytes() const override {
-    std::size_t total = Base::bytes() + bodies_.capacity() * sizeof(Body);
-    for (const Body& body : bodies_) total += body.contents.bytes();
-    return total;
-  }
+  std::size_t bytes() const override { return Base::bytes() + fresh_.capacity() * sizeof(double); }
 
  private:
-  struct Body {
-    LeafContents<S> contents;
-    TreeAge age;
-    double fresh = -1;       ///< surface ratio after the last rebuild; below 0: to be measured
-    std::uint64_t work = 0;  ///< of a frame, while a rebuild runs
-  };
+  static constexpr double unknown = -1;
 
   void topology_changed(std::uint32_t index) override {
-    bodies_[index].contents.prepare(this->hierarchies_[index]);
-    bodies_[index].age = {};
-    bodies_[index].fresh = -1;
+    Base::topology_changed(index);
+    fresh_[index] = unknown;
   }
 
   void update(std::uint32_t index) override {
-    Body& body = bodies_[index];
+    Body& body = this->bodies_[index];
     auto& hierarchy = this->hierarchies_[index];
-    refit_counted(index);
+    this->refit_counted(index);
     const double surplus = body.age.end_frame();
-    if (!body.contents.in_parts()) {
-      if (!is_due(body, hierarchy, surplus)) return;
-      body.work = frames_ == 1 ? MedianSort::unlimited : work_of(hierarchy.topology()) / frames_ + 1;
-    }
+    if (!body.contents.in_parts() && !is_due(index, surplus)) return;
+    const std::uint64_t work =
+        frames_ == 1 ? MedianSort::unlimited : 1 + work_of(hierarchy.topology()) / frames_;
     if (!body.contents.sort_in_parts(hierarchy, this->scene_.primitives(index),
-                                     this->sampled_.positions(index), body.work))
+                                     this->sampled_.positions(index), work))
       return;
     ++rebuilds_;
-    refit_counted(index);
+    this->refit_counted(index);
     body.age.renew();
-    if (measure_ == Measure::surface) body.fresh = surface_ratio(hierarchy);
+    if (measure_ == Measure::surface) fresh_[index] = surface_ratio(hierarchy);
   }
 
-  bool is_due(Body& body, WideHierarchy<S>& hierarchy, double surplus) const {
+  bool is_due(std::uint32_t index, double surplus) {
+    auto& hierarchy = this->hierarchies_[index];
+    if (hierarchy.topology().size() < 2) return false;
     if (measure_ == Measure::work) return surplus > price_ * double(hierarchy.topology().primitives.size());
     const double ratio = surface_ratio(hierarchy);
-    if (body.fresh < 0 || ratio < body.fresh) body.fresh = ratio;
-    return ratio > drift_ * body.fresh;
+    double& fresh = fresh_[index];
+    if (fresh == unknown || ratio < fresh) fresh = ratio;
+    return ratio > drift_ * fresh;
   }
 
-  /// Returns the work of a rebuild: its items times its binary levels.
+  /// Returns the work of a sort: its items times its binary levels.
   static std::uint64_t work_of(const Topology& topology) {
-    std::uint64_t levels = 0;
+    std::uint64_t levels = 1;
     for (std::size_t leaves = topology.primitives.size() / topology.leaf_size; leaves > 1; leaves /= 2)
       ++levels;
     return levels * topology.primitives.size();
   }
 
-  void refit_counted(std::uint32_t index) {
-    auto& hierarchy = this->hierarchies_[index];
-    this->refit(index);
-    this->count_.add(Counter::nodes_visited, hierarchy.topology().size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology().size());
-    this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
-  }
   void counts_cleared() override { rebuilds_ = 0; }
   void add_counts(Counters& table) const override { table.add("rebuilds", rebuilds_); }
 
   Measure measure_;
   double drift_, price_;
-  std::uint32_t frames_;
-  std::vector<Body> bodies_;
+  std::uint64_t frames_;
+  std::vector<double> fresh_;  // [body]: surface ratio of the tree when it was new, where that is the measure
   std::uint64_t rebuilds_ = 0;
 };
 
@@ -159,7 +120,7 @@ KBVH_STRATEGY(drift_rebuild) {
            {"price",
             "100",
             {},
-            "for measure=work: surplus box tests per primitive from which a rebuild pays",
+            "for measure=work: surplus box tests per primitive from which on a rebuild pays",
             0,
             1e6},
            {"drift",
@@ -171,7 +132,7 @@ KBVH_STRATEGY(drift_rebuild) {
            {"spread",
             "1",
             {},
-            "frames over which the sorting of a rebuild is spread, on the positions of the first",
+            "frames over which the sort of a rebuild is spread, on the positions of the first",
             1,
             1000,
             Numbers::whole}},

@@ -64,6 +64,8 @@ struct Soup {
   LeafContents<S> contents;
 };
 
+constexpr std::uint32_t root[] = {0};
+
 template <class S>
 class LeafContentsOf : public testing::Test {};
 using Scalars = testing::Types<float, double>;
@@ -86,9 +88,11 @@ TYPED_TEST(LeafContentsOf, RefilledLayoutEqualsANewOne) {
       soup.mix_positions();
       soup.hierarchy.positions_changed();
       const auto& topology = soup.hierarchy.topology();
-      if (round < 2)
-        soup.contents.sort_primitives(soup.hierarchy, soup.primitives(), soup.positions.data(),
-                                      round == 0 ? 0 : topology.nodes[0].first());
+      const std::uint32_t child = topology.nodes[0].first(), children[] = {child, child + 1};
+      if (round == 0)
+        soup.contents.sort_primitives(soup.hierarchy, soup.primitives(), soup.positions.data(), root);
+      else if (round == 1)
+        soup.contents.sort_primitives(soup.hierarchy, soup.primitives(), soup.positions.data(), children);
       else
         soup.contents.renew_leaves(soup.hierarchy, soup.primitives(), soup.positions.data(),
                                    round == 2 ? 0 : soup.contents.full_leaf_count() / 3);
@@ -114,7 +118,7 @@ TYPED_TEST(LeafContentsOf, ASortedTreeIsAsGoodAsABuiltOne) {
                active_kernel_set());
   built.refit(soup.positions.data());
   const double best = surface_ratio(built);
-  soup.contents.sort_primitives(soup.hierarchy, soup.primitives(), soup.positions.data(), 0);
+  soup.contents.sort_primitives(soup.hierarchy, soup.primitives(), soup.positions.data(), root);
   soup.hierarchy.refit(soup.positions.data());
   EXPECT_LT(surface_ratio(soup.hierarchy), 1.02 * best);
   EXPECT_GT(aged, 1.2 * best);
@@ -125,12 +129,13 @@ TYPED_TEST(LeafContentsOf, ASortedTreeIsAsGoodAsABuiltOne) {
     std::vector<std::vector<std::uint32_t>> all;
     for (std::uint32_t leaf = 0; leaf < soup.hierarchy.leaf_count(); ++leaf) {
       const auto primitives = soup.hierarchy.leaf_primitives(leaf);
-      std::sort(all.emplace_back(primitives.begin(), primitives.end()).begin(), all.back().end());
+      auto& sorted = all.emplace_back(primitives.begin(), primitives.end());
+      std::sort(sorted.begin(), sorted.end());
     }
     return all;
   };
   const auto sorted = leaves();
-  soup.contents.sort_primitives(soup.hierarchy, soup.primitives(), soup.positions.data(), 0);
+  soup.contents.sort_primitives(soup.hierarchy, soup.primitives(), soup.positions.data(), root);
   EXPECT_TRUE(leaves() == sorted);
 }
 
@@ -139,7 +144,7 @@ TYPED_TEST(LeafContentsOf, ASortInPartsEqualsOneAtOnce) {
   Soup<TypeParam> at_once(1000, config), in_parts(1000, config);
   at_once.mix_positions();
   in_parts.mix_positions();
-  at_once.contents.sort_primitives(at_once.hierarchy, at_once.primitives(), at_once.positions.data(), 0);
+  at_once.contents.sort_primitives(at_once.hierarchy, at_once.primitives(), at_once.positions.data(), root);
   int parts = 1;
   while (!in_parts.contents.sort_in_parts(in_parts.hierarchy, in_parts.primitives(),
                                           in_parts.positions.data(), 500)) {
@@ -194,7 +199,7 @@ class Sorting : public StoredHierarchyStrategy<S, Count>,
     this->refit(body);
     if (hierarchy.topology().size() < 3) return;
     if (++frame_ % 2 == 0)
-      contents_[body].sort_primitives(hierarchy, primitives, positions, 0);
+      contents_[body].sort_primitives(hierarchy, primitives, positions, root);
     else
       contents_[body].renew_leaves(hierarchy, primitives, positions, contents_[body].full_leaf_count() / 3);
     if (fault == Fault::lost_primitive) {

@@ -92,22 +92,23 @@ void LeafContents<S>::put_primitives(const WideHierarchy<S>& hierarchy, const Pr
 }
 
 template <class S>
-void LeafContents<S>::take_sorted(WideHierarchy<S>& hierarchy, const Primitives& primitives,
-                                  std::uint32_t begin, std::uint32_t end) {
-  order_ = hierarchy.topology().primitives;
+void LeafContents<S>::take_sorted(std::uint32_t begin, std::uint32_t end) {
   const auto items = entry_sort_.items();
   for (std::uint32_t slot = begin; slot < end; ++slot) order_[slot] = items[slot].id;
-  hierarchy.refill(order_, primitives);
 }
 
 template <class S>
 void LeafContents<S>::sort_primitives(WideHierarchy<S>& hierarchy, const Primitives& primitives,
-                                      const S* positions, std::uint32_t node) {
-  const std::uint32_t begin = entries_.begin[node], end = entries_.end[node];
-  put_primitives(hierarchy, primitives, positions, begin, end);
-  entry_sort_.start(hierarchy.topology(), entries_, node);
-  entry_sort_.run();
-  take_sorted(hierarchy, primitives, begin, end);
+                                      const S* positions, std::span<const std::uint32_t> nodes) {
+  order_ = hierarchy.topology().primitives;
+  for (const std::uint32_t node : nodes) {
+    const std::uint32_t begin = entries_.begin[node], end = entries_.end[node];
+    put_primitives(hierarchy, primitives, positions, begin, end);
+    entry_sort_.start(hierarchy.topology(), entries_, node);
+    entry_sort_.run();
+    take_sorted(begin, end);
+  }
+  hierarchy.refill(order_, primitives);
 }
 
 template <class S>
@@ -121,7 +122,8 @@ bool LeafContents<S>::sort_in_parts(WideHierarchy<S>& hierarchy, const Primitive
   }
   if (!entry_sort_.run(work)) return false;
   in_parts_ = false;
-  take_sorted(hierarchy, primitives, 0, all);
+  take_sorted(0, all);
+  hierarchy.refill(order_, primitives);
   return true;
 }
 

@@ -21,9 +21,10 @@ class LeafContents {
   /// O(nodes).
   void prepare(const WideHierarchy<S>& hierarchy);
 
-  /// Sorts the primitives below a node of the topology. O(n log n) for n primitives below.
+  /// Sorts the primitives below each of some nodes of the topology, none of which is above another. O(n log
+  /// n) for n primitives below.
   void sort_primitives(WideHierarchy<S>& hierarchy, const Primitives& primitives, const S* positions,
-                       std::uint32_t node);
+                       std::span<const std::uint32_t> nodes);
   /// The same for the whole tree, in parts: takes the positions of the first call, and changes the hierarchy
   /// in the call that ends the sort. `work` is that of MedianSort::run. Returns whether the sort has ended.
   bool sort_in_parts(WideHierarchy<S>& hierarchy, const Primitives& primitives, const S* positions,
@@ -57,8 +58,7 @@ class LeafContents {
                      std::uint32_t primitive, MedianSort::Item& item) const;
   void put_primitives(const WideHierarchy<S>& hierarchy, const Primitives& primitives, const S* positions,
                       std::uint32_t begin, std::uint32_t end);
-  void take_sorted(WideHierarchy<S>& hierarchy, const Primitives& primitives, std::uint32_t begin,
-                   std::uint32_t end);
+  void take_sorted(std::uint32_t begin, std::uint32_t end);
   void choose_largest(const WideHierarchy<S>& hierarchy, std::uint32_t count);
 
   SlotRanges entries_, leaves_;      // slots: entries, or full leaves

@@ -18,6 +18,12 @@ class TreeAge {
     surplus_ = 0;
     new_ = true;
   }
+  /// Registers a tree that was improved, but not made anew. What it needs is still known, and forgotten
+  /// slowly.
+  void repair() {
+    surplus_ = 0;
+    per_pair_ *= 1.05;
+  }
   /// Adds the box tests of a query of the current frame, and the pairs of primitives that it found.
   void add(std::uint64_t tests, std::uint64_t found) {
     tests_ += double(tests);
