@@ -337,6 +337,7 @@ std::size_t WideEdits<S>::bytes() const {
 
 template <class S>
 void WideHierarchy<S>::begin_edits() {
+  KBVH_ASSERT(!refilled_);
   if (edited_ || empty()) return;
   edited_ = true;
   edits_.start = topology_;
@@ -384,6 +385,7 @@ void WideHierarchy<S>::refit_edited(const S* positions) {
 template <class S>
 void WideHierarchy<S>::undo_edits(const Primitives& primitives) {
   if (edited_) assign(Topology(edits_.start), primitives, kernels_);
+  if (refilled_) refill(refill_.start, primitives);
 }
 
 template <class S>

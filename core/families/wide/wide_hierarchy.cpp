@@ -11,9 +11,10 @@ void WideHierarchy<S>::assign(Topology topology, const Primitives& primitives, K
   topology_ = std::move(topology);
   this->width_ = topology_.width;
   this->leaf_size_ = topology_.leaf_size;
-  edited_ = false;
+  edited_ = refilled_ = false;
   end_entry_.clear();
   leaf_vertices_ = unique_leaf_vertices(topology_, primitives);
+  listed_total_ = leaf_vertices_.vertices.size();
   kernels_ = kernels;
   refit_ = wide_refit_kernels<S>(kernels).of(topology_.width);
   place_nodes();
@@ -231,7 +232,7 @@ std::size_t WideHierarchy<S>::bytes() const {
           listed_.capacity()) *
              sizeof(std::uint32_t) +
          places_.capacity() * sizeof(Place) + subtrees_.capacity() * sizeof(Subtree) +
-         above_subtrees_.capacity() * sizeof(std::uint32_t) + edits_.bytes();
+         above_subtrees_.capacity() * sizeof(std::uint32_t) + edits_.bytes() + refill_.bytes();
 }
 
 template class WideHierarchy<float>;

@@ -4,8 +4,10 @@
 #include <span>
 #include <vector>
 
+#include "core/base/assert.hpp"
 #include "core/families/wide/kernels/wide_refit.hpp"
 #include "core/families/wide/wide_edits.hpp"
+#include "core/families/wide/wide_refill.hpp"
 #include "core/families/wide/wide_tree.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "core/topology/topology.hpp"
@@ -52,6 +54,13 @@ class WideHierarchy : public WideTree<S> {
   void refit_edited(const S* positions);
   /// Returns whether the topology was edited since `assign`.
   bool edited() const { return edited_; }
+  /// Gives the leaves other primitives, each leaf as many as before: `order` holds them by entry of the
+  /// topology and is a permutation of what the topology holds. Nodes stay as they are. Boxes of changed
+  /// leaves and above are invalid until they are computed. Returns the number of wide nodes with a changed
+  /// leaf. O(primitives) to compare, and O(vertices) per changed leaf. Allocates at the first call after
+  /// `assign`, and where a leaf has more vertices than ever before. Not after edits, nor are edits possible
+  /// afterwards.
+  std::uint32_t refill(std::span<const std::uint32_t> order, const Primitives& primitives);
   /// Restores the topology of the last `assign`; boxes are invalid until they are computed. O(nodes).
   void undo_edits(const Primitives& primitives);
   /// Returns the topology in built layout, and in nodes[i] the node of `topology` that is its node i.
@@ -101,13 +110,15 @@ class WideHierarchy : public WideTree<S> {
   /// Returns the same from rows and node boxes written by `refit_into`.
   Box<S> box_in(const S* child_bounds, const S* node_bounds, std::uint32_t node) const;
   void set_box(std::uint32_t node, const Box<S>& box);
-  /// Returns the unique vertices of a leaf, ascending; nothing for an inner node.
+  /// Returns the unique vertices of a leaf, ascending; nothing for an inner node. Not after `refill`.
   std::span<const std::uint32_t> leaf_vertices(std::uint32_t node) const {
+    KBVH_ASSERT(!refilled_);
     if (!edited_) return leaf_vertices_[node];
     if (!topology_.nodes[node].is_leaf()) return {};
     return leaf_vertices_[edits_.home[nodes_[places_[node].node].first_leaf + places_[node].lane]];
   }
-  std::size_t leaf_vertex_count() const { return leaf_vertices_.vertices.size(); }
+  /// Returns the number of unique vertices of each leaf, summed over all leaves.
+  std::size_t leaf_vertex_count() const { return listed_total_; }
 
   /// Returns the memory in bytes.
   std::size_t bytes() const;
@@ -129,6 +140,9 @@ class WideHierarchy : public WideTree<S> {
   /// Returns the place of new lists of one length for all lanes.
   std::uint32_t new_list(std::size_t length);
   void write_lists(std::uint32_t wide, const LeafLists& lists);
+  void begin_refills(const Primitives& primitives);
+  void list_refilled(std::uint32_t wide, const Primitives& primitives);
+  void list_corners(const Primitives& primitives);
   void begin_edits();
   void follow_edit();
   void refit_all(const WideArrays<S>& arrays, const S* positions) const {
@@ -166,8 +180,11 @@ class WideHierarchy : public WideTree<S> {
   std::vector<std::uint32_t> listed_;  // of wide nodes: vertices of their leaves
   std::vector<Subtree> subtrees_;
   std::vector<std::uint32_t> above_subtrees_;
+  std::size_t listed_total_ = 0;  // vertices of all leaves
   WideEdits<S> edits_;
   bool edited_ = false;
+  WideRefill refill_;
+  bool refilled_ = false;
 };
 
 extern template class WideHierarchy<float>;

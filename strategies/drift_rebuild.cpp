@@ -1,0 +1,140 @@
+// Refit until the tree has drifted, then rebuild (Lauterbach, Yoon & Manocha 2006). A rebuild here sorts the
+// primitives by medians into the leaves that exist, so that nothing is allocated and nodes stay where they
+// are. By default a tree is rebuilt when its queries have made as many box tests beyond those of a new tree
+// as a rebuild is worth: where bodies are apart, an old tree costs nothing, and stays.
+//
+// When it wins: wherever a tree ages within a clip and queries feel it. It needs no tuning to the scene, and
+// costs what a refit costs where nothing ages. A frame that rebuilds is the slowest of all: `spread` divides
+// its sort among several frames, in which queries still meet the old tree.
+
+#include "core/contract/registry.hpp"
+#include "core/families/restructure/leaf_strategy.hpp"
+#include "core/families/restructure/surface_sums.hpp"
+
+namespace kbvh {
+namespace {
+
+/// What says that a tree has drifted.
+enum class Measure : std::uint8_t {
+  work,     ///< box tests of the queries beyond those of the new tree
+  surface,  ///< surfaces of its boxes over that of the root
+};
+
+template <class S, class Count>
+class DriftRebuild final : public LeafStrategy<S, Count> {
+  using Base = LeafStrategy<S, Count>;
+  using Body = typename Base::Body;
+
+ public:
+  static constexpr Foresight foresight = Foresight::none;
+  DriftRebuild(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
+               const Params& params)
+      : Base(scene, motion, std::move(topologies), params),
+        measure_(params.word("measure") == "work" ? Measure::work : Measure::surface),
+        drift_(params.number("drift")),
+        price_(params.number("price")),
+        frames_(std::uint64_t(params.number("spread"))),
+        fresh_(scene.body_count(), unknown) {}
+
+  void reset_to(double t) override {
+    Base::reset_to(t);
+    std::fill(fresh_.begin(), fresh_.end(), unknown);
+    if (measure_ == Measure::surface)
+      for (std::uint32_t body = 0; body < fresh_.size(); ++body)
+        fresh_[body] = surface_ratio(this->hierarchies_[body]);
+  }
+
+  std::size_t bytes() const override { return Base::bytes() + fresh_.capacity() * sizeof(double); }
+
+ private:
+  static constexpr double unknown = -1;
+
+  void topology_changed(std::uint32_t index) override {
+    Base::topology_changed(index);
+    fresh_[index] = unknown;
+  }
+
+  void update(std::uint32_t index) override {
+    Body& body = this->bodies_[index];
+    auto& hierarchy = this->hierarchies_[index];
+    this->refit_counted(index);
+    const double surplus = body.age.end_frame();
+    if (!body.contents.in_parts() && !is_due(index, surplus)) return;
+    const std::uint64_t work =
+        frames_ == 1 ? MedianSort::unlimited : 1 + work_of(hierarchy.topology()) / frames_;
+    if (!body.contents.sort_in_parts(hierarchy, this->scene_.primitives(index),
+                                     this->sampled_.positions(index), work))
+      return;
+    ++rebuilds_;
+    this->refit_counted(index);
+    body.age.renew();
+    if (measure_ == Measure::surface) fresh_[index] = surface_ratio(hierarchy);
+  }
+
+  bool is_due(std::uint32_t index, double surplus) {
+    auto& hierarchy = this->hierarchies_[index];
+    if (hierarchy.topology().size() < 2) return false;
+    if (measure_ == Measure::work) return surplus > price_ * double(hierarchy.topology().primitives.size());
+    const double ratio = surface_ratio(hierarchy);
+    double& fresh = fresh_[index];
+    if (fresh == unknown || ratio < fresh) fresh = ratio;
+    return ratio > drift_ * fresh;
+  }
+
+  /// Returns the work of a sort: its items times its binary levels.
+  static std::uint64_t work_of(const Topology& topology) {
+    std::uint64_t levels = 1;
+    for (std::size_t leaves = topology.primitives.size() / topology.leaf_size; leaves > 1; leaves /= 2)
+      ++levels;
+    return levels * topology.primitives.size();
+  }
+
+  void counts_cleared() override { rebuilds_ = 0; }
+  void add_counts(Counters& table) const override { table.add("rebuilds", rebuilds_); }
+
+  Measure measure_;
+  double drift_, price_;
+  std::uint64_t frames_;
+  std::vector<double> fresh_;  // [body]: surface ratio of the tree when it was new, where that is the measure
+  std::uint64_t rebuilds_ = 0;
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(drift_rebuild) {
+  using namespace kbvh;
+  return {make_entry<DriftRebuild>({
+      .id = "drift_rebuild",
+      .title = "refit, rebuild at drift",
+      .family = "restructuring",
+      .citation = "Lauterbach, Yoon & Manocha 2006",
+      .declares = {.restructures = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+      .parameters =
+          {{"measure",
+            "work",
+            {"work", "surface"},
+            "what says that a tree has drifted: the box tests of queries beyond those when it was "
+            "new, summed over frames; or the surfaces of all boxes over that of the root"},
+           {"price",
+            "100",
+            {},
+            "for measure=work: surplus box tests per primitive from which on a rebuild pays",
+            0,
+            1e6},
+           {"drift",
+            "1.4",
+            {},
+            "for measure=surface: factor over the value of the new tree from which on it is rebuilt",
+            1,
+            1e6},
+           {"spread",
+            "1",
+            {},
+            "frames over which the sort of a rebuild is spread, on the positions of the first",
+            1,
+            1000,
+            Numbers::whole}},
+  })};
+}
