@@ -75,7 +75,7 @@ void WideHierarchy<S>::list_refilled(std::uint32_t wide, const Primitives& primi
     }
     const std::uint32_t stamp = r.stamp;
     std::uint32_t* corner = corners_.data() + std::size_t(first_entry_[leaf]) * r.corners;
-    for (const std::uint32_t primitive : leaf_primitives(leaf)) {
+    for (const std::uint32_t primitive : this->leaf_primitives(leaf)) {
       const auto vertices = primitives[primitive];
       if (count + vertices.size() > r.lists.size()) r.lists.resize(2 * (count + vertices.size()));
       // Writes every vertex, and keeps the new ones, without a branch.
