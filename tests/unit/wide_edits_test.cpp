@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/families/wide/height_order.hpp"
+#include "core/families/wide/wide_hierarchy.hpp"
 #include "core/families/wide/wide_query.hpp"
 #include "core/topology/builders.hpp"
 #include "core/topology/subtree_swap.hpp"
