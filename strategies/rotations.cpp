@@ -1,4 +1,11 @@
-// Tree rotations at every refit (Kopta et al. 2012), on wide nodes: grandchildren of a node change places.
+// Tree rotations at every refit (Kopta et al. 2012), on wide nodes: two grandchildren of a node change places
+// if that saves surface, so that all leaves keep their depth. Only nodes whose children's surface has grown
+// since they were last looked at are looked at again.
+//
+// When it wins: it won nowhere that was measured. On the built-in scenes that age most (65k triangles) it is
+// as fast as the refit without rotations, or slower. What ages there are the leaves, whose primitives drift
+// apart, and no rotation divides a leaf; with smaller leaves, places are too far apart for exchanges within
+// two levels.
 
 #include "core/contract/registry.hpp"
 #include "core/families/restructure/cousins.hpp"
@@ -105,7 +112,7 @@ KBVH_STRATEGY(rotations) {
       .family = "restructuring",
       .citation = "Kopta et al. 2012",
       .declares = {.restructures = true, .time_budget = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4}},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"most",
                       "4",
                       {},

@@ -1,0 +1,85 @@
+// Strategies that restructure conform where they do so as often as they can: by default few of the suite's
+// small scenes age enough for that.
+
+#include <gtest/gtest.h>
+
+#include "tests/conformance/check.hpp"
+
+namespace kbvh::test {
+namespace {
+
+struct Eager {
+  std::string id;
+  std::map<std::string, std::string> params;
+  std::string counter;  ///< counts what the strategy restructured
+};
+const std::vector<Eager>& eager() {
+  static const std::vector<Eager> all{
+      {"drift_rebuild", {{"price", "0"}}, "rebuilds"},
+      {"drift_rebuild", {{"measure", "surface"}, {"drift", "1"}}, "rebuilds"},
+      {"drift_rebuild", {{"measure", "surface"}, {"drift", "1"}, {"spread", "3"}}, "rebuilds"},
+      {"partial_rebuild", {{"price", "0"}, {"share", "0.5"}}, "leaves_renewed"},
+      {"selective_restructuring", {{"drift", "1"}, {"budget", "1"}}, "subtrees_rebuilt"},
+      {"rotations", {{"most", "30"}}, "rotations"},
+  };
+  return all;
+}
+
+class Restructuring : public testing::TestWithParam<std::size_t> {};
+
+TEST_P(Restructuring, AsOftenAsPossibleKeepsEveryGuarantee) {
+  const Eager& one = eager()[GetParam()];
+  const StrategyEntry& entry = find_strategy(one.id);
+  std::vector<std::string> names = synthetic_scene_names();
+  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
+  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
+  for (const std::string& name : names)
+    for (const std::uint32_t leaf : {1u, 4u}) {
+      const BuilderConfig builder{
+          .method = leaf == 1 ? BuildMethod::sah : BuildMethod::median, .width = 8, .leaf_size = leaf};
+      EXPECT_EQ(check(entry, synthetic_scene<float>(name, 3), 3, one.params, builder), "") << name;
+      EXPECT_EQ(check(entry, synthetic_scene<double>(name, 3), 3, one.params, builder), "") << name;
+    }
+}
+
+TEST_P(Restructuring, HappensAndIsTakenBackByReset) {
+  const Eager& one = eager()[GetParam()];
+  const StrategyEntry& entry = find_strategy(one.id);
+  const auto test = synthetic_scene<float>("soups", 7);
+  const BuilderConfig builder{.method = BuildMethod::median, .width = 8, .leaf_size = 1};
+  Session<float> session(test.scene, {&entry, one.params, builder}, CountingPolicy::counting);
+  PhaseTimes times;
+  PairBuffer pairs;
+  std::vector<std::size_t> found[2];
+  std::uint64_t counted[2] = {0, 0};
+  std::optional<Topology> start;
+  for (int round = 0; round < 2; ++round) {
+    session.reset(test.frames.front());
+    const Topology topology = session.strategy().audit_view(0)->topology;
+    if (round == 0)
+      start = topology;
+    else
+      EXPECT_TRUE(topology == *start);
+    for (const double t : test.frames) {
+      session.advance(t, times);
+      session.query(pairs, times);
+      found[round].push_back(pairs.size());
+    }
+    if (round == 0) {
+      EXPECT_FALSE(session.strategy().audit_view(0)->topology == *start);
+    }
+    for (const auto& named : session.strategy().counters().named)
+      if (named.name == one.counter) counted[round] = named.value;
+  }
+  EXPECT_GT(counted[0], 0u);
+  EXPECT_EQ(counted[0], counted[1]);
+  EXPECT_EQ(found[0], found[1]);
+}
+
+INSTANTIATE_TEST_SUITE_P(Eager, Restructuring, testing::Range(std::size_t(0), eager().size()),
+                         [](const auto& test) {
+                           return eager()[test.param].id + "_" + std::to_string(test.param);
+                         });
+
+}  // namespace
+}  // namespace kbvh::test
