@@ -121,6 +121,24 @@ TEST(Allocation, NoneOnceWarm) {
   }
 }
 
+TEST(Allocation, NoneOnceWarmWhereTreesAreRestructured) {
+  using Params = std::map<std::string, std::string>;
+  const std::pair<const char*, Params> eager[] = {
+      {"drift_rebuild", {{"price", "0"}}},
+      {"drift_rebuild", {{"measure", "surface"}, {"drift", "1"}, {"spread", "2"}}},
+      {"partial_rebuild", {{"price", "0"}}},
+      {"selective_restructuring", {{"drift", "1"}, {"budget", "1"}}},
+      {"rotations", {}}};
+  for (const char* const name : {"soups", "sheets", "four_bodies_own_keyframes"})
+    for (const auto& [id, params] : eager) {
+      const StrategyEntry& entry = find_strategy(id);
+      EXPECT_EQ(allocations_when_warm(entry, synthetic_scene<float>(name, 7), params), "")
+          << id << " on " << name;
+      EXPECT_EQ(allocations_when_warm(entry, synthetic_scene<double>(name, 7), params), "")
+          << id << " on " << name;
+    }
+}
+
 TEST(Allocation, NoneOnceWarmWherePlansChange) {
   for (const char* const name : {"plan_changes", "plans_start_at_rest"}) {
     const auto in_float = synthetic_scene<float>(name, 7);
