@@ -169,7 +169,10 @@ TEST(Keys, SeeEveryParameterOfEveryStrategy) {
       std::vector<std::string> values;
       for (const std::string& word : parameter.allowed)
         if (word != parameter.default_value) values.push_back(word);
-      if (parameter.allowed.empty()) values.push_back(std::to_string(std::stod(parameter.default_value) + 1));
+      if (parameter.allowed.empty()) {
+        const double given = std::stod(parameter.default_value);
+        values.push_back(std::to_string(given + 1 <= parameter.most ? given + 1 : parameter.least));
+      }
       if (!values.empty()) add({entry.info.id, {{parameter.name, values}}, {}});
     }
   }
