@@ -2,7 +2,12 @@
 
 #include <algorithm>
 
+#include "core/families/build/kernels/build_wide.hpp"
+
 namespace kbvh {
+
+static_assert(RadixSort::digit_bits == code_digit_bits && RadixSort::digits == code_digits,
+              "kernels count the digits that this sort scatters");
 
 std::uint32_t* RadixSort::counts() {
   counts_.assign(std::size_t(2) * digits * bins, 0);
