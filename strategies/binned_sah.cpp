@@ -1,6 +1,6 @@
 // Binned SAH: the surface-area heuristic from the top down, which gives the best trees of this family. As
-// many box tests as `ploc` or fewer, and a somewhat longer building time: wins only where a frame asks many
-// queries of one tree. Five times as fast as `rebuild` with method=sah, which builds such trees, too.
+// many box tests as `ploc` or fewer, and a somewhat longer building time: for frames that ask many
+// queries of one tree. `rebuild` with method=sah builds such trees, too, and takes longer.
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_strategy.hpp"
 #include "core/families/build/cluster_builders.hpp"

@@ -71,10 +71,7 @@ class BottomUp final : public StoredHierarchyStrategy<S, Count>,
       hierarchy.refit(this->sampled_.positions(body));
     else
       refit_in_parallel(hierarchy, this->sampled_.positions(body));
-    const Topology& topology = hierarchy.topology();
-    this->count_.add(Counter::nodes_visited, topology.size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * topology.size());
-    this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
+    this->count_refit(body);
   }
 
   void refit_in_parallel(WideHierarchy<S>& hierarchy, const S* positions) {

@@ -1,12 +1,12 @@
-// Refit until the tree has drifted, then rebuild (Lauterbach, Yoon & Manocha 2006). A rebuild here sorts the
-// primitives by medians into the leaves that exist, so that nothing is allocated and nodes stay where they
-// are. By default a tree is rebuilt when its queries have made as many box tests beyond those of a new tree
-// as a rebuild is worth: where bodies are apart, an old tree costs nothing, and stays.
+// Refit until the tree has drifted, then rebuild (Lauterbach, Yoon & Manocha 2006). A rebuild here sorts
+// the primitives by medians into the leaves that exist, so that nothing is allocated and nodes stay where
+// they are. By default a tree is rebuilt when its queries have made as many box tests beyond those of a
+// new tree as a rebuild is worth: where bodies are apart, an old tree costs nothing, and stays.
 //
-// When it wins: wherever a tree ages within a clip and queries feel it: 2 to 40 times as fast as the best
-// refit over clips of 65k triangles that age most. Where nothing ages it costs what a refit costs. A frame
-// that rebuilds takes longest: `spread` divides its sort among several frames, but queries meet the old tree
-// meanwhile, and in scenes that age within a few frames that costs more than it saves.
+// When it wins: against a refit, wherever a tree ages within a clip and queries feel it (plan `ageing`).
+// Where nothing ages it costs what a refit costs. A frame that rebuilds takes longest: `spread` divides
+// its sort among several frames, but queries meet the old tree meanwhile, and in scenes that age within a
+// few frames that costs more than it saves.
 
 #include "core/contract/registry.hpp"
 #include "core/families/restructure/leaf_strategy.hpp"

@@ -1,8 +1,7 @@
-// Linear BVH: a radix sort by Morton codes, and a tree read off the sorted codes. A new tree for every frame
-// costs little more than the sort, a twelfth of `rebuild`. Wins where bodies mix or fly apart, whatever the
-// motion is: 16 times faster in total than a refit on mixing swarms. `ploc` and `binned_sah` build better
-// trees, but one query per frame does not earn back the time. A refit wins where neighbours stay neighbours:
-// on cloth it takes a sixth to a third of the total.
+// Linear BVH: a radix sort by Morton codes, and a tree read off the sorted codes. A new tree for every
+// frame costs little more than the sort. Wins against a refit where bodies mix or fly apart, whatever the
+// motion is (plan `ageing`). `ploc` and `binned_sah` build better trees, but one query per frame does not
+// earn back the time. A refit wins where neighbours stay neighbours, as on cloth.
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_strategy.hpp"
 #include "core/families/build/curve_builders.hpp"

@@ -1,7 +1,7 @@
-// PLOC: clusters along a curve merge with their best neighbour until one is left, which gives trees of nearly
-// the quality of the surface-area heuristic. Half to a third of the box tests of `lbvh`, for about ten times
-// its building time: wins only where a frame asks many queries of one tree. grain=16 clusters full leaves
-// instead of primitives, which is cheap and no better than `lbvh`.
+// PLOC: clusters along a curve merge with their best neighbour until one is left, which gives trees of
+// nearly the quality of the surface-area heuristic. Queries make fewer box tests than with `lbvh`, but
+// building takes many times as long: for frames that ask many queries of one tree. grain=16 clusters full
+// leaves instead of primitives, which is cheap and no better than `lbvh`.
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_strategy.hpp"
 #include "core/families/build/cluster_builders.hpp"

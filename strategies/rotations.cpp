@@ -1,11 +1,10 @@
-// Tree rotations at every refit (Kopta et al. 2012), on wide nodes: two grandchildren of a node change places
-// if that saves surface, so that all leaves keep their depth. Only nodes whose children's surface has grown
-// since they were last looked at are looked at again.
+// Tree rotations at every refit (Kopta et al. 2012), on wide nodes: two grandchildren of a node change
+// places if that saves surface, so that all leaves keep their depth. Only nodes whose children's surface
+// has grown since they were last looked at are looked at again.
 //
-// When it wins: it won nowhere that was measured. On the built-in scenes that age most (65k triangles) it is
-// as fast as the refit without rotations, or slower. What ages there are the leaves, whose primitives drift
-// apart, and no rotation divides a leaf; with smaller leaves, places are too far apart for exchanges within
-// two levels.
+// When it wins: nowhere that was tried. On the built-in scenes that age most it is as fast as the refit
+// without rotations, or slower. What ages there are the leaves, whose primitives drift apart, and no
+// rotation divides a leaf; with smaller leaves, places are too far apart for exchanges within two levels.
 
 #include "core/contract/registry.hpp"
 #include "core/families/restructure/cousins.hpp"
@@ -53,10 +52,10 @@ class Rotations final : public StoredHierarchyStrategy<S, Count>,
 
   void update(std::uint32_t body) override {
     auto& hierarchy = this->hierarchies_[body];
-    refit_counted(body);
+    this->refit_counted(body);
     const std::uint64_t before = rotations_;
     for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) rotate(body, node);
-    if (rotations_ != before) refit_counted(body);
+    if (rotations_ != before) this->refit_counted(body);
   }
 
   /// Exchanges grandchildren of a node as long as that pays, unless its children are as they were when
@@ -84,13 +83,6 @@ class Rotations final : public StoredHierarchyStrategy<S, Count>,
     }
   }
 
-  void refit_counted(std::uint32_t body) {
-    auto& hierarchy = this->hierarchies_[body];
-    this->refit(body);
-    this->count_.add(Counter::nodes_visited, hierarchy.topology().size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology().size());
-    this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
-  }
   void counts_cleared() override { rotations_ = 0; }
   void add_counts(Counters& table) const override { table.add("rotations", rotations_); }
 

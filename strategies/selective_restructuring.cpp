@@ -1,10 +1,9 @@
-// Subtrees whose children overlap more than when they were new are rebuilt, those first that gain most for
-// their size (Yoon, Curtis & Manocha 2007), within a budget of primitives per frame. A rebuild sorts the
-// primitives of the subtree by medians into its leaves.
+// Subtrees whose children overlap more than when they were new are rebuilt, those first that gain most
+// for their size (Yoon, Curtis & Manocha 2007), within a budget of primitives per frame. A rebuild sorts
+// the primitives of the subtree by medians into its leaves.
 //
 // When it wins: where parts of a body age and others do not, and where no frame may be much dearer than
-// another. Over a clip of which all parts age it is up to 1.6 times slower than `drift_rebuild` (65k
-// triangles).
+// another. Over a clip of which all parts age it is slower than `drift_rebuild`.
 
 #include <algorithm>
 

@@ -69,14 +69,6 @@ class LeafStrategy : public StoredHierarchyStrategy<S, Count>,
 
   void topology_changed(std::uint32_t body) override { prepare(body); }
 
-  void refit_counted(std::uint32_t body) {
-    auto& hierarchy = this->hierarchies_[body];
-    this->refit(body);
-    this->count_.add(Counter::nodes_visited, hierarchy.topology().size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology().size());
-    this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
-  }
-
   std::vector<Body> bodies_;
 
  private:

@@ -10,7 +10,7 @@ namespace kbvh {
 /// The number of pairs of primitives whose boxes overlap does not depend on the tree. A new tree is therefore
 /// expected to need as many tests per such pair, and per frame, as in its first frame. When the surplus
 /// summed over frames has cost as much as a rebuild, a rebuild is due: for a surplus that grows linearly this
-/// is the period of least total cost, and it never costs more than twice the least.
+/// is the period of least total cost.
 class TreeAge {
  public:
   /// Registers a new tree: the next frame says what it needs.

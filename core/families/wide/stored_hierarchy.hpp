@@ -133,6 +133,17 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
   /// Returns one side of a query of stored boxes.
   WideSide<S> side(std::uint32_t body) { return {&hierarchies_[body], body}; }
   void refit(std::uint32_t body) { hierarchies_[body].refit(this->sampled_.positions(body)); }
+  /// Adds the work of one whole refit of a body to the counters.
+  void count_refit(std::uint32_t body) {
+    const std::uint64_t nodes = hierarchies_[body].topology().size();
+    this->count_.add(Counter::nodes_visited, nodes);
+    this->count_.add(Counter::values_written, 6 * nodes);
+    this->count_.add(Counter::vertex_reads, hierarchies_[body].leaf_vertex_count());
+  }
+  void refit_counted(std::uint32_t body) {
+    refit(body);
+    count_refit(body);
+  }
 
   std::vector<WideHierarchy<S>> hierarchies_;
   NearBodies near_bodies_;
