@@ -58,9 +58,13 @@ std::unique_ptr<Strategy<S>> construct(const SceneView<S>& scene, Playback<S>& p
 template <template <class, class> class T, class S>
 std::unique_ptr<Strategy<S>> make(const SceneView<S>& scene, Playback<S>& playback, Topologies topologies,
                                   const Params& params, CountingPolicy policy) {
-  return policy == CountingPolicy::counting
-             ? construct<T, S, Counting>(scene, playback, std::move(topologies), params)
-             : construct<T, S, Silent>(scene, playback, std::move(topologies), params);
+#ifndef KBVH_COUNTING_ONLY
+  if (policy == CountingPolicy::silent)
+    return construct<T, S, Silent>(scene, playback, std::move(topologies), params);
+#else
+  (void)policy;
+#endif
+  return construct<T, S, Counting>(scene, playback, std::move(topologies), params);
 }
 }  // namespace detail
 
