@@ -18,6 +18,21 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   list(APPEND kbvh_kernel_sets sse avx2 avx512)
   set(kbvh_kernel_definitions KBVH_X86_KERNELS)
 endif()
+option(KBVH_KERNELS_HERE "Leave out kernels for AVX-512 where this processor cannot run them" OFF)
+if(KBVH_KERNELS_HERE AND "avx512" IN_LIST kbvh_kernel_sets)
+  include(CheckCXXSourceCompiles)
+  set(CMAKE_REQUIRED_FLAGS -march=native)
+  check_cxx_source_compiles("
+    #if !defined(__AVX512F__) || !defined(__AVX512VL__) || !defined(__AVX512DQ__) || !defined(__AVX512BW__)
+    #error no
+    #endif
+    int main() {}" KBVH_RUNS_AVX512)
+  unset(CMAKE_REQUIRED_FLAGS)
+  if(NOT KBVH_RUNS_AVX512)
+    list(REMOVE_ITEM kbvh_kernel_sets avx512)
+    list(APPEND kbvh_kernel_definitions KBVH_WITHOUT_AVX512)
+  endif()
+endif()
 
 # kbvh_room(NAME SOURCES file... [KERNELS file...] [USES room...] [NO_UNITY]): the folder that calls it is a room, the library
 # kbvh_NAME. Its headers are staged alone, under the path that #include spells, so that a file sees the rooms that its

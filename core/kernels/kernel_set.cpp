@@ -23,9 +23,13 @@ bool runs_here(KernelSet set) {
     case KernelSet::avx2:
       return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
     case KernelSet::avx512:
+#if defined(KBVH_WITHOUT_AVX512)
+      return false;
+#else
       return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
              __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
              __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+#endif
   }
   return false;
 #else

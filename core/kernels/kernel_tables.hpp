@@ -18,10 +18,16 @@
   namespace kernels::avx512 {             \
   extern const Type table;                \
   }
+#if defined(KBVH_WITHOUT_AVX512)
+// Never chosen: it is not among supported_kernel_sets().
+#define KBVH_AVX512_TABLE(table) static_cast<decltype(&kbvh::kernels::portable::table)>(nullptr)
+#else
+#define KBVH_AVX512_TABLE(table) &kbvh::kernels::avx512::table
+#endif
 /// Selects the table of a KernelSet.
 #define KBVH_SELECT_KERNELS(set, table)                                                 \
   (*kbvh::kernels::choose({&kbvh::kernels::portable::table, &kbvh::kernels::sse::table, \
-                           &kbvh::kernels::avx2::table, &kbvh::kernels::avx512::table}, \
+                           &kbvh::kernels::avx2::table, KBVH_AVX512_TABLE(table)},      \
                           static_cast<int>(set)))
 #else
 #define KBVH_DECLARE_KERNELS(Type, table) \

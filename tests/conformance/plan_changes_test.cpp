@@ -8,20 +8,10 @@
 #include <limits>
 
 #include "tests/conformance/check.hpp"
+#include "tests/support/plan_changes.hpp"
 
 namespace kbvh::test {
 namespace {
-
-template <class S>
-PlanChange<S> flies(std::uint32_t body, std::uint32_t vertex, S x, S y, S z) {
-  PlanChange<S> change;
-  change.body = body;
-  change.vertex = vertex;
-  change.velocity[0] = x;
-  change.velocity[1] = y;
-  change.velocity[2] = z;
-  return change;
-}
 
 /// Goes through one point of its own, then stays there.
 template <class S>

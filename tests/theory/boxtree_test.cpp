@@ -11,6 +11,7 @@
 #include "core/judge/audit.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "tests/theory/boxtree_log.hpp"
+#include "tests/theory/lossy_queue.hpp"
 
 namespace kbvh::test {
 namespace {
@@ -154,18 +155,6 @@ class ForgetsAChild : public KineticBoxTree<S, Queue, Count, Observer> {
     for (auto& bound : this->bounds_) bound.first = std::min(bound.first + 1, bound.vertices);
   }
 };
-template <class S>
-class LosesEvents : public BinaryHeapQueue<S> {
- public:
-  using BinaryHeapQueue<S>::BinaryHeapQueue;
-  void schedule(const Event& event) {
-    if (++scheduled_ % 50 != 0) BinaryHeapQueue<S>::schedule(event);
-  }
-
- private:
-  std::uint64_t scheduled_ = 0;
-};
-
 TEST(BoxTreeFaults, AreCaught) {
   for (const char* name : {"soups", "sheets", "integer_ties"}) {
     const auto test = synthetic_scene<float>(name);
@@ -174,7 +163,7 @@ TEST(BoxTreeFaults, AreCaught) {
     EXPECT_TRUE((BoxTreeProof<float, AvlQueue>::run(test, listed).envelope.holds())) << name;
     EXPECT_FALSE((BoxTreeProof<float, AvlQueue, ForgetsLeaves>::run(test, listed).envelope.holds())) << name;
     EXPECT_FALSE((BoxTreeProof<float, AvlQueue, ForgetsAChild>::run(test, listed).envelope.holds())) << name;
-    EXPECT_FALSE((BoxTreeProof<float, LosesEvents>::run(test, {}).envelope.holds())) << name;
+    EXPECT_FALSE((BoxTreeProof<float, LossyQueue>::run(test, {}).envelope.holds())) << name;
   }
 }
 

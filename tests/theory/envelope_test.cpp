@@ -8,6 +8,7 @@
 #include "core/families/events/kinetic_tree_strategy.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
+#include "tests/theory/lossy_queue.hpp"
 #ifdef KBVH_TEST_HAS_IO
 #include "experiments/io/load.hpp"
 #endif
@@ -201,19 +202,6 @@ TEST(EnvelopeFaults, NeedlessEntries) {
     EXPECT_FALSE(wrong.check().holds()) << "entry " << at;
   }
 }
-
-/// Loses one event in fifty.
-template <class S>
-class LossyQueue : public BinaryHeapQueue<S> {
- public:
-  using BinaryHeapQueue<S>::BinaryHeapQueue;
-  void schedule(const Event& event) {
-    if (++scheduled_ % 50 != 0) BinaryHeapQueue<S>::schedule(event);
-  }
-
- private:
-  std::uint64_t scheduled_ = 0;
-};
 
 TEST(EnvelopeFaults, QueueThatLosesEvents) {
   const auto test = synthetic_scene<float>("soups");

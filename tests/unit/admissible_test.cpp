@@ -9,6 +9,7 @@
 #include "core/contract/registry.hpp"
 #include "core/judge/range_watch.hpp"
 #include "core/judge/verify.hpp"
+#include "tests/support/plan_changes.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh {
@@ -43,17 +44,6 @@ Scene<S> small_scene() {
   }
   scene.pairs = all_pairs(scene.bodies);
   return scene;
-}
-
-template <class S>
-PlanChange<S> flies(std::uint32_t body, std::uint32_t vertex, S x, S y, S z) {
-  PlanChange<S> change;
-  change.body = body;
-  change.vertex = vertex;
-  change.velocity[0] = x;
-  change.velocity[1] = y;
-  change.velocity[2] = z;
-  return change;
 }
 
 template <class S>
