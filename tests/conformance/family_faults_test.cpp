@@ -1,13 +1,13 @@
 // The suite can fail for the families beyond refits: linear bounds, the interval join with its span filter,
-// near pairs, sweeps of contacts, trees built at every frame, fronts and the sweep on one axis, each in its
-// simplest form, sound and with one seeded fault. (faults_test.cpp: the others.)
+// near pairs, sweeps of contacts, trees built at every frame and the sweep
+// on one axis, each in its simplest form, sound and with one seeded fault. (faults_test.cpp: the
+// others.)
 
 #include <gtest/gtest.h>
 
 #include "core/families/build/built_strategy.hpp"
 #include "core/families/build/curve_builders.hpp"
 #include "core/families/drift/near_pairs.hpp"
-#include "core/families/front/pair_front.hpp"
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/linear_bounds.hpp"
 #include "core/families/linear/triangle_span_filter.hpp"
@@ -34,8 +34,6 @@ enum class Fault : std::uint8_t {
   short_leaf,       // a leaf ends one primitive early
   unmade_tree,      // every eighth tree is not built: the one before is used on
   unsorted_boxes,   // boxes are swept on another axis than the one that they are sorted on
-  no_descent,       // a front takes all pairs of children for met, and never descends from them again
-  wrong_climb,      // a front takes pairs of children for dropped that are still in it
   unmade_boxes,     // boxes are those of the first frame
 };
 
@@ -292,31 +290,6 @@ struct HalvesBuilder {
 template <class S, class Count, Fault fault>
 using Built = BuiltStrategy<S, Count, HalvesBuilder<S, fault>>;
 
-/// A front between refitted hierarchies.
-template <class S, class Count, Fault fault>
-class Fronts : public StoredHierarchyStrategy<S, Count> {
- public:
-  static constexpr Foresight foresight = Foresight::none;
-  using StoredHierarchyStrategy<S, Count>::StoredHierarchyStrategy;
-  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
-    for (FrontPair& entry : front_.entries()) {
-      if (fault == Fault::no_descent) entry.met = ~std::uint64_t(0);
-      if (fault == Fault::wrong_climb) entry.met = 0;
-    }
-    std::uint64_t tests = 0;
-    front_.start_frame();
-    for (std::uint32_t i = 0; i < this->scene_.pairs().size(); ++i) {
-      const BodyPair& pair = this->scene_.pairs()[i];
-      front_.run(i, this->side(pair.first), this->side(pair.second), this->query_, out, tests);
-    }
-    return {};
-  }
-
- private:
-  void update(std::uint32_t body) override { this->refit(body); }
-  PairFront<S> front_;
-};
-
 /// A sweep on one axis.
 template <class S, class Count, Fault fault>
 class AxisSweep : public CountedStrategy<S, Count> {
@@ -462,16 +435,6 @@ TEST(FamilyFaults, ALeafThatEndsEarly) {
 }
 TEST(FamilyFaults, ATreeThatIsNotBuilt) {
   expect_caught<Built, Fault::unmade_tree>("soups", "protrudes");
-}
-
-TEST(FamilyFaults, SoundFrontsPass) {
-  expect_sound<Fronts>({"soups", "sheets", "plan_changes", "four_bodies_own_keyframes"});
-}
-TEST(FamilyFaults, AFrontThatNeverDescendsAgain) {
-  expect_caught<Fronts, Fault::no_descent>("soups", "not among the candidates");
-}
-TEST(FamilyFaults, AFrontThatClimbsWrongly) {
-  expect_caught<Fronts, Fault::wrong_climb>("soups", "reported more than once");
 }
 
 TEST(FamilyFaults, SoundSweepsOnAnAxisPass) {

@@ -7,12 +7,12 @@ namespace {
 
 /// The lanes of each mask of eight bits, ascending; 0 behind them.
 struct LaneLists {
-  std::uint32_t of[256][8];
+  std::uint64_t of[256][8];
 };
 constexpr LaneLists make_lane_lists() {
   LaneLists lists{};
   for (unsigned mask = 0; mask < 256; ++mask)
-    for (std::uint32_t lane = 0, n = 0; lane < 8; ++lane)
+    for (unsigned lane = 0, n = 0; lane < 8; ++lane)
       if ((mask >> lane & 1) != 0) lists.of[mask][n++] = lane;
   return lists;
 }
@@ -22,30 +22,25 @@ constexpr unsigned low_bits(unsigned count) {
   return (1U << count) - 1;
 }
 
-/// Appends pairs of leaves: one leaf with the lanes of a mask. Writes eight pairs, of which those behind the
-/// last lane do not count: the number of lanes changes from call to call, and a loop over them would be
-/// mispredicted each time.
+/// Appends pairs of leaves: `pair` with each lane of a mask added, `shift` bits up. Writes eight pairs, of
+/// which those behind the last lane do not count: the number of lanes changes from call to call, and a loop
+/// over them would be mispredicted each time.
+template <unsigned shift>
+[[gnu::always_inline]] inline void emit_lanes(FrontUpdate& update, std::uint64_t pair, unsigned mask) {
+  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "a pair is stored as one number, first slot low");
+  using V = Vector<std::uint64_t, native_lanes<std::uint64_t>>;
+  LeafSlot* const out = update.out + 2 * update.found;
+  for (std::size_t k = 0; k < 8; k += native_lanes<std::uint64_t>)
+    store_lanes(out + 2 * k, (load_lanes<V>(lane_lists.of[mask] + k) << shift) + pair);
+  update.found += unsigned(__builtin_popcount(mask));
+}
 [[gnu::always_inline]] inline void emit_seconds(FrontUpdate& update, LeafSlot first, std::uint32_t node,
                                                 unsigned mask) {
-  LeafSlot* const out = update.out + 2 * update.found;
-  std::uint32_t lanes[8];
-  __builtin_memcpy(lanes, lane_lists.of[mask], sizeof lanes);
-  for (std::uint32_t k = 0; k < 8; ++k) {
-    out[2 * k] = first;
-    out[2 * k + 1] = {LeafSlot::of(node, lanes[k])};
-  }
-  update.found += unsigned(__builtin_popcount(mask));
+  emit_lanes<32>(update, first.word | std::uint64_t(LeafSlot::of(node, 0)) << 32, mask);
 }
 [[gnu::always_inline]] inline void emit_firsts(FrontUpdate& update, std::uint32_t node, LeafSlot second,
                                                unsigned mask) {
-  LeafSlot* const out = update.out + 2 * update.found;
-  std::uint32_t lanes[8];
-  __builtin_memcpy(lanes, lane_lists.of[mask], sizeof lanes);
-  for (std::uint32_t k = 0; k < 8; ++k) {
-    out[2 * k] = {LeafSlot::of(node, lanes[k])};
-    out[2 * k + 1] = second;
-  }
-  update.found += unsigned(__builtin_popcount(mask));
+  emit_lanes<0>(update, LeafSlot::of(node, 0) | std::uint64_t(second.word) << 32, mask);
 }
 
 template <class S>
