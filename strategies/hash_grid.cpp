@@ -1,4 +1,11 @@
-// A uniform grid in space with hashed cells, made anew for each two bodies and frame by a counting sort.
+// A uniform grid with hashed cells, without a hierarchy, made anew for each two bodies and frame by a
+// counting sort. A box is entered once, into the cell of its lower corner, so that no pair is found twice;
+// boxes much larger than most have coarser grids of their own. Only boxes that meet the box of the other body
+// take part.
+//
+// When it wins: against a refit, where bodies mix or fly apart (plan `ageing`); on such scenes it takes about
+// the time of `lbvh`, and less than `sweep`. A refit wins by far where neighbours stay neighbours, as on
+// cloth, because the grid starts over at every frame.
 #include "core/families/grid/hash_grid.hpp"
 
 #include "core/contract/registry.hpp"

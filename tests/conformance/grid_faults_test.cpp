@@ -12,7 +12,6 @@ namespace {
 enum class Fault : std::uint8_t {
   none,
   unmade_boxes,    // boxes are those of the first frame
-  stale_bound,     // a body is taken to be where it was in the first frame, and only its boxes are new
   lost_primitive,  // the last primitive of each body is not entered
 };
 
@@ -31,7 +30,6 @@ struct Seeded {
     }
     void reset_to(double /*t*/) override {
       for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
-      first_ = bodies_;
     }
     void advance_to(double /*t*/) override {
       if (fault == Fault::unmade_boxes) return;
@@ -40,7 +38,6 @@ struct Seeded {
     QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
       std::uint64_t tests = 0;
       for (const auto& [first, second] : this->scene_.pairs()) {
-        if (fault == Fault::stale_bound && !overlap(first_[first].box(), first_[second].box())) continue;
         grid_.search(bodies_[first], lists_[first], bodies_[second], lists_[second], tests,
                      [&, first = first, second = second](std::uint32_t a, std::uint32_t b) {
                        out.push_back({first, a, second, b});
@@ -55,7 +52,7 @@ struct Seeded {
       bodies_[body].update(this->scene_.primitives(body), lists_[body], this->sampled_.positions(body),
                            active_kernel_set());
     }
-    std::vector<GridBody<S>> bodies_, first_;
+    std::vector<GridBody<S>> bodies_;
     std::vector<PrimitiveList> lists_;
     HashGrid<S> grid_{2, active_kernel_set()};
   };
@@ -89,9 +86,6 @@ TEST(GridFaults, SoundGridsPass) {
 }
 TEST(GridFaults, BoxesOfTheFirstFrame) {
   expect_caught<Fault::unmade_boxes>("soups");
-}
-TEST(GridFaults, BodiesWhereTheyWere) {
-  expect_caught<Fault::stale_bound>("four_bodies_own_keyframes");
 }
 TEST(GridFaults, APrimitiveThatIsNotEntered) {
   expect_caught<Fault::lost_primitive>("soups");
