@@ -15,6 +15,8 @@
 namespace kbvh {
 namespace {
 
+using test::flies;
+
 std::string complaint(const std::function<void()>& work) {
   try {
     work();
