@@ -87,7 +87,8 @@ class WideTree {
                sizeof(std::uint32_t);
   }
   const std::uint32_t* end_entries() const {
-    return end_entry_.empty() ? first_entry_.data() + 1 : end_entry_.data();
+    if (!end_entry_.empty()) return end_entry_.data();
+    return first_entry_.empty() ? nullptr : first_entry_.data() + 1;
   }
 
   std::uint32_t width_ = 2, leaf_size_ = 1;
