@@ -4,10 +4,10 @@
 // compares all children of a pair of wide nodes, the disjoint ones among them, so the front saves no box
 // tests; it saves the stack, and branches that depend on which boxes overlap.
 //
-// When it wins: never by more than the spread of repeated runs, on the coherent cloth that was tried. There
-// it is as fast as `bottom_up`, and faster than `kinetic_separation_list`. Even with one change in a hundred
-// pairs of nodes or fewer per frame, the traversal is a small part of a query; the rest is pairs of leaves
-// and triangles, which a front leaves as they are.
+// When it wins: not seen yet. On the coherent cloth that was tried it is about as fast as `bottom_up`; plan
+// `kinetic` has it beside the separation list. Where few pairs of nodes change from frame to frame, the
+// traversal is a small part of a query; the rest is pairs of leaves and triangles, which a front leaves as
+// they are.
 #include "core/contract/registry.hpp"
 #include "core/families/front/pair_front.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
