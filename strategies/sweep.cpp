@@ -5,47 +5,29 @@
 #include <cmath>
 
 #include "core/contract/registry.hpp"
+#include "core/families/build/built_each_frame.hpp"
 #include "core/families/sweep/sorted_boxes.hpp"
-#include "core/families/wide/near_bodies.hpp"
 #include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
 namespace {
 
 template <class S, class Count>
-class Sweep final : public CountedStrategy<S, Count>,
-                    public AnswersSelfPairs,
-                    public TakesPlanChanges<S>,
-                    public TakesGeometryChanges<S> {
+class Sweep final : public BuiltEachFrame<S, Count, SortedBoxes<S>> {
+  using Base = BuiltEachFrame<S, Count, SortedBoxes<S>>;
+  using Base::bodies_;
+  using Base::kernels_;
+  using Base::lists_;
+
  public:
-  static constexpr Foresight foresight = Foresight::none;
   Sweep(const SceneView<S>& scene, const SampledMotion<S>& motion, const Topologies& /*topologies*/,
         const Params& /*params*/)
-      : CountedStrategy<S, Count>(scene, motion),
-        bodies_(scene.body_count()),
-        near_bodies_(scene.pairs(), scene.body_count()),
-        found_(room) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-      lists_.emplace_back(scene.primitives(body));
-  }
+      : Base(scene, motion), found_(room) {}
 
-  void reset_to(double /*t*/) override {
-    plans_changed_ = false;
-    near_bodies_.start_over();
-    axis_ = best_axis();
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
-      bodies_[body].start(lists_[body], kernels_);
-      update(body);
-    }
-  }
-  void advance_to(double /*t*/) override {
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
-      if (this->scene_.moving(body) || plans_changed_) update(body);
-  }
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
     std::uint64_t tests = 0;
     const auto box_of = [&](std::uint32_t body) { return bodies_[body].box(); };
-    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
+    for (const std::uint32_t i : this->near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
       if (!bodies_[pair.first].empty() && !bodies_[pair.second].empty()) sweep(pair, out, tests);
     }
@@ -53,37 +35,22 @@ class Sweep final : public CountedStrategy<S, Count>,
     return {};
   }
   std::size_t bytes() const override {
-    std::size_t total = boxes_.bytes() + near_bodies_.bytes() + found_.capacity() * sizeof(FoundPair) +
-                        bodies_.capacity() * sizeof(bodies_[0]) + lists_.capacity() * sizeof(lists_[0]);
-    for (const auto& body : bodies_) total += body.bytes();
-    for (const PrimitiveList& list : lists_) total += list.bytes();
-    return total;
+    return Base::bytes() + boxes_.bytes() + found_.capacity() * sizeof(FoundPair);
   }
 
  private:
   static constexpr std::size_t room = 4096;
 
-  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
-    plans_changed_ = true;
-  }
-  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
-    plans_changed_ = true;  // new vertices have their own plans
-    for (const BodyChange& body_change : body_changes(this->scene_, change)) {
-      const std::uint32_t body = body_change.body;
-      lists_[body] = PrimitiveList(this->scene_.primitives(body));
-      bodies_[body].start(lists_[body], kernels_);
-      update(body);
-    }
-  }
-  void take_boxes(std::uint32_t body) {
-    boxes_.take(this->scene_.primitives(body), lists_[body], this->sampled_.positions(body), kernels_);
-  }
-  void update(std::uint32_t body) {
+  void start() override { axis_ = best_axis(); }
+  void list_changed(std::uint32_t body) override { bodies_[body].start(lists_[body], kernels_); }
+  void build(std::uint32_t body) override {
     if (lists_[body].count == 0) return;
     take_boxes(body);
     bodies_[body].update(boxes_.boxes(), axis_);
-    this->count_.add(Counter::values_written, std::uint64_t(6) * lists_[body].count);
-    this->count_.add(Counter::vertex_reads, this->scene_.primitives(body).vertices.size());
+    this->count_build(body);
+  }
+  void take_boxes(std::uint32_t body) {
+    boxes_.take(this->scene_.primitives(body), lists_[body], this->sampled_.positions(body), kernels_);
   }
   /// Finds the axis on which the fewest boxes overlap, as far as their mean length and the standard deviation
   /// of their centres tell.
@@ -138,14 +105,9 @@ class Sweep final : public CountedStrategy<S, Count>,
     tests += job.tests;
   }
 
-  const KernelSet kernels_ = active_kernel_set();
-  std::vector<SortedBoxes<S>> bodies_;
-  std::vector<PrimitiveList> lists_;
   CurveOrder<S> boxes_;
-  NearBodies near_bodies_;
   std::vector<FoundPair> found_;
   std::uint32_t axis_ = 0;
-  bool plans_changed_ = false;
 };
 
 }  // namespace

@@ -1,10 +1,9 @@
 #pragma once
 #include <optional>
 
-#include "core/contract/strategy.hpp"
+#include "core/families/build/built_each_frame.hpp"
 #include "core/families/build/built_tree.hpp"
 #include "core/families/build/curve_order.hpp"
-#include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/wide_query.hpp"
 
 namespace kbvh {
@@ -13,46 +12,36 @@ namespace kbvh {
 /// and has
 ///   build(BuiltTree&, CurveOrder&, const PrimitiveList&)   over the boxes that the order has taken
 ///   bytes()
-/// Of the given topologies, only the leaf size counts. Bodies that cannot move are built at `reset` only.
+/// Of the given topologies, only the leaf size counts.
 template <class S, class Count, class Builder>
-class BuiltStrategy : public CountedStrategy<S, Count>,
-                      public AnswersSelfPairs,
-                      public TakesPlanChanges<S>,
-                      public TakesGeometryChanges<S> {
+class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>> {
+  using Base = BuiltEachFrame<S, Count, BuiltTree<S>>;
+  using Base::bodies_;
+  using Base::lists_;
+  using Base::near_bodies_;
+
  public:
-  static constexpr Foresight foresight = Foresight::none;
   BuiltStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, const Topologies& topologies,
                 const Params& params)
-      : CountedStrategy<S, Count>(scene, motion),
-        builder_(params),
-        near_bodies_(scene.pairs(), scene.body_count()) {
-    trees_.resize(scene.body_count());
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
-      trees_[body].start(topologies[body].leaf_size, active_kernel_set());
-      lists_.emplace_back(scene.primitives(body));
-    }
+      : Base(scene, motion), builder_(params) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      bodies_[body].start(topologies[body].leaf_size, this->kernels_);
   }
 
-  void reset_to(double /*t*/) override {
-    plans_changed_ = false;
-    near_bodies_.start_over();
-    for (std::uint32_t body = 0; body < trees_.size(); ++body) build(body);
+  void reset_to(double t) override {
+    Base::reset_to(t);
     check_layouts(
-        this->scene_.pairs(), [&](std::uint32_t body) -> const auto& { return trees_[body]; });
-  }
-  void advance_to(double /*t*/) override {
-    for (std::uint32_t body = 0; body < trees_.size(); ++body)
-      if (this->scene_.moving(body) || plans_changed_) build(body);
+        this->scene_.pairs(), [&](std::uint32_t body) -> const auto& { return bodies_[body]; });
   }
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
     const auto box_of = [&](std::uint32_t body) {
-      return trees_[body].empty() ? Box<double>{} : to_double(trees_[body].root_box());
+      return bodies_[body].empty() ? Box<double>{} : to_double(bodies_[body].root_box());
     };
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
-      const WideSide<S> first{&trees_[pair.first], pair.first}, second{&trees_[pair.second], pair.second};
+      const WideSide<S> first{&bodies_[pair.first], pair.first}, second{&bodies_[pair.second], pair.second};
       status.pending += tests >= budget.box_tests
                             ? 1
                             : query_.run(first, second, out, tests, rest_of(budget, tests)).pending;
@@ -62,48 +51,26 @@ class BuiltStrategy : public CountedStrategy<S, Count>,
   }
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     AuditView view;
-    view.topology = trees_[body].topology(view.boxes);
+    view.topology = bodies_[body].topology(view.boxes);
     return view;
   }
   std::size_t bytes() const override {
-    std::size_t total = builder_.bytes() + order_.bytes() + near_bodies_.bytes() + query_.bytes() +
-                        trees_.capacity() * sizeof(trees_[0]) + lists_.capacity() * sizeof(lists_[0]);
-    for (const BuiltTree<S>& tree : trees_) total += tree.bytes();
-    for (const PrimitiveList& list : lists_) total += list.bytes();
-    return total;
-  }
-
- protected:
-  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
-    plans_changed_ = true;
-  }
-  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
-    plans_changed_ = true;  // new vertices have their own plans
-    for (const BodyChange& body_change : body_changes(this->scene_, change)) {
-      lists_[body_change.body] = PrimitiveList(this->scene_.primitives(body_change.body));
-      build(body_change.body);
-    }
+    return Base::bytes() + builder_.bytes() + order_.bytes() + query_.bytes();
   }
 
  private:
-  void build(std::uint32_t body) {
-    const Primitives& primitives = this->scene_.primitives(body);
-    BuiltTree<S>& tree = trees_[body];
-    order_.take(primitives, lists_[body], this->sampled_.positions(body), tree.kernels());
+  void build(std::uint32_t body) override {
+    BuiltTree<S>& tree = bodies_[body];
+    order_.take(this->scene_.primitives(body), lists_[body], this->sampled_.positions(body), this->kernels_);
     builder_.build(tree, order_, lists_[body]);
     const std::uint64_t boxes = tree.node_count() + tree.leaf_count();
     this->count_.add(Counter::nodes_visited, boxes);
-    this->count_.add(Counter::values_written, 6 * (boxes + lists_[body].count));
-    this->count_.add(Counter::vertex_reads, primitives.vertices.size());
+    this->count_build(body, boxes);
   }
 
   Builder builder_;
-  std::vector<BuiltTree<S>> trees_;
-  std::vector<PrimitiveList> lists_;
   CurveOrder<S> order_;
-  NearBodies near_bodies_;
   WideQuery<S> query_{this->scene_, this->sampled_};
-  bool plans_changed_ = false;
 };
 
 }  // namespace kbvh
