@@ -104,7 +104,7 @@ def zero_log_axis(axes: Axes, values: Sequence[float], tick: FormatTick) -> None
 
 def mark(axes: Axes, x: float, y: float, look: Look, size: float = 7.5, zorder: float = 3) -> None:
     """Draws one contestant's marker in data coordinates."""
-    axes.plot([x], [y], marker=look.marker, color=look.colour, markerfacecolor=look.face, markersize=size,
+    axes.plot([x], [y], marker=look.drawn, color=look.colour, markerfacecolor=look.face, markersize=size,
               markeredgewidth=1.5, linestyle="none", zorder=zorder, clip_on=False)  # fmt: skip
 
 
@@ -118,7 +118,7 @@ def contestants_on_y(axes: Axes, labels: Sequence[str], looks: Sequence[Optional
     for row, look in enumerate(looks):
         if look is None:
             continue
-        axes.plot([0], [row], marker=look.marker, color=look.colour, markerfacecolor=look.face, markersize=6.5,
+        axes.plot([0], [row], marker=look.drawn, color=look.colour, markerfacecolor=look.face, markersize=6.5,
                   markeredgewidth=1.4, linestyle="none", clip_on=False, transform=beside)  # fmt: skip
 
 
@@ -135,7 +135,7 @@ def key(axes: Axes, entries: Sequence[tuple[str, Look]], lines: KeyLines) -> Non
             left = offset_copy(at, axes.figure, x=2, units="points")
             axes.add_line(_segment(axes, left, look))
         middle = offset_copy(at, axes.figure, x=19 if lines is KeyLines.shown else 6, units="points")
-        axes.plot([0], [1], marker=look.marker, color=look.colour, markerfacecolor=look.face, markersize=6,
+        axes.plot([0], [1], marker=look.drawn, color=look.colour, markerfacecolor=look.face, markersize=6,
                   markeredgewidth=1.4, linestyle="none", clip_on=False, transform=middle)  # fmt: skip
         text_at = offset_copy(at, axes.figure, x=start + 8, units="points")
         axes.text(0, 1, lines_of_label[0], transform=text_at, va="center_baseline", fontsize=8.5, clip_on=False)

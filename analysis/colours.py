@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-#: family -> (colour, matplotlib marker)
+#: family -> (colour, marker: one of matplotlib's letters or a name in `_POLYGONS`)
 FAMILIES: dict[str, tuple[str, str]] = {
     "refit": ("#0072B2", "o"),
     "period": ("#7A7A7A", "d"),
@@ -25,13 +25,16 @@ FAMILIES: dict[str, tuple[str, str]] = {
     "linear": ("#882255", "h"),
     "approximate": ("#AA4499", "8"),
     "auto": ("#44AA99", "p"),
+    "restructuring": ("#5D4A9C", ">"),
+    "sweep": ("#117733", "*"),
+    "volumes": ("#6B4C2A", "H"),
 }
 
 #: Choices for unknown families.
 FREE: tuple[tuple[str, str], ...] = (
-    ("#5D4A9C", ">"),
-    ("#117733", "*"),
-    ("#6B4C2A", "H"),
+    ("#A8324A", "bar"),
+    ("#2F6F7E", "hourglass"),
+    ("#1B1BB3", "arrow"),
 )
 
 LINE_STYLES: tuple[object, ...] = ("-", (0, (5, 2)), (0, (1.2, 1.4)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
@@ -70,6 +73,14 @@ class Look:
     def face(self) -> str:
         """Returns the colour inside the marker: open markers distinguish members of a family without colour."""
         return self.colour if self.filled else "#FFFFFF"
+
+    @property
+    def drawn(self) -> object:
+        """Returns the marker as matplotlib takes it: a letter, or corners."""
+        if len(self.marker) == 1:
+            return self.marker
+        corners = [corner.split(",") for corner in _POLYGONS[self.marker].split()]
+        return tuple((float(x), -float(y)) for x, y in [*corners, corners[0]])
 
 
 def families(names: Iterable[str]) -> dict[str, tuple[str, str]]:
@@ -142,6 +153,9 @@ _POLYGONS: dict[str, str] = {
     "P": "-1.7,-5 1.7,-5 1.7,-1.7 5,-1.7 5,1.7 1.7,1.7 1.7,5 -1.7,5 -1.7,1.7 -5,1.7 -5,-1.7 -1.7,-1.7",
     "X": "-5,-2.7 -2.7,-5 0,-2.3 2.7,-5 5,-2.7 2.3,0 5,2.7 2.7,5 0,2.3 -2.7,5 -5,2.7 -2.3,0",
     "*": "0,-5 1.2,-1.6 4.8,-1.6 1.9,.6 3,4.1 0,2 -3,4.1 -1.9,.6 -4.8,-1.6 -1.2,-1.6",
+    "bar": "-5,-2 5,-2 5,2 -5,2",
+    "hourglass": "-4,-5 4,-5 1.2,0 4,5 -4,5 -1.2,0",
+    "arrow": "5,0 -4.5,-4.5 -1.5,0 -4.5,4.5",
 }
 
 

@@ -225,7 +225,7 @@ def draw_wrong_pairs(axes: Axes, rows: pd.DataFrame, looks: Looks) -> tuple[list
         look = looks[contestant]
         axes.plot([m, e], [y, y], color=look.colour, linewidth=1.2, zorder=2)
         for x, face in ((m, look.colour), (e, "white")):
-            axes.plot([x], [y], marker=look.marker, color=look.colour, markerfacecolor=face, markersize=7.5,
+            axes.plot([x], [y], marker=look.drawn, color=look.colour, markerfacecolor=face, markersize=7.5,
                       markeredgewidth=1.5, zorder=3, clip_on=False)  # fmt: skip
         points.append((max(m, e), y))
     handles = [
@@ -254,7 +254,7 @@ def _lines(
         log_axis(axes, "y", list(positive[column]))
         for contestant, line in positive.sort_values(x).groupby("contestant"):
             look = looks[contestant]
-            axes.plot(line[x], line[column], linestyle=look.line, color=look.colour, marker=look.marker,
+            axes.plot(line[x], line[column], linestyle=look.line, color=look.colour, marker=look.drawn,
                       markerfacecolor=look.face, markersize=5.5, markeredgewidth=1.3)  # fmt: skip
         axes.set_title(title)
         axes.set_xlabel(x_label)

@@ -227,7 +227,7 @@ def draw_panel(axes: Axes, panel: Panel, lines: list[Line], where: str) -> None:
     log_axis(axes, "y", [y for line in lines for y in line.y])
     for line in lines:
         style = (0, (1, 1.6)) if line.second else line.look.line
-        axes.plot(line.x, line.y, linestyle=style, color=line.look.colour, marker=line.look.marker,
+        axes.plot(line.x, line.y, linestyle=style, color=line.look.colour, marker=line.look.drawn,
                   markerfacecolor="white" if line.second else line.look.face, markersize=5.5, markeredgewidth=1.3)  # fmt: skip
     axes.set_title(f"{panel.place}: {panel.title}", fontsize=8.5)
     axes.set_xlabel(f"polygons ({where})" if panel.x == "polygons" else f"frames per keyframe, l ({where})")

@@ -76,7 +76,7 @@ def _keyed(scenes: Sequence[str], theory: Theory, panels: int, height: float) ->
 
 def _line(axes: Axes, x: Sequence[float], y: Sequence[float], look: Look, filled: Optional[bool] = None) -> None:
     face = look.colour if (look.filled if filled is None else filled) else "#FFFFFF"
-    axes.plot(x, y, linestyle=look.line, color=look.colour, marker=look.marker, markerfacecolor=face, markersize=5.5,
+    axes.plot(x, y, linestyle=look.line, color=look.colour, marker=look.drawn, markerfacecolor=face, markersize=5.5,
               markeredgewidth=1.3, zorder=3)  # fmt: skip
 
 
@@ -154,7 +154,7 @@ def draw_values_over_l(axes: Axes, rows: pd.DataFrame, scene_looks: dict[str, Lo
     for scene, line in rows.groupby("scene"):
         look = scene_looks[str(scene)]
         _line(axes, line["l"], line["values"], look, filled=True)
-        axes.plot(line["l"], line["bottom_up_values"], linestyle=(0, (1, 1.6)), color=look.colour, marker=look.marker,
+        axes.plot(line["l"], line["bottom_up_values"], linestyle=(0, (1, 1.6)), color=look.colour, marker=look.drawn,
                   markerfacecolor="white", markersize=5, markeredgewidth=1.1, linewidth=1.1, zorder=2)  # fmt: skip
     axes.set_title("bound values written in a clip")
     axes.set_xlabel("interpolated frames per keyframe, l")
@@ -191,7 +191,7 @@ def draw_mean_and_most(
     for scene, line in rows.groupby("scene"):
         look = scene_looks[str(scene)]
         _line(axes, line["vertices"], mean[line.index], look, filled=True)
-        axes.plot(line["vertices"], most[line.index], linestyle=(0, (1, 1.6)), color=look.colour, marker=look.marker,
+        axes.plot(line["vertices"], most[line.index], linestyle=(0, (1, 1.6)), color=look.colour, marker=look.drawn,
                   markerfacecolor="white", markersize=5.5, markeredgewidth=1.2, linewidth=1.1, zorder=2)  # fmt: skip
     axes.set_ylim(0, float(most.max()) * 1.2)
     axes.grid(True, axis="y")
@@ -228,7 +228,7 @@ def draw_steps(
         look = scene_looks[str(scene)]
         axes.plot(line["triangles"], bound[line.index], color=BOUND, linewidth=1.2, zorder=1)
         _line(axes, line["triangles"], mean[line.index], look, filled=True)
-        axes.plot(line["triangles"], most[line.index], linestyle=(0, (1, 1.6)), color=look.colour, marker=look.marker,
+        axes.plot(line["triangles"], most[line.index], linestyle=(0, (1, 1.6)), color=look.colour, marker=look.drawn,
                   markerfacecolor="white", markersize=5.5, markeredgewidth=1.2, linewidth=1.1, zorder=2)  # fmt: skip
     axes.set_xlabel("polygons m")
     handles = [

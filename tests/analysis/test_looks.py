@@ -8,6 +8,7 @@ import paths  # noqa: F401  (finds the modules under test)
 
 import pandas as pd
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 import colours
 import figures
@@ -38,6 +39,13 @@ class TestLooks(unittest.TestCase):
         self.assertEqual(len({(look.colour, str(look.line), look.filled) for look in looks.values()}), 3)
         self.assertEqual(looks["a1"].colour, looks["a2"].colour)
         self.assertEqual({look.marker for look in looks.values()}, {"o"})
+
+    def test_every_marker_can_be_drawn(self) -> None:
+        figure = Figure()
+        axes = figure.subplots()
+        for colour, marker in [*colours.FAMILIES.values(), *colours.FREE]:
+            axes.plot([0], [0], marker=colours.Look(colour, marker, "-", True).drawn)
+        FigureCanvasAgg(figure).draw()
 
     def test_every_marker_has_a_symbol_for_the_page(self) -> None:
         for colour, marker in [*colours.FAMILIES.values(), *colours.FREE]:
