@@ -240,6 +240,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "tightness": record.text("strategy.tightness", ""),
         "foresight": record.text("strategy.foresight", ""),
         "citation": record.text("strategy.citation", ""),
+        "about": record.text("strategy.about", ""),
         "choice": record.text("choice", ""),
         "own_scalar": record.text("strategy.own_scalar", ""),
         "params": params,

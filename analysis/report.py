@@ -14,6 +14,7 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+import ageing
 import choices
 import break_even
 import claim_pictures
@@ -21,6 +22,7 @@ import claim_tables
 import claims as paper_claims
 import exactness
 import files
+import guide
 import paper_figures
 import robustness
 import sections
@@ -122,6 +124,9 @@ def write(
         own_sections=[section for section in of_scenes if section.own],
         every_section=of_scenes,
         strategies=_strategies(study),
+        descriptions=_descriptions(study),
+        guide_kinds=guide.kinds(study),
+        ageing_scenes=ageing.scenes(study),
         choices=choices.choices(study),
         exactness=exactness_rows,
         exactness_says=exactness.paragraph(exactness_rows),
@@ -283,6 +288,18 @@ def _strategies(study: Study) -> list[dict[str, object]]:
                 "citation": row.citation or text.MISSING,
             }
         )
+    return result
+
+
+def _descriptions(study: Study) -> list[dict[str, object]]:
+    """Describes each strategy in its own words, with what it did in this study."""
+    records = guide.records(study)
+    unique = study.runs.sort_values(["family", "id"]).drop_duplicates("id")
+    result = []
+    for row in unique.itertuples():
+        own = [part for part in str(row.about).split("\n") if part]
+        result.append({"id": row.id, "title": row.title, "contestant": row.contestant, "family": row.family,
+                       "citation": row.citation or text.MISSING, "paragraphs": own, "record": records.get(str(row.id))})  # fmt: skip
     return result
 
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 
+#include "core/contract/about.hpp"
 #include "experiments/cli/commands.hpp"
 #include "experiments/cli/program.hpp"
 #include "experiments/common/output.hpp"
@@ -78,6 +79,7 @@ json strategy_json(const Info& info) {
           {"family", info.family},
           {"baseline", info.baseline},
           {"citation", info.citation},
+          {"about", about(info.id)},
           {"foresight", word(info.foresight)},
           {"tightness", word(info.tightness)},
           {"guarantee", word(info.guarantee)},
@@ -106,8 +108,26 @@ void print_json() {
   print(all.dump(2) + "\n");
 }
 
+/// Returns a text in lines of at most 100 characters, indented.
+std::string wrapped(std::string_view text, const std::string& indent) {
+  std::string lines;
+  for (const std::string& paragraph : split(text, '\n')) {
+    std::string line = indent;
+    for (const std::string& word : split(paragraph, ' ')) {
+      if (line.size() > indent.size() && line.size() + 1 + word.size() > 100) {
+        lines += line + "\n";
+        line = indent;
+      }
+      line += (line.size() > indent.size() ? " " : "") + word;
+    }
+    if (line.size() > indent.size()) lines += line + "\n";
+  }
+  return lines;
+}
+
 void print_strategy(const Info& info) {
   std::string text = fmt::format("{}: {} ({})\n", info.id, info.title, info.citation);
+  text += wrapped(about(info.id), "    ");
   text +=
       fmt::format("    family {}, foresight {}, {}, guarantee {}, {}{}\n", info.family, word(info.foresight),
                   info.tightness == Tightness::none ? "bounds of no declared tightness"

@@ -1,5 +1,7 @@
 #include "experiments/study/strategy_record.hpp"
 
+#include "core/contract/about.hpp"
+
 namespace kbvh::experiments {
 
 using nlohmann::json;
@@ -60,6 +62,7 @@ json strategy_record(const ContestantSpec& spec) {
           {"tightness", word(info.tightness)},
           {"foresight", word(info.foresight)},
           {"citation", info.citation},
+          {"about", about(info.id)},
           {"own_scalar", info.own_scalar},
           {"params", params},
           {"builder", builder}};

@@ -4,6 +4,7 @@
 #include <exception>
 #include <new>
 
+#include "core/contract/about.hpp"
 #include "core/contract/registry.hpp"
 #include "experiments/cli/program.hpp"
 
@@ -99,6 +100,9 @@ const std::vector<StrategyEntry>& registry() {
       make_entry<Honest>(small),
       make_entry<Honest, Scalars::double_only>(info("only_double", Guarantee::exact))};
   return entries;
+}
+std::string_view about(std::string_view /*id*/) {
+  return "Deliberately at fault.";
 }
 
 }  // namespace kbvh

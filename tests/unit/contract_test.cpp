@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/contract/about.hpp"
 #include "core/contract/registry.hpp"
 #include "tests/support/moving_grids.hpp"
 
@@ -99,6 +100,16 @@ struct Made {
   T<float, Count> strategy{view, SampledMotion<float>(playback), {}, {}};
   PairBuffer pairs;
 };
+
+TEST(About, TellsEveryStrategyInWholeSentences) {
+  for (const StrategyEntry& entry : registry()) {
+    const std::string_view text = about(entry.info.id);
+    ASSERT_GE(text.size(), 40U) << entry.info.id;
+    EXPECT_TRUE(text.back() == '.' || text.back() == ')') << entry.info.id << ": " << text;
+    EXPECT_EQ(text.find("//"), text.npos) << entry.info.id << ": " << text;
+  }
+  EXPECT_EQ(about("no such strategy"), "");
+}
 
 TEST(Contract, AbilitiesAreThoseOfTheClass) {
   Info boasting = described("boasting");
