@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/families/volumes/dop_hierarchy.hpp"
 #include "core/families/volumes/volume_strategy.hpp"
 #include "core/geometry/volumes/dop.hpp"
 #include "core/geometry/volumes/obb.hpp"
@@ -195,6 +196,66 @@ TEST(VolumeFaults, OneNodeIsEnough) {
   expect_one_node_is_enough<Dop<double, 18>>();
   expect_one_node_is_enough<Sphere<float>>();
   expect_one_node_is_enough<Obb<float>>();
+}
+
+// k-DOPs by SIMD: sides of points that moved since, and a search that forgets a pair of leaves now and then.
+enum class DopFault : std::uint8_t { none, late, forgetful };
+template <class S, DopFault fault>
+class FaultyDops : public DopHierarchy<S, 18> {
+  using Base = DopHierarchy<S, 18>;
+
+ public:
+  FaultyDops(Topology topology, const Primitives& primitives, Cover cover)
+      : Base(std::move(topology), primitives, cover) {
+    for (std::uint32_t p = 0; p < primitives.count(); ++p)
+      for (const std::uint32_t v : primitives[p]) scalars_ = std::max(scalars_, std::size_t(3) * v + 3);
+  }
+  void refit(const S* positions) {
+    if (fault == DopFault::late) {
+      late_.assign(positions, positions + scalars_);
+      for (S& x : late_) x *= S(1 - shrinkage);
+      late_.push_back(0);
+    }
+    Base::refit(fault == DopFault::late ? late_.data() : positions);
+  }
+  template <class OnLeaves>
+  static std::size_t search(const FaultyDops& a, const FaultyDops& b, typename Base::Scratch& scratch,
+                            BoxTests& tests, const Budget& budget, OnLeaves&& on_leaves) {
+    std::size_t met = 0;
+    return Base::search(a, b, scratch, tests, budget, [&](std::uint32_t p, std::uint32_t q) {
+      if (fault != DopFault::forgetful || ++met % 20 != 0) on_leaves(p, q);
+    });
+  }
+
+ private:
+  std::size_t scalars_ = 0;
+  std::vector<S> late_;
+};
+template <DopFault fault>
+struct FaultyKdop {
+  template <class S, class Count>
+  class Strategy : public HierarchyStrategy<S, Count, FaultyDops<S, fault>> {
+   public:
+    Strategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params&)
+        : HierarchyStrategy<S, Count, FaultyDops<S, fault>>(scene, motion, std::move(topologies), 0) {}
+  };
+};
+template <DopFault fault>
+std::string kdop_violation() {
+  Info info;
+  info.id = "faulty_kdop";
+  info.tightness = Tightness::conservative;
+  info.topology.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 2};
+  const StrategyEntry entry = make_entry<FaultyKdop<fault>::template Strategy>(std::move(info));
+  return check(entry, synthetic_scene<float>("soups", 7), 7, {}, entry.info.topology.preferred);
+}
+
+TEST(VolumeFaults, LateAndForgetfulDopsAreFound) {
+  EXPECT_EQ(kdop_violation<DopFault::none>(), "");
+  EXPECT_NE(kdop_violation<DopFault::late>().find("protrudes"), std::string::npos);
+  const std::string forgotten = kdop_violation<DopFault::forgetful>();
+  EXPECT_NE(forgotten, "");
+  EXPECT_EQ(forgotten.find("protrudes"), std::string::npos) << forgotten;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/contract/audited_volumes.hpp"
+#include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/geometry/volumes/bounding_volume.hpp"
 #include "core/topology/subtree_swap.hpp"
@@ -26,6 +27,12 @@ template <BoundingVolume V>
 class VolumeHierarchy {
  public:
   using S = VolumeScalar<V>;
+  using Volume = V;
+  /// The memory of searches; one serves all bodies.
+  struct Scratch {
+    std::vector<NodePair> stack;
+    std::size_t bytes() const { return stack.capacity() * sizeof(NodePair); }
+  };
 
   VolumeHierarchy(Topology topology, const Primitives& primitives, Cover cover) : cover_(cover) {
     assign(std::move(topology), primitives);
@@ -89,6 +96,20 @@ class VolumeHierarchy {
   /// Returns a copy of all volumes, for audits.
   std::vector<V> volumes() const { return volumes_; }
 
+  /// Calls on_leaves(leaf a, leaf b) for each two leaves whose volumes, and those of all nodes above them,
+  /// overlap; within one body, for each two leaves once and for each leaf with itself. Counts the tests.
+  /// Returns the pairs of nodes that the budget left undone.
+  template <class OnLeaves>
+  static std::size_t search(const VolumeHierarchy& a, const VolumeHierarchy& b, Scratch& scratch,
+                            BoxTests& tests, const Budget& budget, OnLeaves&& on_leaves) {
+    const auto once = [&](std::uint32_t leaf_a, std::uint32_t leaf_b) {
+      if (&a != &b || leaf_a <= leaf_b) on_leaves(leaf_a, leaf_b);
+    };
+    return traverse(a.topology(), Stored{a}, b.topology(), Stored{b}, scratch.stack, tests,
+                    rest_of(budget, tests.made), once)
+        .pending;
+  }
+
   std::size_t bytes() const {
     return topology_.bytes() + (start_ ? start_->bytes() : 0) + volumes_.size() * sizeof(V) +
            leaf_vertices_.size() * sizeof(Range) + vertices_.size() * sizeof(std::uint32_t) +
@@ -97,6 +118,12 @@ class VolumeHierarchy {
   }
 
  private:
+  /// A bounds view of stored volumes.
+  struct Stored {
+    void ensure(std::uint32_t /*node*/) const {}
+    const V& operator()(std::uint32_t node) const { return hierarchy.volume(node); }
+    const VolumeHierarchy& hierarchy;
+  };
   static constexpr std::size_t corners_each = 8;
   struct Range {
     std::uint32_t begin = 0, end = 0;

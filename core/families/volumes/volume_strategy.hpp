@@ -10,29 +10,29 @@
 
 namespace kbvh {
 
-/// A simple strategy over bounding volumes of any kind: it recomputes every volume of a moving body at each
-/// frame, leaves first, and compares volumes by the template traversal (core/topology/traversal.hpp).
-/// `Volumes` lists the kinds; an instance uses one. Nothing is specialised for speed; the wide
-/// hierarchies of boxes are the fast special case.
-///
-/// Within one body the traversal meets each two leaves in both orders; one order is dropped.
-template <class S, class Count, BoundingVolume... Volumes>
-class VolumeStrategy : public CountedStrategy<S, Count>,
-                       public TakesPlanChanges<S>,
-                       public TakesGeometryChanges<S>,
-                       public AnswersSelfPairs {
-  template <class V>
-  using Bodies = std::vector<VolumeHierarchy<V>>;
+/// The shared part of strategies over hierarchies of bounding volumes: every volume of a moving body is
+/// recomputed at each frame, leaves first. `Hierarchies` lists the kinds; an instance uses one. Each is one
+/// body's hierarchy, as VolumeHierarchy and DopHierarchy are.
+template <class S, class Count, class... Hierarchies>
+class HierarchyStrategy : public CountedStrategy<S, Count>,
+                          public TakesPlanChanges<S>,
+                          public TakesGeometryChanges<S>,
+                          public AnswersSelfPairs {
+  template <class Hierarchy>
+  struct State {
+    std::vector<Hierarchy> bodies;
+    typename Hierarchy::Scratch scratch;
+  };
 
  public:
   static constexpr Foresight foresight = Foresight::none;
 
-  /// `kind` is the index of the used kind among Volumes.
-  VolumeStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
-                 std::size_t kind)
+  /// `kind` is the index of the used kind among Hierarchies.
+  HierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
+                    std::size_t kind)
       : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
     std::size_t index = 0;
-    (void)((index++ == kind && (bodies_.template emplace<Bodies<Volumes>>(), true)) || ...);
+    (void)((index++ == kind && (state_.template emplace<State<Hierarchies>>(), true)) || ...);
     const std::vector<Cover> cover = covers(scene);
     on_bodies([&](auto& bodies) {
       for (std::uint32_t body = 0; body < scene.body_count(); ++body)
@@ -63,28 +63,7 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     BoxTests tests;
-    on_bodies([&](auto& bodies) {
-      const auto box_of = [&](std::uint32_t body) {
-        return bodies[body].empty() ? Box<double>{} : enclosing_box(bodies[body].volume(0));
-      };
-      for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
-        const BodyPair& pair = this->scene_.pairs()[i];
-        if (tests.made >= budget.box_tests) {
-          ++status.pending;
-          continue;
-        }
-        const auto &a = bodies[pair.first], &b = bodies[pair.second];
-        LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
-                                      b.topology(), tests, out);
-        const bool within = pair.first == pair.second;
-        const auto on_leaves = [&](std::uint32_t leaf_a, std::uint32_t leaf_b) {
-          if (!within || leaf_a <= leaf_b) leaves(leaf_a, leaf_b);
-        };
-        status.pending += traverse(a.topology(), stored(a), b.topology(), stored(b), stack_, tests,
-                                   rest_of(budget, tests.made), on_leaves)
-                              .pending;
-      }
-    });
+    std::visit([&](auto& state) { search(state, out, tests, budget, status); }, state_);
     this->count_.add(Counter::box_tests, tests.made);
     return status;
   }
@@ -116,35 +95,45 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
   }
 
   std::size_t bytes() const override {
-    return on_bodies([&](const auto& bodies) {
-      std::size_t total = near_bodies_.bytes() + stack_.capacity() * sizeof(NodePair);
-      for (const auto& body : bodies) total += body.bytes();
-      return total;
-    });
+    return std::visit(
+        [&](const auto& state) {
+          std::size_t total = near_bodies_.bytes() + state.scratch.bytes();
+          for (const auto& body : state.bodies) total += body.bytes();
+          return total;
+        },
+        state_);
   }
 
  protected:
   /// Calls work(bodies) with the hierarchies of all bodies, of the used kind.
   template <class Work>
   decltype(auto) on_bodies(Work&& work) {
-    return std::visit(std::forward<Work>(work), bodies_);
+    return std::visit([&](auto& state) -> decltype(auto) { return work(state.bodies); }, state_);
   }
   template <class Work>
   decltype(auto) on_bodies(Work&& work) const {
-    return std::visit(std::forward<Work>(work), bodies_);
+    return std::visit([&](const auto& state) -> decltype(auto) { return work(state.bodies); }, state_);
   }
 
  private:
-  /// A bounds view of stored volumes.
-  template <class V>
-  struct Stored {
-    void ensure(std::uint32_t /*node*/) const {}
-    const V& operator()(std::uint32_t node) const { return hierarchy.volume(node); }
-    const VolumeHierarchy<V>& hierarchy;
-  };
-  template <class V>
-  static Stored<V> stored(const VolumeHierarchy<V>& hierarchy) {
-    return {hierarchy};
+  template <class Hierarchy>
+  void search(State<Hierarchy>& state, PairBuffer& out, BoxTests& tests, const Budget& budget,
+              QueryStatus& status) {
+    const auto& bodies = state.bodies;
+    const auto box_of = [&](std::uint32_t body) {
+      return bodies[body].empty() ? Box<double>{} : enclosing_box(bodies[body].volume(0));
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      if (tests.made >= budget.box_tests) {
+        ++status.pending;
+        continue;
+      }
+      const Hierarchy &a = bodies[pair.first], &b = bodies[pair.second];
+      LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
+                                    b.topology(), tests, out);
+      status.pending += Hierarchy::search(a, b, state.scratch, tests, budget, leaves);
+    }
   }
 
   /// Returns `boxes` for the bodies of pairs that are answered by boxes; a point equals its box.
@@ -160,17 +149,18 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
     return covers;
   }
 
-  template <class V>
-  void update(VolumeHierarchy<V>& hierarchy, std::uint32_t body) {
+  template <class Hierarchy>
+  void update(Hierarchy& hierarchy, std::uint32_t body) {
     hierarchy.refit(this->sampled_.positions(body));
     const std::uint64_t nodes = hierarchy.topology().size();
     this->count_.add(Counter::nodes_visited, nodes);
-    this->count_.add(Counter::values_written, nodes * (sizeof(V) / sizeof(S)));
+    this->count_.add(Counter::values_written, nodes * (sizeof(typename Hierarchy::Volume) / sizeof(S)));
     this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
   }
 
-  template <class V>
-  static AuditView view_of(const VolumeHierarchy<V>& hierarchy) {
+  template <class Hierarchy>
+  static AuditView view_of(const Hierarchy& hierarchy) {
+    using V = typename Hierarchy::Volume;
     AuditView view{hierarchy.topology(), {}, {}};
     for (const V& volume : hierarchy.volumes()) view.boxes.push_back(enclosing_box(volume));
     if constexpr (!std::is_same_v<V, Box<S>>)
@@ -179,9 +169,14 @@ class VolumeStrategy : public CountedStrategy<S, Count>,
   }
 
   NearBodies near_bodies_;
-  std::variant<Bodies<Volumes>...> bodies_;
-  std::vector<NodePair> stack_;
+  std::variant<State<Hierarchies>...> state_;
   bool plans_changed_ = false;
 };
+
+/// A simple strategy over bounding volumes of any kind, which compares them by the template traversal
+/// (core/topology/traversal.hpp). Nothing is specialised for speed; the wide hierarchies of boxes and
+/// DopHierarchy are fast special cases.
+template <class S, class Count, BoundingVolume... Volumes>
+using VolumeStrategy = HierarchyStrategy<S, Count, VolumeHierarchy<Volumes>...>;
 
 }  // namespace kbvh

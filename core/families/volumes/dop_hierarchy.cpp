@@ -1,0 +1,121 @@
+#include "core/families/volumes/dop_hierarchy.hpp"
+
+#include <array>
+
+namespace kbvh {
+namespace {
+
+/// Constants of the sides of a k-DOP, as DopRefit takes them.
+template <class S, int K>
+struct DopSides {
+  static constexpr std::size_t padded = padded_sides(K), half = padded / 2;
+  std::array<S, 3 * padded> coefficients{};
+  std::array<S, padded> two_terms{}, three_terms{};
+
+  constexpr DopSides() {
+    for (std::size_t slab = 0; slab < Dop<S, K>::slabs; ++slab) {
+      int terms = 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const int n = Dop<S, K>::directions[slab][axis];
+        coefficients[axis * padded + slab] = S(n);
+        coefficients[axis * padded + half + slab] = S(-n);
+        terms += n != 0 ? 1 : 0;
+      }
+      constexpr S unit = std::numeric_limits<S>::epsilon();
+      two_terms[slab] = two_terms[half + slab] = terms >= 2 ? unit : 0;
+      three_terms[slab] = three_terms[half + slab] = terms == 3 ? unit : 0;
+    }
+  }
+};
+
+template <class S, int K>
+constexpr DopSides<S, K> dop_sides{};
+
+}  // namespace
+
+template <class S, int K>
+DopHierarchy<S, K>::DopHierarchy(Topology topology, const Primitives& primitives, Cover cover,
+                                 KernelSet kernels)
+    : kernels_(&dop_kernels<S>(kernels)), cover_(cover) {
+  assign(std::move(topology), primitives);
+}
+
+template <class S, int K>
+void DopHierarchy<S, K>::assign(Topology topology, const Primitives& primitives) {
+  topology_ = std::move(topology);
+  primitives_ = &primitives;
+  LeafVertices lists;
+  if (cover_ == Cover::vertices) lists = unique_leaf_vertices(topology_, primitives);
+  points_ = std::move(lists.vertices);
+  nodes_.clear();
+  for (std::uint32_t node = 0; node < topology_.size(); ++node) {
+    const TopologyNode content = topology_.nodes[node];
+    if (!content.is_leaf()) {
+      nodes_.push_back({content.first(), content.first() + content.count(), false});
+      continue;
+    }
+    if (cover_ == Cover::vertices) {
+      nodes_.push_back({lists.offsets[node], lists.offsets[node + 1], true});
+      continue;
+    }
+    const auto begin = std::uint32_t(points_.size());
+    for (std::uint32_t k = content.first(); k < content.first() + content.count(); ++k)
+      for (std::uint32_t corner = 0; corner < corners_each; ++corner)
+        points_.push_back(std::uint32_t(corners_each) * topology_.primitives[k] + corner);
+    nodes_.push_back({begin, std::uint32_t(points_.size()), true});
+  }
+  sides_.assign(padded * topology_.size(), 0);
+  corners_.resize(cover_ == Cover::boxes ? 3 * corners_each * primitives.count() : 0);
+}
+
+template <class S, int K>
+void DopHierarchy<S, K>::refit(const S* positions) {
+  if (cover_ == Cover::boxes) place_corners(positions);
+  constexpr const DopSides<S, K>& sides = dop_sides<S, K>;
+  kernels_->refit(K)({nodes_.data(), std::uint32_t(nodes_.size()), points_.data(),
+                      cover_ == Cover::boxes ? corners_.data() : positions, sides.coefficients.data(),
+                      sides.two_terms.data(), sides.three_terms.data(), sides_.data()});
+}
+
+template <class S, int K>
+void DopHierarchy<S, K>::place_corners(const S* positions) {
+  for (const std::uint32_t primitive : topology_.primitives) {
+    const Box<S> box = primitive_box((*primitives_)[primitive], positions);
+    S* out = corners_.data() + 3 * corners_each * primitive;
+    for (std::size_t corner = 0; corner < corners_each; ++corner)
+      for (std::size_t d = 0; d < 3; ++d) *out++ = (corner >> d) & 1 ? box.upper[d] : box.lower[d];
+  }
+}
+
+template <class S, int K>
+typename DopHierarchy<S, K>::Volume DopHierarchy<S, K>::volume(std::uint32_t node) const {
+  Volume volume;
+  const S* const sides = sides_.data() + padded * node;
+  for (std::size_t slab = 0; slab < Volume::slabs; ++slab) {
+    volume.upper[slab] = sides[slab];
+    volume.lower[slab] = -sides[half + slab];
+  }
+  return volume;
+}
+
+template <class S, int K>
+std::vector<Dop<S, K>> DopHierarchy<S, K>::volumes() const {
+  std::vector<Volume> all;
+  for (std::uint32_t node = 0; node < topology_.size(); ++node) all.push_back(volume(node));
+  return all;
+}
+
+template <class S, int K>
+std::size_t DopHierarchy<S, K>::bytes() const {
+  return topology_.bytes() + nodes_.capacity() * sizeof(DopNode) +
+         points_.capacity() * sizeof(std::uint32_t) + (sides_.capacity() + corners_.capacity()) * sizeof(S);
+}
+
+template class DopHierarchy<float, 14>;
+template class DopHierarchy<float, 18>;
+template class DopHierarchy<float, 26>;
+template class DopHierarchy<double, 14>;
+template class DopHierarchy<double, 18>;
+template class DopHierarchy<double, 26>;
+
+}  // namespace kbvh

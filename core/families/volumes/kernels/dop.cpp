@@ -1,0 +1,140 @@
+// k-DOPs, a node at a time: the lanes of a vector are sides of one node.
+#include "core/families/volumes/kernels/dop.hpp"
+
+#include "core/kernels/lanes.hpp"
+
+namespace kbvh {
+namespace {
+
+/// The lanes of a vector that runs over `count` sides: as many as there are registers for and as divide the
+/// count.
+template <class S, std::size_t count>
+constexpr std::size_t lanes_over = [] {
+  std::size_t lanes = native_lanes<S>;
+  while (lanes > 1 && count % lanes != 0) lanes /= 2;
+  return lanes * sizeof(S) < 16 ? std::size_t(1) : lanes;  // there are no shorter registers
+}();
+
+template <class S, std::size_t padded>
+void fit_leaf(const DopRefit<S>& job, const DopNode& leaf, S* sides) {
+  constexpr std::size_t lanes = lanes_over<S, padded>, vectors = padded / lanes;
+  using V = Vector<S, lanes>;
+  V best[vectors];
+  for (std::uint32_t k = leaf.first; k < leaf.end; ++k) {
+    const S* const p = job.positions + std::size_t(3) * job.points[k];
+    const V x = V{} + p[0], y = V{} + p[1], z = V{} + p[2];
+    for (std::size_t i = 0; i < vectors; ++i) {
+      const S* const along = job.coefficients + lanes * i;
+      const V at = load_lanes<V>(along) * x + load_lanes<V>(along + padded) * y +
+                   load_lanes<V>(along + 2 * padded) * z;
+      best[i] = k == leaf.first ? at : larger(at, best[i]);
+    }
+  }
+  for (std::size_t i = 0; i < vectors; ++i) store_lanes(sides + lanes * i, best[i]);
+  const S reach_x = larger(sides[0], sides[padded / 2]), reach_y = larger(sides[1], sides[padded / 2 + 1]);
+  const V reach = V{} + (reach_x + reach_y);
+  for (std::size_t i = 0; i < vectors; ++i) {
+    const V margin = load_lanes<V>(job.two_terms + lanes * i) * larger(best[i], -best[i]) +
+                     load_lanes<V>(job.three_terms + lanes * i) * reach;
+    store_lanes(sides + lanes * i, best[i] + margin);
+  }
+}
+
+template <class S, std::size_t padded>
+void refit(const DopRefit<S>& job) {
+  constexpr std::size_t lanes = lanes_over<S, padded>;
+  using V = Vector<S, lanes>;
+  for (std::uint32_t node = job.node_count; node-- > 0;) {
+    const DopNode content = job.nodes[node];
+    S* const sides = job.sides + padded * node;
+    if (content.leaf) {
+      fit_leaf<S, padded>(job, content, sides);
+      continue;
+    }
+    const S* const children = job.sides + padded * content.first;
+    for (std::size_t i = 0; i < padded; i += lanes) {
+      V best = load_lanes<V>(children + i);
+      for (std::size_t child = 1; child < content.end - content.first; ++child)
+        best = larger(load_lanes<V>(children + padded * child + i), best);
+      store_lanes(sides + i, best);
+    }
+  }
+}
+
+/// Returns bits of the slabs, of `lanes` in a row, in which b lies wholly below a.
+template <class S, std::size_t lanes>
+[[gnu::always_inline]] inline unsigned apart(const S* negated_lower_a, const S* upper_b) {
+  using V = Vector<S, lanes>;
+  return mask_bits(-load_lanes<V>(negated_lower_a) > load_lanes<V>(upper_b));
+}
+
+template <class S, std::size_t padded>
+bool overlap(const S* a, const S* b) {
+  constexpr std::size_t half = padded / 2;
+  // Twelve slabs are a vector of eight and one of four, where there are such registers.
+  constexpr std::size_t wide = half == 12 && native_lanes<S> >= 8 ? 8 : lanes_over<S, half>;
+  constexpr std::size_t narrow = half == 12 && native_lanes<S> >= 8 ? 4 : wide;
+  unsigned bits = 0;
+  std::size_t i = 0;
+  for (; i + wide <= half; i += wide)
+    bits |= apart<S, wide>(a + half + i, b + i) | apart<S, wide>(b + half + i, a + i);
+  for (; i < half; i += narrow)
+    bits |= apart<S, narrow>(a + half + i, b + i) | apart<S, narrow>(b + half + i, a + i);
+  return bits == 0;
+}
+
+/// Returns the sum of the extents along the axes.
+template <class S, std::size_t padded>
+[[gnu::always_inline]] inline S extent(const S* sides) {
+  const S* const lower = sides + padded / 2;
+  return (sides[0] + lower[0]) + (sides[1] + lower[1]) + (sides[2] + lower[2]);
+}
+
+template <class S, std::size_t padded>
+void search(DopSearch<S>& job) {
+  const auto sides_a = [&](std::uint32_t node) { return job.sides_a + padded * node; };
+  const auto sides_b = [&](std::uint32_t node) { return job.sides_b + padded * node; };
+  while (job.depth > 0 && job.found_count < job.found_room && job.depth + dop_search_step <= job.stack_room &&
+         job.tests < job.most_tests) {
+    const DopPair pair = job.stack[--job.depth];
+    const DopNode a = job.nodes_a[pair.a], b = job.nodes_b[pair.b];
+    if (a.leaf && b.leaf) {
+      job.found[job.found_count++] = pair;
+      continue;
+    }
+    if (job.within && pair.a == pair.b) {
+      for (std::uint32_t i = a.first; i < a.end; ++i) {
+        job.stack[job.depth++] = {i, i};
+        for (std::uint32_t j = i + 1; j < a.end; ++j, ++job.tests)
+          if (overlap<S, padded>(sides_a(i), sides_a(j))) job.stack[job.depth++] = {i, j};
+      }
+      continue;
+    }
+    const bool into_a =
+        b.leaf || (!a.leaf && extent<S, padded>(sides_a(pair.a)) >= extent<S, padded>(sides_b(pair.b)));
+    if (into_a) {
+      for (std::uint32_t i = a.first; i < a.end; ++i)
+        if (overlap<S, padded>(sides_a(i), sides_b(pair.b))) job.stack[job.depth++] = {i, pair.b};
+      job.tests += a.end - a.first;
+    } else {
+      for (std::uint32_t i = b.first; i < b.end; ++i)
+        if (overlap<S, padded>(sides_a(pair.a), sides_b(i))) job.stack[job.depth++] = {pair.a, i};
+      job.tests += b.end - b.first;
+    }
+  }
+}
+
+template <class S>
+constexpr DopKernels<S> table{
+    {&refit<S, padded_sides(14)>, &refit<S, padded_sides(18)>, &refit<S, padded_sides(26)>},
+    {&search<S, padded_sides(14)>, &search<S, padded_sides(18)>, &search<S, padded_sides(26)>},
+    {&overlap<S, padded_sides(14)>, &overlap<S, padded_sides(18)>, &overlap<S, padded_sides(26)>}};
+
+}  // namespace
+
+namespace kernels::KBVH_KERNELS {
+const DopKernels<float> dop_float = table<float>;
+const DopKernels<double> dop_double = table<double>;
+}  // namespace kernels::KBVH_KERNELS
+
+}  // namespace kbvh
