@@ -16,6 +16,8 @@ namespace kbvh {
 template <class S, class Count, class Builder>
 class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>> {
   using Base = BuiltEachFrame<S, Count, BuiltTree<S>>;
+
+ protected:
   using Base::bodies_;
   using Base::lists_;
   using Base::near_bodies_;
@@ -41,10 +43,15 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>> {
     };
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
+      if (tests >= budget.box_tests) {
+        ++status.pending;
+        continue;
+      }
       const WideSide<S> first{&bodies_[pair.first], pair.first}, second{&bodies_[pair.second], pair.second};
-      status.pending += tests >= budget.box_tests
-                            ? 1
-                            : query_.run(first, second, out, tests, rest_of(budget, tests)).pending;
+      const std::uint64_t tests_before = tests;
+      const std::size_t pairs_before = out.size();
+      status.pending += query_.run(first, second, out, tests, rest_of(budget, tests)).pending;
+      searched(pair, tests - tests_before, out.size() - pairs_before);
     }
     this->count_.add(Counter::box_tests, tests);
     return status;
@@ -58,12 +65,27 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>> {
     return Base::bytes() + builder_.bytes() + order_.bytes() + query_.bytes();
   }
 
- private:
+ protected:
   void build(std::uint32_t body) override {
-    BuiltTree<S>& tree = bodies_[body];
+    take_boxes(body);
+    builder_.build(bodies_[body], order_, lists_[body]);
+    count_boxes(body);
+  }
+  /// Computes the boxes of a tree that keeps its shape.
+  void refit(std::uint32_t body) {
+    take_boxes(body);
+    bodies_[body].fit(order_.boxes());
+    count_boxes(body);
+  }
+  /// Learns what the search of two bodies took: box tests made, and pairs of primitives found.
+  virtual void searched(const BodyPair& /*pair*/, std::uint64_t /*tests*/, std::uint64_t /*found*/) {}
+
+ private:
+  void take_boxes(std::uint32_t body) {
     order_.take(this->scene_.primitives(body), lists_[body], this->sampled_.positions(body), this->kernels_);
-    builder_.build(tree, order_, lists_[body]);
-    const std::uint64_t boxes = tree.node_count() + tree.leaf_count();
+  }
+  void count_boxes(std::uint32_t body) {
+    const std::uint64_t boxes = bodies_[body].node_count() + bodies_[body].leaf_count();
     this->count_.add(Counter::nodes_visited, boxes);
     this->count_build(body, boxes);
   }
