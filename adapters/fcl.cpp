@@ -1,5 +1,5 @@
-// FCL 0.7 (Pan et al. 2012) as contestants: its BVHModel<AABB> and its mesh traversal, in float and in
-// double.
+// FCL 0.7 (Pan et al. 2012) as contestants: its BVHModel of boxes or 18-DOPs and its mesh traversal, in float
+// and in double.
 //
 // How FCL is driven:
 // - Frames are passed by beginReplaceModel / endReplaceModel(refit, bottomup). begin/endUpdateModel would fit
@@ -17,6 +17,12 @@
 //   vertices is passed as the triangle (lower, upper, first vertex) over two vertices that follow the body's
 //   own. That triangle has the polygon's box, so leaves are primitives, points and control nets are answered,
 //   too, and no pair is reported twice. It favours FCL over fanning polygons, which would need more leaves.
+//   18-DOPs would need more than that triangle: `fcl_*_kdop18` fans polygons, drops repeated pairs, and takes
+//   no control nets.
+// - FCL rounds the sides of its 18-DOPs to nearest. Each is a sum of two coordinates, so that rounding is
+// monotone in the
+//   exact sum: what overlaps still overlaps, but a vertex may lie half a unit in the last place outside.
+//   Hence no audit.
 // - FCL's AABB overlap is closed, and its boxes are unions of vertices: tight, to the last bit.
 // - FCL recurses in its mean-split tree and in its traversal; the depth is bounded by the number of
 //   primitives, not by
@@ -24,6 +30,7 @@
 // - The float version does not accept double scenes: rounding positions would lose pairs.
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/bv/AABB.h>
+#include <fcl/math/bv/kDOP.h>
 #include <fcl/math/bv/utility.h>  // BVHModel uses its fit() without including it
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 #include <fcl/narrowphase/detail/traversal/collision/mesh_collision_traversal_node.h>
@@ -44,23 +51,50 @@ namespace {
 enum class Mode : std::uint8_t { bottom_up, top_down, rebuild };
 enum class Verdict : std::uint8_t { kbvh, own };
 
-/// FCL's simultaneous traversal of two models, with leaves that are collected instead of tested.
 template <class Own>
-class LeafCollector final : public fcl::detail::MeshCollisionTraversalNode<fcl::AABB<Own>> {
+using Kdop18 = fcl::KDOP<Own, 18>;
+
+template <class Own>
+Box<double> box_of(const fcl::AABB<Own>& bounds) {
+  Box<double> box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.lower[axis] = double(bounds.min_[axis]);
+    box.upper[axis] = double(bounds.max_[axis]);
+  }
+  return box;
+}
+template <class Own>
+Box<double> box_of(const Kdop18<Own>& bounds) {
+  Box<double> box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.lower[axis] = double(bounds.dist(std::size_t(axis)));
+    box.upper[axis] = double(bounds.dist(std::size_t(axis + 9)));
+  }
+  return box;
+}
+
+/// FCL's simultaneous traversal of two models, with leaves that are collected instead of tested.
+template <class Own, class Bounds>
+class LeafCollector final : public fcl::detail::MeshCollisionTraversalNode<Bounds> {
  public:
   BodyPair bodies{};
   PairBuffer* out = nullptr;
+  const std::uint32_t *primitives_a = nullptr, *primitives_b = nullptr;  // of triangles; null: their indices
 
   void leafTesting(int leaf_a, int leaf_b) const override {
-    out->push_back({bodies.first, std::uint32_t(this->model1->getBV(leaf_a).primitiveId()), bodies.second,
-                    std::uint32_t(this->model2->getBV(leaf_b).primitiveId())});
+    const auto a = std::uint32_t(this->model1->getBV(leaf_a).primitiveId());
+    const auto b = std::uint32_t(this->model2->getBV(leaf_b).primitiveId());
+    out->push_back({bodies.first, primitives_a == nullptr ? a : primitives_a[a], bodies.second,
+                    primitives_b == nullptr ? b : primitives_b[b]});
   }
 };
 
-template <class Own, Mode mode, Verdict verdict, class S, class Count>
+template <class Own, template <class> class Bounds, Mode mode, Verdict verdict, class S, class Count>
 class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
   static_assert(sizeof(Own) >= sizeof(S), "rounding positions would lose pairs");
-  using Model = fcl::BVHModel<fcl::AABB<Own>>;
+  static constexpr bool boxes = std::is_same_v<Bounds<Own>, fcl::AABB<Own>>;
+  using Model = fcl::BVHModel<Bounds<Own>>;
+  using Collector = LeafCollector<Own, Bounds<Own>>;
   using Vector = fcl::Vector3<Own>;
 
  public:
@@ -96,11 +130,11 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     for (const auto& node : collectors_) collide(*node, out);
     if (!near_bodies_.searches()) return {};
     std::uint64_t tests = 0;
-    const auto box_of = [&](std::uint32_t body) {
+    const auto root_of = [&](std::uint32_t body) {
       const Model* model = bodies_[body].model.get();
-      return model == nullptr ? Box<double>{} : box_in(*model, 0);
+      return model == nullptr ? Box<double>{} : box_of(model->getBV(0).bv);
     };
-    for (const std::uint32_t i : near_bodies_.find(box_of, tests))
+    for (const std::uint32_t i : near_bodies_.find(root_of, tests))
       collide(*collector(this->scene_.pairs()[i]), out);
     this->count_.add(Counter::box_tests, tests);
     return {};
@@ -118,6 +152,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
   }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    if (!boxes) return std::nullopt;
     AuditView view;
     const Model* model = bodies_[body].model.get();
     if (model == nullptr) return view;
@@ -127,12 +162,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     view.topology.depths.assign(size, 0);
     for (std::uint32_t i = 0; i < size; ++i) {
       const auto& node = model->getBV(int(i));
-      Box<double> box;
-      for (int axis = 0; axis < 3; ++axis) {
-        box.lower[axis] = double(node.bv.min_[axis]);
-        box.upper[axis] = double(node.bv.max_[axis]);
-      }
-      view.boxes.push_back(box);
+      view.boxes.push_back(box_of(node.bv));
       if (node.isLeaf()) {
         view.topology.nodes.push_back(TopologyNode::leaf(std::uint32_t(view.topology.primitives.size()), 1));
         view.topology.primitives.push_back(std::uint32_t(node.primitiveId()));
@@ -154,19 +184,19 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     for (const BodyState& state : bodies_) {
       if (!state.model) continue;
       const auto triangles = std::size_t(state.model->num_tris);
-      total += sizeof(Model) +
-               (2 * triangles - 1) * (sizeof(fcl::BVNode<fcl::AABB<Own>>) + sizeof(unsigned)) +
+      total += sizeof(Model) + (2 * triangles - 1) * (sizeof(fcl::BVNode<Bounds<Own>>) + sizeof(unsigned)) +
                triangles * sizeof(fcl::Triangle) + std::size_t(state.model->num_vertices) * sizeof(Vector) +
-               state.polygons.size() * sizeof(std::uint32_t);
+               (state.polygons.size() + state.primitives.size()) * sizeof(std::uint32_t);
     }
     return total;
   }
 
  private:
   struct BodyState {
-    std::unique_ptr<Model> model;         // none for a body without primitives: FCL refuses empty models
-    std::vector<std::uint32_t> polygons;  // primitives of more than 3 vertices
-    std::uint64_t fitted_vertices = 0;    // vertex reads of a refit
+    std::unique_ptr<Model> model;           // none for a body without primitives: FCL refuses empty models
+    std::vector<std::uint32_t> polygons;    // primitives of more than 3 vertices, passed as boxes
+    std::vector<std::uint32_t> primitives;  // of triangles, where polygons are fans
+    std::uint64_t fitted_vertices = 0;      // vertex reads of a refit
     bool moves = false;
   };
 
@@ -185,33 +215,33 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
   }
 
   /// Makes FCL's traversal of two bodies that both have triangles.
-  std::unique_ptr<LeafCollector<Own>> collector(const BodyPair& pair) {
-    auto node = std::make_unique<LeafCollector<Own>>();
+  std::unique_ptr<Collector> collector(const BodyPair& pair) {
+    auto node = std::make_unique<Collector>();
     fcl::Transform3<Own> here = fcl::Transform3<Own>::Identity();
     if (!fcl::detail::initialize(*node, *bodies_[pair.first].model, here, *bodies_[pair.second].model, here,
                                  fcl::CollisionRequest<Own>(), result_))
       throw std::runtime_error("FCL refuses to traverse bodies " + std::to_string(pair.first) + " and " +
                                std::to_string(pair.second));
     node->bodies = pair;
+    const auto primitives_of = [&](std::uint32_t body) {
+      return bodies_[body].primitives.empty() ? nullptr : bodies_[body].primitives.data();
+    };
+    node->primitives_a = primitives_of(pair.first);
+    node->primitives_b = primitives_of(pair.second);
     node->enable_statistics = Count::enabled;
     return node;
   }
-  void collide(LeafCollector<Own>& node, PairBuffer& out) {
+  void collide(Collector& node, PairBuffer& out) {
+    const auto begin = std::ptrdiff_t(out.size());
     node.out = &out;
     node.num_bv_tests = 0;
     fcl::detail::collide<Own>(&node);
+    if (node.primitives_a != nullptr || node.primitives_b != nullptr) {
+      std::sort(out.begin() + begin, out.end());
+      out.erase(std::unique(out.begin() + begin, out.end()), out.end());
+    }
     this->count_.add(Counter::box_tests, std::uint64_t(node.num_bv_tests));
   }
-  static Box<double> box_in(const Model& model, int node) {
-    Box<double> box;
-    const auto& bounds = model.getBV(node).bv;
-    for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] = double(bounds.min_[axis]);
-      box.upper[axis] = double(bounds.max_[axis]);
-    }
-    return box;
-  }
-
   void build(std::uint32_t body) {
     BodyState& state = bodies_[body];
     state.moves = this->scene_.moving(body);
@@ -219,11 +249,18 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     if (primitives.count() == 0) return;
     std::vector<fcl::Triangle> triangles;
     triangles.reserve(primitives.count());
+    std::vector<std::uint32_t> owners;
     std::uint32_t next = this->scene_.vertex_count(body);
     for (std::uint32_t p = 0; p < primitives.count(); ++p) {
       const auto v = primitives[p];
       if (v.size() <= 3) {
         triangles.emplace_back(v[0], v[v.size() / 2], v.back());
+        owners.push_back(p);
+      } else if (!boxes) {
+        for (std::size_t i = 1; i + 1 < v.size(); ++i) {
+          triangles.emplace_back(v[0], v[i], v[i + 1]);
+          owners.push_back(p);
+        }
       } else {
         triangles.emplace_back(next, next + 1, v[0]);
         next += 2;
@@ -233,6 +270,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     std::vector<Vector> vertices;
     vertices.reserve(next);
     for_each_vertex(body, [&](const Vector& p) { vertices.push_back(p); });
+    if (!boxes && triangles.size() > primitives.count()) state.primitives = std::move(owners);
     state.model = std::make_unique<Model>();
     Model& model = *state.model;
     check(model.beginModel(int(triangles.size()), int(vertices.size())), body);
@@ -253,7 +291,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
       const auto nodes = std::uint64_t(model.getNumBVs());
       if (mode == Mode::rebuild) state.fitted_vertices = 3 * vertices_below_nodes(model);
       this->count_.add(Counter::nodes_visited, nodes);
-      this->count_.add(Counter::values_written, 6 * nodes);
+      this->count_.add(Counter::values_written, (boxes ? 6 : 18) * nodes);
       this->count_.add(Counter::vertex_reads, state.fitted_vertices);
     }
   }
@@ -303,13 +341,13 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
   std::vector<BodyState> bodies_;
   NearBodies near_bodies_;
   fcl::CollisionResult<Own> result_;  // stays empty: FCL tests no leaf
-  std::vector<std::unique_ptr<LeafCollector<Own>>> collectors_;
+  std::vector<std::unique_ptr<Collector>> collectors_;
 };
 
-template <class Own, Mode mode, Verdict verdict = Verdict::kbvh>
+template <class Own, template <class> class Bounds, Mode mode, Verdict verdict>
 struct Bind {
   template <class S, class Count>
-  using Type = Fcl<Own, mode, verdict, S, Count>;
+  using Type = Fcl<Own, Bounds, mode, verdict, S, Count>;
 };
 
 /// Performs FCL's own test of a vertex and a face, or of two edges, in linear motion: it finds the cubic's
@@ -338,8 +376,9 @@ bool fcl_impact(Contact::Kind kind, const MovingPoints& points) {
                                                                  p[1][1], p[1][2], p[1][3], &time, &place);
 }
 
-template <class Own, Mode mode, Verdict verdict = Verdict::kbvh>
+template <class Own, Mode mode, Verdict verdict = Verdict::kbvh, template <class> class Bounds = fcl::AABB>
 StrategyEntry entry(const std::string& name, const std::string& title) {
+  constexpr bool boxes = std::is_same_v<Bounds<Own>, fcl::AABB<Own>>;
   constexpr bool single = std::is_same_v<Own, float>;
   constexpr Scalars scalars = single ? Scalars::float_only : Scalars::both;
   Info info;
@@ -348,13 +387,14 @@ StrategyEntry entry(const std::string& name, const std::string& title) {
   info.title = "FCL " + info.own_scalar + ", " + title;
   info.family = "fcl";
   info.citation = "Pan, Chitta & Manocha 2012 (FCL 0.7)";
-  info.tightness = Tightness::tight;
+  info.tightness = boxes ? Tightness::tight : Tightness::none;
+  if (!boxes) info.primitives = {PrimitiveKind::polygons, PrimitiveKind::points};
   info.guarantee = verdict == Verdict::own ? Guarantee::approximate : Guarantee::candidate_superset;
   info.positions = PositionUse::all;
   info.declares.restructures = mode == Mode::rebuild;
   info.topology.own = true;
   if (verdict == Verdict::own && !single) info.own_impact = fcl_impact;
-  return make_entry<Bind<Own, mode, verdict>::template Type, scalars>(std::move(info));
+  return make_entry<Bind<Own, Bounds, mode, verdict>::template Type, scalars>(std::move(info));
 }
 
 template <class Own>
@@ -363,6 +403,8 @@ void append(std::vector<StrategyEntry>& entries) {
   entries.push_back(entry<Own, Mode::top_down>("top_down", "top-down refit"));
   entries.push_back(entry<Own, Mode::rebuild>("rebuild", "rebuild"));
   entries.push_back(entry<Own, Mode::bottom_up, Verdict::own>("own_verdict", "bottom-up refit, own test"));
+  entries.push_back(
+      entry<Own, Mode::bottom_up, Verdict::kbvh, Kdop18>("kdop18", "bottom-up refit of 18-DOPs"));
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ KBVH_STRATEGY(kdop) {
       .citation = "Klosowski et al. 1998",
       .tightness = Tightness::conservative,  // by the margins of roundings
       .declares = {.time_budget = true},
-      .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 4}},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4}},
       .parameters = {{"sides", "18", {"14", "18", "26"}, "sides of every node's k-DOP"}},
   })};
 }

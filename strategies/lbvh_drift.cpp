@@ -73,6 +73,6 @@ KBVH_STRATEGY(lbvh_drift) {
       .declares = {.restructures = true, .time_budget = true},
       .topology = {.widths = {8}, .preferred = {.method = BuildMethod::morton, .width = 8, .leaf_size = 16}},
       .parameters =
-          {{"price", "10", {}, "surplus box tests per primitive from which on a build pays", 0, 1e6}},
+          {{"price", "5", {}, "surplus box tests per primitive from which on a build pays", 0, 1e6}},
   })};
 }

@@ -5,31 +5,29 @@
 namespace kbvh {
 namespace {
 
-/// Constants of the sides of a k-DOP, as DopRefit takes them.
+/// Constants of the padded slabs of a k-DOP.
 template <class S, int K>
-struct DopSides {
-  static constexpr std::size_t padded = padded_sides(K), half = padded / 2;
-  std::array<S, 3 * padded> coefficients{};
-  std::array<S, padded> two_terms{}, three_terms{};
+struct DopSlabs {
+  static constexpr std::size_t slabs = padded_sides(K) / 2;
+  std::array<S, 3 * slabs> directions{};
+  std::array<S, slabs>
+      margins{};  ///< over the largest coordinate: 2^-23 (float) or 2^-52 times twice the terms
 
-  constexpr DopSides() {
+  constexpr DopSlabs() {
     for (std::size_t slab = 0; slab < Dop<S, K>::slabs; ++slab) {
       int terms = 0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const int n = Dop<S, K>::directions[slab][axis];
-        coefficients[axis * padded + slab] = S(n);
-        coefficients[axis * padded + half + slab] = S(-n);
+        directions[axis * slabs + slab] = S(n);
         terms += n != 0 ? 1 : 0;
       }
-      constexpr S unit = std::numeric_limits<S>::epsilon();
-      two_terms[slab] = two_terms[half + slab] = terms >= 2 ? unit : 0;
-      three_terms[slab] = three_terms[half + slab] = terms == 3 ? unit : 0;
+      if (terms > 1) margins[slab] = S(2 * terms) * std::numeric_limits<S>::epsilon();
     }
   }
 };
 
 template <class S, int K>
-constexpr DopSides<S, K> dop_sides{};
+constexpr DopSlabs<S, K> dop_slabs{};
 
 }  // namespace
 
@@ -64,6 +62,8 @@ void DopHierarchy<S, K>::assign(Topology topology, const Primitives& primitives)
         points_.push_back(std::uint32_t(corners_each) * topology_.primitives[k] + corner);
     nodes_.push_back({begin, std::uint32_t(points_.size()), true});
   }
+  point_count_ = 0;
+  for (const std::uint32_t point : points_) point_count_ = std::max(point_count_, point + 1);
   sides_.assign(padded * topology_.size(), 0);
   corners_.resize(cover_ == Cover::boxes ? 3 * corners_each * primitives.count() : 0);
 }
@@ -71,10 +71,13 @@ void DopHierarchy<S, K>::assign(Topology topology, const Primitives& primitives)
 template <class S, int K>
 void DopHierarchy<S, K>::refit(const S* positions) {
   if (cover_ == Cover::boxes) place_corners(positions);
-  constexpr const DopSides<S, K>& sides = dop_sides<S, K>;
-  kernels_->refit(K)({nodes_.data(), std::uint32_t(nodes_.size()), points_.data(),
-                      cover_ == Cover::boxes ? corners_.data() : positions, sides.coefficients.data(),
-                      sides.two_terms.data(), sides.three_terms.data(), sides_.data()});
+  constexpr const DopSlabs<S, K>& slabs = dop_slabs<S, K>;
+  const S* const points = cover_ == Cover::boxes ? corners_.data() : positions;
+  const S reach = kernels_->reach(points, std::size_t(3) * point_count_);
+  std::array<S, padded / 2> margins;
+  for (std::size_t slab = 0; slab < half; ++slab) margins[slab] = slabs.margins[slab] * reach;
+  kernels_->refit(K)({nodes_.data(), std::uint32_t(nodes_.size()), points_.data(), points,
+                      slabs.directions.data(), margins.data(), sides_.data()});
 }
 
 template <class S, int K>

@@ -13,10 +13,10 @@ namespace kbvh {
 /// The k-DOPs of one body's hierarchy, in which the sides of a node lie next to each other: a refit and a
 /// comparison handle several sides at once. Works with any topology.
 ///
-/// Rounding: n . p is summed in S, and each side of a leaf is moved outwards by a margin that covers all
-/// roundings of the sum: two units in the last place of the side for directions of two terms, and of the
-/// largest |x| + |y| besides for those of three. Sides along the axes are exact. The bounds are therefore
-/// conservative, and looser than `Dop`'s by that margin.
+/// Rounding: n . p is summed in S, and the sides of leaves are moved outwards by a margin that covers all
+/// roundings, its own among them: by 4 or 6 units of rounding (2^-23 in float, 2^-52 in double) of the body's
+/// largest coordinate for directions of 2 or 3 terms. Sides along the axes are exact. The bounds are
+/// therefore conservative, and looser than `Dop`'s by that margin.
 template <class S, int K>
 class DopHierarchy {
  public:
@@ -91,6 +91,7 @@ class DopHierarchy {
   const Primitives* primitives_ = nullptr;
   Cover cover_;
   std::vector<DopNode> nodes_;
+  std::uint32_t point_count_ = 0;      ///< one past the last point of a leaf
   std::vector<std::uint32_t> points_;  ///< of the leaves: vertices, or corners of boxes
   std::vector<S> sides_;               ///< [node][padded]
   std::vector<S> corners_;             ///< of the primitives' boxes, [primitive][8][3], if boxes are covered

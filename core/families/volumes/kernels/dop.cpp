@@ -1,4 +1,4 @@
-// k-DOPs, a node at a time: the lanes of a vector are sides of one node.
+// k-DOPs, a node at a time: the lanes of a vector are slabs of one node.
 #include "core/families/volumes/kernels/dop.hpp"
 
 #include "core/kernels/lanes.hpp"
@@ -15,28 +15,49 @@ constexpr std::size_t lanes_over = [] {
   return lanes * sizeof(S) < 16 ? std::size_t(1) : lanes;  // there are no shorter registers
 }();
 
+/// Returns the largest absolute value of many numbers.
+template <class S>
+S reach(const S* numbers, std::size_t count) {
+  constexpr std::size_t lanes = native_lanes<S>;
+  using V = Vector<S, lanes>;
+  V most[4] = {};
+  std::size_t i = 0;
+  for (; i + 4 * lanes <= count; i += 4 * lanes)
+    for (std::size_t j = 0; j < 4; ++j) {
+      const V x = load_lanes<V>(numbers + i + lanes * j);
+      most[j] = larger(larger(x, -x), most[j]);
+    }
+  S each[4 * lanes];
+  for (std::size_t j = 0; j < 4; ++j) store_lanes(each + lanes * j, most[j]);
+  S result = 0;
+  for (const S x : each) result = larger(x, result);
+  for (; i < count; ++i) result = larger(larger(numbers[i], -numbers[i]), result);
+  return result;
+}
+
 template <class S, std::size_t padded>
 void fit_leaf(const DopRefit<S>& job, const DopNode& leaf, S* sides) {
-  constexpr std::size_t lanes = lanes_over<S, padded>, vectors = padded / lanes;
+  constexpr std::size_t half = padded / 2, lanes = lanes_over<S, half>, vectors = half / lanes;
   using V = Vector<S, lanes>;
-  V best[vectors];
-  for (std::uint32_t k = leaf.first; k < leaf.end; ++k) {
-    const S* const p = job.positions + std::size_t(3) * job.points[k];
-    const V x = V{} + p[0], y = V{} + p[1], z = V{} + p[2];
+  V least[vectors], most[vectors];
+  const auto along = [&](const S* p, std::size_t i) {
+    const S* const n = job.directions + lanes * i;
+    return load_lanes<V>(n) * p[0] + load_lanes<V>(n + half) * p[1] + load_lanes<V>(n + 2 * half) * p[2];
+  };
+  const S* p = job.positions + std::size_t(3) * job.points[leaf.first];
+  for (std::size_t i = 0; i < vectors; ++i) least[i] = most[i] = along(p, i);
+  for (std::uint32_t k = leaf.first + 1; k < leaf.end; ++k) {
+    p = job.positions + std::size_t(3) * job.points[k];
     for (std::size_t i = 0; i < vectors; ++i) {
-      const S* const along = job.coefficients + lanes * i;
-      const V at = load_lanes<V>(along) * x + load_lanes<V>(along + padded) * y +
-                   load_lanes<V>(along + 2 * padded) * z;
-      best[i] = k == leaf.first ? at : larger(at, best[i]);
+      const V at = along(p, i);
+      least[i] = smaller(at, least[i]);
+      most[i] = larger(at, most[i]);
     }
   }
-  for (std::size_t i = 0; i < vectors; ++i) store_lanes(sides + lanes * i, best[i]);
-  const S reach_x = larger(sides[0], sides[padded / 2]), reach_y = larger(sides[1], sides[padded / 2 + 1]);
-  const V reach = V{} + (reach_x + reach_y);
   for (std::size_t i = 0; i < vectors; ++i) {
-    const V margin = load_lanes<V>(job.two_terms + lanes * i) * larger(best[i], -best[i]) +
-                     load_lanes<V>(job.three_terms + lanes * i) * reach;
-    store_lanes(sides + lanes * i, best[i] + margin);
+    const V margin = load_lanes<V>(job.margins + lanes * i);
+    store_lanes(sides + lanes * i, most[i] + margin);
+    store_lanes(sides + half + lanes * i, margin - least[i]);
   }
 }
 
@@ -70,16 +91,10 @@ template <class S, std::size_t lanes>
 
 template <class S, std::size_t padded>
 bool overlap(const S* a, const S* b) {
-  constexpr std::size_t half = padded / 2;
-  // Twelve slabs are a vector of eight and one of four, where there are such registers.
-  constexpr std::size_t wide = half == 12 && native_lanes<S> >= 8 ? 8 : lanes_over<S, half>;
-  constexpr std::size_t narrow = half == 12 && native_lanes<S> >= 8 ? 4 : wide;
+  constexpr std::size_t half = padded / 2, lanes = lanes_over<S, half>;
   unsigned bits = 0;
-  std::size_t i = 0;
-  for (; i + wide <= half; i += wide)
-    bits |= apart<S, wide>(a + half + i, b + i) | apart<S, wide>(b + half + i, a + i);
-  for (; i < half; i += narrow)
-    bits |= apart<S, narrow>(a + half + i, b + i) | apart<S, narrow>(b + half + i, a + i);
+  for (std::size_t i = 0; i < half; i += lanes)
+    bits |= apart<S, lanes>(a + half + i, b + i) | apart<S, lanes>(b + half + i, a + i);
   return bits == 0;
 }
 
@@ -125,10 +140,10 @@ void search(DopSearch<S>& job) {
 }
 
 template <class S>
-constexpr DopKernels<S> table{
-    {&refit<S, padded_sides(14)>, &refit<S, padded_sides(18)>, &refit<S, padded_sides(26)>},
-    {&search<S, padded_sides(14)>, &search<S, padded_sides(18)>, &search<S, padded_sides(26)>},
-    {&overlap<S, padded_sides(14)>, &overlap<S, padded_sides(18)>, &overlap<S, padded_sides(26)>}};
+constexpr DopKernels<S> table{{&refit<S, 16>, &refit<S, 32>},
+                              {&search<S, 16>, &search<S, 32>},
+                              {&overlap<S, 16>, &overlap<S, 32>},
+                              &reach<S>};
 
 }  // namespace
 

@@ -9,13 +9,10 @@ namespace kbvh {
 enum class KernelSet : std::uint8_t;
 
 /// The sides of a k-DOP as they are stored: for each slab the largest n . p, then for each slab the largest
-/// -n . p. The slabs of each half are padded to a multiple of four by slabs of direction 0, whose sides are
-/// 0.
-constexpr std::size_t padded_slabs(int sides) {
-  return (std::size_t(sides / 2) + 3) / 4 * 4;
-}
+/// -n . p. Each half is padded to 8 or 16 slabs by slabs of direction 0, whose sides are 0: one or two cache
+/// lines in float, and whole vectors.
 constexpr std::size_t padded_sides(int sides) {
-  return 2 * padded_slabs(sides);
+  return sides <= 16 ? 16 : 32;
 }
 
 /// A node, as in Topology: children or leaf content.
@@ -25,19 +22,16 @@ struct DopNode {
   bool leaf;
 };
 
-/// A k-DOP per node, computed from points. `coefficients` has three rows of padded sides: the components of
-/// the sides' directions along x, y, z, each -1, 0 or 1.
+/// A k-DOP per node, computed from points. Slabs are padded, as in half of the sides.
 template <class S>
 struct DopRefit {
   const DopNode* nodes;
   std::uint32_t node_count;
   const std::uint32_t* points;  ///< of the leaves
   const S* positions;           ///< [point][3]
-  const S* coefficients;        ///< [3][padded sides]
-  const S*
-      two_terms;  ///< [padded sides]: 2^-23 (float) or 2^-52 for directions of two or three terms, else 0
-  const S* three_terms;  ///< [padded sides]: the same for directions of three terms, else 0
-  S* sides;              ///< [node][padded sides]
+  const S* directions;          ///< [3][slabs]: components along x, y, z, each -1, 0 or 1
+  const S* margins;             ///< [slabs]: by which both sides of a leaf are moved outwards
+  S* sides;                     ///< [node][padded sides]
 };
 
 struct DopPair {
@@ -61,22 +55,22 @@ struct DopSearch {
   std::uint64_t tests, most_tests;  ///< it pauses once `tests` reaches `most_tests`
 };
 
-/// Functions for 14, 18 and 26 sides.
+/// Functions for 16 and 32 padded sides.
 template <class S>
 struct DopKernels {
   using Refit = void (*)(const DopRefit<S>& job);
   using Search = void (*)(DopSearch<S>& job);
   using Overlap = bool (*)(const S* a, const S* b);
-  Refit refit_sides[3];
-  Search search_sides[3];
-  Overlap overlap_sides[3];
+  Refit refit_padded[2];
+  Search search_padded[2];
+  Overlap overlap_padded[2];
+  S (*reach)(const S* numbers, std::size_t count);  ///< the largest absolute value; 0 of none
 
-  static constexpr std::size_t index(int sides) { return sides == 14 ? 0 : sides == 18 ? 1 : 2; }
-  Refit refit(int sides) const { return refit_sides[index(sides)]; }
-  Search search(int sides) const { return search_sides[index(sides)]; }
-  Overlap overlap(int sides) const { return overlap_sides[index(sides)]; }
+  static constexpr std::size_t index(int sides) { return padded_sides(sides) == 16 ? 0 : 1; }
+  Refit refit(int sides) const { return refit_padded[index(sides)]; }
+  Search search(int sides) const { return search_padded[index(sides)]; }
+  Overlap overlap(int sides) const { return overlap_padded[index(sides)]; }
 };
-
 KBVH_DECLARE_KERNELS(DopKernels<float>, dop_float)
 KBVH_DECLARE_KERNELS(DopKernels<double>, dop_double)
 
