@@ -102,6 +102,7 @@ class Primitives : public testing::TestWithParam<std::string> {
     const StrategyEntry& entry = find_strategy(GetParam());
     if (entry.factory<S>() == nullptr) return;
     const Scene<S> scene = experiments::assemble<S>(surface_and_sphere(surface));
+    if (!unsuitable_bodies(entry.info, scene).empty()) return;
     Session<S> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
     PhaseTimes times;
     PairBuffer pairs;
