@@ -25,6 +25,9 @@ struct BuilderConfig {
   double sah_traversal_cost = 1.0;  ///< of one node, in units of one primitive test
 };
 
+/// Throws std::invalid_argument on an inadmissible width, leaf size, or number of bins.
+void check_builder(const BuilderConfig& config);
+
 /// Computes the boxes of all primitives; empty for removed ones. O(primitives).
 template <class S>
 std::vector<Box<S>> primitive_boxes(const Primitives& primitives, const S* positions);

@@ -1,0 +1,77 @@
+// One topology for a whole clip, refitted: each split of the tree is chosen by the surfaces of its parts at
+// several times of the clip, not only at the first (temporal surface-area heuristic).
+#include "core/contract/registry.hpp"
+#include "core/families/wide/stored_hierarchy.hpp"
+#include "core/topology/builder_over_time.hpp"
+
+namespace kbvh {
+namespace {
+
+/// Returns the topologies, those of moving bodies built anew for `samples` times of the clip.
+template <class S>
+Topologies over_clip(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+                     std::size_t samples) {
+  for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+    const FlightPlans<S>& plans = motion.plans(body);
+    const auto times = plans.keyframe_times();
+    if (!scene.moving(body) || times.size() < 2) continue;
+    std::vector<std::vector<S>> positions(samples);
+    std::vector<const S*> rows;
+    for (std::size_t i = 0; i < samples; ++i) {
+      const double share = double(i) / double(samples - 1);
+      positions[i].resize(std::size_t(3) * scene.vertex_count(body) + 1);
+      plans.evaluate(times.front() + share * (times.back() - times.front()), positions[i].data());
+      rows.push_back(positions[i].data());
+    }
+    topologies[body] = build_topology_over_time<S>(
+        scene.primitives(body), rows,
+        {.width = topologies[body].width, .leaf_size = topologies[body].leaf_size});
+  }
+  return topologies;
+}
+
+template <class S, class Count>
+class Tsah final : public StoredHierarchyStrategy<S, Count>,
+                   public AnswersSelfPairs,
+                   public TakesGeometryChanges<S> {
+  using Base = StoredHierarchyStrategy<S, Count>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::whole_clip;
+  Tsah(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params& params)
+      : Base(scene, motion,
+             over_clip(scene, motion, std::move(topologies), std::size_t(params.number("samples"))), params) {
+  }
+
+  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
+    this->edit_geometry(change);
+  }
+
+ private:
+  void update(std::uint32_t body) override {
+    this->hierarchies_[body].refit(this->sampled_.positions(body));
+    this->count_refit(body);
+  }
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(tsah) {
+  using namespace kbvh;
+  return {make_entry<Tsah>({
+      .id = "tsah",
+      .title = "refit, one tree for the clip",
+      .family = "restructuring",
+      .citation = "Bittner & Meister 2015",
+      .declares = {.time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+      .parameters = {{"samples",
+                      "8",
+                      {},
+                      "times of the clip that the tree is built for, the first and the last among them",
+                      2,
+                      64,
+                      Numbers::whole}},
+  })};
+}
