@@ -186,7 +186,7 @@ TEST(ChangesFaults, AreCaught) {
   expect(violation<Fault::begins_twice>(), "begins twice");
   expect(violation<Fault::lost_begin>(), "has not begun");
   expect(violation<Fault::end_of_nothing>(), "ends without a begin");
-  expect(violation<Fault::stale_after_reset>(), "has not begun");
+  expect(violation<Fault::stale_after_reset>(), "ends without a begin");
 }
 
 // --- comparison of two answers

@@ -37,11 +37,7 @@ class TriangleSpanFilter {
   bool intersects(std::uint32_t pair) const { return state_[pair] == State::intersecting; }
   /// Returns whether the pair is a candidate.
   bool may_intersect(std::uint32_t pair) const { return state_[pair] != State::apart; }
-  /// Call use(pair) for every pair that certainly intersects, or whose triangles have to be tested.
-  template <class Use>
-  void for_intersecting(const Use& use) const {
-    for (const std::uint32_t pair : intersecting_) use(pair);
-  }
+  /// Calls use(pair) for every pair whose triangles have to be tested at the frame.
   template <class Use>
   void for_open(const Use& use) const {
     for (const Item item : open_) use(item.pair);
