@@ -33,6 +33,7 @@ class detail::WorldImplementation {
   virtual void spans(double t, std::vector<WorldSpan>& out) = 0;
   virtual void contacts(double t, std::vector<WorldContact>& out) = 0;
   virtual double next_knot() const = 0;
+  virtual void hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vector<WorldHit>& out) = 0;
   virtual void positions(std::uint32_t body, std::vector<double>& out) = 0;
   virtual void positions(std::uint32_t body, double t, std::vector<double>& out) const = 0;
   virtual bool hierarchy(std::uint32_t body, WorldHierarchy& out) const = 0;

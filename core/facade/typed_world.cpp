@@ -80,6 +80,19 @@ void replace(std::vector<WorldPair>& out, const PairBuffer& pairs) {
   for (const PrimitivePair& pair : pairs) out.push_back(plain(pair));
 }
 
+/// Rounds a ray to the world's precision.
+template <class S>
+Ray<S> typed(const WorldRay& ray) {
+  Ray<S> made{};
+  for (int axis = 0; axis < 3; ++axis) {
+    made.origin[axis] = S(ray.origin[axis]);
+    made.direction[axis] = S(ray.direction[axis]);
+  }
+  made.length = S(ray.length);
+  return made;
+}
+static_assert(WorldHit::none == RayHit::none && int(WorldRayQuery::any) == int(RayQuery::any));
+
 std::optional<std::uint32_t> number_of(const std::map<std::string, std::string>& words,
                                        const std::string& key) {
   const auto found = words.find(key);
@@ -225,6 +238,14 @@ class TypedWorld final : public detail::WorldImplementation {
                      contact.feature_b, contact.begin, contact.end});
   }
   double next_knot() const override { return session().next_knot(); }
+  void hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vector<WorldHit>& out) override {
+    rays_.clear();
+    for (const WorldRay& ray : rays) rays_.push_back(typed<S>(ray));
+    hits_.resize(rays.size());
+    session().hits(RayQuery(query), rays_, std::span<RayHit>(hits_), ignored_);
+    out.clear();
+    for (const RayHit& hit : hits_) out.push_back({hit.body, hit.primitive, hit.parameter});
+  }
 
   void positions(std::uint32_t body, std::vector<double>& out) override {
     check_body(body);
@@ -423,6 +444,8 @@ class TypedWorld final : public detail::WorldImplementation {
   PairBuffer pairs_, ended_;
   SpanBuffer spans_;
   ContactBuffer contacts_;
+  std::vector<Ray<S>> rays_;
+  std::vector<RayHit> hits_;
   EventDescription<S> done_;
 };
 

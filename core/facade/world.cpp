@@ -70,6 +70,9 @@ void World::contacts(double t, std::vector<WorldContact>& out) {
 double World::next_knot() const {
   return implementation_->next_knot();
 }
+void World::hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vector<WorldHit>& out) {
+  implementation_->hits(query, rays, out);
+}
 void World::positions(std::uint32_t body, std::vector<double>& out) {
   implementation_->positions(body, out);
 }
