@@ -45,10 +45,10 @@
 #include <type_traits>
 #include <utility>
 
-#include "embree.hpp"
 #include "core/base/assert.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
+#include "embree.hpp"
 
 namespace kbvh {
 namespace {
