@@ -50,15 +50,24 @@ export function race() {
 /// Lesson 3: a smaller race, small enough to do by hand.
 export function race4() {
   return scene("race of four", [
-    points("runners", [0, 1], [[0, 2, 4, 6], [8, 7, 4, 5]].map((xs) => xs.map((x, i) => [x, i]))),
+    points("runners", [0, 1], [[0, 2, 4, 6], [8, 6, 3, 5]].map((xs) => xs.map((x, i) => [x, i]))),
   ]);
 }
 
-/// Lesson 3: the maximum changes hands as often as it can.
-export function relay(count = 8) {
+/// Lessons 3 and 5: the maximum changes hands as often as it can, because the lines are tangents of a parabola.
+/// The tree splits on y, which is large: "sorted" makes neighbours of neighbouring tangents, "mixed" puts the even
+/// ones on one side and the odd ones on the other, at every level. `count` is a power of two.
+export function relay(count = 8, order = "sorted") {
+  const place = (i) => (order === "sorted" ? i : reversed(i, Math.log2(count)));
   const from = [], to = [];
-  for (let i = 0; i < count; ++i) from.push([-i * i, i]), to.push([32 * i - i * i, i]);
-  return scene("relay of " + count, [points("runners", [0, 1], [from, to])]);
+  for (let i = 0; i < count; ++i) from.push([-i * i, 128 * place(i)]), to.push([4 * count * i - i * i, 128 * place(i)]);
+  return scene(`relay of ${count}, ${order}`, [points("runners", [0, 1], [from, to])]);
+}
+
+function reversed(i, bits) {
+  let result = 0;
+  for (let b = 0; b < bits; ++b) result = 2 * result + ((i >> b) & 1);
+  return result;
 }
 
 /// Lesson 4: a ribbon of four triangles that bends: a tree of seven nodes.
