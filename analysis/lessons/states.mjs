@@ -19,7 +19,7 @@ export const states = {
   combs: { state: state(scenes.combs(), "kinetic_separation_list"), note: "Two combs slide past each other." },
   sheet: { state: state(scenes.sheet(), "kinetic_aabb", { compare: { strategy: "bottom_up", params: {}, topology: binary } }), note: "Kinetic tree beside refit; compare the values written." },
   tie: { state: state(scenes.tie()), note: "Three points meet in one point of the diagram." },
-  carried: { state: state(scenes.carried()), note: "Sixteen points, translated exactly." },
+  carried: { state: state(scenes.carried()), note: "Sixty-four points, translated exactly." },
   "carried-far": { state: state(scenes.carried(1000000), "kinetic_aabb", { precision: "float32" }), note: "The same points, a million units away, in float." },
 };
 

@@ -18,11 +18,12 @@ export const breakT9 = {
   wrong: () => [state(scenes.shoal()), state(scenes.tangents(6))],
 };
 
-/// Four triangles; vertex 0 of the first moves by (dx, dy).
+/// Four triangles in a row, the first the tallest. Its second vertex moves by (dx, dy).
 function row(dx, dy) {
-  const from = [0, 1, 2, 3].flatMap((i) => [[3 * i, 0], [3 * i + 1, 0.25], [3 * i + 0.25, 1]]);
-  const to = from.map(([x, y], v) => (v === 0 ? [x + dx, y + dy] : [x, y]));
-  return state({ ...scenes.shoal(), name: "row", bodies: [triangles("row", [0, 1], [from, to], [0, 1, 2, 3].map((i) => [3 * i, 3 * i + 1, 3 * i + 2]))] });
+  const from = [0, 1, 2, 3].flatMap((i) => [[3 * i, 0.125 * i], [3 * i + 1, 0.5], [3 * i + 0.25, i === 0 ? 1 : 0.75]]);
+  const to = from.map(([x, y], v) => (v === 1 ? [x + dx, y + dy] : [x, y]));
+  const faces = [0, 1, 2, 3].map((i) => [3 * i, 3 * i + 1, 3 * i + 2]);
+  return state({ ...scenes.shoal(), name: "row", bodies: [triangles("row", [0, 1], [from, to], faces)] });
 }
 
 export const climber = {
@@ -37,6 +38,6 @@ export const climber = {
     return top && touched.length >= 3 ? yes(`The only event begins at node ${event.node} and changes ${touched.length} nodes, up to the root.`)
       : no(`The event changes ${count(touched.length, "node")}; it should begin at a leaf and end at the root.`);
   },
-  solution: () => row(0, 1.5),
-  wrong: () => [row(0, 0), row(0, -1)],
+  solution: () => row(0, 1),
+  wrong: () => [row(-2, 0), state(scenes.flag())],
 };

@@ -12,7 +12,7 @@ export const noDuration = {
     return twice ? yes(`At ${twice.time} s node ${twice.node} changes the realiser of one side twice: vertex ${twice.newVertex} holds the bound for no time.`)
       : no("No bound changes twice at one instant. Let three lines of one subtree meet in one point, in an order that the tree notices one by one.");
   },
-  solution: () => state(scene("three in one point", [points("points", [0, 1], [[[0, 0], [2, 4], [4, 8], [1, 12]], [[8, 0], [6, 4], [4, 8], [1, 12]]])])),
+  solution: () => state(scene("three in one point", [points("points", [0, 1], [[[4, 0], [2, 4], [0, 40], [-9, 44]], [[4, 0], [6, 4], [8, 40], [-9, 44]]])])),
   wrong: () => [state(scenes.race4()), state(scene("two by two", [points("points", [0, 1], [[[0, 0], [4, 4]], [[4, 0], [0, 4]]])]))],
 };
 

@@ -41,7 +41,7 @@ export function dart() {
 /// Lesson 3: eight runners on parallel tracks; y only keeps them apart on the screen.
 export function race() {
   const from = [0, 1, 2, 3, 4, 5, 6, 7];
-  const to = [9, 4, 12, 3, 10, 6, 8, 11];
+  const to = [13.5, 4, 13.25, 3.5, 10, 12, 8, 10.5];
   return scene("race", [
     points("runners", [0, 1], [from, to].map((xs) => xs.map((x, i) => [x, i]))),
   ]);
@@ -59,8 +59,8 @@ export function race4() {
 /// ones on one side and the odd ones on the other, at every level. `count` is a power of two.
 export function relay(count = 8, order = "sorted") {
   const place = (i) => (order === "sorted" ? i : reversed(i, Math.log2(count)));
-  const from = [], to = [];
-  for (let i = 0; i < count; ++i) from.push([-i * i, 128 * place(i)]), to.push([4 * count * i - i * i, 128 * place(i)]);
+  const from = [], to = [], apart = 2 * count * count;
+  for (let i = 0; i < count; ++i) from.push([-i * i, apart * place(i)]), to.push([4 * count * i - i * i, apart * place(i)]);
   return scene(`relay of ${count}, ${order}`, [points("runners", [0, 1], [from, to])]);
 }
 
@@ -152,13 +152,14 @@ export function tie() {
   return scene("tie", [points("points", [0, 1], [[[2, 0], [1, 1], [0, 2]], [[2, 0], [3, 1], [4, 2]]])]);
 }
 
-/// Lesson 9: eight points in a row, translated by 1 per second, `offset` from the origin.
+/// Lesson 9: 64 points, translated by the same vector in each of three seconds, `offset` from the origin. All numbers
+/// are multiples of 2^-10: exact in float near the origin.
 export function carried(offset = 0) {
   const random = noise(9);
-  const from = Array.from({ length: 16 }, (_, i) => [offset + i + random(), offset + random()]);
+  const from = Array.from({ length: 64 }, (_, i) => [offset + (i % 8) + random(), offset + random()]);
   const times = [0, 1, 2, 3];
   return scene(offset ? "carried, far away" : "carried", [
-    points("points", times, times.map((k) => from.map(([x, y]) => [x + 0.4375 * k, y + 0.3125 * k]))),
+    points("points", times, times.map((k) => from.map(([x, y]) => [x + 0.4140625 * k, y + 0.2734375 * k]))),
   ]);
 }
 
