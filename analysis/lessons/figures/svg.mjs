@@ -36,8 +36,8 @@ export const rules = `
 .picture .a{stroke:var(--a)}.picture .b{stroke:var(--b)}.picture .c{stroke:var(--c)}.picture .d{stroke:var(--d)}.picture .soft{stroke:var(--soft)}
 .picture text.a{stroke:none;fill:var(--a)}.picture text.b{stroke:none;fill:var(--b)}.picture text.c{stroke:none;fill:var(--c)}.picture text.d{stroke:none;fill:var(--d)}
 .picture .solid{fill:var(--ink)}.picture .a.solid{fill:var(--a)}.picture .b.solid{fill:var(--b)}.picture .c.solid{fill:var(--c)}.picture .d.solid{fill:var(--d)}.picture .soft.solid{fill:var(--soft)}
-.picture .paper{fill:var(--paper)}.picture .wash{fill:var(--grid);stroke:none}
-.picture .fa{fill:var(--fa);stroke:none}.picture .fb{fill:var(--fb);stroke:none}.picture .fc{fill:var(--fc);stroke:none}.picture .fd{fill:var(--fd);stroke:none}`;
+.picture .bare{stroke:none}.picture .paper{fill:var(--paper)}.picture .wash{fill:var(--grid);stroke:none}
+.picture .fa{fill:var(--fa)}.picture .fb{fill:var(--fb)}.picture .fc{fill:var(--fc)}.picture .fd{fill:var(--fd)}`;
 
 /// Colours of the pictures, distinguishable for the colour-blind: blue, orange, green, purple.
 export const light = "--ink:#1c1f24;--quiet:#5b6370;--grid:#e3e6ea;--soft:#a7afba;--paper:#ffffff;--a:#0063a8;--b:#c24a00;--c:#00795a;--d:#8a3a8f;--fa:#0063a822;--fb:#c24a0022;--fc:#00795a22;--fd:#8a3a8f22";

@@ -143,6 +143,7 @@ export function smallNumbers(walker) {
     put(`relay${n}.lead_changes`, changesOf(trace(`relay${n}.sorted`), 0, 1));
   }
   for (const n of [8, 16, 32, 64, 128, 256]) {
+    put(`wander${n}.points`, n);
     put(`wander${n}.events`, trace("wander" + n).steps.length);
     put(`wander${n}.values`, last(trace("wander" + n), "values_written"));
     put(`wander${n}.bound`, forcedMost(trace("wander" + n).start[0], 4));

@@ -60,7 +60,7 @@ export function race4() {
 export function relay(count = 8, order = "sorted") {
   const place = (i) => (order === "sorted" ? i : reversed(i, Math.log2(count)));
   const from = [], to = [], apart = 2 * count * count;
-  for (let i = 0; i < count; ++i) from.push([-i * i, apart * place(i)]), to.push([4 * count * i - i * i, apart * place(i)]);
+  for (let i = 0; i < count; ++i) from.push([-i * i, apart * place(i)]), to.push([2 * count * i - i * i, apart * place(i)]);
   return scene(`relay of ${count}, ${order}`, [points("runners", [0, 1], [from, to])]);
 }
 
