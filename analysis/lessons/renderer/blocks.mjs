@@ -21,6 +21,12 @@ export function blocks({ figures, states, checkers, numbers }) {
     return `<div class="lab" data-lab="${name}"><p class="lab-bar"><button type="button" class="open-lab">${label}</button>
 <span class="lab-note">${escape(states[name].note ?? "")}</span></p><div class="lab-place" hidden></div></div>\n`;
   };
+  /// The buttons of the open exercise, once: before its solution, or at its end.
+  const bars = (env) => {
+    const html = env.bars ?? "";
+    env.bars = "";
+    return html;
+  };
   return {
     goals: titled("goals", "After this lesson you can"),
     theorem: titled("theorem", "Theorem"),
@@ -31,7 +37,7 @@ export function blocks({ figures, states, checkers, numbers }) {
     task: titled("task", "In the lab"),
     programming: titled("programming", "Programming exercise"),
     warning: titled("warning", "Mind"),
-    solution: (_, opening) => (opening ? '<details class="solution"><summary>Solution</summary>\n' : "</details>\n"),
+    solution: (_, opening, env) => (opening ? bars(env) + '<details class="solution"><summary>Solution</summary>\n' : "</details>\n"),
     teacher: (_, opening, env, tokens, i) => (opening ? "<!--teacher-->" : "<!--/teacher-->"),
     predict: (rest, opening, env) => {
       if (!opening) return '<p class="commit"><button type="button">Commit to this answer</button> <output></output></p></form>\n';
@@ -51,20 +57,20 @@ export function blocks({ figures, states, checkers, numbers }) {
     },
     lab: (rest, opening) => (opening ? lab(words(rest)[0], "Open the lab here") + '<div class="under-lab">' : "</div>\n"),
     exercise: (rest, opening, env) => {
-      if (!opening) return "</section>\n";
+      if (!opening) return bars(env) + "</section>\n";
       const [name] = words(rest);
       if (!(name in checkers)) throw new Error(`no checker '${name}' in checkers/`);
       env.exercises.push(name);
-      return `<section class="exercise" data-exercise="${name}"><h3 class="kind">Exercise: ${escape(checkers[name].title)}</h3>
-${lab("exercise-" + name, "Open the lab with the start scene")}<p class="check-bar"><button type="button" class="check">Check my scene</button> <button type="button" class="show-solution">Load a solution into the lab</button> <output class="verdict-line"></output></p>\n`;
+      env.bars = `${lab("exercise-" + name, "Open the lab with the start scene")}<p class="check-bar"><button type="button" class="check">Check my scene</button> <button type="button" class="show-solution">Load a solution into the lab</button> <output class="verdict-line"></output></p>\n`;
+      return `<section class="exercise" data-exercise="${name}"><h3 class="kind">Exercise: ${escape(checkers[name].title)}</h3>\n`;
     },
     answer: (rest, opening, env) => {
-      if (!opening) return "</form>\n";
+      if (!opening) return '<p class="answer-bar"><label>Your number: <input type="text" inputmode="decimal" size="10" autocomplete="off"></label> <button type="submit">Check</button> <output></output></p></form>\n';
       const [key, options] = words(rest);
       if (!(key in numbers)) throw new Error(`no number '${key}' for an answer`);
       env.answers.push(key);
       return `<form class="answer" data-value="${numbers[key].value}" data-tolerance="${options.tolerance ?? 0}">
-<h3 class="kind">Question</h3><p class="answer-bar"><label>Your number: <input type="text" inputmode="decimal" size="10" autocomplete="off"></label> <button type="submit">Check</button> <output></output></p>\n`;
+<h3 class="kind">Question</h3>\n`;
     },
   };
 }

@@ -1,14 +1,14 @@
 // Renders the course: node renderer/build.mjs --walker PROGRAM --kbvh PROGRAM --out FOLDER
 // The folder gets one page per lesson, an index, the teacher's notes, the slides, and what these need.
 import { build } from "esbuild";
-import { cpSync, mkdirSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
+import { mkdirSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { parseArgs } from "node:util";
 import { load } from "js-yaml";
 import { checkers } from "../checkers/index.mjs";
 import { figures as figureMakers } from "../figures/index.mjs";
-import { standalone } from "../figures/svg.mjs";
+import { rules, standalone } from "../figures/svg.mjs";
 import { makeNumbers } from "../numbers/numbers.mjs";
 import { states as preparedStates, exerciseStates } from "../states.mjs";
 import { blocks, options } from "./blocks.mjs";
@@ -85,13 +85,13 @@ async function main() {
   const { values } = parseArgs({ options: { walker: { type: "string" }, kbvh: { type: "string" }, out: { type: "string" } } });
   if (!values.walker || !values.kbvh || !values.out) throw new Error("usage: build.mjs --walker PROGRAM --kbvh PROGRAM --out FOLDER");
   mkdirSync(join(values.out, "pictures"), { recursive: true });
-  const made = makeNumbers({ walker: values.walker, kbvh: values.kbvh, cache: join(values.out, "numbers.json") });
-  const { pages, drawn, states } = render(made);
+  const made = makeNumbers({ walker: values.walker, kbvh: values.kbvh, cache: join(dirname(values.walker), "lesson_numbers.json") });
+  const { pages, drawn } = render(made);
   for (const [name, html] of Object.entries(pages)) writeFileSync(join(values.out, name), html);
   for (const [name, svg] of Object.entries(drawn)) writeFileSync(join(values.out, "pictures", name + ".svg"), standalone(svg));
   writeFileSync(join(values.out, "katex.css"), mathematicsStyle());
-  cpSync(join(root, "page/lessons.css"), join(values.out, "lessons.css"));
-  writeFileSync(join(values.out, "states.json"), JSON.stringify(states));
+  writeFileSync(join(values.out, "lessons.css"), readFileSync(join(root, "page/lessons.css"), "utf8") + rules + "\n");
+  writeFileSync(join(values.out, "numbers.json"), JSON.stringify(made.numbers, null, 1));
   await build({ entryPoints: [join(root, "page/lessons.mjs")], bundle: true, minify: true, format: "iife", target: "es2020",
     outfile: join(values.out, "lessons.js"), logLevel: "warning" });
   console.log(`${Object.keys(pages).length} pages, ${Object.keys(drawn).length} pictures, ${Object.keys(made.numbers).length} numbers in ${values.out}`);

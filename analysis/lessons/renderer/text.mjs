@@ -8,7 +8,27 @@ import container from "markdown-it-container";
 export function parse(source, file) {
   const match = /^---\n([\s\S]*?)\n---\n/.exec(source);
   if (!match) throw new Error(`${file}: expected front matter between two lines of ---`);
-  return { meta: load(match[1]), text: source.slice(match[0].length), file };
+  return { meta: load(match[1]), text: nested(source.slice(match[0].length), file), file };
+}
+
+/// Writes blocks inside of blocks with fewer colons than the outer ones, as the parser wants it. Throws if a block
+/// is not closed.
+function nested(text, file) {
+  const open = [];
+  let code = false;
+  const lines = text.split("\n").map((line, i) => {
+    if (line.startsWith("```")) code = !code;
+    if (code || !line.startsWith(":::")) return line;
+    if (line.trim() === ":::" && open.length === 0) throw new Error(`${file}: line ${i + 1} closes a block that is not open`);
+    if (line.trim() === ":::") {
+      open.pop();
+      return ":".repeat(7 - open.length);
+    }
+    open.push(line);
+    return ":".repeat(8 - open.length) + line.slice(3);
+  });
+  if (open.length > 0) throw new Error(`${file}: the block '${open.at(-1)}' is not closed`);
+  return lines.join("\n");
 }
 
 export function escape(text) {
