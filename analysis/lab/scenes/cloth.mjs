@@ -54,8 +54,8 @@ function advance(position, velocity, springs, step, top, half) {
 /** Keeps a vertex a little above the top face of the box (so that folds still cut it), and out of its walls. */
 function collide(p, v, top, half) {
   const inside = Math.max(Math.abs(p[0]), Math.abs(p[1])) < half;
-  if (inside && p[2] < top + 0.004 && p[2] > top - 0.25) {
-    p[2] = top + 0.004;
+  if (inside && p[2] < top + 0.03 && p[2] > top - 0.25) {
+    p[2] = top + 0.03;
     for (let k = 0; k < 3; ++k) v[k] *= k === 2 ? 0 : 0.6;
   }
 }

@@ -6,7 +6,7 @@ export function spheres(scene, mesh) {
     return mesh(name, indices, [0, 2], [at(0.5), at(1.35)]);
   };
   return scene('Two expanding spheres',
-      'Two spheres of 320 triangles each expand until they overlap; directions never change, so few certificates fail.', 3,
+      'Two spheres of 320 triangles each expand until they overlap. Directions never change, so no bound changes hands; only a separation list has events.', 3,
       [body('left', -1.1, 0), body('right', 1.1, 0.25)], 20, [[0, 1]]);
 }
 

@@ -36,6 +36,7 @@ export async function mountLab(element, state = null, options = {}) {
   const lab = new Lab();
   const views = new Set(options.views ?? allViews.filter((view) => !options.compact || view !== 'header'));
   if (options.theme) lab.view({theme: options.theme});
+  element.replaceChildren();
   render(html`<${Page} lab=${lab} views=${views} options=${options} />`, element);
   lab.element = element;
   lab.destroy = () => { render(null, element); lab.close(); };

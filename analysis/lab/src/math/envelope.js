@@ -60,7 +60,7 @@ function overtaker(cut, leader, now, t0, t1) {
   let found = null;
   const l = cut[leader];
   for (let i = 0; i < cut.length; ++i) {
-    if (i === leader || cut[i].b <= l.b) continue;
+    if (i === leader || !(cut[i].b > l.b)) continue;
     const behind = l.a - cut[i].a, ahead = cut[i].b - l.b;
     const time = Math.max(now, t0 + (t1 - t0) * (behind / (behind + ahead)));
     if (!found || time < found.time || (time === found.time && cut[i].b > cut[found.index].b)) found = {index: i, time};

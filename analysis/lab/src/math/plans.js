@@ -63,4 +63,4 @@ export function clip(scene) {
 export const axisOf = (side) => side >> 1;
 export const isUpper = (side) => (side & 1) === 1;
 export const axisNames = ['x', 'y', 'z'];
-export const sideName = (side) => `${isUpper(side) ? 'upper' : 'lower'} ${axisNames[axisOf(side)]}`;
+export const sideName = (side) => side > 5 ? `slanted side ${side}` : `${isUpper(side) ? 'upper' : 'lower'} ${axisNames[axisOf(side)]}`;

@@ -46,9 +46,9 @@ export function gauges({trees, at, info, step, history}) {
       `${bounds} certificates that fail, in ${boxes} boxes`, 'at most 6 events for each box'));
 
   const steps = counters.certificates_failed || 0;
-  const work = steps ? ((counters.nodes_visited ?? 0) + (counters.queue_steps ?? 0)) / steps : null;
+  const work = steps ? ((counters.values_written ?? 0) + (counters.queue_steps ?? 0)) / steps : null;
   const latest = step ? `; the last one changed ${step.touched.length} ${step.touched.length === 1 ? 'side' : 'sides'} and scheduled ${step.rescheduled.length}` : '';
-  result.push(gauge('responsive', 'Responsive', kinetic ? work : null, responsiveBound(log), 'nodes and queue steps per event',
+  result.push(gauge('responsive', 'Responsive', kinetic ? work : null, responsiveBound(log), 'sides changed and queue steps per event',
       `mean of ${steps} events${latest}`, `of the order of log² m; log₂ m = ${log.toFixed(1)} for m = ${m}. Drawn: 6 log₂² m + 6`));
 
   let most = 0, total = 0, vertices = 0, leaves = 1, levels = 1, haveRealisers = false;

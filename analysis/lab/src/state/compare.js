@@ -32,7 +32,8 @@ export class Comparison {
       ++this.measuring;
       return;
     }
-    this.lab.store.set({compare: {params: {}, topology: {}, ...choice, info: null, at: null, trees: [], lit: nothingLit}});
+    const topology = this.lab.defaultTopology(choice.strategy, this.lab.state.scene);
+    this.lab.store.set({compare: {params: {}, topology, ...choice, info: null, at: null, trees: [], lit: nothingLit}});
     await this.reload();
   }
 

@@ -58,10 +58,11 @@ export class Lab {
     const saved = checkState(pageState);
     const scene = saved.scene ?? sceneById(saved.sceneId);
     this.editing.forget();
+    this.savedLevel = saved.view?.level !== undefined;
     this.store.set({view: {...defaultView(), theme: this.state.view.theme, ...saved.view}});
     await this.load({
       scene, sceneId: saved.scene ? null : saved.sceneId, strategy: saved.strategy ?? 'kinetic_aabb', params: saved.params ?? {},
-      topology: saved.topology ?? {}, precision: saved.precision ?? 'float64',
+      topology: saved.topology ?? this.defaultTopology(saved.strategy ?? 'kinetic_aabb', scene), precision: saved.precision ?? 'float64',
     }, {time: saved.time, events: saved.events, selection: saved.selection});
     await this.comparison.set(saved.compare ?? null);
   }
@@ -75,6 +76,22 @@ export class Lab {
       selection: s.selection, view: s.view,
       ...(s.compare ? {compare: {strategy: s.compare.strategy, params: s.compare.params, topology: s.compare.topology}} : {}),
     };
+  }
+
+  /**
+   * The tree as in the paper, binary with one primitive a leaf, for scenes small enough to be looked at node by node and
+   * strategies that take it; else the strategy's own best settings.
+   */
+  defaultTopology(strategy, scene) {
+    const known = this.state.strategies.find(({id}) => id === strategy);
+    const vertices = scene.bodies.reduce((sum, body) => sum + body.vertices, 0);
+    return vertices <= 2000 && known?.widths?.includes(2) ? {width: 2, leaf_size: 1} : {};
+  }
+
+  /** Changes to another strategy at the present time. */
+  choose(strategy) {
+    const {scene, at} = this.state;
+    return this.load({strategy, params: {}, topology: this.defaultTopology(strategy, scene)}, {time: at?.time});
   }
 
   /** Where the clip stands, as a frame (any time) and the number of single events after it. */
@@ -112,7 +129,7 @@ export class Lab {
         selection: this.#checkedSelection(place.selection ?? (choice.scene ? null : s.selection), info),
       });
       this.#arrive(first);
-      if (this.#nodes() > manyNodes && this.state.view.level === 'all') this.view({level: '6'});
+      if (choice.scene && !quiet) this.#chooseLevel();
       for (let k = 0; k < (place.events ?? 0); ++k) {
         const {step, state} = await this.engine.event(end, this.#want());
         if (!step) break;
@@ -293,8 +310,15 @@ export class Lab {
 
   /** Chooses an event that was just performed; with `follow`, its node and side, too. */
   #followStep({index, event}) {
-    const place = this.state.view.follow ? {body: event.body, node: event.node, ...(event.kind === 'bound' ? {side: event.side} : {})} : {};
+    const place = this.state.view.follow ? {body: event.body, node: event.node, ...(event.kind === 'bound' && event.side < 6 ? {side: event.side} : {})} : {};
     this.select({...place, event: {done: index}});
+  }
+
+  /** With many nodes all levels hide each other: shows one of the upper levels, unless a saved view says otherwise. */
+  #chooseLevel() {
+    if (this.savedLevel) { this.savedLevel = false; return; }
+    const nodes = this.#nodes(), levels = Math.max(1, ...this.state.trees.map((tree) => tree?.levels ?? 1));
+    this.view({level: nodes <= 64 ? 'all' : String(Math.min(levels - 1, 3))});
   }
 
   /** Keeps the selected node inside a tree that became smaller. */

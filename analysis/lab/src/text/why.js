@@ -50,7 +50,7 @@ export function story(step, context) {
 
 function boundStory(step, context) {
   const {event} = step, {trees, bodies} = context, b = event.body;
-  const tree = trees[b], axis = axisNames[axisOf(event.side)], more = isUpper(event.side) ? 'larger' : 'smaller';
+  const tree = trees[b], axis = event.side > 5 ? 'the coordinate' : axisNames[axisOf(event.side)], more = isUpper(event.side) ? 'larger' : 'smaller';
   const leaf = tree?.isLeaf(event.node), done = step.touched !== undefined;
   const moment = when(event);
   const paragraphs = [];
@@ -58,7 +58,7 @@ function boundStory(step, context) {
   paragraphs.push({heading: 'Which certificate', parts: [
     `The certificate “${axis} of `, vertex(b, event.winner), ` ${sign} ${axis} of `, vertex(b, event.loser),
     '” proved that ', vertex(b, event.winner), ` realises the ${sideName(event.side)} side of `, node(b, event.node),
-    leaf ? ` (a leaf: its ${primitiveWord(bodies[b])}’s own vertices compete).`
+    leaf ? ` (a leaf: the vertices of its ${tree.count[event.node] > 1 ? `${tree.count[event.node]} ` : ''}${primitiveWord(bodies[b])}${tree.count[event.node] > 1 ? 's' : ''} compete).`
          : ' (an inner node: only the realisers of its children compete).',
     done ? ' It failed at ' : ' It will fail at ', {time: event.time, text: moment.text}, moment.exactly ? ', exactly.' : '.']});
   const lines = overtaking(event, axis, more);

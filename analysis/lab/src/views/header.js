@@ -20,10 +20,10 @@ export function Header({lab, state, onHelp}) {
   const load = (choice) => lab.load(choice, choice.scene ? {} : {time: state.at?.time});
   return html`<header class="lab-head">
     <h1>kbvh <span>lab</span></h1>
-    <label>Scene <select value=${sceneId ?? ''} onChange=${(event) => { const id = event.currentTarget.value; if (builtIn[id]) { lab.editing.forget(); load({scene: builtIn[id], sceneId: id, params: state.params}); } }}>
+    <label>Scene <select value=${sceneId ?? ''} onChange=${(event) => { const id = event.currentTarget.value; if (builtIn[id]) { lab.editing.forget(); load({scene: builtIn[id], sceneId: id, topology: lab.defaultTopology(strategy, builtIn[id])}); } }}>
       ${!sceneId && html`<option value="">${scene?.name ?? '…'} (changed or own)</option>`}
       ${Object.entries(builtIn).map(([id, each]) => html`<option value=${id}>${each.name}</option>`)}</select></label>
-    <label>Strategy <select value=${strategy} onChange=${(event) => load({strategy: event.currentTarget.value, params: {}, topology: {}})}>
+    <label>Strategy <select value=${strategy} onChange=${(event) => lab.choose(event.currentTarget.value)}>
       ${ordered(strategies).map((s) => html`<option value=${s.id}>${s.title}${s.events ? ' (events)' : ''}</option>`)}</select></label>
     <label>Compare with <select value=${compare?.strategy ?? ''} onChange=${(event) => { const id = event.currentTarget.value; lab.comparison.set(id ? {strategy: id} : null); if (id) lab.view({panel: 'work'}); }}>
       <option value="">nothing</option>${ordered(strategies).map((s) => html`<option value=${s.id}>${s.title}</option>`)}</select></label>

@@ -40,6 +40,7 @@ export class Space {
     if (width < 2 || height < 2) return;
     this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
+    this.sized = true;
     this.camera.updateProjectionMatrix();
     if (this.box && !this.placed) this.fit();
     this.soon();
@@ -114,14 +115,14 @@ export class Space {
   /** Looks at the whole clip. */
   fit() {
     const centre = this.box.getCenter(new THREE.Vector3()), size = this.box.getSize(new THREE.Vector3()).length() || 1;
-    const distance = size / (2 * Math.tan(this.camera.fov * Math.PI / 360)) / Math.min(1, this.camera.aspect) * 0.92;
+    const distance = size / (2 * Math.tan(this.camera.fov * Math.PI / 360)) / Math.min(1, this.camera.aspect) * 0.66;
     this.camera.position.copy(centre).add(new THREE.Vector3(0.55, -0.95, 0.55).normalize().multiplyScalar(distance));
     this.camera.near = distance / 100;
     this.camera.far = distance * 10;
     this.camera.updateProjectionMatrix();
     this.controls.target.copy(centre);
     this.controls.update();
-    this.placed = this.camera.aspect !== 1;
+    this.placed = this.sized;
     this.soon();
   }
 
@@ -186,7 +187,7 @@ export class Space {
     scene.bodies.forEach((body, b) => {
       for (let v = 0; v < body.vertices; ++v) {
         const mine = b === selection.body && v === selection.vertex;
-        if (!mine && !(view.paths && vertices <= 100)) continue;
+        if (!mine && !(view.paths && vertices <= 70)) continue;
         for (let k = 0; k + 1 < body.times.length; ++k)
           for (const p of [body.positions[k], body.positions[k + 1]]) (mine ? chosen : lines).push(p[3 * v], p[3 * v + 1], p[3 * v + 2]);
       }

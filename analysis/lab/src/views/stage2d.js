@@ -19,7 +19,8 @@ export function Stage2d({lab, state, source, which}) {
             backX: (px) => z.x + (px - width / 2 - 14) / z.scale, backY: (py) => z.y - (py - height / 2 + 8) / z.scale};
   };
   const vertices = scene.bodies.reduce((sum, body) => sum + body.vertices, 0);
-  const labels = view.labels && vertices <= 80;
+  const points = scene.bodies.every((body) => body.shape === 'points');
+  const labels = view.labels && vertices <= (points ? 80 : 24);
 
   const draw = (c, size) => {
     frame.current = {...size, ...place(size)};
@@ -72,14 +73,15 @@ export function Stage2d({lab, state, source, which}) {
     trees.forEach((tree, b) => {
       if (!tree) return;
       const rect = (node) => [X(tree.bound(node, 0)), Y(tree.bound(node, 3)), X(tree.bound(node, 1)), Y(tree.bound(node, 2))];
-      for (const node of shownNodes(tree, b, view, selection, lit)) {
+      const nodes = shownNodes(tree, b, view, selection, lit), fill = nodes.filter((node) => isLit(lit, b, node)).length <= 5;
+      for (const node of nodes) {
         const [x0, y0, x1, y1] = rect(node), chosen = b === selection.body && node === selection.node;
-        if (isLit(lit, b, node)) { c.fillStyle = colours.litSoft; c.globalAlpha = 0.45; c.fillRect(x0, y0, x1 - x0, y1 - y0); c.globalAlpha = 1; }
+        if (fill && isLit(lit, b, node)) { c.fillStyle = colours.litSoft; c.globalAlpha = 0.45; c.fillRect(x0, y0, x1 - x0, y1 - y0); c.globalAlpha = 1; }
         c.strokeStyle = chosen ? colours.ink : colours.level(tree.depth[node]);
         c.lineWidth = chosen ? 3 : Math.max(1, 2.4 - 0.4 * tree.depth[node]);
         c.strokeRect(x0, y0, x1 - x0, y1 - y0);
       }
-      for (const node of shownNodes(tree, b, view, selection, lit)) {
+      for (const node of nodes) {
         const [x0, y0, x1, y1] = rect(node), ends = [[x0, y0, x0, y1], [x1, y0, x1, y1], [x0, y1, x1, y1], [x0, y0, x1, y0]];
         for (let side = 0; side < 4; ++side) {
           const chosen = b === selection.body && node === selection.node && side === selection.side;

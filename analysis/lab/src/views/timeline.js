@@ -9,8 +9,8 @@ const left = 66, right = 14;
 /** Rows of the timeline: the sides of the scene's dimension, then pairs of boxes if the strategy has such events. */
 export function rowsOf(scene, events) {
   const sides = scene.dimension === 2 ? [0, 1, 2, 3] : [0, 1, 2, 3, 4, 5];
-  const pairs = events.some((event) => event.kind !== 'bound');
-  return sides.map((side) => ({side, name: sideName(side)})).concat(pairs ? [{side: null, name: 'pairs'}] : []);
+  const pairs = events.some((event) => event.kind !== 'bound'), slanted = events.some((event) => event.side > 5);
+  return sides.map((side) => ({side, name: sideName(side)})).concat(slanted ? [{side: 'slanted', name: 'slanted'}] : [], pairs ? [{side: null, name: 'pairs'}] : []);
 }
 
 export function Timeline({lab, state}) {
@@ -22,13 +22,12 @@ export function Timeline({lab, state}) {
   const timeAt = (px) => info.begin + (px - left) / (size.current[0] - left - right) * span;
   const all = history.map((step) => step.event).concat(at.queue);
   const rows = rowsOf(scene, all);
-  const planar = scene.dimension === 2;
 
   const draw = (c, {width, height, colours}) => {
     size.current = [width, height];
     hits.current = [];
     const top = 6, bottom = 20, rowHeight = (height - top - bottom) / rows.length;
-    const rowOf = (event) => event.kind === 'bound' ? rows.findIndex((row) => row.side === event.side) : rows.length - 1;
+    const rowOf = (event) => rows.findIndex((row) => row.side === (event.kind !== 'bound' ? null : event.side > 5 ? 'slanted' : event.side));
     c.fillStyle = colours.bg;
     c.fillRect(left, top, Math.max(0, x(at.time) - left), height - top - bottom);
     font(c, 11);
@@ -57,7 +56,7 @@ export function Timeline({lab, state}) {
     };
     history.forEach((step, i) => {
       const row = rowOf(step.event);
-      if (row >= 0 && !(planar && step.event.side > 3 && step.event.kind === 'bound'))
+      if (row >= 0)
         mark(step.event, {done: i}, top + (row + 0.5) * rowHeight, true, selection.event?.done === i);
     });
     at.queue.forEach((event, i) => {
@@ -133,7 +132,7 @@ export function chooseEvent(lab, place) {
   const event = place.done !== undefined ? history[place.done]?.event : at.queue[place.due];
   if (!event) return;
   const chosen = place.done !== undefined ? {done: place.done} : {due: event};
-  lab.select({body: event.body, node: event.node, event: chosen, ...(event.kind === 'bound' ? {side: event.side} : {})});
+  lab.select({body: event.body, node: event.node, event: chosen, ...(event.kind === 'bound' && event.side < 6 ? {side: event.side} : {})});
   if (lab.state.view.panel !== 'edit') lab.view({panel: 'why'});
 }
 

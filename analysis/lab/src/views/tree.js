@@ -2,7 +2,7 @@
  * The hierarchy. Small trees are drawn as boxes with lines, large ones as strips whose width is the number of primitives.
  * Each node names the realiser of the chosen side; nodes that just changed are lit.
  */
-import {html, Canvas, font, pointerAt, useRef} from './dom.js';
+import {html, Canvas, font, haloText, pointerAt, useRef} from './dom.js';
 import {isLit} from '../state/lit.js';
 import {sideName} from '../math/plans.js';
 import {plainNode} from './box.js';
@@ -86,16 +86,15 @@ export function TreeView({lab, state, which = 'main'}) {
       if (w < 0.4 && plan.x[node] % Math.ceil(0.4 / unit)) continue;
       const on = isLit(lit, tree.body, node), gap = w > 5 ? 1 : 0;
       c.fillStyle = on ? colours.lit : colours.level(tree.depth[node]);
-      c.globalAlpha = on ? 1 : onPath.has(node) ? 0.75 : 0.32;
+      c.globalAlpha = on ? 1 : onPath.has(node) ? 0.6 : 0.3;
       c.fillRect(x0, y0, Math.max(0.5, w - gap), h);
       c.globalAlpha = 1;
       if (w > 30 && h > 11) {
         font(c, 11);
         c.textAlign = 'center';
         c.textBaseline = 'middle';
-        c.fillStyle = colours.ink;
         const v = tree.realiser(node, selection.side);
-        c.fillText(w > 64 && v !== null ? `${node}: v${v}` : String(node), x0 + w / 2, y0 + h / 2);
+        haloText(c, w > 64 && v !== null ? `${node}: v${v}` : String(node), x0 + w / 2, y0 + h / 2, colours.ink, on ? colours.litSoft : colours.panel);
       }
       hits.current.push({node, x0, x1: x0 + Math.max(1, w), y0, y1: y0 + h});
     }
