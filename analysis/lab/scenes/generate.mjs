@@ -90,7 +90,7 @@ function passing() {
       for (let corner = 0; corner < 3; ++corner) {
         const ox = [0.35, -0.2, -0.2][corner] + (random() - 0.5) * 0.2, oy = [0, 0.35, -0.35][corner] + (random() - 0.5) * 0.2;
         from.push(x0 + cx + ox, cy + oy, 0);
-        to.push(x1 + cx + oy, cy + drift + ox, 0);
+        to.push(x1 + cx + ox * 0.8 + oy * 0.5, cy + drift + oy * 0.8 - ox * 0.5, 0);
         indices.push(3 * k + corner);
       }
     }

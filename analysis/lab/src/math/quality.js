@@ -49,7 +49,7 @@ export function gauges({trees, at, info, step, history}) {
   const work = steps ? ((counters.values_written ?? 0) + (counters.queue_steps ?? 0)) / steps : null;
   const latest = step ? `; the last one changed ${step.touched.length} ${step.touched.length === 1 ? 'side' : 'sides'} and scheduled ${step.rescheduled.length}` : '';
   result.push(gauge('responsive', 'Responsive', kinetic ? work : null, responsiveBound(log), 'sides changed and queue steps per event',
-      `mean of ${steps} events${latest}`, `of the order of log² m; log₂ m = ${log.toFixed(1)} for m = ${m}. Drawn: 6 log₂² m + 6`));
+      `mean of ${steps} events${latest}`, `O(log² m); drawn is 6 log₂² m + 6 with m = ${m}`));
 
   let most = 0, total = 0, vertices = 0, leaves = 1, levels = 1, haveRealisers = false;
   if (kinetic && boxes <= 6000)
@@ -65,7 +65,7 @@ export function gauges({trees, at, info, step, history}) {
     }
   result.push(gauge('local', 'Local', haveRealisers ? most : null, 6 * leaves * levels, 'certificates of one vertex',
       haveRealisers ? `the busiest vertex; the mean is ${(total / Math.max(1, vertices)).toFixed(1)}` : 'realisers are not known',
-      `at most 6 sides × ${levels} levels × ${leaves} leaves of a vertex`));
+      `6 sides × ${levels} levels × ${leaves} ${leaves === 1 ? 'leaf' : 'leaves'} of a vertex`));
 
   const internal = counters.internal_events ?? history.filter((s) => s.event.kind === 'bound' && !s.touched.length).length;
   result.push(gauge('efficient', 'Efficient', kinetic ? internal : null, 0, 'events that change no bound',

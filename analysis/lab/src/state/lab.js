@@ -226,12 +226,12 @@ export class Lab {
     return this.enqueue('working', 'Running to the break point', async () => {
       const {info} = this.state;
       if (!info.hasEvents) { this.say('This strategy has no events to stop at.'); return; }
-      const {stopped, state} = await this.engine.run(info.end, stop, this.#want());
+      const {stopped, begun, state} = await this.engine.run(info.end, stop, this.#want());
       this.#arrive(state, stopped && !stop.pair ? stopped : null);
       await this.#followHistory();
       await this.comparison.frame(this.state.at.time);
       const where = stop.pair ? 'a pair begins' : stop.node !== undefined ? `an event of node ${stop.node}` : `an event of vertex ${stop.vertex}`;
-      this.say(stopped ? `Stopped: ${where}.` : `The clip ended before ${where}.`);
+      this.say(stopped || begun ? `Stopped: ${where}.` : `The clip ended before ${where}.`);
       if (stopped) this.select({event: {done: stopped.index}});
     });
   }

@@ -115,7 +115,7 @@ export class Space {
   /** Looks at the whole clip. */
   fit() {
     const centre = this.box.getCenter(new THREE.Vector3()), size = this.box.getSize(new THREE.Vector3()).length() || 1;
-    const distance = size / (2 * Math.tan(this.camera.fov * Math.PI / 360)) / Math.min(1, this.camera.aspect) * 0.66;
+    const distance = size / (2 * Math.tan(this.camera.fov * Math.PI / 360)) / Math.min(1, this.camera.aspect) * 0.78;
     this.camera.position.copy(centre).add(new THREE.Vector3(0.55, -0.95, 0.55).normalize().multiplyScalar(distance));
     this.camera.near = distance / 100;
     this.camera.far = distance * 10;
@@ -150,7 +150,7 @@ export class Space {
         if (b === selection.body && node === selection.node) { chosen = {tree, node, corners}; }
         colour.set(on ? colours.lit : colours.level(tree.depth[node]));
         for (const corner of edges) { lines.push(...corners[corner]); lineColours.push(colour.r, colour.g, colour.b); }
-        if (on && tree.size < 6000) for (let side = 0; side < 6; ++side) if (isLit(lit, b, node, side)) quads.push(...quad(corners, side));
+        if (on && lit.count <= 24) for (let side = 0; side < 6; ++side) if (isLit(lit, b, node, side)) quads.push(...quad(corners, side));
       }
     });
     if (lines.length) {

@@ -26,7 +26,7 @@ export function Stage2d({lab, state, source, which}) {
     frame.current = {...size, ...place(size)};
     const f = frame.current, {colours} = size;
     drawGrid(c, f, colours);
-    if (view.paths && vertices <= 200) drawPaths(c, f, colours);
+    if (view.paths && vertices <= (points ? 200 : 24)) drawPaths(c, f, colours);
     drawBoxes(c, f, colours);
     drawPrimitives(c, f, colours);
     drawPoints(c, f, colours);

@@ -99,7 +99,9 @@ export function Timeline({lab, state}) {
     return best;
   };
   const onPointerDown = (event) => {
-    const hit = pick(pointerAt(event));
+    const [px, py] = pointerAt(event), row = Math.floor((py - 6) / ((size.current[1] - 26) / rows.length));
+    if (px < left - 4 && typeof rows[row]?.side === 'number') { lab.select({side: rows[row].side}); return; }
+    const hit = pick([px, py]);
     if (hit) { chooseEvent(lab, hit.when); return; }
     dragging.current = true;
     event.currentTarget.setPointerCapture(event.pointerId);
