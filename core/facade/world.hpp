@@ -242,8 +242,9 @@ class World {
   void positions(std::uint32_t body, double t, std::vector<double>& out) const;
   /// Replaces `out` by the vertex that realises each side of each node of `hierarchy`, [node][6], side 2 *
   /// axis
-  /// + (0 lower, 1 upper); `world_no_vertex` for an inherited side. Returns false unless the strategy has
-  /// events on a hierarchy that is visible.
+  /// + (0 lower, 1 upper); `world_no_vertex` for an inherited side. The box of realisers contains the box
+  /// that `hierarchy` shows, and is equal to it unless queries read tighter ones. Returns false unless the
+  /// strategy has events on a hierarchy that is visible.
   bool realisers(std::uint32_t body, std::vector<std::uint32_t>& out) const;
   /// Replaces `out` by all pairs of boxes that a separation list watches, in ascending order; by nothing for
   /// a strategy without such a list.

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
+#include <string>
 
 #include "core/contract/about.hpp"
 #include "core/contract/registry.hpp"
@@ -17,7 +19,7 @@ struct Strips {
   World world{Precision::float64};
   static constexpr std::uint32_t vertices = 24;
 
-  explicit Strips(const std::string& strategy) {
+  explicit Strips(const std::string& strategy, const std::map<std::string, std::string>& params = {}) {
     std::vector<std::uint32_t> indices;
     for (std::uint32_t i = 0; i + 2 < vertices; ++i) indices.insert(indices.end(), {i, i + 1, i + 2});
     std::vector<double> moving, rest;
@@ -25,11 +27,11 @@ struct Strips {
       for (std::uint32_t i = 0; i < vertices; ++i) {
         const double fast = double((7 * i) % 11) - 5;
         moving.insert(moving.end(), {i + t * fast, (i % 2) + 0.3 * t * double((5 * i) % 7), t * fast * 0.2});
-        if (t == 0) rest.insert(rest.end(), {double(i), double(i % 3) - 1, 0.25 * (i % 5)});
+        if (t == 0) rest.insert(rest.end(), {2.5 * i, double(i % 3) - 1, 0.25 * (i % 5)});
       }
     world.add_body("moving", {indices}, std::vector<double>{0, 1, 2}, std::span<const double>(moving));
     world.add_body("rest", {indices}, std::vector<double>{0}, std::span<const double>(rest));
-    world.start(strategy);
+    world.start(strategy, params, 0, {{"leaf_size", "1"}});
   }
 };
 
@@ -48,10 +50,10 @@ void expect_boxes_of_realisers(World& world, std::uint32_t body) {
       const std::uint32_t vertex = realisers[6 * i + side];
       const std::size_t axis = side / 2;
       const double bound = side % 2 == 0 ? node.lower[axis] : node.upper[axis];
-      if (vertex == world_no_vertex)
-        ASSERT_EQ(bound, side % 2 == 0 ? parent.lower[axis] : parent.upper[axis]) << "node " << i;
-      else
-        ASSERT_EQ(bound, positions[3 * vertex + axis]) << "node " << i << ", side " << side;
+      const double expected = vertex != world_no_vertex ? positions[3 * vertex + axis]
+                              : side % 2 == 0           ? parent.lower[axis]
+                                                        : parent.upper[axis];
+      ASSERT_EQ(bound, expected) << "node " << i << ", side " << side;
     }
 }
 
@@ -60,7 +62,10 @@ TEST(WorldEvents, RealisersGiveTheBoxesBeforeAndAfterEdits) {
   for (const WorldStrategy& strategy : World::strategy_descriptions()) {
     if (!strategy.events || !strategy.has_float64) continue;
     SCOPED_TRACE(strategy.id);
-    Strips strips(strategy.id);
+    // Queries of the BoxTree read tighter boxes than those that nodes inherit, unless asked not to.
+    const bool inherits = strategy.id == "kinetic_boxtree";
+    Strips strips(strategy.id, inherits ? std::map<std::string, std::string>{{"leaf_boxes", "inherited"}}
+                                        : std::map<std::string, std::string>{});
     World& world = strips.world;
     std::vector<WorldPair> pairs;
     for (const double t : {0.0, 0.4, 1.0}) {
@@ -86,8 +91,9 @@ TEST(WorldEvents, RealisersGiveTheBoxesBeforeAndAfterEdits) {
       while (world.step_event(t, step)) {
         ASSERT_TRUE(world.hierarchy(step.event.body, tree));
         const auto names = [&](const WorldNode& node) { return node.event_node == step.event.node; };
-        if (step.event.kind == WorldEvent::Kind::bound)
+        if (step.event.kind == WorldEvent::Kind::bound) {
           ASSERT_EQ(std::count_if(tree.nodes.begin(), tree.nodes.end(), names), 1);
+        }
       }
       world.advance(t);
       world.pairs(pairs);
@@ -140,8 +146,9 @@ TEST(WorldEvents, QuestionsDoNotCount) {
       const auto found = asked.world.counters(), expected = silent.world.counters();
       ASSERT_EQ(found.size(), expected.size());
       for (std::size_t i = 0; i < found.size(); ++i)
-        if (found[i].name != "bytes")
+        if (found[i].name != "bytes") {
           EXPECT_EQ(found[i].value, expected[i].value) << found[i].name << ", t = " << t;
+        }
     }
   }
 }
@@ -167,7 +174,7 @@ TEST(WorldEvents, WatchedPairsAreThoseOfASeparationList) {
       bool overlap = true;
       for (int axis = 0; axis < 3; ++axis)
         overlap &= a.lower[axis] <= b.upper[axis] && b.lower[axis] <= a.upper[axis];
-      if (overlap) EXPECT_TRUE(pair.overlapping) << "boxes that overlap count as apart, at t = " << t;
+      EXPECT_TRUE(pair.overlapping || !overlap) << "boxes that overlap count as apart, at t = " << t;
       EXPECT_EQ(pair.listed, !pair.overlapping || (a.leaf && b.leaf));
       apart += pair.overlapping ? 0 : 1;
     }
