@@ -1,23 +1,18 @@
 #include "core/base/params.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+
+#include "core/base/library_gaps.hpp"
 
 namespace kbvh {
 
 namespace {
 
-/// Returns the shortest text that reads back as the same number: 1, 1e+15, 0.1.
-std::string shown(double number) {
-  char text[32];
-  return std::string(text, std::to_chars(text, text + sizeof text, number).ptr);
-}
-
 /// Parses a number, subnormal ones included; returns NaN if the text is not a number.
 double number_of(const std::string& text) {
   double number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const auto [end, error] = parse_floating(text.data(), text.data() + text.size(), number);
   const bool whole = error == std::errc() && end == text.data() + text.size();
   return whole ? number : std::numeric_limits<double>::quiet_NaN();
 }
@@ -39,8 +34,8 @@ std::string admissible(const Parameter& parameter) {
     return words;
   }
   const std::string number = parameter.numbers == Numbers::whole ? "a whole number" : "a number";
-  if (std::isinf(parameter.most)) return number + " of at least " + shown(parameter.least);
-  return number + " from " + shown(parameter.least) + " to " + shown(parameter.most);
+  if (std::isinf(parameter.most)) return number + " of at least " + shortest_text(parameter.least);
+  return number + " from " + shortest_text(parameter.least) + " to " + shortest_text(parameter.most);
 }
 
 Params::Params(const std::string& owner, const std::vector<Parameter>& declared,

@@ -2,7 +2,11 @@
 
 # kbvh_add_strategy(NAME SOURCE TARGET): compiles SOURCE into TARGET (a static library) and lists NAME, the word
 # in its KBVH_STRATEGY(NAME), in the manifest.
+# KBVH_STRATEGIES, a list of such words, leaves out all others.
 function(kbvh_add_strategy name source target)
+  if(KBVH_STRATEGIES AND NOT name IN_LIST KBVH_STRATEGIES)
+    return()
+  endif()
   target_sources(${target} PRIVATE ${source})
   kbvh_add_about(${name} ${source} ${target})
   set_property(GLOBAL APPEND PROPERTY KBVH_STRATEGY_NAMES ${name})

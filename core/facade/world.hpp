@@ -1,4 +1,5 @@
 #pragma once
+#include <compare>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -57,6 +58,8 @@ struct WorldNode {
   bool leaf;
   bool stale;  ///< the box is not current, because no query read it
   double lower[3], upper[3];
+  std::uint32_t
+      event_node;  ///< the number by which events, realisers' changes and watched pairs name the node
 };
 struct WorldHierarchy {
   std::vector<WorldNode> nodes;
@@ -123,6 +126,34 @@ struct WorldStep {
   WorldEvent event;
   std::vector<WorldBoundChange> touched;  ///< in the order of the changes
   std::vector<WorldEvent> rescheduled;    ///< certificates of bounds that the event created, if they fail
+};
+
+/// Two boxes that a separation list watches.
+struct WorldWatch {
+  std::uint32_t body, node, other_body, other_node;
+  bool overlapping;
+  bool listed;  ///< in the list: apart, or overlapping leaves; else an overlapping pair of inner nodes above
+                ///< it
+  auto operator<=>(const WorldWatch&) const = default;
+};
+
+/// Marks a missing vertex: the realiser of a side that a node inherits from its parent.
+inline constexpr std::uint32_t world_no_vertex = 0xffffffff;
+
+/// A parameter of a strategy; the admissible values are in words.
+struct WorldParameter {
+  std::string name, default_value, admissible, meaning;
+  std::vector<std::string> allowed;  ///< the words that it takes; empty for numbers
+};
+/// What a strategy is and can do.
+struct WorldStrategy {
+  std::string id, title, family, citation, about;
+  std::string foresight;  ///< the motion that it knows: none, step bound, next keyframe, whole clip
+  bool tight = false, exact = false, events = false, plan_changes = false, geometry_changes = false,
+       spans = false, self_pairs = false;
+  bool has_float32 = false, has_float64 = false;
+  std::vector<std::uint32_t> widths;  ///< of the nodes of the trees that it takes; empty if it builds its own
+  std::vector<WorldParameter> parameters;
 };
 
 /// A counter of a strategy since the last `reset`.
@@ -206,7 +237,20 @@ class World {
   void positions(std::uint32_t body, std::vector<double>& out);
   /// Replaces `out` by the hierarchy of a body; returns false if the strategy's hierarchy is not visible.
   bool hierarchy(std::uint32_t body, WorldHierarchy& out) const;
-  /// Returns all counters since the last `reset`; the strategy's own counters come last.
+  /// Replaces `out` by the positions of a body with known motion at t, correctly rounded, on its current
+  /// plans, without any change of time. For times before the last change of a plan the answer is meaningless.
+  void positions(std::uint32_t body, double t, std::vector<double>& out) const;
+  /// Replaces `out` by the vertex that realises each side of each node of `hierarchy`, [node][6], side 2 *
+  /// axis
+  /// + (0 lower, 1 upper); `world_no_vertex` for an inherited side. The box of realisers contains the box
+  /// that `hierarchy` shows, and is equal to it unless queries read tighter ones. Returns false unless the
+  /// strategy has events on a hierarchy that is visible.
+  bool realisers(std::uint32_t body, std::vector<std::uint32_t>& out) const;
+  /// Replaces `out` by all pairs of boxes that a separation list watches, in ascending order; by nothing for
+  /// a strategy without such a list.
+  void watched_pairs(std::vector<WorldWatch>& out) const;
+  /// Returns all counters since the last `reset`, without the work for `positions` and `hierarchy`; the
+  /// strategy's own counters come last.
   std::vector<WorldCounter> counters() const;
 
   // ---- Single events, for event-driven strategies
@@ -223,6 +267,8 @@ class World {
 
   /// Returns the ids of all strategies.
   static std::vector<std::string> strategies();
+  /// Describes all strategies, in the same order.
+  static std::vector<WorldStrategy> strategy_descriptions();
 
  private:
   std::unique_ptr<detail::WorldImplementation> implementation_;

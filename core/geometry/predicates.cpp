@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/base/library_gaps.hpp"
+
 namespace kbvh {
 namespace {
 
@@ -22,7 +24,7 @@ struct Dyadic {
 };
 
 Dyadic to_dyadic(double x) {
-  const auto bits = std::bit_cast<std::uint64_t>(x);
+  const auto bits = bit_cast<std::uint64_t>(x);
   const int biased = static_cast<int>((bits >> 52) & 0x7ff);
   std::uint64_t mantissa = bits & 0xfffffffffffffULL;
   if (biased != 0) mantissa |= 0x10000000000000ULL;

@@ -1,14 +1,14 @@
 #include "core/motion/admissible.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <stdexcept>
+
+#include "core/base/library_gaps.hpp"
 
 namespace kbvh {
 
 std::string number_text(double value) {
-  char text[40];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+  return shortest_text(value);
 }
 
 template <class S>

@@ -1,7 +1,6 @@
 #include "core/motion/round_positions.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -10,6 +9,7 @@
 #include <string>
 #include <type_traits>
 
+#include "core/base/library_gaps.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "core/motion/exact_arithmetic.hpp"
 #include "core/motion/kernels/round.hpp"
@@ -196,7 +196,7 @@ S round_one(S x0, S x1, const TimeFraction& f, const Times& times, RoundingStats
           const int sign = side.sign();
           if (sign != 0) return (sign < 0 ? lower : upper) + S(0);
           using Bits = std::conditional_t<std::is_same_v<S, float>, std::uint32_t, std::uint64_t>;
-          return ((std::bit_cast<Bits>(lower) & 1) == 0 ? lower : upper) + S(0);
+          return ((bit_cast<Bits>(lower) & 1) == 0 ? lower : upper) + S(0);
         }
       }
     }

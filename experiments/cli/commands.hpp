@@ -21,6 +21,7 @@ void add_scene(CLI::App& program, Action& action);
 void add_theory(CLI::App& program, Action& action);
 void add_stress(CLI::App& program, Action& action);
 void add_ccd(CLI::App& program, Action& action);
+void add_lab(CLI::App& program, Action& action);
 
 /// Runs a program of PATH, passes on its output, waits for it and returns its exit code. Throws
 /// io::InputError if it cannot be started.

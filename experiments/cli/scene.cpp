@@ -9,7 +9,9 @@
 #include "experiments/common/output.hpp"
 #include "experiments/common/progress.hpp"
 #include "experiments/common/text.hpp"
+#include "experiments/io/bytes.hpp"
 #include "experiments/io/obj.hpp"
+#include "experiments/scenes/lab_scene.hpp"
 #include "experiments/scenes/scene_card.hpp"
 
 namespace kbvh::experiments {
@@ -20,9 +22,12 @@ constexpr const char* scene_examples = R"(Examples:
   kbvh scene shirt --triangles 32000
   kbvh scene dress --triangles 8000 --frame 30 --out dress.obj
   kbvh scene dress --triangles 8000 --out folder
+  kbvh scene tablecloth --triangles 500 --keyframes 20 --out tablecloth.json
 Prints counts and a measure of the motion: the share of the sides of a binary tree (one triangle per leaf) whose
 realising vertex changes from one keyframe to the next. A folder gets every body as OBJ, with PC2 if it moves, and
-these numbers as card.json; a file ending in .obj gets all bodies at one keyframe, one after the other.)";
+these numbers as card.json; a file ending in .obj gets all bodies at one keyframe, one after the other; a file ending in .json is a scene for the lab.)";
+
+constexpr std::uint32_t lab_frames_per_keyframe = 10;
 
 struct SceneOptions {
   std::string name, out;
@@ -51,14 +56,15 @@ io::AnimatedMesh snapshot(const std::vector<io::AnimatedMesh>& bodies, std::size
   return all;
 }
 
-bool is_obj(const SceneOptions& options) {
-  return std::filesystem::path(options.out).extension() == ".obj";
+bool ends_in(const SceneOptions& options, const char* extension) {
+  return std::filesystem::path(options.out).extension() == extension;
 }
 
 /// Rejects a --frame that no file would show.
 void check_frame(const LoadedScene& scene, const SceneOptions& options) {
   if (options.frame == 0) return;
-  if (!is_obj(options)) throw io::InputError("--frame: goes with --out FILE.obj, which shows one keyframe");
+  if (!ends_in(options, ".obj"))
+    throw io::InputError("--frame: goes with --out FILE.obj, which shows one keyframe");
   std::size_t keyframes = 0;
   for (const io::AnimatedMesh& body : scene.meshes)
     keyframes = std::max(keyframes, body.keyframe_times.size());
@@ -70,8 +76,10 @@ void check_frame(const LoadedScene& scene, const SceneOptions& options) {
 
 void write(const LoadedScene& scene, const SceneOptions& options) {
   const std::filesystem::path out = options.out;
-  if (is_obj(options))
+  if (ends_in(options, ".obj"))
     io::save_obj(snapshot(scene.meshes, options.frame), out);
+  else if (ends_in(options, ".json"))
+    io::write_file_atomically(out, lab_scene(scene, lab_frames_per_keyframe).dump() + "\n");
   else
     export_scene(scene, out, 0);
 }
@@ -126,7 +134,7 @@ void add_scene(CLI::App& program, Action& action) {
   add_whole(*command, "--full-triangles", o->scene.full_triangles, ranges::triangles,
             "garments: largest number of triangles simulated in full; above it, a second level refines");
   add_whole(*command, "--frame", o->frame, ranges::any, "keyframe of the OBJ file, from 0");
-  add_text(*command, "--out", o->out, "OBJ file or folder to write");
+  add_text(*command, "--out", o->out, "OBJ file, JSON file or folder to write");
   command->add_flag("--json", o->as_json, "for programs");
   command->callback([&action, o] { action = [o] { return show(*o); }; });
 }

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <system_error>
 
+#include "core/base/library_gaps.hpp"
 #include "experiments/io/animated_mesh.hpp"
 
 namespace kbvh::io {
@@ -37,9 +37,7 @@ std::string printable(std::string_view text) {
 
 std::string text_of(double value) {
   if (std::isnan(value)) return "nan";
-  char buffer[40];
-  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
-  return {buffer, end};
+  return shortest_text(value);
 }
 
 std::string read_file(const fs::path& file) {

@@ -3,6 +3,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/base/library_gaps.hpp"
+
 namespace kbvh::io {
 namespace {
 
@@ -15,8 +17,12 @@ std::string_view without_plus(std::string_view token) {
 
 template <class T>
 std::errc parse_all(std::string_view token, T& value) {
-  const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), value);
-  return end == token.data() + token.size() ? error : std::errc::invalid_argument;
+  std::from_chars_result read{};
+  if constexpr (std::is_floating_point_v<T>)
+    read = parse_floating(token.data(), token.data() + token.size(), value);
+  else
+    read = std::from_chars(token.data(), token.data() + token.size(), value);
+  return read.ptr == token.data() + token.size() ? read.ec : std::errc::invalid_argument;
 }
 
 }  // namespace

@@ -1,15 +1,16 @@
 #include "experiments/io/weld.hpp"
 
-#include <bit>
 #include <limits>
 #include <unordered_map>
+
+#include "core/base/library_gaps.hpp"
 
 namespace kbvh::io {
 namespace {
 
 std::uint64_t mixed(std::uint64_t hash, const double* p) {
   for (int axis = 0; axis < 3; ++axis) {
-    hash = (hash ^ std::bit_cast<std::uint64_t>(p[axis] + 0.0)) *
+    hash = (hash ^ bit_cast<std::uint64_t>(p[axis] + 0.0)) *
            0x9E3779B97F4A7C15u;  // + 0.0: merges both zeros
     hash ^= hash >> 29;
   }

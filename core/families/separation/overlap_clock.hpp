@@ -1,5 +1,4 @@
 #pragma once
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -7,6 +6,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/base/library_gaps.hpp"
 #include "core/families/events/event.hpp"
 
 namespace kbvh {
@@ -24,15 +24,15 @@ template <class S>
 S widened_up(S x) {
   using Bits = std::conditional_t<sizeof(S) == 4, std::uint32_t, std::uint64_t>;
   constexpr S share = sizeof(S) == 4 ? S(0x1p-21) : S(0x1p-50);
-  constexpr Bits sign = std::bit_cast<Bits>(S(-0.0));
+  constexpr Bits sign = bit_cast<Bits>(S(-0.0));
   const S sum = x + std::abs(x) * share;
   // Adds two ulps for the rounding errors of product and sum.
-  const Bits bits = std::bit_cast<Bits>(sum);
+  const Bits bits = bit_cast<Bits>(sum);
   if ((bits & ~sign) <= 2) [[unlikely]] {
     if (sum == 0) return 2 * std::numeric_limits<S>::denorm_min();
-    return std::bit_cast<S>(sum > 0 ? bits + 2 : Bits(0));
+    return bit_cast<S>(sum > 0 ? bits + 2 : Bits(0));
   }
-  return std::bit_cast<S>(Bits(bits + 2 - ((bits & sign) != 0 ? 4 : 0)));
+  return bit_cast<S>(Bits(bits + 2 - ((bits & sign) != 0 ? 4 : 0)));
 }
 
 /// Iterates over the linear pieces of one vertex coordinate, from an instant on.

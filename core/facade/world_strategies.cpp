@@ -1,0 +1,53 @@
+#include "core/contract/about.hpp"
+#include "core/contract/registry.hpp"
+#include "core/facade/world.hpp"
+
+namespace kbvh {
+namespace {
+
+const char* words(Foresight foresight) {
+  switch (foresight) {
+    case Foresight::none:
+      return "none";
+    case Foresight::step_bound:
+      return "step bound";
+    case Foresight::next_keyframe:
+      return "next keyframe";
+    case Foresight::whole_clip:
+      return "whole clip";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::vector<std::string> World::strategies() {
+  std::vector<std::string> ids;
+  for (const StrategyEntry& entry : registry()) ids.push_back(entry.info.id);
+  return ids;
+}
+std::vector<WorldStrategy> World::strategy_descriptions() {
+  std::vector<WorldStrategy> all;
+  for (const StrategyEntry& entry : registry()) {
+    const Info& info = entry.info;
+    WorldStrategy& made = all.emplace_back();
+    made = {
+        info.id, info.title, info.family, info.citation, std::string(about(info.id)), words(info.foresight)};
+    made.tight = info.tightness == Tightness::tight;
+    made.exact = info.guarantee == Guarantee::exact;
+    made.events = info.can.events;
+    made.plan_changes = info.can.plan_changes;
+    made.geometry_changes = info.can.geometry_changes;
+    made.spans = info.can.spans;
+    made.self_pairs = info.can.self_pairs;
+    made.has_float32 = info.has_float;
+    made.has_float64 = info.has_double;
+    if (!info.topology.own) made.widths = info.topology.widths;
+    for (const Parameter& parameter : info.parameters)
+      made.parameters.push_back({parameter.name, parameter.default_value, admissible(parameter),
+                                 parameter.meaning, parameter.allowed});
+  }
+  return all;
+}
+
+}  // namespace kbvh
