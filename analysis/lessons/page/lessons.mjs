@@ -125,7 +125,7 @@ async function api() {
 
 for (const section of document.querySelectorAll(".exercise")) {
   const checker = checkers[section.dataset.exercise], place = section.querySelector(".lab");
-  const output = section.querySelector(".verdict-line"), check = section.querySelector(".check");
+  const output = section.querySelector(".verdict-line"), check = section.querySelector(".check-scene");
   const say = (text, css) => {
     output.textContent = text;
     output.className = `verdict-line ${css}`;

@@ -61,7 +61,7 @@ export function blocks({ figures, states, checkers, numbers }) {
       const [name] = words(rest);
       if (!(name in checkers)) throw new Error(`no checker '${name}' in checkers/`);
       env.exercises.push(name);
-      env.bars = `${lab("exercise-" + name, "Open the lab with the start scene")}<p class="check-bar"><button type="button" class="check">Check my scene</button> <button type="button" class="show-solution">Load a solution into the lab</button> <output class="verdict-line"></output></p>\n`;
+      env.bars = `${lab("exercise-" + name, "Open the lab with the start scene")}<p class="check-bar"><button type="button" class="check-scene">Check my scene</button> <button type="button" class="show-solution">Load a solution into the lab</button> <output class="verdict-line"></output></p>\n`;
       return `<section class="exercise" data-exercise="${name}"><h3 class="kind">Exercise: ${escape(checkers[name].title)}</h3>\n`;
     },
     answer: (rest, opening, env) => {

@@ -1,4 +1,4 @@
-// Takes pictures of every page: node tests/screenshots.mjs PAGES OUT [name part]
+// Takes pictures of every page: node tests/lessons/screenshots.mjs PAGES OUT [name part]
 import { mkdirSync, readdirSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { launch } from "./browser.mjs";

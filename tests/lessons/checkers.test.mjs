@@ -1,9 +1,9 @@
 // Every checker accepts its solution and refuses its start scene and two wrong scenes, by the native walker.
-// node --test tests/checkers.test.mjs, with the walker in $KBVH_WALKER
+// Run by tests/lessons/run, with the walker in $KBVH_WALKER.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { checkers } from "../checkers/index.mjs";
-import { walk } from "../trace.mjs";
+import { checkers } from "../../analysis/lessons/checkers/index.mjs";
+import { walk } from "../../analysis/lessons/trace.mjs";
 
 const walker = process.env.KBVH_WALKER;
 const api = { trace: async (request) => walk(walker, [request])[0] };
