@@ -43,7 +43,7 @@ test("numbers have a source and are finite", () => {
 test("formats", () => {
   assert.equal(format(1234.5678, "1"), "1,234.6");
   assert.equal(format(3, "Word"), "Three");
-  assert.equal(format(0.0123, "%"), "1.2 %");
+  assert.equal(format(0.0123, "%"), "1.2\u00a0%");
 });
 
 test("blocks that are not closed, or closed twice, are errors", () => {

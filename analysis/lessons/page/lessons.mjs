@@ -31,6 +31,7 @@ for (const form of document.querySelectorAll(".predict")) {
   const inputs = [...form.querySelectorAll("input")], button = form.querySelector("button"), output = form.querySelector("output");
   const commit = (choice) => {
     const right = "right" in inputs[choice].dataset;
+    form.querySelector(".rest")?.remove();
     inputs.forEach((input, i) => {
       input.checked = i === choice;
       input.disabled = true;
@@ -39,9 +40,12 @@ for (const form of document.querySelectorAll(".predict")) {
     button.disabled = true;
     output.textContent = right ? "Your prediction agrees." : "Your prediction differs; read why.";
     form.classList.add(right ? "agrees" : "differs");
-    if (result) result.hidden = false;
+    for (const element of held) element.hidden = false;
   };
-  if (result) result.hidden = true;
+  // The result and the rest of its section wait for the answer.
+  const held = [];
+  for (let next = result; next && next.tagName !== "H2" && !next.matches(".predict"); next = next.nextElementSibling) held.push(next);
+  for (const element of held) element.hidden = true;
   button.addEventListener("click", () => {
     const choice = inputs.findIndex((input) => input.checked);
     if (choice < 0) {

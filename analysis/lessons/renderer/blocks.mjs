@@ -40,7 +40,7 @@ export function blocks({ figures, states, checkers, numbers }) {
     solution: (_, opening, env) => (opening ? bars(env) + '<details class="solution"><summary>Solution</summary>\n' : "</details>\n"),
     teacher: (_, opening, env, tokens, i) => (opening ? "<!--teacher-->" : "<!--/teacher-->"),
     predict: (rest, opening, env) => {
-      if (!opening) return '<p class="commit"><button type="button">Commit to this answer</button> <output></output></p></form>\n';
+      if (!opening) return '<p class="commit"><button type="button">Commit to this answer</button> <output></output></p><p class="rest">The rest of this section appears when you have committed.</p></form>\n';
       env.predictions.push(rest);
       return `<form class="predict" data-predict="${rest}"><h3 class="kind">Predict before you read on</h3>\n`;
     },
@@ -53,7 +53,7 @@ export function blocks({ figures, states, checkers, numbers }) {
       const [name] = words(rest);
       if (!(name in figures)) throw new Error(`no figure '${name}'`);
       env.figures.push(name);
-      return `<figure id="figure-${name}">${figures[name]}<figcaption>\n`;
+      return `<figure id="figure-${name}"><div class="scroll" tabindex="0" role="group" aria-label="picture ${name}">${figures[name]}</div><figcaption>\n`;
     },
     lab: (rest, opening) => (opening ? lab(words(rest)[0], "Open the lab here") + '<div class="under-lab">' : "</div>\n"),
     exercise: (rest, opening, env) => {

@@ -45,7 +45,7 @@ export function format(value, how = "") {
     const word = words[value] ?? value.toLocaleString("en");
     return how === "Word" ? word[0].toUpperCase() + word.slice(1) : word;
   }
-  if (how === "%") return (100 * value).toLocaleString("en", { maximumFractionDigits: 1 }) + " %";
+  if (how === "%") return (100 * value).toLocaleString("en", { maximumFractionDigits: 1 }) + "\u00a0%";
   const digits = how === "" ? 3 : Number(how);
   return value.toLocaleString("en", { minimumFractionDigits: how === "" ? 0 : digits, maximumFractionDigits: digits });
 }
@@ -118,7 +118,7 @@ export function renderer({ sources, cited, blocks }) {
   const slug = (text) => text.toLowerCase().replace(/<[^>]*>|[^\w\s-]/g, "").trim().replace(/\s+/g, "-");
   md.renderer.rules.heading_open = (tokens, i, options, env, self) => {
     tokens[i].attrSet("id", slug(tokens[i + 1].content));
-    if (tokens[i].tag === "h2") env.headings.push({ id: slug(tokens[i + 1].content), text: tokens[i + 1].content });
+    if (tokens[i].tag === "h2") env.headings.push({ id: slug(tokens[i + 1].content), text: tokens[i + 1].content.replace(/[*`]/g, "") });
     return self.renderToken(tokens, i, options);
   };
   md.renderer.rules.table_open = () => '<div class="table"><table>\n';
