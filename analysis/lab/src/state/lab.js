@@ -261,7 +261,7 @@ export class Lab {
       if (this.state.phase !== 'playing') return;
       time = Math.min(info.end, time + Math.min(0.2, (now - last) / 1000) * this.state.speed * natural);
       last = now;
-      await this.seek(this.#nodes() > manyNodes ? this.#frameBefore(time) : time);
+      await this.seek(this.#large() ? this.#frameBefore(time) : time);
       if (time >= info.end) this.pause();
       else this.playTimer = requestAnimationFrame(tick);
     };
@@ -303,6 +303,9 @@ export class Lab {
     const light = this.state.phase === 'playing' && this.#nodes() > manyNodes;
     return {positions: true, nodes: !light, flat: !light, pairs: true, queue: !light, counters: true, queueLimit: 4000, pairsLimit: 20000};
   }
+
+  /** Whether frames between those of the scene, and all nodes of each frame, would cost too much while playing. */
+  #large() { return this.#nodes() > manyNodes || this.state.scene.bodies.reduce((sum, body) => sum + body.vertices, 0) > 3000; }
 
   #nodes() { return this.state.trees.reduce((sum, tree) => sum + (tree?.size ?? 0), 0); }
 
