@@ -3,6 +3,7 @@ import {mountLab} from './mount.js';
 import {decodeState} from './state/permalink.js';
 
 export {mountLab};
+export {createEngine} from './engine/client.js';
 export {encodeState, decodeState, checkState, checkScene} from './state/permalink.js';
 export {builtIn} from './state/scenes.js';
 

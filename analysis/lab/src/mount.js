@@ -6,6 +6,7 @@ import {Lab} from './state/lab.js';
 import {html, render, Panel, useEffect, useLab, useRef, useState} from './views/dom.js';
 import {openFiles} from './state/files.js';
 import {BoxPanel} from './views/box.js';
+import {CountersPanel} from './views/counters.js';
 import {Diagram} from './views/diagram.js';
 import {EditPanel} from './views/editor.js';
 import {Gauges} from './views/gauges.js';
@@ -20,7 +21,7 @@ import {WhyPanel} from './views/why.js';
 import {WorkPanel} from './views/work.js';
 import {isUpper, sideName} from './math/plans.js';
 
-const tabs = [['why', 'Event'], ['box', 'Box'], ['pairs', 'Pairs'], ['edit', 'Edit'], ['work', 'Compare']];
+const tabs = [['why', 'Event'], ['box', 'Box'], ['pairs', 'Pairs'], ['counters', 'Counters'], ['edit', 'Edit'], ['work', 'Compare']];
 /** Views that `options.views` may name. */
 export const allViews = ['header', 'transport', 'timeline', 'stage', 'tree', 'diagram', 'gauges', 'panels'];
 
@@ -28,13 +29,13 @@ export const allViews = ['header', 'transport', 'timeline', 'stage', 'tree', 'di
  * Mounts a lab.
  * @param element  gets the lab as its content
  * @param state    a page state ({format: 'kbvh-lab', ...}), or null for the first built-in scene
- * @param options  {compact: true} leaves the header out; {views: [...]} shows only these (see allViews); {theme: 'auto'|'light'|'dark'};
+ * @param options  {compact: true}: without the menu of scenes and files; {views: [...]} shows only these (see allViews); {theme: 'auto'|'light'|'dark'};
  *                 {panels: ['why', ...]} tabs to offer
  * @returns {Promise} of a lab: on(name, listener), getState(), setState(state), engine, store, destroy(), and the moves of `Lab`
  */
 export async function mountLab(element, state = null, options = {}) {
   const lab = new Lab();
-  const views = new Set(options.views ?? allViews.filter((view) => !options.compact || view !== 'header'));
+  const views = new Set(options.views ?? allViews);
   if (options.theme) lab.view({theme: options.theme});
   element.replaceChildren();
   render(html`<${Page} lab=${lab} views=${views} options=${options} />`, element);
@@ -48,6 +49,7 @@ function Page({lab, views, options}) {
   const state = useLab(lab), root = useRef(null);
   const [help, setHelp] = useState(false), [over, setOver] = useState(false);
   const {phase, task, error, notice, view} = state;
+  const has = (name) => views.has(name);
   const onKeyDown = (event) => {
     const typing = event.target.closest('input:not([type=range]):not([type=checkbox]), select, textarea, dialog');
     const pressing = event.key === ' ' && event.target.closest('button, input, summary');
@@ -60,12 +62,11 @@ function Page({lab, views, options}) {
     document.addEventListener('keydown', onBody);
     return () => document.removeEventListener('keydown', onBody);
   }, []);
-  const has = (name) => views.has(name);
-  return html`<div ref=${root} class=${`kbvh-lab ${options.compact ? 'compact' : 'whole'} ${over ? 'dropping' : ''} ${state.compare ? 'comparing' : ''}`} data-theme=${view.theme} data-phase=${phase} onKeyDown=${onKeyDown}
+  return html`<div ref=${root} class=${`kbvh-lab ${options.compact ? 'compact' : 'page'} ${allViews.slice(2).every(has) ? 'whole' : ''} ${over ? 'dropping' : ''} ${state.compare ? 'comparing' : ''}`} data-theme=${view.theme} data-phase=${phase} onKeyDown=${onKeyDown}
       onDragOver=${(event) => { event.preventDefault(); setOver(true); }} onDragLeave=${() => setOver(false)}
       onDrop=${(event) => { event.preventDefault(); setOver(false); openFiles(lab, event.dataTransfer.files); }}>
     <div class="lab-inner">
-      ${has('header') && html`<${Header} lab=${lab} state=${state} onHelp=${() => setHelp(true)} />`}
+      ${has('header') && html`<${Header} lab=${lab} state=${state} compact=${options.compact} onHelp=${() => setHelp(true)} />`}
       ${error && html`<div class="banner error" role="alert"><span>${error}</span><button onClick=${() => lab.store.set({error: ''})} aria-label="Dismiss">✕</button></div>`}
       ${has('transport') && html`<${Transport} lab=${lab} state=${state} />`}
       <main class="lab-grid">
@@ -87,7 +88,7 @@ function Page({lab, views, options}) {
 function Tabs({lab, state, shown}) {
   const offered = tabs.filter(([id]) => !shown || shown.includes(id));
   const panel = offered.some(([id]) => id === state.view.panel) ? state.view.panel : offered[0][0];
-  const content = {why: WhyPanel, box: BoxPanel, pairs: PairsPanel, edit: EditPanel, work: WorkPanel}[panel];
+  const content = {why: WhyPanel, box: BoxPanel, pairs: PairsPanel, counters: CountersPanel, edit: EditPanel, work: WorkPanel}[panel];
   const onKeyDown = (event) => {
     const i = offered.findIndex(([id]) => id === panel), by = {ArrowRight: 1, ArrowLeft: -1}[event.key];
     if (!by || event.target.getAttribute('role') !== 'tab') return;

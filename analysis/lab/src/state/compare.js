@@ -44,7 +44,7 @@ export class Comparison {
     if (!compare) return;
     await this.lab.enqueue(quiet ? null : 'loading', `Loading the second strategy, ${compare.strategy}`, async () => {
       this.engine ??= await createEngine();
-      const info = await this.engine.load({scene, strategy: compare.strategy, params: compare.params, topology: compare.topology, precision});
+      const info = await this.engine.load({scene: this.lab.sceneFor(scene, compare.strategy), strategy: compare.strategy, params: compare.params, topology: compare.topology, precision});
       this.lab.store.set({compare: {...this.lab.state.compare, info, at: null, trees: [], lit: nothingLit}});
       if (at) await this.frame(at.time);
     });
@@ -78,7 +78,7 @@ export class Comparison {
     try {
       this.meter ??= await createEngine();
       for (const [k, choice] of chosen.entries()) {
-        await this.meter.load({scene, precision, ...choice});
+        await this.meter.load({scene: this.lab.sceneFor(scene, choice.strategy), precision, ...choice});
         let before = {}, shown = performance.now();
         for (let f = 0; f < frames.length; ++f) {
           if (number !== this.measuring) return;

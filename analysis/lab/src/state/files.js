@@ -27,8 +27,8 @@ export async function openFiles(lab, list) {
     const primitives = scene.bodies.reduce((sum, body) => sum + (body.offsets ? body.offsets.length - 1 : body.indices.length / 3), 0);
     if (primitives > mostPrimitives) throw new Error(`${primitives} primitives; the lab takes up to ${mostPrimitives}. The command-line program takes more.`);
     lab.editing.forget();
-    await lab.load({scene, sceneId: null, topology: lab.defaultTopology(lab.state.strategy, scene)}, {selection: {}});
-    lab.say(`Opened ${names}: ${primitives} primitives.`);
+    const loaded = await lab.load({scene, sceneId: null, topology: lab.defaultTopology(lab.state.strategy, scene)}, {selection: {}});
+    if (loaded) lab.say(`Opened ${names}: ${primitives} primitives.`);
   } catch (error) {
     lab.store.set({error: `${names}: ${error.message}`});
   }

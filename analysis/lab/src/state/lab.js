@@ -25,6 +25,7 @@ export class Lab {
     this.engine = null;
     this.chain = Promise.resolve();
     this.pendingSeek = null;
+    this.target = null;  // the time of the newest seek that has not arrived
     this.listeners = new Map();
     this.store.subscribe((state) => this.#emit('state', state));
   }
@@ -47,7 +48,8 @@ export class Lab {
     await this.enqueue('loading', 'Starting the engine: the C++ of kbvh, as WebAssembly', async () => {
       if (!this.engine) {
         this.engine = await createEngine();
-        this.store.set({strategies: await this.engine.strategies()});
+        const meanings = await this.engine.counters?.() ?? [];
+        this.store.set({strategies: await this.engine.strategies(), meanings: new Map(meanings.map(({name, meaning}) => [name, meaning]))});
       }
     });
     if (this.state.phase !== 'failed') await this.setState(pageState);
@@ -73,7 +75,7 @@ export class Lab {
     return {
       format: 'kbvh-lab', version: 1, ...(s.sceneId ? {sceneId: s.sceneId} : {scene: plain(s.scene)}),
       strategy: s.strategy, params: s.params, topology: s.topology, precision: s.precision, ...place,
-      selection: s.selection, view: s.view,
+      selection: {...s.selection, event: s.selection.event?.done === undefined ? null : {done: s.selection.event.done}}, view: s.view,
       ...(s.compare ? {compare: {strategy: s.compare.strategy, params: s.compare.params, topology: s.compare.topology}} : {}),
     };
   }
@@ -86,6 +88,13 @@ export class Lab {
     const known = this.state.strategies.find(({id}) => id === strategy);
     const vertices = scene.bodies.reduce((sum, body) => sum + body.vertices, 0);
     return vertices <= 2000 && known?.widths?.includes(2) ? {width: 2, leaf_size: 1} : {};
+  }
+
+  /** The scene without requests for pairs within one body, if a strategy cannot answer them. */
+  sceneFor(scene, strategy) {
+    if (!scene.pairs || this.state.strategies.find(({id}) => id === strategy)?.selfPairs) return scene;
+    const pairs = scene.pairs.filter(([a, b]) => a !== b);
+    return pairs.length === scene.pairs.length ? scene : {...scene, pairs: pairs.length ? pairs : undefined};
   }
 
   /** Changes to another strategy at the present time. */
@@ -115,9 +124,9 @@ export class Lab {
     const {scene: given, sceneId, strategy, params, topology, precision} = {
       scene: s.scene, sceneId: s.sceneId, strategy: s.strategy, params: s.params, topology: s.topology, precision: s.precision, ...choice};
     this.pause();
-    await this.enqueue(quiet ? null : 'loading', `Loading '${given?.name}' with ${strategy}`, async () => {
+    const loaded = await this.enqueue(quiet ? null : 'loading', `Loading '${given?.name}' with ${strategy}`, async () => {
       const scene = checkScene(given);
-      const info = await this.engine.load({scene, strategy, params, topology, precision});
+      const info = await this.engine.load({scene: this.sceneFor(scene, strategy), strategy, params, topology, precision});
       const range = clip(scene);
       const begin = info.begin ?? range.begin, end = info.end ?? range.end;
       const time = Math.min(end, Math.max(begin, place.time ?? begin));
@@ -136,16 +145,19 @@ export class Lab {
         this.#arrive(state, step);
       }
       await this.#followHistory();
+      if (place.selection) this.store.set({selection: this.#checkedSelection(place.selection, info)});
     });
+    if (!loaded) return false;
     this.#emit('load', this.state);
     await this.comparison.reload({quiet});
+    return true;
   }
 
   #checkedSelection(selection, info) {
     const chosen = {body: 0, node: 0, side: 1, vertex: null, event: null, ...selection};
     if (chosen.body >= info.bodies.length) Object.assign(chosen, {body: 0, node: 0, vertex: null});
     if (chosen.vertex !== null && chosen.vertex >= info.bodies[chosen.body].vertices) chosen.vertex = null;
-    return {...chosen, event: null};
+    return {...chosen, event: chosen.event?.done < this.state.history.length ? {done: chosen.event.done} : null};
   }
 
   // ---- Time
@@ -157,11 +169,13 @@ export class Lab {
     const time = Math.min(info.end, Math.max(info.begin, t));
     const first = this.pendingSeek === null;
     this.pendingSeek = time;
+    this.target = time;
     if (!first) return this.chain;
     return this.enqueue(null, '', async () => {
       const target = this.pendingSeek;
       this.pendingSeek = null;
       this.#arrive(await this.engine.frame(target, this.#want()));
+      if (this.target === target) this.target = null;
       if (this.state.phase !== 'playing') await this.#followHistory();
       await this.comparison.frame(target);
     });
@@ -172,9 +186,10 @@ export class Lab {
     this.pause();
     const {frames, at} = this.state;
     if (!at) return Promise.resolve();
-    let index = frameAt(frames, at.time);
+    const time = this.target ?? at.time, between = this.target === null && at.betweenFrames;
+    let index = frameAt(frames, time);
     if (direction > 0) ++index;
-    else if (frames[index] === at.time && !at.betweenFrames) --index;
+    else if (frames[index] === time && !between) --index;
     return this.seek(frames[Math.max(0, Math.min(frames.length - 1, index))]);
   }
 
@@ -246,7 +261,7 @@ export class Lab {
       if (this.state.phase !== 'playing') return;
       time = Math.min(info.end, time + Math.min(0.2, (now - last) / 1000) * this.state.speed * natural);
       last = now;
-      await this.seek(this.#nodes() > manyNodes ? this.#frameBefore(time) : time);
+      await this.seek(this.#large() ? this.#frameBefore(time) : time);
       if (time >= info.end) this.pause();
       else this.playTimer = requestAnimationFrame(tick);
     };
@@ -288,6 +303,9 @@ export class Lab {
     const light = this.state.phase === 'playing' && this.#nodes() > manyNodes;
     return {positions: true, nodes: !light, flat: !light, pairs: true, queue: !light, counters: true, queueLimit: 4000, pairsLimit: 20000};
   }
+
+  /** Whether frames between those of the scene, and all nodes of each frame, would cost too much while playing. */
+  #large() { return this.#nodes() > manyNodes || this.state.scene.bodies.reduce((sum, body) => sum + body.vertices, 0) > 3000; }
 
   #nodes() { return this.state.trees.reduce((sum, tree) => sum + (tree?.size ?? 0), 0); }
 
@@ -344,7 +362,7 @@ export class Lab {
 
   /**
    * Runs a job after all others. With a phase, the store says so and shows `task` meanwhile. An error is shown; a failed
-   * load fails the lab, any other error leaves it as it was.
+   * load fails the lab, any other error leaves it as it was. Resolves to whether the job succeeded.
    */
   enqueue(phase, task, job) {
     this.chain = this.chain.then(async () => {
@@ -352,10 +370,12 @@ export class Lab {
       try {
         await job();
         if (phase) this.store.set({phase: 'ready', task: ''});
+        return true;
       } catch (error) {
         console.error(error);
         const canGoOn = this.state.at !== null;
         this.store.set({phase: canGoOn ? 'ready' : 'failed', task: '', error: error.message ?? String(error)});
+        return false;
       }
     });
     return this.chain;

@@ -21,6 +21,7 @@ export function initialState() {
     error: '',               // the last error, in words
     notice: '',              // what the last action did, for the live region
     strategies: [],          // from the engine
+    meanings: new Map(),     // of counters, by name
     scene: null, sceneId: null,
     strategy: 'kinetic_aabb', params: {}, topology: {}, precision: 'float64',
     info: null,              // what load() returned

@@ -7,10 +7,15 @@ import {envelope} from '../math/envelope.js';
 /** Above this many vertices the end of a tenure is read from the queue only. */
 const manyVertices = 400;
 
-/** The lines of all vertices below a node, on the axis of a side. */
-export function linesBelow(scene, tree, node, side, precision) {
-  const body = scene.bodies[tree.body];
-  return tree.verticesBelow(node).map((id) => ({id, ...polyline(body, id, axisOf(side), precision)}));
+/**
+ * The lines of the vertices below a node, on the axis of a side. With more than `most` vertices, an even sample and the
+ * vertices of `always`.
+ */
+export function linesBelow(scene, tree, node, side, precision, most = Infinity, always = []) {
+  const body = scene.bodies[tree.body], all = tree.verticesBelow(node);
+  const step = Math.ceil(all.length / most);
+  const chosen = step > 1 ? [...new Set([...always, ...all.filter((_, i) => i % step === 0)])] : all;
+  return chosen.map((id) => ({id, ...polyline(body, id, axisOf(side), precision)}));
 }
 
 /** Index of the last performed step that changed this side; -1 if none did. */

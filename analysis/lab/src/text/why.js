@@ -64,7 +64,7 @@ function boundStory(step, context) {
   const lines = overtaking(event, axis, more);
   if (lines) paragraphs.push({heading: 'Who overtakes whom', parts: [vertex(b, event.loser), ...lines.loser, ' ', vertex(b, event.winner), ...lines.winner, lines.tail]});
   const ties = tiesOf(step, context);
-  if (ties.length) paragraphs.push({heading: 'Exact tie', tie: true, parts: ties});
+  if (ties) paragraphs.push({heading: ties.tie ? 'Exact tie' : 'At the same instant', ...ties});
   if (!done) return paragraphs;
   paragraphs.push({heading: 'Where it went', parts: route(step, context)});
   paragraphs.push({heading: 'What was rescheduled', parts: rescheduled(step, context)});
@@ -90,7 +90,7 @@ function overtaking(event, axis, more) {
 /** Other events at exactly the same time. */
 function tiesOf(step, {history, queue = [], bodies}) {
   const time = eventTime(step.event);
-  if (!time) return [];
+  if (!time) return null;
   const same = (event) => {
     if (Math.abs(event.time - step.event.time) > 1e-9 * Math.max(1, Math.abs(event.time))) return false;
     const other = eventTime(event);
@@ -98,10 +98,13 @@ function tiesOf(step, {history, queue = [], bodies}) {
   };
   const near = (history ?? []).filter((s) => s.index !== step.index && same(s.event)).map((s) => s.event)
       .concat(queue.filter((event) => event !== step.event && same(event) && !isSame(event, step.event)));
-  if (!near.length) return [];
+  if (!near.length) return null;
+  const pair = ({winner, loser}) => [winner, loser].sort((a, b) => a - b).join();
+  const own = near.every((event) => event.kind === 'bound' && event.body === step.event.body && pair(event) === pair(step.event));
+  if (own) return {tie: false, parts: [`The same two vertices cross in ${near.length === 1 ? 'one other certificate' : `${near.length} other certificates`} at this instant: ${near.slice(0, 4).map((event) => `${sideName(event.side)} of node ${event.node}`).join('; ')}${near.length > 4 ? '; and more' : ''}.`]};
   const list = near.slice(0, 4).map((event) => title(event, bodies)).join('; ');
-  return [`${near.length === 1 ? 'One other event has' : `${near.length} other events have`} exactly this time: ${list}${near.length > 4 ? '; and more' : ''}. `,
-          'Deeper nodes go first, then smaller ids.'];
+  return {tie: true, parts: [`${near.length === 1 ? 'One other event has' : `${near.length} other events have`} exactly this time: ${list}${near.length > 4 ? '; and more' : ''}. `,
+          'Deeper nodes go first, then smaller ids.']};
 }
 
 export const isSame = (a, b) => a.kind === b.kind && a.body === b.body && a.node === b.node && a.side === b.side && a.winner === b.winner &&

@@ -11,7 +11,7 @@ import {short} from '../math/exact.js';
 import {chooseEvent} from './timeline.js';
 
 const left = 52, right = 40, top = 14, bottom = 36;
-const manyLines = 600;
+const manyLines = 500;
 
 export function Diagram({lab, state}) {
   const {trees, selection, scene, info, at, history, precision} = state;
@@ -19,8 +19,9 @@ export function Diagram({lab, state}) {
   const hits = useRef([]), drag = useRef(null), frame = useRef(null), hover = useRef(null);
   const tree = trees[selection.body], {node, side} = selection;
   const known = tree && node < tree.size;
-  const lines = useMemo(() => known ? linesBelow(scene, tree, node, side, precision) : [], [scene, known && tree.childStart, node, side, precision]);
-  const few = lines.length <= manyLines;
+  const total = known ? tree.verticesBelow(node).length : 0, few = total <= manyLines;
+  const always = !known || few ? [] : specialVertices(tree, node, side, selection.vertex, at?.queue ?? []);
+  const lines = useMemo(() => known ? linesBelow(scene, tree, node, side, precision, manyLines / 2, always) : [], [scene, known && tree.childStart, node, side, precision, always.join()]);
   const pieces = useMemo(() => few && info ? envelope(lines, isUpper(side), info.begin, info.end) : [], [lines, info]);
   const whole = useMemo(() => extent(lines, info), [lines, info]);
   if (!known || !at) return html`<div class="empty">Choose a node that has a box.</div>`;
@@ -73,6 +74,7 @@ export function Diagram({lab, state}) {
     c.restore();
     drawLabels(c, {width, height, colours, X, Y});
     drawTenures(c, {width, height, colours, X});
+    if (!few) { font(c, 11); c.textAlign = 'left'; haloText(c, `${lines.length} of ${total} vertices drawn, no envelope: choose a smaller node`, left + 4, top + 8, colours.muted, colours.panel); }
   };
 
   const drawAxes = (c, {width, height, colours, X, Y}) => {
@@ -221,7 +223,7 @@ export function Diagram({lab, state}) {
     const dt = (whole.t1 - whole.t0) / 20, dv = (whole.v1 - whole.v0) / 20;
     setZoom({t0: certificate.time - dt, t1: certificate.time + dt, v0: v - dv, v1: v + dv});
   };
-  const label = `Value-time diagram: ${sideName(side)} side of node ${node}, ${lines.length} vertices. ` +
+  const label = `Value-time diagram: ${sideName(side)} side of node ${node}, ${total} vertices. ` +
       (realiser === null ? '' : `Vertex ${realiser} leads. `) + (certificate ? `Vertex ${certificate.loser} overtakes at ${when(certificate).text}.` : 'No overtaking is scheduled.');
   return html`<${Canvas} draw=${draw} role="img" tabIndex="0" data-view="diagram" aria-label=${`${label} Plus and minus zoom, 0 shows all, c shows the crossing.`}
       onKeyDown=${onKeyDown} onWheel=${(event) => { event.preventDefault(); zoomAt(pointerAt(event), event.deltaY > 0 ? 1.2 : 1 / 1.2, !event.shiftKey); }}
@@ -232,6 +234,13 @@ export function Diagram({lab, state}) {
       onDblClick=${() => setZoom(null)} />
     <div class="diagram-tools"><button onClick=${toEvent} disabled=${!certificate} title="Zoom on the crossing (c)">crossing</button>
       <button onClick=${() => setZoom(null)} disabled=${!zoom} title="Show all (0)">all</button></div>`;
+}
+
+/** Vertices that must be drawn: the realisers of a node and its children, the certificate's loser, the chosen vertex. */
+function specialVertices(tree, node, side, vertex, queue) {
+  const below = tree.isLeaf(node) ? [] : Array.from(tree.kids(node), (kid) => tree.realiser(kid, side));
+  const loser = queue.find((event) => event.kind === 'bound' && event.body === tree.body && event.node === node && event.side === side)?.loser;
+  return [tree.realiser(node, side), ...below, loser ?? null, vertex].filter((v) => v !== null);
 }
 
 /** The first scheduled event of a node below that will change this side before its own certificate fails; or null. */

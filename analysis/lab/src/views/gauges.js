@@ -1,10 +1,13 @@
 /** The four criteria of a kinetic data structure as gauges: value, bound, and what was counted. */
-import {html, useMemo} from './dom.js';
+import {html, useMemo, useRef} from './dom.js';
 import {gauges} from '../math/quality.js';
 
 export function Gauges({state}) {
   const {trees, at, info, step, history} = state;
-  const list = useMemo(() => at && info ? gauges({trees, at, info, step, history}) : [], [at, info, history]);
+  const playing = state.phase === 'playing' && trees.reduce((sum, tree) => sum + (tree?.size ?? 0), 0) > 200;
+  const last = useRef([]);
+  const list = useMemo(() => playing ? last.current : at && info ? gauges({trees, at, info, step, history}) : [], [playing ? null : at, info, history]);
+  last.current = list;
   if (!at || !info) return null;
   return html`<div class="gauges">${list.map((gauge) => html`<${Gauge} key=${gauge.id} gauge=${gauge} />`)}</div>`;
 }

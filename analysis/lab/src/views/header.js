@@ -13,26 +13,26 @@ export function ordered(strategies) {
   return [...strategies].sort((a, b) => rank(a) - rank(b) || a.family.localeCompare(b.family) || a.title.localeCompare(b.title));
 }
 
-export function Header({lab, state, onHelp}) {
+export function Header({lab, state, compact, onHelp}) {
   const {sceneId, scene, strategy, strategies, compare, view, precision} = state;
   const [open, setOpen] = useState(false), file = useRef(null);
   const about = strategies.find((s) => s.id === strategy);
   const load = (choice) => lab.load(choice, choice.scene ? {} : {time: state.at?.time});
   return html`<header class="lab-head">
-    <h1>kbvh <span>lab</span></h1>
+    ${!compact && html`<h1>kbvh <span>lab</span></h1>
     <label>Scene <select value=${sceneId ?? ''} onChange=${(event) => { const id = event.currentTarget.value; if (builtIn[id]) { lab.editing.forget(); load({scene: builtIn[id], sceneId: id, topology: lab.defaultTopology(strategy, builtIn[id])}); } }}>
       ${!sceneId && html`<option value="">${scene?.name ?? '…'} (changed or own)</option>`}
-      ${Object.entries(builtIn).map(([id, each]) => html`<option value=${id}>${each.name}</option>`)}</select></label>
+      ${Object.entries(builtIn).map(([id, each]) => html`<option value=${id}>${each.name}</option>`)}</select></label>`}
     <label>Strategy <select value=${strategy} onChange=${(event) => lab.choose(event.currentTarget.value)}>
       ${ordered(strategies).map((s) => html`<option value=${s.id}>${s.title}${s.events ? ' (events)' : ''}</option>`)}</select></label>
     <label>Compare with <select value=${compare?.strategy ?? ''} onChange=${(event) => { const id = event.currentTarget.value; lab.comparison.set(id ? {strategy: id} : null); if (id) lab.view({panel: 'work'}); }}>
       <option value="">nothing</option>${ordered(strategies).map((s) => html`<option value=${s.id}>${s.title}</option>`)}</select></label>
     <button aria-expanded=${open} onClick=${() => setOpen(!open)} title="Parameters of the strategy, precision">Settings</button>
     <span class="spring"></span>
-    <button onClick=${() => file.current.click()} title="Open OBJ, OBJ with PC2, glTF, or a scene or state of the lab">Open…</button>
-    <input ref=${file} type="file" class="sr" tabIndex="-1" multiple aria-label="Open files" onChange=${(event) => { openFiles(lab, event.currentTarget.files); event.currentTarget.value = ''; }} />
+    ${!compact && html`<button onClick=${() => file.current.click()} title="Open OBJ, OBJ with PC2, glTF, or a scene or state of the lab">Open…</button>
+    <input ref=${file} type="file" class="sr" tabIndex="-1" multiple aria-label="Open files" onChange=${(event) => { openFiles(lab, event.currentTarget.files); event.currentTarget.value = ''; }} />`}
     <button onClick=${() => save(lab)} title="Save the whole state as a file">Save</button>
-    <button onClick=${() => copyLink(lab)} title="Copy a link that keeps the whole state" data-action="link">Link</button>
+    ${!compact && html`<button onClick=${() => copyLink(lab)} title="Copy a link that keeps the whole state" data-action="link">Link</button>`}
     <button onClick=${() => lab.view({theme: {auto: 'dark', dark: 'light', light: 'auto'}[view.theme]})} title="Colours: automatic, dark, light" aria-label=${`Colours: ${view.theme}`}>${{auto: '◐ auto', dark: '● dark', light: '○ light'}[view.theme]}</button>
     <button onClick=${onHelp} title="Keys and help (?)" aria-label="Keys and help">?</button>
     ${open && html`<${Settings} lab=${lab} state=${state} about=${about} precision=${precision} />`}

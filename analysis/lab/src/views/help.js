@@ -6,7 +6,7 @@ export const keys = [
   ['b', 'run to the next event of the chosen node'], ['Shift B', 'run to the next event of the chosen vertex'],
   ['Home and End', 'start and end of the clip'], ['v and Shift V', 'next, previous vertex'],
   ['[ and ]', 'previous, next node'], ['s and Shift S', 'next, previous side'],
-  ['1 to 5', 'panel: event, box, pairs, edit, work'], ['e', 'dragging vertices on or off'],
+  ['1 to 6', 'panel: event, box, pairs, counters, edit, compare'], ['e', 'dragging vertices on or off'],
   ['Shift and arrows', 'on the stage, while dragging is on: move the chosen vertex'], ['Ctrl Z, Ctrl Y', 'undo, redo an edit'],
   ['Arrows', 'tree: move the selection; timeline: choose an event; stage and diagram: move or turn'],
   ['+ − 0', 'stage and diagram: zoom, show all'], ['c', 'diagram: zoom on the crossing'], ['?', 'this help'],
@@ -43,7 +43,7 @@ export function labKey(lab, event, {help}) {
     Home: () => { lab.pause(); lab.seek(state.info.begin); }, End: () => { lab.pause(); lab.seek(state.info.end); },
     v: () => cycle(lab, 'vertex', 1), V: () => cycle(lab, 'vertex', -1), ']': () => cycle(lab, 'node', 1), '[': () => cycle(lab, 'node', -1),
     s: () => cycle(lab, 'side', 1), S: () => cycle(lab, 'side', -1),
-    1: panel('why'), 2: panel('box'), 3: panel('pairs'), 4: panel('edit'), 5: panel('work'), e: () => lab.view({edit: !state.view.edit, panel: 'edit'}), '?': help,
+    1: panel('why'), 2: panel('box'), 3: panel('pairs'), 4: panel('counters'), 5: panel('edit'), 6: panel('work'), e: () => lab.view({edit: !state.view.edit, panel: 'edit'}), '?': help,
   };
   const act = acts[event.key];
   if (!act) return false;

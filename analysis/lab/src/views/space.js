@@ -15,6 +15,7 @@ export class Space {
   constructor(holder) {
     this.holder = holder;
     this.renderer = new THREE.WebGLRenderer({antialias: true, alpha: true});
+    this.renderer.debug.checkShaderErrors = false;
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
     this.renderer.domElement.setAttribute('aria-hidden', 'true');
     holder.prepend(this.renderer.domElement);
@@ -30,8 +31,11 @@ export class Space {
     this.bodies = [];
     this.extras = new THREE.Group();
     this.scene.add(this.extras);
+    this.materials = sharedMaterials();
     this.pending = 0;
     this.afterRender = null;
+    this.compiled = false;
+    this.warmUp();
     new ResizeObserver(() => this.resize()).observe(holder);
   }
 
@@ -46,9 +50,26 @@ export class Space {
     this.soon();
   }
 
+  /** Compiles all shaders without blocking the page; nothing is drawn before that. */
+  async warmUp() {
+    const group = new THREE.Group(), triangle = geometryOf([0, 0, 0, 1, 0, 0, 0, 1, 0]), thick = new LineSegmentsGeometry();
+    triangle.setAttribute('color', new THREE.Float32BufferAttribute(new Array(9).fill(1), 3));
+    thick.setPositions([0, 0, 0, 1, 0, 0]);
+    const {lines, sheets, thickInk, paths, mesh, wire, points} = this.materials;
+    group.add(new THREE.LineSegments(triangle, lines), new THREE.LineSegments(triangle, paths), new THREE.LineSegments(triangle, wire), new LineSegments2(thick, thickInk),
+              new THREE.Mesh(triangle, sheets.lit), new THREE.Mesh(triangle, mesh), new THREE.Points(triangle, points));
+    this.scene.add(group);
+    try { await this.renderer.compileAsync(this.scene, this.camera); } catch (error) { console.warn(error); }
+    this.scene.remove(group);
+    triangle.dispose();
+    thick.dispose();
+    this.compiled = true;
+    this.soon();
+  }
+
   /** Draws once, at the next animation frame. */
   soon() {
-    if (this.pending) return;
+    if (this.pending || !this.compiled || this.closed) return;
     this.pending = requestAnimationFrame(() => {
       this.pending = 0;
       this.renderer.render(this.scene, this.camera);
@@ -67,8 +88,8 @@ export class Space {
     });
     this.recolour(colours);
     this.drawBoxes(state, source, colours);
-    this.drawPairs(source, colours);
-    this.drawPaths(state, colours);
+    this.drawPairs(source);
+    this.drawPaths(state);
     this.soon();
   }
 
@@ -80,21 +101,20 @@ export class Space {
     this.bodies = info.bodies.map((body, b) => {
       const geometry = new THREE.BufferGeometry();
       geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(3 * body.vertices), 3));
-      const colour = new THREE.Color(colours.body(b));
       let object, wire = null;
       if (body.shape === 'polygons') {
         geometry.setIndex(triangles(body));
-        object = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({color: colour, flatShading: true, side: THREE.DoubleSide, roughness: 0.85, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1}));
+        object = new THREE.Mesh(geometry, this.materials.mesh.clone());
         if (body.primitives <= 4000) {
           const lines = new THREE.BufferGeometry();
           lines.setAttribute('position', geometry.getAttribute('position'));
           lines.setIndex(edgeList(body));
-          wire = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({color: colour, transparent: true, opacity: 0.7}));
+          wire = new THREE.LineSegments(lines, this.materials.wire.clone());
           wire.frustumCulled = false;
           this.scene.add(wire);
         }
       } else {
-        object = new THREE.Points(geometry, new THREE.PointsMaterial({color: colour, size: 8, sizeAttenuation: false, map: disc(), alphaTest: 0.5, transparent: true}));
+        object = new THREE.Points(geometry, this.materials.points.clone());
       }
       object.frustumCulled = false;
       this.scene.add(object);
@@ -108,15 +128,27 @@ export class Space {
     this.bodies.forEach(({object, wire}, b) => {
       object.material.color.set(colours.body(b));
       wire?.material.color.set(colours.ink);
-      if (wire) wire.material.opacity = 0.22;
     });
+    const {sheets, thickInk, thickPath, paths} = this.materials;
+    sheets.lit.color.set(colours.lit);
+    sheets.side.color.set(colours.realiser);
+    sheets.pair.color.set(colours.pair);
+    thickInk.color.set(colours.ink);
+    thickPath.color.set(colours.challenger);
+    paths.color.set(colours.muted);
   }
 
   /** Looks at the whole clip. */
   fit() {
-    const centre = this.box.getCenter(new THREE.Vector3()), size = this.box.getSize(new THREE.Vector3()).length() || 1;
-    const distance = size / (2 * Math.tan(this.camera.fov * Math.PI / 360)) / Math.min(1, this.camera.aspect) * 0.78;
-    this.camera.position.copy(centre).add(new THREE.Vector3(0.55, -0.95, 0.55).normalize().multiplyScalar(distance));
+    const centre = this.box.getCenter(new THREE.Vector3()), toCamera = new THREE.Vector3(0.55, -0.95, 0.55).normalize();
+    const across = new THREE.Vector3(0, 0, 1).cross(toCamera).normalize(), up = toCamera.clone().cross(across);
+    const tall = Math.tan(this.camera.fov * Math.PI / 360) * 0.92, wide = tall * this.camera.aspect;
+    let distance = 1e-3;
+    for (let k = 0; k < 8; ++k) {  // far enough for every corner
+      const d = new THREE.Vector3(...[0, 1, 2].map((axis) => (k >> axis & 1 ? this.box.max : this.box.min).getComponent(axis))).sub(centre);
+      distance = Math.max(distance, d.dot(toCamera) + Math.max(Math.abs(d.dot(across)) / wide, Math.abs(d.dot(up)) / tall));
+    }
+    this.camera.position.copy(centre).addScaledVector(toCamera, distance);
     this.camera.near = distance / 100;
     this.camera.far = distance * 10;
     this.camera.updateProjectionMatrix();
@@ -157,18 +189,17 @@ export class Space {
       const geometry = new THREE.BufferGeometry();
       geometry.setAttribute('position', new THREE.Float32BufferAttribute(lines, 3));
       geometry.setAttribute('color', new THREE.Float32BufferAttribute(lineColours, 3));
-      this.extras.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({vertexColors: true})));
+      this.extras.add(new THREE.LineSegments(geometry, this.materials.lines));
     }
-    if (quads.length) this.extras.add(sheet(quads, colours.lit, 0.35));
+    if (quads.length) this.extras.add(new THREE.Mesh(geometryOf(quads), this.materials.sheets.lit));
     if (chosen) {
       const geometry = new LineSegmentsGeometry();
       geometry.setPositions(edges.flatMap((corner) => chosen.corners[corner]));
-      const thick = new LineSegments2(geometry, new LineMaterial({color: new THREE.Color(colours.ink), linewidth: 3}));
-      this.extras.add(thick, sheet(quad(chosen.corners, selection.side), colours.realiser, 0.4));
+      this.extras.add(new LineSegments2(geometry, this.materials.thickInk), new THREE.Mesh(geometryOf(quad(chosen.corners, selection.side)), this.materials.sheets.side));
     }
   }
 
-  drawPairs({at, info}, colours) {
+  drawPairs({at, info}) {
     const pairs = at.pairs ?? [], seen = new Set(), positions = [];
     for (let i = 0; i + 3 < pairs.length; i += 4)
       for (const [b, primitive] of [[pairs[i], pairs[i + 1]], [pairs[i + 2], pairs[i + 3]]]) {
@@ -178,10 +209,10 @@ export class Space {
         const list = primitiveVertices(info.bodies[b], primitive), p = at.positions[b];
         for (let k = 1; k + 1 < list.length; ++k) for (const v of [list[0], list[k], list[k + 1]]) positions.push(p[3 * v], p[3 * v + 1], p[3 * v + 2]);
       }
-    if (positions.length) this.extras.add(sheet(positions, colours.pair, 0.95));
+    if (positions.length) this.extras.add(new THREE.Mesh(geometryOf(positions), this.materials.sheets.pair));
   }
 
-  drawPaths({view, scene, selection}, colours) {
+  drawPaths({view, scene, selection}) {
     const vertices = scene.bodies.reduce((sum, body) => sum + body.vertices, 0);
     const lines = [], chosen = [];
     scene.bodies.forEach((body, b) => {
@@ -192,16 +223,16 @@ export class Space {
           for (const p of [body.positions[k], body.positions[k + 1]]) (mine ? chosen : lines).push(p[3 * v], p[3 * v + 1], p[3 * v + 2]);
       }
     });
-    if (lines.length) this.extras.add(new THREE.LineSegments(geometryOf(lines), new THREE.LineBasicMaterial({color: colours.muted, transparent: true, opacity: 0.25})));
+    if (lines.length) this.extras.add(new THREE.LineSegments(geometryOf(lines), this.materials.paths));
     if (chosen.length) {
       const geometry = new LineSegmentsGeometry();
       geometry.setPositions(chosen);
-      this.extras.add(new LineSegments2(geometry, new LineMaterial({color: new THREE.Color(colours.challenger), linewidth: 2})));
+      this.extras.add(new LineSegments2(geometry, this.materials.thickPath));
     }
   }
 
   clear() {
-    for (const object of [...this.extras.children]) { object.geometry.dispose(); object.material.dispose(); this.extras.remove(object); }
+    for (const object of [...this.extras.children]) { object.geometry.dispose(); this.extras.remove(object); }
   }
 
   /** A position in CSS pixels of the holder, and its depth; z > 1 is behind the camera. */
@@ -226,6 +257,7 @@ export class Space {
 
   close() {
     cancelAnimationFrame(this.pending);
+    this.closed = true;
     this.clear();
     this.controls.dispose();
     this.renderer.dispose();
@@ -247,8 +279,18 @@ function geometryOf(positions) {
   return geometry;
 }
 
-function sheet(positions, colour, opacity) {
-  return new THREE.Mesh(geometryOf(positions), new THREE.MeshBasicMaterial({color: colour, transparent: true, opacity, side: THREE.DoubleSide, depthWrite: false}));
+/** The materials of all objects: few, so that few shaders are compiled, and before anything is shown. */
+function sharedMaterials() {
+  const sheet = (opacity) => new THREE.MeshBasicMaterial({transparent: true, opacity, side: THREE.DoubleSide, depthWrite: false});
+  return {
+    mesh: new THREE.MeshLambertMaterial({flatShading: true, side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1}),
+    wire: new THREE.LineBasicMaterial({transparent: true, opacity: 0.22}),
+    points: new THREE.PointsMaterial({size: 8, sizeAttenuation: false, map: disc(), alphaTest: 0.5, transparent: true}),
+    lines: new THREE.LineBasicMaterial({vertexColors: true}),
+    paths: new THREE.LineBasicMaterial({transparent: true, opacity: 0.25}),
+    sheets: {lit: sheet(0.35), side: sheet(0.4), pair: sheet(0.95)},
+    thickInk: new LineMaterial({linewidth: 3}), thickPath: new LineMaterial({linewidth: 2}),
+  };
 }
 
 function triangles(body) {

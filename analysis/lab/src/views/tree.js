@@ -108,7 +108,7 @@ export function TreeView({lab, state, which = 'main'}) {
   const onKeyDown = (event) => {
     const node = selection.node, kids = tree.kids(node);
     const siblings = node === 0 ? [0] : Array.from(tree.kids(tree.parent[node])), i = siblings.indexOf(node);
-    const next = {ArrowUp: tree.parent[node], ArrowDown: kids[0] ?? node, ArrowLeft: siblings[i - 1] ?? level(-1), ArrowRight: siblings[i + 1] ?? level(1), Home: 0}[event.key];
+    const next = {ArrowUp: tree.parent[node], ArrowDown: kids[0] ?? node, ArrowLeft: siblings[i - 1] ?? level(-1), ArrowRight: siblings[i + 1] ?? level(1)}[event.key];
     if (next === undefined || event.shiftKey || event.ctrlKey || event.altKey) return;
     event.preventDefault();
     event.stopPropagation();
