@@ -60,6 +60,7 @@ for (const name of names)
     assert.match(text, /CC BY 4\.0/);
     for (const link of links.filter((to) => !/^https?:/.test(to))) {
       const [file, anchor] = link.split("#");
+      if (file === "../index.html" && !hasLab) continue;
       if (file) assert.ok(existsSync(join(folder, file)), `${link} leads nowhere`);
       if (anchor) assert.ok((file ? readFileSync(join(folder, file), "utf8").includes(`id="${anchor}"`) : ids.includes(anchor)), `${link} leads nowhere`);
     }

@@ -40,7 +40,7 @@ export function render({ numbers, data }) {
   const states = { ...preparedStates, ...exerciseStates() };
   const links = (current) => [["index.html", "Course", current === "index"],
     ...all.map(({ meta, name }) => [name + ".html", `<b>${meta.lesson}</b> <span>${escape(meta.short)}</span>`, current === name]),
-    ["slides.html", "Pictures", current === "slides"], ["teacher.html", "Teacher", current === "teacher"]];
+    ["../index.html", "Lab", false], ["slides.html", "Pictures", current === "slides"], ["teacher.html", "Teacher", current === "teacher"]];
   const shown = [], notes = [];
   for (const { name, meta, text, file } of all) {
     const env = { order: [], headings: [], predictions: [], figures: [], exercises: [], answers: [] };
