@@ -98,6 +98,7 @@ export function smallNumbers(walker) {
     const scene = name === "race" ? scenes.race() : scenes.race4(), n = scene.bodies[0].vertices;
     put(name + ".runners", n);
     put(name + ".swaps", swaps(scene.bodies[0]));
+    put(name + ".internal", swaps(scene.bodies[0]) - changesOf(trace(name), 0, 1));
     put(name + ".pairs", (n * (n - 1)) / 2);
     put(name + ".events", trace(name).steps.length);
     put(name + ".upper_events", eventsOf(trace(name), 1));

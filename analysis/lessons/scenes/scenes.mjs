@@ -72,7 +72,7 @@ function reversed(i, bits) {
 
 /// Lesson 4: a ribbon of four triangles that bends: a tree of seven nodes.
 export function flag() {
-  const y0 = [[0, 2], [1, 3], [0, 2]], y1 = [[2, 3], [0, 3.5], [1.5, 3]];
+  const y0 = [[0, 2], [1, 3], [0.25, 2.5]], y1 = [[2, 3.25], [-0.5, 3.5], [-1.5, 2.75]];
   return scene("flag", [
     strip("flag", [0, 1], 2, (u, v, k) => [2 * u + (k === 1 ? [0, 0.5, -1.5][u] - 0.75 * v * u : 0.25 * v), (k === 0 ? y0 : y1)[u][v]]),
   ]);
