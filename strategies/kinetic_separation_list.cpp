@@ -17,6 +17,7 @@ namespace {
 
 template <class S, class Count>
 class KineticSeparationList final : public CountedStrategy<S, Count>,
+                                    public AnswersChanges<S>,
                                     public AnswersSelfPairs,
                                     public AnswersSpans<S>,
                                     public AnswersSweeps<S>,
@@ -33,6 +34,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
                         const Params& params)
       : CountedStrategy<S, Count>(scene, motion), motion_(motion), rows_(scene, motion) {
     for (const Topology& topology : topologies) by_rows_ = by_rows_ || topology.leaf_size > 1;
+    notes_changes_ = !by_rows_ && !has_self_pairs(scene.pairs());
     const int look_ahead = std::stoi(params.word("look_ahead"));
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       vertices_ += motion.plans(body).vertex_count();
@@ -89,6 +91,19 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     this->count_.add(Counter::positions_fetched, reads);
     many_candidates_ = 4 * (out.size() - before) > vertices_;
     return {};
+  }
+
+  /// Candidates that are the leaves of the list begin and end at its events. All others, and pairs of
+  /// triangles, are tested at every frame, so that a comparison costs little beside the tests.
+  void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
+    if (!notes_changes_ || answer != Answer::candidates)
+      return this->compare_answers(t, answer, begun, ended);
+    on_collision([&](auto& collision) {
+      LeafOverlaps& overlaps = collision.list().overlaps();
+      if (overlaps.is_noting()) return overlaps.take_changes(begun, ended);
+      find_candidates(t, begun, {});
+      overlaps.start_noting();
+    });
   }
 
   void find_spans(double t0, double t1, SpanBuffer& out) override {
@@ -295,8 +310,9 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
                std::unique_ptr<Collision<AvlOrHeapEventQueue>>>
       collision_;
   ClipMotion<S> motion_;
-  bool by_rows_ = false;      ///< leaves have several primitives
-  KineticRowsQuery<S> rows_;  ///< empty unless by_rows_
+  bool by_rows_ = false;        ///< leaves have several primitives
+  bool notes_changes_ = false;  ///< the list's leaves are the candidates
+  KineticRowsQuery<S> rows_;    ///< empty unless by_rows_
   std::uint64_t first_step_ = 0;
   std::size_t vertices_ = 0;      ///< of the initial scene
   bool many_candidates_ = false;  ///< in the last frame

@@ -26,6 +26,26 @@ class AnswersSpans {
   virtual void find_spans(double t0, double t1, SpanBuffer& out) = 0;
 };
 
+/// The two answers of a frame.
+enum class Answer : std::uint8_t {
+  candidates,  ///< of `Strategy::candidates_at`
+  pairs,       ///< of `Strategy::pairs_at`
+};
+
+/// Answers in its own way what has changed, at a cost in proportion to the changes.
+template <class S>
+class AnswersChanges {
+ public:
+  virtual ~AnswersChanges() = default;
+
+ protected:
+  friend class Strategy<S>;
+  /// Implements `Strategy::changes_at`: appends the difference between the answer at t and that of the last
+  /// call with the same `answer` since `reset_to`. A strategy that cannot do better for some answer calls
+  /// `compare_answers`, for that answer always.
+  virtual void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) = 0;
+};
+
 /// Answers which primitives may touch between two times: the broad phase of continuous collision detection.
 template <class S>
 class AnswersSweeps {

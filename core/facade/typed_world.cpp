@@ -75,6 +75,10 @@ static_assert(int(WorldEvent::Kind::window) == int(EventKind::window) &&
 WorldPair plain(const PrimitivePair& pair) {
   return {pair.body_a, pair.primitive_a, pair.body_b, pair.primitive_b};
 }
+void replace(std::vector<WorldPair>& out, const PairBuffer& pairs) {
+  out.clear();
+  for (const PrimitivePair& pair : pairs) out.push_back(plain(pair));
+}
 
 std::optional<std::uint32_t> number_of(const std::map<std::string, std::string>& words,
                                        const std::string& key) {
@@ -193,8 +197,13 @@ class TypedWorld final : public detail::WorldImplementation {
 
   void pairs(std::vector<WorldPair>& out) override {
     session().query(pairs_, ignored_);
-    out.clear();
-    for (const PrimitivePair& pair : pairs_) out.push_back(plain(pair));
+    replace(out, pairs_);
+  }
+  void changes(std::vector<WorldPair>& begun, std::vector<WorldPair>& ended) override {
+    if (&begun == &ended) throw std::invalid_argument("changes need two lists, not one twice");
+    session().changes(Answer::pairs, pairs_, ended_, ignored_);
+    replace(begun, pairs_);
+    replace(ended, ended_);
   }
   void spans(double t, std::vector<WorldSpan>& out) override {
     if (!session().info().can.spans)
@@ -411,7 +420,7 @@ class TypedWorld final : public detail::WorldImplementation {
   std::vector<Copies> given_;                        ///< [body]
   mutable std::uint64_t fetched_for_questions_ = 0;  ///< positions that are no work of the strategy
   PhaseTimes ignored_;
-  PairBuffer pairs_;
+  PairBuffer pairs_, ended_;
   SpanBuffer spans_;
   ContactBuffer contacts_;
   EventDescription<S> done_;

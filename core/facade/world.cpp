@@ -58,6 +58,9 @@ void World::change_geometry(const WorldEdit& edit) {
 void World::pairs(std::vector<WorldPair>& out) {
   implementation_->pairs(out);
 }
+void World::changes(std::vector<WorldPair>& begun, std::vector<WorldPair>& ended) {
+  implementation_->changes(begun, ended);
+}
 void World::spans(double t, std::vector<WorldSpan>& out) {
   implementation_->spans(t, out);
 }

@@ -227,6 +227,11 @@ class World {
   /// Replaces `out` by the pairs of primitives that intersect at the current time, under the strategy's
   /// guarantee.
   void pairs(std::vector<WorldPair>& out);
+  /// Replaces `begun` and `ended` by the pairs that began and ended to intersect since the last call, as
+  /// contact events of a simulator. The first call after `start` or `reset` begins all pairs. Added up, the
+  /// changes equal `pairs`, which may be called in between. Throws std::invalid_argument if both lists are
+  /// the same one.
+  void changes(std::vector<WorldPair>& begun, std::vector<WorldPair>& ended);
   /// Advances to t and replaces `out` by the pairs of the elapsed time.
   void spans(double t, std::vector<WorldSpan>& out);
   /// Advances to t and replaces `out` by the contacts of the elapsed time, in which every vertex moves on a

@@ -39,7 +39,8 @@ std::vector<std::string> capabilities_of(const Info& info) {
                                               {info.can.spans, "spans"},
                                               {info.can.self_pairs, "self_pairs"},
                                               {info.can.time_budget, "time_budget"},
-                                              {info.can.contacts, "contacts"}};
+                                              {info.can.contacts, "contacts"},
+                                              {info.can.changes, "changes"}};
   std::vector<std::string> words;
   for (const auto& [can, word] : all)
     if (can) words.push_back(word);

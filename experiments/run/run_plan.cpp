@@ -157,12 +157,16 @@ class Runner {
              const Scene<S>& scene, const PlanScript<S>& script, Oracle<S>& oracle, std::uint32_t l,
              const std::vector<double>& frames) {
     json about_scene = scene_record(scene, loaded, l, frames, script);
-    const std::string title = scene.name + ", l = " + std::to_string(l);
+    if (study.changes) {
+      about_scene["changes"] = word(*study.changes);
+      about_scene["name"] = name_with_changes(scene.name, word(*study.changes));
+    }
+    const std::string title = about_scene["name"].get<std::string>() + ", l = " + std::to_string(l);
     if (l > 1 && study.oracle_every % l == 0)
       note("warning: with oracle_every " + std::to_string(study.oracle_every) +
            " and l = " + std::to_string(l) +
            " only keyframes are compared with the truth; take a number without common factors");
-    Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script);
+    Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script, study.changes);
     measure_all(study, contestants, loaded, about_scene, title, measurement,
                 [&](const Info& info) { return unsuitable(info, scene, script); });
   }

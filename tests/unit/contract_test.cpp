@@ -53,6 +53,7 @@ class Careless : public CountedStrategy<S, Count> {
 /// The same with every ability.
 template <class S, class Count>
 class Able : public Careless<S, Count>,
+             public AnswersChanges<S>,
              public AnswersSelfPairs,
              public AnswersSpans<S>,
              public AnswersSweeps<S>,
@@ -63,6 +64,7 @@ class Able : public Careless<S, Count>,
   std::vector<std::string> calls;
 
  protected:
+  void find_changes(double, Answer, PairBuffer&, PairBuffer&) override { calls.push_back("changes"); }
   void find_spans(double, double, SpanBuffer&) override { calls.push_back("spans"); }
   void find_swept_pairs(double, double, std::span<const S* const>, PairBuffer&) override {
     calls.push_back("sweep");
@@ -118,14 +120,16 @@ TEST(Contract, AbilitiesAreThoseOfTheClass) {
                   .geometry_changes = true,
                   .spans = true,
                   .self_pairs = true,
-                  .contacts = true};
+                  .contacts = true,
+                  .changes = true};
   boasting.declares.continuous = true;
   const Capabilities none = make_entry<Careless>(boasting).info.can;
   EXPECT_FALSE(none.event_driven || none.events || none.plan_changes || none.geometry_changes || none.spans ||
-               none.self_pairs || none.contacts || none.restructures || none.time_budget);
+               none.self_pairs || none.contacts || none.changes || none.restructures || none.time_budget);
   EXPECT_TRUE(none.continuous);
   const Capabilities all = make_entry<Able>(described("able")).info.can;
-  EXPECT_TRUE(all.plan_changes && all.geometry_changes && all.spans && all.self_pairs && all.contacts);
+  EXPECT_TRUE(all.plan_changes && all.geometry_changes && all.spans && all.self_pairs && all.contacts &&
+              all.changes);
   EXPECT_FALSE(all.events || all.continuous);
 }
 
@@ -191,6 +195,9 @@ TEST(Contract, TheBaseClassChecksTimes) {
   EXPECT_EQ(strategy.before(), 1);
   EXPECT_THROW(strategy.candidates_at(1, made.pairs, {}), std::invalid_argument);
   EXPECT_THROW(strategy.confirm(3, made.pairs), std::invalid_argument);
+  PairBuffer ended;
+  EXPECT_THROW(strategy.changes_at(1, Answer::pairs, made.pairs, ended), std::invalid_argument);
+  EXPECT_THROW(strategy.changes_at(2, Answer::pairs, ended, ended), std::invalid_argument);
   EXPECT_EQ(strategy.queries, 0);
   strategy.candidates_at(2, made.pairs, {});
   SpanBuffer spans;
@@ -203,11 +210,14 @@ TEST(Contract, TheBaseClassChecksTimes) {
   const float* const none[] = {nullptr};
   EXPECT_THROW(strategy.swept_pairs(2, 3, none, made.pairs), std::invalid_argument);  // two bodies
   EXPECT_TRUE(strategy.calls.empty());
+  made.pairs = {{0, 1, 1, 2}};  // of a frame before
+  strategy.changes_at(2, Answer::candidates, made.pairs, ended);
+  EXPECT_TRUE(made.pairs.empty());
   strategy.spans(2, 3, spans);
   const float* const both[] = {nullptr, nullptr};
   strategy.swept_pairs(3, 4, both, made.pairs);
   strategy.flight_plans_changed(4, {});
-  EXPECT_EQ(strategy.calls, (std::vector<std::string>{"spans", "sweep", "plans"}));
+  EXPECT_EQ(strategy.calls, (std::vector<std::string>{"changes", "spans", "sweep", "plans"}));
   EXPECT_EQ(strategy.now(), 4);
   EXPECT_EQ(strategy.before(), 3);
 }

@@ -111,6 +111,52 @@ TEST(World, ShowsBoxesAroundVolumes) {
   }
 }
 
+/// Whether the pairs that began and ended add up to the world's pairs, after each of some frames and after a
+/// reset.
+void expect_changes_add_up(const std::string& id, const TestScene<float>& test) {
+  SCOPED_TRACE(id);
+  World world = world_of(test.scene);
+  const std::vector<double> frames = frame_times(test.scene, 7);
+  world.start(id, {}, frames[0]);
+  std::vector<WorldPair> held, begun, ended, pairs;
+  const auto take = [&] {
+    world.changes(begun, ended);
+    for (const WorldPair& pair : ended) {
+      const auto found = std::find(held.begin(), held.end(), pair);
+      ASSERT_NE(found, held.end());
+      held.erase(found);
+    }
+    for (const WorldPair& pair : begun) {
+      ASSERT_EQ(std::find(held.begin(), held.end(), pair), held.end());
+      held.push_back(pair);
+    }
+    world.pairs(pairs);
+    ASSERT_TRUE(std::is_permutation(held.begin(), held.end(), pairs.begin(), pairs.end()));
+  };
+  std::size_t changed = 0;
+  for (int round = 0; round < 2; ++round) {
+    if (round == 1) world.reset(frames[0]);
+    held.clear();  // a reset begins all pairs again
+    for (std::size_t f = 0; f < frames.size(); f += 1 + f % 3) {
+      if (f > 0) world.advance(frames[f]);
+      take();
+      if (f > 0) changed += begun.size() + ended.size();
+    }
+  }
+  EXPECT_GT(changed, 20u);
+  EXPECT_THROW(world.changes(begun, begun), std::invalid_argument);
+}
+
+TEST(World, TellsWhatBeganAndEnded) {
+  const auto test = synthetic_scene<float>("soups", 7);
+  for (const char* const id :
+       {"bottom_up", "interval_join", "interval_join_ahead", "kinetic_separation_list", "auto"})
+    expect_changes_add_up(id, test);
+  World world;
+  std::vector<WorldPair> begun, ended;
+  EXPECT_THROW(world.changes(begun, ended), std::logic_error) << "not started";
+}
+
 const std::vector<std::uint32_t> triangle{0, 1, 2};
 std::vector<float> triangle_at(float z, bool padded = false) {
   std::vector<float> positions{0, 0, z, 1, 0, z, 0, 1, z};
