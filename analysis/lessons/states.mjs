@@ -26,8 +26,10 @@ export const states = {
   "carried-far": { state: state(scenes.carried(1000000), "kinetic_aabb", { precision: "float32" }), note: "The same points, a million units away, in float." },
 };
 
-/// The start states of the exercises.
+const forEditing = (state) => ({ ...state, view: { panel: "edit", edit: true } });
+
+/// The start states of the exercises, with the editor open.
 export function exerciseStates() {
   return Object.fromEntries(Object.entries(checkers).map(([name, { start }]) =>
-    ["exercise-" + name, { state: start(), note: "" }]));
+    ["exercise-" + name, { state: forEditing(start()), note: "The panel Edit is open; drag vertices, or type their keyframes." }]));
 }

@@ -7,12 +7,13 @@ import { fill, format, parse } from "../../analysis/lessons/renderer/text.mjs";
 
 const numbers = JSON.parse(readFileSync(process.env.KBVH_LESSONS + "/numbers.json", "utf8"));
 
-/// Numbers of two digits or more, or with decimals, that stand in the prose of a text: outside of code, mathematics,
-/// citations, links and tables of the alignment row.
+/// Numbers above ten, in digits or words, and numbers with decimals, that stand in the prose of a text: outside of code,
+/// mathematics, citations, links and the first lines of blocks.
 export function typedNumbers(text) {
   const prose = text.replace(/```[\s\S]*?```/g, " ").replace(/\$\$[\s\S]*?\$\$/g, " ").replace(/\$[^$\n]+\$/g, " ").replace(/`[^`]*`/g, " ")
     .replace(/\{\{[^}]*\}\}/g, " ").replace(/\[@[^\]]*\]/g, " ").replace(/\]\([^)]*\)/g, "]").replace(/^:{3,}.*$/gm, " ");
-  return prose.match(/(?<![\w.,])\d[\d,.]*\d(?!\w)/g) ?? [];
+  const words = /\b(eleven|twelve|thirteen|fourteen|fifteen|sixteen|seventeen|eighteen|nineteen|(?:twen|thir|for|fif|six|seven|eigh|nine)ty)\b/gi;
+  return [...(prose.match(/(?<![\w.,])\d[\d,.]*\d(?!\w)/g) ?? []), ...(prose.match(words) ?? [])];
 }
 
 for (const { text, meta, file } of lessons())
@@ -26,7 +27,7 @@ for (const { text, meta, file } of lessons())
   });
 
 test("a number typed by hand is found", () => {
-  assert.deepEqual(typedNumbers("We saw 1,234 events at {{ a.b }} nodes, 3.5 each, in `12` cases of $n = 44$ [@x2006], and 5 more."), ["1,234", "3.5"]);
+  assert.deepEqual(typedNumbers("We saw 1,234 events at {{ a.b }} nodes, 3.5 each, in `12` cases of $n = 44$ [@x2006], and 5 more, or sixteen."), ["1,234", "3.5", "sixteen"]);
 });
 
 test("a missing key is an error that names key and file", () => {

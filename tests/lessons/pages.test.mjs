@@ -186,7 +186,7 @@ test("the buttons of an exercise load a solution and check it", needsLab, async 
     await until(() => /event/.test(output.textContent));
     const first = [output.textContent, output.className];
     section.querySelector(".show-solution").click();
-    await until(() => section.querySelector(".lab-note").textContent === "" && !section.querySelector(".open-lab").disabled);
+    await until(() => !section.querySelector(".lab-note").textContent.startsWith("Loading") && !section.querySelector(".open-lab").disabled);
     section.querySelector(".check-scene").click();
     await until(() => /Exactly/.test(output.textContent));
     return [first, [output.textContent, output.className]];
