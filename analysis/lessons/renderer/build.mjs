@@ -61,7 +61,7 @@ ${sourceList(env.order, known)}<nav class="neighbours">${neighbour(all[at - 1], 
   pages["teacher.html"] = page({ title: "Teacher's notes · kinetic hierarchies", kind: "teacher", links: links("teacher"), script: false,
     body: `<header><h1>Teacher's notes</h1><p class="lead">Timing, answers and stumbling blocks, lesson by lesson. Students do not need this page.</p></header>${notes.join("\n")}` });
   pages["slides.html"] = page({ title: "Pictures · kinetic hierarchies", kind: "slides", links: links("slides"), script: false,
-    body: `<header><h1>Pictures</h1><p class="lead">Every picture of the course at the size of a slide. Each is a file of its own in <a href="pictures/">pictures/</a>; printed in landscape, this page gives one picture a sheet.</p></header>${shown
+    body: `<header><h1>Pictures</h1><p class="lead">Every picture of the course at the size of a slide. Each is a file of its own in the folder <code>pictures</code>; printed in landscape, this page gives one picture a sheet.</p></header>${shown
       .flatMap(({ meta, figures }) => figures.map((figure) => `<figure><p class="number">Lesson ${meta.lesson}</p>${drawn[figure]}<figcaption><a href="pictures/${figure}.svg">${figure}.svg</a></figcaption></figure>`)).join("\n")}` });
   const rows = shown.map(({ name, meta, exercises }) => `<li><a href="${name}.html"><b>${meta.lesson}. ${escape(meta.title)}</b></a>
 <span class="minutes">${meta.minutes} min, ${exercises.length} exercises that the lab checks</span><p>${escape(meta.lead)}</p></li>`);
