@@ -3,7 +3,7 @@
     serve.py FOLDER [--port P] [--study DIR]
 
 The lab is at http://127.0.0.1:P/. Of a study (a folder of `kbvh run`), study/scenes.json lists the scenes as
-[{"name", "framesPerSecond", "files": [addresses]}], and the files are served below study/. The server answers only requests
+[{"name", "framesPerSecond", "files": [addresses]}] (without a study: none), and the files are served below study/. The server answers only requests
 that name it as 127.0.0.1 or localhost, so that no page of another site can read from it.
 """
 
@@ -48,8 +48,8 @@ class Handler(SimpleHTTPRequestHandler):
         return super().send_head()
 
     def do_GET(self) -> None:
-        if self.study is not None and self.path.split("?")[0] == "/study/scenes.json" and self.allowed():
-            text = json.dumps(scenes_of(self.study)).encode()
+        if self.path.split("?")[0] == "/study/scenes.json" and self.allowed():
+            text = json.dumps([] if self.study is None else scenes_of(self.study)).encode()
             self.send_response(200)
             self.send_header("Content-Type", "application/json")
             self.send_header("Content-Length", str(len(text)))

@@ -62,7 +62,9 @@ class Server(unittest.TestCase):
             self.assertEqual(self.get(port, path, "other.example")[0], 403, path)
 
     def test_without_a_study_there_is_none(self) -> None:
-        self.assertEqual(self.get(self.start(), "/study/scenes.json")[0], 404)
+        port = self.start()
+        self.assertEqual(self.get(port, "/study/scenes.json"), (200, b"[]"))
+        self.assertEqual(self.get(port, "/study/cloth%201/0-cloth.obj")[0], 404)
 
     def test_says_what_is_wrong(self) -> None:
         for words, said in ((("nowhere",), "no built lab in nowhere"),
