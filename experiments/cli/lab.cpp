@@ -21,8 +21,8 @@ namespace {
 constexpr const char* lab_examples = R"(Examples:
   kbvh lab
   kbvh lab --study results --port 8080
-shows the lab, which `experiments/lab` builds, to browsers on this machine, until Ctrl+C; with a study, its scenes are in
-the lab's menu. The lab also works without this server: open index.html or lab.html of its folder.)";
+shows the lab, which `experiments/lab` builds, to browsers on this machine, until Ctrl+C, and opens it in one if there is a
+screen; with a study, its scenes are in the lab's menu. The lab also works without this server: open index.html or lab.html of its folder.)";
 
 struct LabOptions {
   std::string folder, study;
@@ -48,8 +48,12 @@ int serve(const LabOptions& options) {
   if (!is_lab(folder))
     throw io::InputError("there is no built lab in " + folder.string() +
                          " (`experiments/lab` makes it; --folder names another)");
-  std::vector<std::string> words{python(), (analysis / "lab" / "serve.py").string(), folder.string(),
-                                 "--port", std::to_string(options.port)};
+  std::vector<std::string> words{python(),
+                                 (analysis / "lab" / "serve.py").string(),
+                                 folder.string(),
+                                 "--port",
+                                 std::to_string(options.port),
+                                 "--open"};
   if (!options.study.empty()) words.insert(words.end(), {"--study", options.study});
   // The server takes this process's place, and with it the signals that end it.
   std::vector<char*> arguments;

@@ -2,9 +2,11 @@
 
 import http.client
 import json
+import os
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -65,6 +67,31 @@ class Server(unittest.TestCase):
         port = self.start()
         self.assertEqual(self.get(port, "/study/scenes.json"), (200, b"[]"))
         self.assertEqual(self.get(port, "/study/cloth%201/0-cloth.obj")[0], 404)
+
+    def test_opens_a_browser_where_there_is_a_screen(self) -> None:
+        browser, seen = self.root / "browser", self.root / "seen"
+        browser.write_text(f"#!/bin/sh\necho $1 > {seen}\n")
+        browser.chmod(0o755)
+        os.environ["BROWSER"] = str(browser)
+        self.addCleanup(os.environ.pop, "BROWSER")
+        for screen in ("", ":7"):
+            before = os.environ.get("DISPLAY")
+            os.environ.update({"DISPLAY": screen, "WAYLAND_DISPLAY": ""})
+            try:
+                port = self.start("--open")
+            finally:
+                os.environ.pop("WAYLAND_DISPLAY")
+                os.environ.pop("DISPLAY") if before is None else os.environ.update({"DISPLAY": before})
+            self.assertEqual(self.get(port, "/")[0], 200)
+            if not screen:
+                time.sleep(0.5)
+                self.assertFalse(seen.exists())
+                continue
+            for _ in range(200):
+                if seen.exists() and seen.read_text():
+                    break
+                time.sleep(0.1)
+            self.assertEqual(seen.read_text(), f"http://127.0.0.1:{port}/\n")
 
     def test_says_what_is_wrong(self) -> None:
         for words, said in ((("nowhere",), "no built lab in nowhere"),
