@@ -76,7 +76,7 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
         columns["kind"].append(row["kind"])
         columns["refused"].append(row["refused"])
         for name in NUMBERS:
-            columns[name].append(number(row[name], 6))
+            columns[name].append(number(row[name]))
         for name in COUNTERS:
             columns[name].append(number(row.get(f"{name}_per_frame"), 5))
         mine = times.get(int(row["run"]))
@@ -146,7 +146,7 @@ def _contestant(row: pd.Series, look: colours.Look, takes_part: bool) -> dict[st
         "id": row["id"],
         "title": row["title"],
         "label": row["label"].replace("\u00a0", " "),
-        "tag": row["tag"] or row["id"],
+        "tag": row["tag"] or " ".join([row["id"], *(f"{name}={value}" for name, value in sorted(row["params"].items()))]),
         "family": row["family"],
         "guarantee": row["guarantee"],
         "baseline": bool(row["baseline"]),
@@ -172,6 +172,7 @@ def _cell(row: pd.Series, machines: dict[str, int], commits: list[dict[str, Any]
         "frames": number(row["frames"]),
         "keyframes": number(row["keyframes"]),
         "continuous": bool(row["continuous"]),
+        "changes": str(row["again"].get("changes", "")),
         "machine": machines[row["machine"]],
         "commit": commit,
         "again": _again(row),

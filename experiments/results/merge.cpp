@@ -86,9 +86,9 @@ std::vector<Line> read_lines(const fs::path& file, std::vector<std::string>& not
   }
   if (lines.empty()) throw io::InputError(file.string() + ": has no record of results");
   if (defects > 0)
-    notes.push_back(counted(defects, "record") + " of " + file.string() + " cannot be shown, and " +
-                    (defects == 1 ? "is" : "are") + " kept as " + (defects == 1 ? "it is" : "they are") +
-                    " (" + first_defect + ")");
+    notes.push_back(counted(defects, "record") + " of " + file.string() +
+                    (defects == 1 ? " lacks" : " lack") + " a field that tables need (" + first_defect +
+                    "), and " + (defects == 1 ? "is" : "are") + " kept unchanged");
   return lines;
 }
 

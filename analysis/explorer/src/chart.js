@@ -47,17 +47,19 @@ export function lineLook(contestant, width = 1.7) {
 
 /**
  * Returns a logarithmic axis that no outlier stretches: its domain, and `clip`, which returns a value moved to the edge and
- * the side on which it was outside (-1, 0, 1). Values within a factor of `spare` of the bulk are never clipped.
+ * the side on which it was outside (-1, 0, 1). Outside are values beyond three times the spread of the middle half (Tukey's
+ * outer fences, of logarithms), and at most a twentieth of the values at each end.
  */
-export function logAxis(values, { include = [], spare = 3, least = 1.5 } = {}) {
+export function logAxis(values, { include = [], least = 1.5 } = {}) {
   const sorted = values.filter((v) => v > 0 && Number.isFinite(v)).sort((a, b) => a - b);
   if (!sorted.length) return { domain: [0.5, 2], clip: (v) => [v, 0], outside: 0 };
-  let low = sorted[0];
-  let high = sorted.at(-1);
-  if (sorted.length >= 8) {
-    low = Math.max(low, quantile(sorted, 0.02) / spare);
-    high = Math.min(high, quantile(sorted, 0.98) * spare);
-  }
+  const [q05, q25, q75, q95] = [0.05, 0.25, 0.75, 0.95].map((share) => quantile(sorted, share));
+  const spread = Math.max(q75 / q25, 1.05) ** 3;
+  let low = Math.max(sorted[0], Math.min(q25 / spread, q05));
+  let high = Math.min(sorted.at(-1), Math.max(q75 * spread, q95));
+  // A little beyond is not worth an arrow.
+  if (sorted[0] > low / 1.6) low = sorted[0];
+  if (sorted.at(-1) < high * 1.6) high = sorted.at(-1);
   low = Math.min(low, ...include);
   high = Math.max(high, ...include);
   if (high / low < least) {
@@ -150,7 +152,8 @@ export function forget() {
 /**
  * Makes a figure.
  *   plot(width)   the options of Plot
- *   points        [{x, y, fy?, run, lines: [text]}]: what the pointer and the arrow keys visit, in data's units
+ *   points        [{x, y, run, lines: [text], also?: [x]}]: what the pointer and the arrow keys visit, in data's units; `also` are
+ *                 other places on the same row that the pointer takes for the point
  *   table         {head: [text], rows: [[text]]}: the same numbers for readers of tables
  *   choose(run)   called when a point is chosen
  *   least         the width below which the figure scrolls instead of shrinking
@@ -192,8 +195,10 @@ export function figure({ title, reading, plot, points = [], table, choose, least
     let best = -1;
     let distance = 26 ** 2;
     placed.forEach((point, i) => {
-      const d = (point.px - x) ** 2 + (point.py - y) ** 2;
-      if (d < distance) [best, distance] = [i, d];
+      for (const px of [point.px, ...point.others]) {
+        const d = (px - x) ** 2 + (point.py - y) ** 2;
+        if (d < distance) [best, distance] = [i, d];
+      }
     });
     return best;
   };
@@ -225,14 +230,10 @@ export function figure({ title, reading, plot, points = [], table, choose, least
     });
     const chart = svg.matches("svg") ? svg : svg.querySelector("svg");
     label(chart, options);
-    const [sx, sy, sfy, sfx] = ["x", "y", "fy", "fx"].map((name) => svg.scale(name));
-    const half = (scale) => (scale?.bandwidth ?? 0) / 2;
+    const [sx, sy] = ["x", "y"].map((name) => svg.scale(name));
+    const on = (scale, value) => scale.apply(value) + (scale.bandwidth ?? 0) / 2;
     placed = points
-      .map((point) => ({
-        ...point,
-        px: sx.apply(point.x) + half(sx) + (sfx ? sfx.apply(point.fx) - sfx.range[0] : 0),
-        py: sy.apply(point.y) + half(sy) + (sfy ? sfy.apply(point.fy) - sfy.range[0] : 0),
-      }))
+      .map((point) => ({ ...point, px: on(sx, point.x), py: on(sy, point.y), others: (point.also ?? []).map((x) => on(sx, x)) }))
       .filter((point) => Number.isFinite(point.px) && Number.isFinite(point.py));
     at = -1;
     tip.hidden = true;

@@ -18,6 +18,7 @@ export function command(run) {
     const { builder } = contestant;
     if (builder) words.push("--builder", builder.method, "--width", builder.width, "--leaf-size", builder.leaf_size);
     words.push("--scalar", cell.scalar, cell.continuous ? "--continuous" : `--l ${cell.l}`);
+    if (cell.changes) words.push("--changes", cell.changes);
     words.push("--repetitions", Math.max(run.repetitions, 1), "--oracle-every", run.every ?? 1);
     if (run.limit) words.push("--frames-limit", run.limit);
     lines.push(`${words.join(" ")} --out again`);
@@ -31,6 +32,7 @@ export function command(run) {
       oracle_every: run.every ?? 1,
       ...(run.limit && { frames_limit: run.limit }),
       ...(cell.continuous && { continuous: true }),
+      ...(cell.changes && { changes: cell.changes }),
     };
     lines.push("cat > again.json <<'PLAN'", JSON.stringify(plan, null, 1), "PLAN");
     lines.push(`kbvh ${run.kind === "bench" ? "bench" : "run"} --plan again.json --out again`);

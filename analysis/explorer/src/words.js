@@ -40,6 +40,11 @@ export function percent(share, digits = 2) {
   return share === null || share === undefined ? "–" : `${significant(share * 100, digits)}${THIN}%`;
 }
 
+/** Begins a sentence. */
+export function sentence(text) {
+  return text[0].toUpperCase() + text.slice(1);
+}
+
 export function plural(number, noun) {
   return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }

@@ -3,7 +3,7 @@ import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, logAxis, logScale } from "../chart.js";
 import { make, paintOf } from "../dom.js";
 import { MEASURES, selected, value } from "../model.js";
-import { percent, plural, significant, tick } from "../words.js";
+import { percent, plural, sentence, significant, tick } from "../words.js";
 import { empty } from "./overview.js";
 
 const ERRORS = {
@@ -34,7 +34,7 @@ function one({ model, state, choose }, error, runs) {
   const usable = runs.map((run) => ({ run, time: value(model, run, state.measure), error: error.of(run) })).filter((p) => p.error !== null && p.error >= 0);
   if (new Set(usable.map((p) => p.error)).size < 2) return null;
   const times = logAxis(usable.map((p) => p.time));
-  const axis = logAxis(usable.map((p) => p.error), { spare: 10 });
+  const axis = logAxis(usable.map((p) => p.error));
   // An error of exactly 0 has its own place, left of all others.
   const zero = axis.domain[0] / (axis.domain[1] / axis.domain[0]) ** 0.12;
   const points = usable.map((p) => {
@@ -44,7 +44,7 @@ function one({ model, state, choose }, error, runs) {
   const front = pareto(points);
   const measure = MEASURES[state.measure];
   return figure({
-    title: error.name[0].toUpperCase() + error.name.slice(1),
+    title: sentence(error.name),
     reading: error.reading,
     notes: times.outside ? [`${plural(times.outside, "point")} beyond the axis of time: arrows at its edge.`] : [],
     plot: (width) => ({

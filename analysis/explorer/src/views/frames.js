@@ -41,7 +41,7 @@ function share(samples) {
 }
 
 function worst({ model, state, choose }, cell, runs) {
-  const axis = logAxis(runs.flatMap((run) => [run.p50, run.worst]), { spare: 5 });
+  const axis = logAxis(runs.flatMap((run) => [run.p50, run.worst]));
   const rows = runs.map((run) => {
     const [x, side] = axis.clip(run.worst);
     return { run, y: String(run.index), x, side, p50: axis.clip(run.p50)[0], p99: axis.clip(run.p99)[0], paint: paintOf(run.contestant) };
@@ -51,7 +51,7 @@ function worst({ model, state, choose }, cell, runs) {
     title: `Worst frames: ${cell.title}`,
     reading: "The marker is the median frame, the bar reaches to the 99th percentile, the cross is the worst frame (update and query, without motion evaluation). A long line is a stutter, even if the mean is good.",
     notes: axis.outside ? [`${plural(axis.outside, "value")} beyond the axis: arrows at its edge.`] : [],
-    least: 420,
+    least: 340,
     plot: (width) => {
       const { left, cut } = rowLabels([...label.values()], width);
       return {
@@ -68,7 +68,7 @@ function worst({ model, state, choose }, cell, runs) {
         ],
       };
     },
-    points: rows.map((row) => ({ x: row.x, y: row.y, run: row.run, current: row.run.key === state.point, lines: [row.run.contestant.label, `median ${milliseconds(row.run.p50)} ms, 99th percentile ${milliseconds(row.run.p99)} ms`, `worst ${milliseconds(row.run.worst)} ms, ${factor(row.run.worst / row.run.p50)} times the median`] })),
+    points: rows.map((row) => ({ x: row.x, y: row.y, also: [row.p50, row.p99], run: row.run, current: row.run.key === state.point, lines: [row.run.contestant.label, `median ${milliseconds(row.run.p50)} ms, 99th percentile ${milliseconds(row.run.p99)} ms`, `worst ${milliseconds(row.run.worst)} ms, ${factor(row.run.worst / row.run.p50)} times the median`] })),
     choose,
     table: { head: ["contestant", "median, ms", "99th percentile", "worst", "worst over median"], rows: rows.map(({ run }) => [run.contestant.label, milliseconds(run.p50), milliseconds(run.p99), milliseconds(run.worst), factor(run.worst / run.p50)]) },
   });
@@ -77,7 +77,7 @@ function worst({ model, state, choose }, cell, runs) {
 function over({ state, choose }, cell, runs, kind, title, reading, unit, samples) {
   const lines = runs.map((run) => ({ run, own: samples(run).filter(([, v]) => v > 0) })).filter((line) => line.own.length > 1);
   if (!lines.length) return null;
-  const axis = logAxis(lines.flatMap(({ own }) => own.map(([, v]) => v)), { spare: 2, include: kind === "quality" ? [1] : [] });
+  const axis = logAxis(lines.flatMap(({ own }) => own.map(([, v]) => v)), { include: kind === "quality" ? [1] : [] });
   const drawn = lines.map(({ run, own }) => ({
     run,
     own: own.map(([at, v]) => {
@@ -130,7 +130,7 @@ function stutter({ model, state, choose }, cells) {
     title: "How much worse than the median is the worst frame? Every cell",
     reading: "Each mark is one cell, the line the median over the cells. Cells differ in what they find per frame, so this compares strategies, not scenes.",
     notes: axis.outside ? [`${plural(axis.outside, "point")} beyond the axis: arrows at its edge.`] : [],
-    least: 420,
+    least: 340,
     plot: (width) => {
       const { left, cut } = rowLabels([...label.values()], width);
       return {

@@ -4,9 +4,11 @@ import { dotLook, figure, lineLook, logScale } from "../chart.js";
 import { make, symbol } from "../dom.js";
 import { MEASURES, compare, decided, entrants, ratioText, reference, referenceName, seriesOfName, value } from "../model.js";
 import { geometricMean, median, profiles, quantile, within } from "../statistics.js";
-import { factor, percent, plural } from "../words.js";
+import { factor, percent, plural, sentence } from "../words.js";
 
 const SHARES = [1, 1.25, 2];
+const STRONG = 8; // lines of a profile that are drawn thick
+const NAMED = 16; // rows of the ranking before "show all", and lines with markers
 
 export function overview(context) {
   const cells = entrants(context.model, context.state);
@@ -33,7 +35,7 @@ const BASIS = {
 
 function profileFigure({ model, state, choose }, found) {
   const measure = MEASURES[state.measure];
-  const title = `How often is who within a factor of the best? ${measure.name[0].toUpperCase()}${measure.name.slice(1)}`;
+  const title = `How often is who within a factor of the best? ${sentence(measure.name)}`;
   if (!found.length)
     return empty(title, state.cells === "common" ? "No cell has all of the selected contestants." : "No cell of this selection has two contestants with a time.");
   const cells = found[0].cells;
@@ -54,7 +56,7 @@ function profileFigure({ model, state, choose }, found) {
         });
     });
     const marks = [0, 1, 2].map((k) => top ** ((k + ((index * 7) % found.length) / found.length) / 3)).map((x) => ({ x, y: share(x) })).filter((mark) => mark.y > 0);
-    return { one, steps, marks, strong: index < 8 };
+    return { one, steps, marks, strong: index < STRONG, named: index < NAMED || found.length <= NAMED + 4 };
   });
   return figure({
     title,
@@ -68,9 +70,9 @@ function profileFigure({ model, state, choose }, found) {
       y: { domain: [0, 100], label: "↑ share of cells, %", grid: true, ticks: 5 },
       marks: [
         Plot.ruleY([0], { stroke: "var(--soft)" }),
-        ...lines.toReversed().flatMap(({ one, steps, marks, strong }) => [
-          Plot.line(steps, { x: "x", y: "y", curve: "step-after", ...lineLook(one.series.contestant, strong ? 2 : 1.1), strokeOpacity: strong ? 1 : 0.55, className: `series-${CSS.escape(one.name)}` }),
-          Plot.dot(marks, { x: "x", y: "y", ...dotLook(one.series.contestant, strong ? 4.5 : 3.5) }),
+        ...lines.toReversed().flatMap(({ one, steps, marks, strong, named }) => [
+          Plot.line(steps, { x: "x", y: "y", curve: "step-after", ...lineLook(one.series.contestant, strong ? 2 : 1.1), strokeOpacity: strong ? 1 : named ? 0.55 : 0.3 }),
+          Plot.dot(named ? marks : [], { x: "x", y: "y", ...dotLook(one.series.contestant, strong ? 4.5 : 3.5) }),
         ]),
       ],
     }),
@@ -100,6 +102,9 @@ function ranking({ state, set }, found) {
       make("td", { class: "n", text: factor(median(one.factors)) }),
       make("td", { class: "n", text: `${one.factors.length}` }),
     );
+  const first = found.length > NAMED + 4 ? NAMED : found.length;
+  const body = make("tbody", {}, found.slice(0, first).map(line));
+  const more = first < found.length && make("button", { type: "button", text: `Show all ${found.length}`, click: () => { body.append(...found.slice(first).map(line)); more.remove(); } });
   return make(
     "section",
     { class: "ranking" },
@@ -108,8 +113,9 @@ function ranking({ state, set }, found) {
       {},
       make("caption", { text: "Ordered by the mean share of the best's speed. Pale: measured in fewer than half of the cells." }),
       make("thead", {}, make("tr", {}, ["strategy", "best in", "within 1.25×", "within 2×", "median factor", "cells"].map((text, i) => make("th", { scope: "col", class: i ? "n" : null, text })))),
-      make("tbody", {}, found.map(line)),
+      body,
     )),
+    more,
   );
 }
 

@@ -4,7 +4,7 @@ import { clippedMarks, dotLook, figure, logAxis, logScale, rowLabels } from "../
 import { paintOf } from "../dom.js";
 import { compare, entrants, ratioText, reference, referenceName, seriesOfName, MEASURES } from "../model.js";
 import { geometricMean } from "../statistics.js";
-import { factor, plural } from "../words.js";
+import { factor, plural, sentence } from "../words.js";
 import { empty, profiled } from "./overview.js";
 
 const MOST = 6; // series in one figure, unless strategies are chosen
@@ -32,7 +32,7 @@ export function pairwise(context) {
     }
     if (any) order_of.push(cell);
   }
-  const title = `How many times as fast as ${against}? ${MEASURES[state.measure].name}`;
+  const title = `How many times as fast as ${against}? ${sentence(MEASURES[state.measure].name)}`;
   if (!points.length) return [empty(title, `Nothing of this selection can be compared with ${against}.`)];
   const axis = logAxis(points.flatMap((p) => [p.found.middle]), { include: [1] });
   const means = names
@@ -64,7 +64,7 @@ export function pairwise(context) {
         fewest < 7 && MEASURES[state.measure].column === undefined ? "With fewer than 7 repetitions, an interval is about the whole range of the repetitions: the bootstrap cannot know more." : "",
         axis.outside ? `${plural(axis.outside, "point")} beyond the axis: arrows at its edge.` : "",
       ].filter(Boolean),
-      least: 460,
+      least: 340,
       plot: (width) => {
         const { left, cut } = rowLabels([...label.values()], width);
         return {

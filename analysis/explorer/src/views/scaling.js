@@ -52,7 +52,7 @@ function one({ model, state, choose }, sweep, field) {
   const { first } = sweep;
   const place = [first.scene, field === "l" ? `${first.size} primitives` : `l = ${first.l}`, model.several.scalars && first.scalar, model.several.commits && first.commit.label, model.several.machines && first.machine.label].filter(Boolean).join(", ");
   const all = [...sweep.lines.values()].flat().map(({ run }) => value(model, run, state.measure));
-  const axis = logAxis(all, { spare: 2 });
+  const axis = logAxis(all);
   const at = [...sweep.cells.keys()].sort((a, b) => a - b);
   const points = [];
   const rows = [];

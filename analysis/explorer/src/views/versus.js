@@ -4,7 +4,7 @@ import { clippedMarks, dotLook, figure, logAxis, logScale, meanLook, rowLabels }
 import { choice, make, paintOf } from "../dom.js";
 import { MEASURES, compare, decided, ratioText, selected, seriesOfName, value } from "../model.js";
 import { geometricMean } from "../statistics.js";
-import { factor, plural } from "../words.js";
+import { factor, plural, sentence } from "../words.js";
 import { empty } from "./overview.js";
 
 /** Returns the sources of results: every pair of a commit and a machine. */
@@ -51,7 +51,7 @@ export function versus(context) {
   const options = Object.fromEntries(known);
   const chosen = make("div", { class: "toolbar" }, choice("A", options, a, (key) => set({ a: key })), choice("B", options, b, (key) => set({ b: key })), make("button", { type: "button", text: "Swap", click: () => set({ a: b, b: a }) }));
   const { both, alone } = pairs(model, state, a, b);
-  const title = `How many times as fast is B as A? ${MEASURES[state.measure].name}`;
+  const title = `How many times as fast is B as A? ${sentence(MEASURES[state.measure].name)}`;
   if (!both.length) return [chosen, empty(title, "The two share no configuration in this selection: same scene by its hash, scalar, l, frames and settings.")];
   const of = new Map();
   for (const one of both) {
@@ -78,7 +78,7 @@ function strategies({ model, state, choose }, title, of, both) {
     title,
     reading: "Each mark is one configuration; it is filled where the 95 % interval of the ratio excludes 1. To the right of 1, B is faster. The bar is the geometric mean of the strategy.",
     notes: axis.outside ? [`${plural(axis.outside, "point")} beyond the axis: arrows at its edge.`] : [],
-    least: 420,
+    least: 340,
     plot: (width) => {
       const { left, cut } = rowLabels([...label.values()], width);
       return {
@@ -111,7 +111,7 @@ function changes({ model, state, choose }, both) {
   return figure({
     title: `The ${sure.length === 1 ? "change" : `${sure.length} largest changes`} whose intervals exclude 1`,
     reading: "The line is the 95 % interval of the ratio, by a bootstrap over the repetitions of both.",
-    least: 460,
+    least: 340,
     plot: (width) => {
       const { left, cut } = rowLabels(rows.map(text), width, 0.5);
       return {
