@@ -9,7 +9,14 @@ const puppeteer = require("puppeteer-core");
 const expected = JSON.parse(readFileSync(process.argv[2], "utf8"));
 const browser = await puppeteer.launch({
   executablePath: process.env.KBVH_BROWSER,
-  args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run"],
+  args: [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+  ],
   protocolTimeout: 300_000,
 });
 const VIEWS = ["overview", "pairwise", "errors", "scaling", "frames", "versus", "claims", "runs"];
@@ -43,16 +50,20 @@ async function open(which, link = "", { width = 1440, scheme = "light" } = {}) {
   return page;
 }
 
-const near = (a, b) => (a === null || b === null ? a === b : Math.abs(a - b) <= 1e-9 * Math.max(Math.abs(a), Math.abs(b)));
+const near = (a, b) =>
+  a === null || b === null ? a === b : Math.abs(a - b) <= 1e-9 * Math.max(Math.abs(a), Math.abs(b));
 
 function sameRatio(own, python, place) {
   if (python === null) return assert.equal(own, null, place);
   const [middle, low, high, paired, within] = python;
   assert.ok(own, place);
-  for (const [name, value] of Object.entries({ middle, low, high })) assert.ok(near(own[name], value), `${place}, ${name}: ${own[name]} and ${value}`);
+  for (const [name, value] of Object.entries({ middle, low, high }))
+    assert.ok(near(own[name], value), `${place}, ${name}: ${own[name]} and ${value}`);
   assert.equal(own.paired, paired, place);
   assert.equal(own.within === null, within === null, place);
-  within?.forEach((value, i) => assert.ok(near(own.within[i], value), `${place}, interval: ${own.within} and ${within}`));
+  within?.forEach((value, i) =>
+    assert.ok(near(own.within[i], value), `${place}, interval: ${own.within} and ${within}`),
+  );
 }
 
 // --- numbers: ratios, intervals and profiles are Python's -------------------------------------------------
@@ -89,11 +100,16 @@ for (const which of ["reference", "merged"]) {
         window.explorer.set({ ...window.explorer.initial(), measure });
         return window.explorer.profiles().map(({ name, factors, cells }) => ({ name, factors, cells }));
       }, measure);
-      assert.deepEqual(own.map((one) => one.name), profiles.map(([id]) => id));
+      assert.deepEqual(
+        own.map((one) => one.name),
+        profiles.map(([id]) => id),
+      );
       own.forEach((one, i) => {
         assert.equal(one.cells, profiles[i][2]);
         assert.equal(one.factors.length, profiles[i][1].length);
-        one.factors.forEach((factor, k) => assert.ok(near(factor, profiles[i][1][k]), `${one.name}: ${factor} and ${profiles[i][1][k]}`));
+        one.factors.forEach((factor, k) =>
+          assert.ok(near(factor, profiles[i][1][k]), `${one.name}: ${factor} and ${profiles[i][1][k]}`),
+        );
       });
     });
   await page.close();
@@ -126,7 +142,10 @@ await check("merged: an outlier stretches no axis", async () => {
       const texts = (selector) => [...figure.querySelectorAll(selector)].map((one) => one.textContent);
       return [texts(".note"), texts('[aria-label="x-axis tick label"] text').map(Number)];
     });
-    assert.ok(notes.some((text) => /1 point beyond the axis/.test(text)), notes.join(" | "));
+    assert.ok(
+      notes.some((text) => /1 point beyond the axis/.test(text)),
+      notes.join(" | "),
+    );
     assert.ok(ticks.length > 2 && Math.max(...ticks) / Math.min(...ticks) < 100, `${view}: ${ticks.join(" ")}`);
     await page.close();
   }
@@ -162,7 +181,7 @@ await check("states survive their links, strange names included", async () => {
   const page = await open("merged");
   const failures = await page.evaluate(() => {
     const { initial, encode, decode } = window.explorer;
-    const words = ["a", "a,b", "100%", "x=y&z", "#", "ä \"<b>", "sequences/one", "~", "+"];
+    const words = ["a", "a,b", "100%", "x=y&z", "#", 'ä "<b>', "sequences/one", "~", "+"];
     const found = [];
     for (let i = 0; i < 300; ++i) {
       const state = initial();
@@ -176,7 +195,11 @@ await check("states survive their links, strange names included", async () => {
     return found;
   });
   assert.deepEqual(failures, []);
-  assert.deepEqual(await page.evaluate(() => window.explorer.decode("#view&scene=%E0%A4%A&nonsense=1&l=10,10")), { ...(await page.evaluate(() => window.explorer.initial())), scene: ["%E0%A4%A"], l: ["10"] });
+  assert.deepEqual(await page.evaluate(() => window.explorer.decode("#view&scene=%E0%A4%A&nonsense=1&l=10,10")), {
+    ...(await page.evaluate(() => window.explorer.initial())),
+    scene: ["%E0%A4%A"],
+    l: ["10"],
+  });
   await page.evaluate(() => window.explorer.set({ view: "runs" }));
   await page.evaluate(() => window.explorer.set({ view: "frames" }));
   await page.goBack();
@@ -189,16 +212,26 @@ await check("a study's question is the title, and its text stays text", async ()
   assert.equal(await page.title(), "is it faster?");
   assert.equal(await page.$eval("h1", (one) => one.textContent), "is it faster?");
   assert.match(await page.$eval(".question", (one) => one.textContent), /<script>alert\(1\)<\/script>/);
-  assert.ok((await page.$$eval(".matrix tbody .scene", (list) => list.map((one) => one.textContent))).some((text) => text.includes('<b>&"scene"')));
+  assert.ok(
+    (await page.$$eval(".matrix tbody .scene", (list) => list.map((one) => one.textContent))).some((text) =>
+      text.includes('<b>&"scene"'),
+    ),
+  );
   await page.close();
 });
 
 await check("claims appear only where they are decided", async () => {
   const decided = await open("reference", "#view=claims");
-  assert.equal((await decided.$$(".claim")).length, await decided.evaluate(() => window.explorer.model.data.claims.length));
+  assert.equal(
+    (await decided.$$(".claim")).length,
+    await decided.evaluate(() => window.explorer.model.data.claims.length),
+  );
   assert.ok((await decided.$$(".claim")).length > 20);
   const none = await open("merged", "#view=claims");
-  const [tabs, claims] = await none.evaluate(() => [[...document.querySelectorAll('[role="tab"]')].map((tab) => tab.dataset.view), window.explorer.model.data.claims]);
+  const [tabs, claims] = await none.evaluate(() => [
+    [...document.querySelectorAll('[role="tab"]')].map((tab) => tab.dataset.view),
+    window.explorer.model.data.claims,
+  ]);
   assert.equal(tabs.includes("claims"), claims.length > 0);
   assert.ok(claims.every((claim) => claim.verdict !== "not decided here"));
   await decided.close();
@@ -212,7 +245,10 @@ await check("a number of the matrix leads to its command", async () => {
   const cell = await page.$(".matrix td[data-run]");
   await cell.click();
   const run = await cell.evaluate((td) => Number(td.dataset.run));
-  const [id, command] = await page.evaluate((index) => [window.explorer.model.runs[index].contestant.id, document.querySelector(".command").textContent], run);
+  const [id, command] = await page.evaluate(
+    (index) => [window.explorer.model.runs[index].contestant.id, document.querySelector(".command").textContent],
+    run,
+  );
   assert.match(command, new RegExp(`kbvh (run|bench) .*--strategies ${id} `));
   assert.match(await page.evaluate(() => location.hash), /point=/);
   const other = await open("reference", await page.evaluate(() => location.hash));
@@ -237,7 +273,10 @@ await check("arrow keys and Enter reach every kind of figure", async () => {
   await page.keyboard.press("ArrowDown");
   const run = await page.evaluate(() => Number(document.activeElement.dataset.run));
   await page.keyboard.press("Enter");
-  assert.equal(await page.evaluate(() => window.explorer.model.runs.findIndex((one) => one.key === window.explorer.state().point)), run);
+  assert.equal(
+    await page.evaluate(() => window.explorer.model.runs.findIndex((one) => one.key === window.explorer.state().point)),
+    run,
+  );
   await page.focus('[role="tab"][aria-selected="true"]');
   await page.keyboard.press("ArrowRight");
   assert.equal(await page.evaluate(() => window.explorer.state().view), "pairwise");
@@ -247,7 +286,9 @@ await check("arrow keys and Enter reach every kind of figure", async () => {
 await check("the pointer finds the point below it", async () => {
   const page = await open("reference", "#view=frames");
   const ring = async () => page.$eval(".tip:not([hidden])", (tip) => tip.textContent);
-  const box = await page.$eval('.plot[role="application"] svg.chart [aria-label="dot"] path', (path) => path.getBoundingClientRect().toJSON());
+  const box = await page.$eval('.plot[role="application"] svg.chart [aria-label="dot"] path', (path) =>
+    path.getBoundingClientRect().toJSON(),
+  );
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   assert.match(await ring(), /median .* ms/);
   await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
@@ -261,13 +302,18 @@ await check("the program accepts the commands", async () => {
     const one = new Map();
     for (const run of window.explorer.model.runs) {
       const { text } = window.explorer.command(run);
-      if (text && (!one.has(run.contestant.id) || !one.has(run.cell.name))) one.set(run.contestant.id, text).set(run.cell.name, text);
+      if (text && (!one.has(run.contestant.id) || !one.has(run.cell.name)))
+        one.set(run.contestant.id, text).set(run.cell.name, text);
     }
     return [...new Set(one.values())];
   });
   assert.ok(commands.length > 15);
   for (const text of commands) {
-    const line = text.split("\n").at(-1).replace(/^kbvh/, `'${process.env.KBVH_PROGRAM}'`).replace("--out again", "--print-plan");
+    const line = text
+      .split("\n")
+      .at(-1)
+      .replace(/^kbvh/, `'${process.env.KBVH_PROGRAM}'`)
+      .replace("--out again", "--print-plan");
     const told = spawnSync("sh", ["-c", line], { encoding: "utf8" });
     assert.equal(told.status, 0, `${line}: ${told.stderr}`);
   }
@@ -280,18 +326,31 @@ await check("the program accepts the commands", async () => {
 
 // --- every view, both schemes, three widths -------------------------------------------------------------------
 
-for (const [which, views] of [["reference", VIEWS], ["merged", ["overview", "versus"]]])
+for (const [which, views] of [
+  ["reference", VIEWS],
+  ["merged", ["overview", "versus"]],
+])
   for (const view of views)
-    for (const [width, scheme] of [[1440, "light"], [1024, "dark"], [390, "light"]])
+    for (const [width, scheme] of [
+      [1440, "light"],
+      [1024, "dark"],
+      [390, "light"],
+    ])
       await check(`${which}: ${view} at ${width}, ${scheme}`, async () => {
         const page = await open(which, `#view=${view}`, { width, scheme });
         assert.equal(await page.evaluate(() => document.documentElement.dataset.scheme), scheme);
-        assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= width, "the page is wider than the window");
+        assert.ok(
+          (await page.evaluate(() => document.documentElement.scrollWidth)) <= width,
+          "the page is wider than the window",
+        );
         const cut = await page.$$eval(".plot svg.chart text", (list) =>
-          list.filter((text) => {
-            const [own, host] = [text.getBoundingClientRect(), text.closest(".plot").getBoundingClientRect()];
-            return text.textContent && own.width && (own.left < host.left - 1 || own.right > host.right + 1);
-          }).map((text) => text.textContent));
+          list
+            .filter((text) => {
+              const [own, host] = [text.getBoundingClientRect(), text.closest(".plot").getBoundingClientRect()];
+              return text.textContent && own.width && (own.left < host.left - 1 || own.right > host.right + 1);
+            })
+            .map((text) => text.textContent),
+        );
         assert.deepEqual(cut, [], "labels beyond the edge of their figure");
         assert.ok((await page.$eval("#view", (one) => one.textContent.length)) > 100);
         await page.close();
@@ -319,7 +378,9 @@ await check("10 MB of results", async () => {
     await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
     return [...first, performance.now() - begun];
   });
-  console.log(`${megabytes.toFixed(1)} MB of results, ${runs} runs: shown ${shown.toFixed(0)} ms after the start of loading (its own work ${ready.toFixed(0)} ms), filtered in ${filter.toFixed(0)} ms`);
+  console.log(
+    `${megabytes.toFixed(1)} MB of results, ${runs} runs: shown ${shown.toFixed(0)} ms after the start of loading (its own work ${ready.toFixed(0)} ms), filtered in ${filter.toFixed(0)} ms`,
+  );
   assert.equal(await page.evaluate(() => window.explorer.model.runs.length), runs);
   assert.ok(shown < 20_000, "even a busy machine is faster");
   await page.close();

@@ -82,7 +82,9 @@ export function logTicks([low, high], room) {
       }
     if (ticks.length * 46 <= room || steps.length === 1) {
       const every = Math.max(1, Math.ceil((ticks.length * 46) / room));
-      return ticks.length < 2 ? [low, Math.sqrt(low * high), high].map((v) => Number(v.toPrecision(2))) : ticks.filter((_, i) => i % every === 0);
+      return ticks.length < 2
+        ? [low, Math.sqrt(low * high), high].map((v) => Number(v.toPrecision(2)))
+        : ticks.filter((_, i) => i % every === 0);
     }
   }
   return [];
@@ -101,7 +103,9 @@ function label(chart, options) {
 let ruler;
 /** Cuts a text to a width in pixels, as drawn in the figures. */
 export function fit(text, room) {
-  ruler ??= Object.assign(document.createElement("canvas").getContext("2d"), { font: `12px ${getComputedStyle(document.body).fontFamily}` });
+  ruler ??= Object.assign(document.createElement("canvas").getContext("2d"), {
+    font: `12px ${getComputedStyle(document.body).fontFamily}`,
+  });
   if (ruler.measureText(text).width <= room) return text;
   let end = text.length;
   while (end > 1 && ruler.measureText(`${text.slice(0, end)}…`).width > room) end -= 1;
@@ -112,7 +116,16 @@ export function fit(text, room) {
 export function rowLabels(texts, width, most = 0.42) {
   fit("", 0);
   const left = Math.ceil(Math.min(Math.max(...texts.map((text) => ruler.measureText(text).width)) + 16, width * most));
-  return { left, cut: (text) => fit(text, left - 14) };
+  const room = left - 14;
+  return {
+    left,
+    // The name of a scene is cut before its size and l, which tell its rows apart.
+    cut: (text) => {
+      const at = text.indexOf(", ");
+      const tail = ruler.measureText(text.slice(at)).width;
+      return at < 0 || tail > room * 0.6 ? fit(text, room) : fit(text.slice(0, at), room - tail) + text.slice(at);
+    },
+  };
 }
 
 /** Options of a logarithmic axis of Plot. */
@@ -125,7 +138,13 @@ export function clippedMarks(points, along) {
   const outside = points.filter((p) => p.side);
   const glyph = (p) => (along === "x" ? (p.side < 0 ? "◂" : "▸") : p.side < 0 ? "▾" : "▴");
   return Plot.text(outside, {
-    x: "x", y: "y", text: glyph, fill: "paint", fontSize: 13, stroke: "var(--page)", strokeWidth: 3,
+    x: "x",
+    y: "y",
+    text: glyph,
+    fill: "paint",
+    fontSize: 13,
+    stroke: "var(--page)",
+    strokeWidth: 3,
   });
 }
 
@@ -160,7 +179,9 @@ export function forget() {
  */
 export function figure({ title, reading, plot, points = [], table, choose, least = 300, notes = [] }) {
   const host = make("div", {
-    class: "plot", tabindex: points.length ? 0 : null, role: points.length ? "application" : "img",
+    class: "plot",
+    tabindex: points.length ? 0 : null,
+    role: points.length ? "application" : "img",
     "aria-label": `${title}. ${points.length ? `${points.length} points: arrow keys visit them, Enter shows where one comes from.` : ""}`,
   });
   const tip = make("div", { class: "tip", role: "status", "aria-live": "polite", hidden: true });
@@ -178,7 +199,9 @@ export function figure({ title, reading, plot, points = [], table, choose, least
     }
     host.querySelector("svg.chart").append(make("svg:circle", { class: "ring", cx: point.px, cy: point.py, r: 9 }));
     tip.replaceChildren(
-      ...(point.run ? [make("div", { class: "tip-name" }, symbol(point.run.contestant), point.lines[0])] : [make("div", { text: point.lines[0] })]),
+      ...(point.run
+        ? [make("div", { class: "tip-name" }, symbol(point.run.contestant), point.lines[0])]
+        : [make("div", { text: point.lines[0] })]),
       ...point.lines.slice(1).map((line) => make("div", { text: line })),
     );
     tip.hidden = false;
@@ -233,13 +256,21 @@ export function figure({ title, reading, plot, points = [], table, choose, least
     const [sx, sy] = ["x", "y"].map((name) => svg.scale(name));
     const on = (scale, value) => scale.apply(value) + (scale.bandwidth ?? 0) / 2;
     placed = points
-      .map((point) => ({ ...point, px: on(sx, point.x), py: on(sy, point.y), others: (point.also ?? []).map((x) => on(sx, x)) }))
+      .map((point) => ({
+        ...point,
+        px: on(sx, point.x),
+        py: on(sy, point.y),
+        others: (point.also ?? []).map((x) => on(sx, x)),
+      }))
       .filter((point) => Number.isFinite(point.px) && Number.isFinite(point.py));
     at = -1;
     tip.hidden = true;
     host.replaceChildren(svg, tip);
     chart.setAttribute("aria-hidden", "true");
-    placed.forEach((point) => point.current && chart.append(make("svg:circle", { class: "ring chosen", cx: point.px, cy: point.py, r: 9 })));
+    placed.forEach(
+      (point) =>
+        point.current && chart.append(make("svg:circle", { class: "ring chosen", cx: point.px, cy: point.py, r: 9 })),
+    );
   };
 
   if (points.length) {
@@ -283,12 +314,33 @@ function numbers({ head, rows }) {
 
 /** Makes a table; cells are texts, numbers are aligned to the right. */
 export function tableOf(head, rows) {
-  const numeric = head.map((_, i) => rows.length > 0 && rows.every((row) => /^[–~◂▸]? ?[\d.,\u202f]/.test(row[i] ?? "–") || row[i] === "–"));
-  const cell = (kind, text, i) => make(kind, { class: numeric[i] ? "n" : null }, text instanceof Node ? text : document.createTextNode(text ?? "–"));
+  const numeric = head.map(
+    (_, i) => rows.length > 0 && rows.every((row) => /^[–~◂▸]? ?[\d.,\u202f]/.test(row[i] ?? "–") || row[i] === "–"),
+  );
+  const cell = (kind, text, i) =>
+    make(kind, { class: numeric[i] ? "n" : null }, text instanceof Node ? text : document.createTextNode(text ?? "–"));
   return make(
     "table",
     {},
-    make("thead", {}, make("tr", {}, head.map((text, i) => cell("th", text, i)))),
-    make("tbody", {}, rows.map((row) => make("tr", {}, row.map((text, i) => cell("td", text, i))))),
+    make(
+      "thead",
+      {},
+      make(
+        "tr",
+        {},
+        head.map((text, i) => cell("th", text, i)),
+      ),
+    ),
+    make(
+      "tbody",
+      {},
+      rows.map((row) =>
+        make(
+          "tr",
+          {},
+          row.map((text, i) => cell("td", text, i)),
+        ),
+      ),
+    ),
   );
 }

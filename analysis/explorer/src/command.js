@@ -9,7 +9,9 @@ function quoted(word) {
 /** Returns {text, why}: the command, or why there is none. */
 export function command(run) {
   const { cell, contestant } = run;
-  const lines = [`# kbvh at commit ${cell.commit.commit || "unknown"}${cell.commit.dirty ? ", with uncommitted changes" : ""}`];
+  const lines = [
+    `# kbvh at commit ${cell.commit.commit || "unknown"}${cell.commit.dirty ? ", with uncommitted changes" : ""}`,
+  ];
   const { options, scene, why } = cell.again;
   if (why) return { text: "", why };
   if (options) {
@@ -25,7 +27,9 @@ export function command(run) {
   } else {
     const plan = {
       scenes: [scene],
-      strategies: [{ id: contestant.id, params: contestant.params, ...(contestant.builder && { builder: contestant.builder }) }],
+      strategies: [
+        { id: contestant.id, params: contestant.params, ...(contestant.builder && { builder: contestant.builder }) },
+      ],
       scalars: [cell.scalar],
       l: [cell.l],
       repetitions: Math.max(run.repetitions, 1),

@@ -11,18 +11,28 @@ export function make(name, attributes = {}, ...children) {
     else if (key === "text") element.textContent = value;
     else element.setAttribute(key, value === true ? "" : value);
   }
-  element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
+  element.append(
+    ...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false),
+  );
   return element;
 }
 
 /** Makes the marker of a contestant, as analysis/colours.py draws it. */
 export function symbol(contestant) {
   const { corners, filled } = contestant.look;
-  const paint = { fill: filled ? paintOf(contestant) : "var(--page)", stroke: paintOf(contestant), "stroke-width": 1.6 };
+  const paint = {
+    fill: filled ? paintOf(contestant) : "var(--page)",
+    stroke: paintOf(contestant),
+    "stroke-width": 1.6,
+  };
   const shape = corners.length
     ? make("svg:polygon", { points: corners.map((c) => c.join(",")).join(" "), ...paint })
     : make("svg:circle", { r: 4.2, ...paint });
-  return make("svg:svg", { class: "symbol", viewBox: "-6.5 -6.5 13 13", width: 13, height: 13, "aria-hidden": "true" }, shape);
+  return make(
+    "svg:svg",
+    { class: "symbol", viewBox: "-6.5 -6.5 13 13", width: 13, height: 13, "aria-hidden": "true" },
+    shape,
+  );
 }
 
 /** Returns the colour of a contestant, in the page's scheme. */

@@ -2,14 +2,36 @@
 import { make, symbol } from "./dom.js";
 import { facetOf, selected } from "./model.js";
 
-const NAMES = { plan: "Study", scene: "Scene", size: "Size (primitives)", l: "l (frames per keyframe)", scalar: "Scalar", machine: "Machine", commit: "Commit", strategy: "Strategy" };
+const NAMES = {
+  plan: "Study",
+  scene: "Scene",
+  size: "Size (primitives)",
+  l: "l (frames per keyframe)",
+  scalar: "Scalar",
+  machine: "Machine",
+  commit: "Commit",
+  strategy: "Strategy",
+};
 const NUMERIC = ["size", "l"];
 
 export function filters({ model, state, set }) {
-  const groups = Object.keys(NAMES).map((facet) => group(model, state, set, facet)).filter(Boolean);
+  const groups = Object.keys(NAMES)
+    .map((facet) => group(model, state, set, facet))
+    .filter(Boolean);
   const active = Object.keys(NAMES).filter((facet) => state[facet].length);
   return [
-    make("div", { class: "filters-head" }, make("h2", { text: "Filter" }), active.length > 0 && make("button", { type: "button", class: "quiet", text: "Clear all", click: () => set(Object.fromEntries(active.map((facet) => [facet, []]))) })),
+    make(
+      "div",
+      { class: "filters-head" },
+      make("h2", { text: "Filter" }),
+      active.length > 0 &&
+        make("button", {
+          type: "button",
+          class: "quiet",
+          text: "Clear all",
+          click: () => set(Object.fromEntries(active.map((facet) => [facet, []]))),
+        }),
+    ),
     ...groups,
   ];
 }
@@ -23,7 +45,8 @@ function group(model, state, set, facet) {
   for (const run of selected(model, state, facet)) counts.set(of(run), (counts.get(of(run)) ?? 0) + 1);
   let values = [...counts.keys()];
   if (NUMERIC.includes(facet)) values.sort((a, b) => a - b);
-  if (facet === "strategy") values.sort((a, b) => family(model, a).localeCompare(family(model, b)) || a.localeCompare(b));
+  if (facet === "strategy")
+    values.sort((a, b) => family(model, a).localeCompare(family(model, b)) || a.localeCompare(b));
   const chosen = new Set(state[facet]);
   const toggle = (value, on) => {
     const next = new Set(chosen);
@@ -36,9 +59,18 @@ function group(model, state, set, facet) {
     return make(
       "label",
       { class: counts.get(value) ? null : "absent", title: contestant ? contestant.title : null },
-      make("input", { type: "checkbox", name: facet, value, checked: chosen.has(value), change: (event) => toggle(value, event.target.checked) }),
+      make("input", {
+        type: "checkbox",
+        name: facet,
+        value,
+        checked: chosen.has(value),
+        change: (event) => toggle(value, event.target.checked),
+      }),
       contestant && symbol(contestant),
-      make("span", { class: "value", text: NUMERIC.includes(facet) ? Number(value).toLocaleString("en").replaceAll(",", "\u202f") : value }),
+      make("span", {
+        class: "value",
+        text: NUMERIC.includes(facet) ? Number(value).toLocaleString("en").replaceAll(",", "\u202f") : value,
+      }),
       make("span", { class: "count", text: counts.get(value) }),
     );
   };
@@ -46,7 +78,14 @@ function group(model, state, set, facet) {
     "details",
     { class: "facet", "data-facet": facet, open: facet === "scene" || facet === "strategy" || chosen.size > 0 },
     make("summary", {}, NAMES[facet], chosen.size > 0 && make("span", { class: "chosen-count", text: chosen.size })),
-    make("fieldset", {}, make("legend", { class: "hidden", text: NAMES[facet] }), values.map(box), chosen.size > 0 && make("button", { type: "button", class: "quiet", text: "Clear", click: () => set({ [facet]: [] }) })),
+    make(
+      "fieldset",
+      {},
+      make("legend", { class: "hidden", text: NAMES[facet] }),
+      values.map(box),
+      chosen.size > 0 &&
+        make("button", { type: "button", class: "quiet", text: "Clear", click: () => set({ [facet]: [] }) }),
+    ),
   );
 }
 

@@ -74,33 +74,72 @@ function currentCell() {
 }
 
 function tools(uses, current) {
-  const strategies = Object.fromEntries([...new Map(model.contestants.map((one) => [one.id, one.title]))].sort((a, b) => a[1].localeCompare(b[1])));
-  const settings = Object.fromEntries(model.contestants.filter((one) => model.contestants.filter((other) => other.id === one.id).length > 1).map((one) => [one.key, one.label]).sort((a, b) => a[1].localeCompare(b[1])));
-  const against = { usual: undefined, "In each cell": { baseline: "the best refit", tree: "the refit of the same tree", fastest: "the fastest" }, "A strategy, at its fastest": strategies, "One setting": settings };
+  const strategies = Object.fromEntries(
+    [...new Map(model.contestants.map((one) => [one.id, one.title]))].sort((a, b) => a[1].localeCompare(b[1])),
+  );
+  const settings = Object.fromEntries(
+    model.contestants
+      .filter((one) => model.contestants.filter((other) => other.id === one.id).length > 1)
+      .map((one) => [one.key, one.label])
+      .sort((a, b) => a[1].localeCompare(b[1])),
+  );
+  const against = {
+    usual: undefined,
+    "In each cell": { baseline: "the best refit", tree: "the refit of the same tree", fastest: "the fastest" },
+    "A strategy, at its fastest": strategies,
+    "One setting": settings,
+  };
   delete against.usual;
   if (!Object.keys(settings).length) delete against["One setting"];
   const words = Object.fromEntries(Object.entries(MEASURES).map(([name, measure]) => [name, measure.name]));
   const all = {
-    cell: () => current && choice("Cell", Object.fromEntries([...current.cells.keys()].map((cell) => [cell.key, cell.title])), current.cell?.key, (cell) => set({ cell })),
+    cell: () =>
+      current &&
+      choice(
+        "Cell",
+        Object.fromEntries([...current.cells.keys()].map((cell) => [cell.key, cell.title])),
+        current.cell?.key,
+        (cell) => set({ cell }),
+      ),
     measure: () => choice("Measure", words, state.measure, (measure) => set({ measure })),
     against: () => choice("Compared with", against, state.against, (name) => set({ against: name })),
-    per: () => choice("Settings", { best: "each strategy's fastest", each: "every setting" }, state.per, (per) => set({ per })),
-    contestants: () => choice("Contestants", { usual: "guaranteed, one thread", all: "all" }, state.contestants, (contestants) => set({ contestants })),
-    cells: () => choice("Cells", { own: "those of each strategy", all: "all; absent is never", common: "common to all" }, state.cells, (cells) => set({ cells })),
+    per: () =>
+      choice("Settings", { best: "each strategy's fastest", each: "every setting" }, state.per, (per) => set({ per })),
+    contestants: () =>
+      choice("Contestants", { usual: "guaranteed, one thread", all: "all" }, state.contestants, (contestants) =>
+        set({ contestants }),
+      ),
+    cells: () =>
+      choice(
+        "Cells",
+        { own: "those of each strategy", all: "all; absent is never", common: "common to all" },
+        state.cells,
+        (cells) => set({ cells }),
+      ),
   };
   host.tools.replaceChildren(...uses.map((name) => all[name]()).filter(Boolean));
 }
 
 /** A legend of series or strategies, or of runs. */
 function legend(names) {
-  const named = (name) => seriesOfName(model, { per: model.contestants.some((one) => one.id === name) ? "best" : "each" }, name);
+  const named = (name) =>
+    seriesOfName(model, { per: model.contestants.some((one) => one.id === name) ? "best" : "each" }, name);
   return legendList(names.map(named).map(({ contestant, label }) => [contestant, label]));
 }
 function legendOf(list) {
-  return legendList([...new Map(list.map((run) => [run.contestant.key, [run.contestant, run.contestant.label]])).values()]);
+  return legendList([
+    ...new Map(list.map((run) => [run.contestant.key, [run.contestant, run.contestant.label]])).values(),
+  ]);
 }
 function legendList(entries) {
-  return entries.length > 0 && make("ul", { class: "legend", "aria-label": "Legend" }, entries.map(([contestant, label]) => make("li", {}, symbol(contestant), label)));
+  return (
+    entries.length > 0 &&
+    make(
+      "ul",
+      { class: "legend", "aria-label": "Legend" },
+      entries.map(([contestant, label]) => make("li", {}, symbol(contestant), label)),
+    )
+  );
 }
 
 function drawView() {
@@ -116,7 +155,11 @@ function drawView() {
   const context = { model, state, set, choose, legend, legendOf, cell: current?.cell };
   const count = selected(model, state).length;
   const nothing = count === 0 && name !== "claims";
-  host.view.replaceChildren(...(nothing ? [make("p", { class: "lead", text: "No run passes these filters." })] : view.draw(context).filter(Boolean)));
+  host.view.replaceChildren(
+    ...(nothing
+      ? [make("p", { class: "lead", text: "No run passes these filters." })]
+      : view.draw(context).filter(Boolean)),
+  );
   host.said.textContent = `${view.name}: ${plural(count, "run")}`;
   forget();
 }
@@ -132,8 +175,10 @@ function drawFilters() {
   const open = new Map([...host.filters.querySelectorAll("details")].map((one) => [one.dataset.facet, one.open]));
   const focused = document.activeElement?.closest?.("#filters input");
   host.filters.replaceChildren(...filters({ model, state, set }));
-  for (const one of host.filters.querySelectorAll("details")) if (open.has(one.dataset.facet)) one.open = open.get(one.dataset.facet);
-  if (focused) host.filters.querySelector(`input[name="${focused.name}"][value="${CSS.escape(focused.value)}"]`)?.focus();
+  for (const one of host.filters.querySelectorAll("details"))
+    if (open.has(one.dataset.facet)) one.open = open.get(one.dataset.facet);
+  if (focused)
+    host.filters.querySelector(`input[name="${focused.name}"][value="${CSS.escape(focused.value)}"]`)?.focus();
   const active = FACETS.filter((facet) => state[facet].length).length;
   host.open.textContent = active ? `Filters (${active})` : "Filters";
 }
@@ -146,7 +191,9 @@ function draw(changed) {
   if (only("point")) markChosen();
   else {
     const top = changed?.includes("view");
-    const focus = host.tools.contains(document.activeElement) ? [...host.tools.querySelectorAll("select")].indexOf(document.activeElement) : -1;
+    const focus = host.tools.contains(document.activeElement)
+      ? [...host.tools.querySelectorAll("select")].indexOf(document.activeElement)
+      : -1;
     drawView();
     if (focus >= 0) host.tools.querySelectorAll("select")[focus]?.focus();
     if (top && scrollY > host.tabs.offsetTop) scrollTo({ top: host.tabs.offsetTop - 8 });
@@ -154,30 +201,68 @@ function draw(changed) {
 }
 
 function markChosen() {
-  for (const cell of host.view.querySelectorAll("[data-run]")) cell.classList.toggle("chosen", model.runs[cell.dataset.run].key === state.point);
+  for (const cell of host.view.querySelectorAll("[data-run]"))
+    cell.classList.toggle("chosen", model.runs[cell.dataset.run].key === state.point);
 }
 
 function header() {
   const { data } = model;
   const named = data.plans.filter((plan) => plan.name);
-  const title = data.title || (named.length === 1 ? named[0].name : named.length ? named.map((plan) => plan.name).join(" · ") : document.title);
-  const about = named.length === 1 ? [named[0].description] : named.map((plan) => `${plan.name}: ${plan.description || "no description"}`);
+  const title =
+    data.title ||
+    (named.length === 1 ? named[0].name : named.length ? named.map((plan) => plan.name).join(" · ") : document.title);
+  const about =
+    named.length === 1
+      ? [named[0].description]
+      : named.map((plan) => `${plan.name}: ${plan.description || "no description"}`);
   const facts = [
-    plural(model.runs.length, "run"), plural(model.cells.length, "cell"), plural(new Set(model.cells.map((cell) => cell.scene)).size, "scene"),
+    plural(model.runs.length, "run"),
+    plural(model.cells.length, "cell"),
+    plural(new Set(model.cells.map((cell) => cell.scene)).size, "scene"),
     plural(new Set(model.contestants.map((one) => one.id)).size, "strategy").replace("strategys", "strategies"),
     model.commits.length === 1 ? `commit ${model.commits[0].label}` : plural(model.commits.length, "commit"),
     model.machines.length === 1 ? model.machines[0].label : plural(model.machines.length, "machine"),
   ];
-  const share = make("button", { type: "button", text: "Copy the link", title: "The link has the filters, the view and the chosen point", click: () => copy(location.href, share) });
-  const theme = make("button", { type: "button", id: "theme", click: () => scheme(document.documentElement.dataset.scheme === "dark" ? "light" : "dark") });
+  const share = make("button", {
+    type: "button",
+    text: "Copy the link",
+    title: "The link has the filters, the view and the chosen point",
+    click: () => copy(location.href, share),
+  });
+  const theme = make("button", {
+    type: "button",
+    id: "theme",
+    click: () => scheme(document.documentElement.dataset.scheme === "dark" ? "light" : "dark"),
+  });
   host.theme = theme;
   return make(
     "header",
     { class: "page" },
-    make("div", { class: "title" }, make("h1", { text: title }), make("div", { class: "actions" }, data.report && make("a", { href: data.report, text: "Report for print" }), share, theme)),
+    make(
+      "div",
+      { class: "title" },
+      make("h1", { text: title }),
+      make(
+        "div",
+        { class: "actions" },
+        data.report && make("a", { href: data.report, text: "Report for print" }),
+        share,
+        theme,
+      ),
+    ),
     about.filter(Boolean).map((text) => make("p", { class: "question", text })),
     make("p", { class: "facts", text: facts.join(" · ") }),
-    data.notes.length > 0 && make("details", { class: "notes" }, make("summary", { text: plural(data.notes.length, "note") + " on the input" }), make("ul", {}, data.notes.map((text) => make("li", { text })))),
+    data.notes.length > 0 &&
+      make(
+        "details",
+        { class: "notes" },
+        make("summary", { text: plural(data.notes.length, "note") + " on the input" }),
+        make(
+          "ul",
+          {},
+          data.notes.map((text) => make("li", { text })),
+        ),
+      ),
   );
 }
 
@@ -189,12 +274,33 @@ function scheme(name) {
 }
 
 function build() {
-  document.head.append(make("style", { text: `:root{${paints(model.contestants, "light")}}:root[data-scheme=dark]{${paints(model.contestants, "dark")}}` }));
-  host.open = make("button", { type: "button", id: "open-filters", "aria-controls": "filters", "aria-expanded": "false", click: () => {
-    const open = document.body.classList.toggle("filters-open");
-    host.open.setAttribute("aria-expanded", open);
-  } });
-  host.tabs.append(...views.map(([key, { name }]) => make("button", { type: "button", role: "tab", "data-view": key, "aria-controls": "view", text: name, click: () => set({ view: key }) })));
+  document.head.append(
+    make("style", {
+      text: `:root{${paints(model.contestants, "light")}}:root[data-scheme=dark]{${paints(model.contestants, "dark")}}`,
+    }),
+  );
+  host.open = make("button", {
+    type: "button",
+    id: "open-filters",
+    "aria-controls": "filters",
+    "aria-expanded": "false",
+    click: () => {
+      const open = document.body.classList.toggle("filters-open");
+      host.open.setAttribute("aria-expanded", open);
+    },
+  });
+  host.tabs.append(
+    ...views.map(([key, { name }]) =>
+      make("button", {
+        type: "button",
+        role: "tab",
+        "data-view": key,
+        "aria-controls": "view",
+        text: name,
+        click: () => set({ view: key }),
+      }),
+    ),
+  );
   host.tabs.addEventListener("keydown", (event) => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!step) return;
@@ -205,10 +311,30 @@ function build() {
   });
   host.panel.addEventListener("keydown", (event) => event.key === "Escape" && close());
   document.body.prepend(
-    make("a", { class: "skip", href: "#view", text: "Skip to the figures", click: (event) => { event.preventDefault(); host.view.focus(); } }),
+    make("a", {
+      class: "skip",
+      href: "#view",
+      text: "Skip to the figures",
+      click: (event) => {
+        event.preventDefault();
+        host.view.focus();
+      },
+    }),
     header(),
-    make("div", { class: "layout" }, host.filters, make("main", {}, make("nav", { class: "views" }, host.open, host.tabs), host.tools, host.view), host.panel),
-    make("footer", {}, make("p", { text: `From ${model.data.source}. Ratios compare repetition with repetition where both ran in one session; intervals are bootstraps over repetitions.` })),
+    make(
+      "div",
+      { class: "layout" },
+      host.filters,
+      make("main", {}, make("nav", { class: "views" }, host.open, host.tabs), host.tools, host.view),
+      host.panel,
+    ),
+    make(
+      "footer",
+      {},
+      make("p", {
+        text: `From ${model.data.source}. Ratios compare repetition with repetition where both ran in one session; intervals are bootstraps over repetitions.`,
+      }),
+    ),
     host.said,
   );
   const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -229,9 +355,20 @@ addEventListener("popstate", () => {
 
 // For the console, and for tests: what the page computes.
 window.explorer = {
-  model, set, statistics, sources: () => sources(model), pairs: (a, b) => pairs(model, state, a, b), initial, encode, decode,
-  state: () => state, command, profiles: () => profiled({ model, state }),
-  ratio: (run, base, measure) => compare(model, run, base, measure), reference: (run) => reference(model, state, run.cell, run),
-  selected: () => selected(model, state), ready: performance.now() - begun,
+  model,
+  set,
+  statistics,
+  sources: () => sources(model),
+  pairs: (a, b) => pairs(model, state, a, b),
+  initial,
+  encode,
+  decode,
+  state: () => state,
+  command,
+  profiles: () => profiled({ model, state }),
+  ratio: (run, base, measure) => compare(model, run, base, measure),
+  reference: (run) => reference(model, state, run.cell, run),
+  selected: () => selected(model, state),
+  ready: performance.now() - begun,
 };
 requestAnimationFrame(() => requestAnimationFrame(() => (window.explorer.shown = performance.now())));

@@ -44,10 +44,22 @@ export function model(data) {
     cells[cell].runs.push(run);
     return run;
   });
-  const several = { machines: machines.length > 1, commits: commits.length > 1, scalars: new Set(cells.map((c) => c.scalar)).size > 1 };
+  const several = {
+    machines: machines.length > 1,
+    commits: commits.length > 1,
+    scalars: new Set(cells.map((c) => c.scalar)).size > 1,
+  };
   for (const cell of cells) cell.title = title(cell, several);
   const scenes = [...new Set(cells.map((cell) => cell.scene))];
-  const order = [...cells].sort((a, b) => scenes.indexOf(a.scene) - scenes.indexOf(b.scene) || a.primitives - b.primitives || (a.scalar < b.scalar ? 1 : a.scalar > b.scalar ? -1 : 0) || a.l - b.l || a.commit.index - b.commit.index || a.machine.index - b.machine.index);
+  const order = [...cells].sort(
+    (a, b) =>
+      scenes.indexOf(a.scene) - scenes.indexOf(b.scene) ||
+      a.primitives - b.primitives ||
+      (a.scalar < b.scalar ? 1 : a.scalar > b.scalar ? -1 : 0) ||
+      a.l - b.l ||
+      a.commit.index - b.commit.index ||
+      a.machine.index - b.machine.index,
+  );
   order.forEach((cell, place) => (cell.place = place));
   return { data, machines, commits, contestants, cells, runs, place, several };
 }
@@ -109,7 +121,8 @@ export function selected(model, state, except = "") {
     .filter((name) => name !== except && state[name].length)
     .map((name) => [facetOf[name], new Set(state[name])]);
   return model.runs.filter(
-    (run) => (state.contestants === "all" || run.contestant.usual) && active.every(([of, wanted]) => wanted.has(of(run))),
+    (run) =>
+      (state.contestants === "all" || run.contestant.usual) && active.every(([of, wanted]) => wanted.has(of(run))),
   );
 }
 
@@ -160,7 +173,11 @@ export function reference(model, state, cell, run, measure = state.measure) {
 
 /** Says what a state compares with. */
 export function referenceName(model, state) {
-  const fixed = { baseline: "the best refit", fastest: "the fastest of the cell", tree: "the best refit of the same tree" };
+  const fixed = {
+    baseline: "the best refit",
+    fastest: "the fastest of the cell",
+    tree: "the best refit of the same tree",
+  };
   if (fixed[state.against]) return fixed[state.against];
   const known = model.contestants.find((one) => one.id === state.against || one.key === state.against);
   return known ? (known.id === state.against ? known.title : known.label) : state.against;
@@ -170,7 +187,9 @@ export function referenceName(model, state) {
 export function ratioText(found) {
   if (!found) return "–";
   const within = found.within ?? (found.low < found.high ? [found.low, found.high] : null);
-  return (found.paired ? "" : "~ ") + factor(found.middle) + (within ? ` (${factor(within[0])}–${factor(within[1])})` : "");
+  return (
+    (found.paired ? "" : "~ ") + factor(found.middle) + (within ? ` (${factor(within[0])}–${factor(within[1])})` : "")
+  );
 }
 
 /** Returns 1 if a ratio's interval lies above 1, -1 if below, 0 if it has 1 or there is none. */

@@ -29,7 +29,12 @@ export function encode(state) {
   for (const [name, usual] of Object.entries(DEFAULTS)) {
     const value = state[name];
     if (Array.isArray(usual) ? value.length > 0 : value !== usual)
-      words.push(`${name}=${[value].flat().map((one) => encodeURIComponent(one)).join(",")}`);
+      words.push(
+        `${name}=${[value]
+          .flat()
+          .map((one) => encodeURIComponent(one))
+          .join(",")}`,
+      );
   }
   return words.join("&");
 }
@@ -41,7 +46,11 @@ export function decode(fragment) {
     const at = word.indexOf("=");
     const name = word.slice(0, at);
     if (at < 0 || !(name in DEFAULTS)) continue;
-    const values = word.slice(at + 1).split(",").filter(Boolean).map(plain);
+    const values = word
+      .slice(at + 1)
+      .split(",")
+      .filter(Boolean)
+      .map(plain);
     if (Array.isArray(DEFAULTS[name])) state[name] = [...new Set(values)];
     else if (values.length) state[name] = values[0];
   }

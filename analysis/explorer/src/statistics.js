@@ -79,7 +79,9 @@ function medians(values) {
     let alone = lower[i];
     for (let j = i + 1; j < n; ++j) {
       const share =
-        (((i + 1) / n) ** half - (i / n) ** half) * (((n - j) / n) ** half - ((n - j - 1) / n) ** half) * choose(n, half);
+        (((i + 1) / n) ** half - (i / n) ** half) *
+        (((n - j) / n) ** half - ((n - j - 1) / n) ** half) *
+        choose(n, half);
       alone -= share;
       result.push([(x[i] + x[j]) / 2, share]);
     }

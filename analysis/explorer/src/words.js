@@ -31,7 +31,11 @@ export function count(value) {
 
 export function bytes(value) {
   if (value === null || value === undefined) return "–";
-  for (const [unit, scale] of [["GB", 1e9], ["MB", 1e6], ["kB", 1e3]])
+  for (const [unit, scale] of [
+    ["GB", 1e9],
+    ["MB", 1e6],
+    ["kB", 1e3],
+  ])
     if (value >= scale) return `${significant(value / scale)}\u00a0${unit}`;
   return `${value}\u00a0B`;
 }

@@ -2,7 +2,17 @@
 import * as Plot from "@observablehq/plot";
 import { dotLook, figure, lineLook, logScale } from "../chart.js";
 import { make, symbol } from "../dom.js";
-import { MEASURES, compare, decided, entrants, ratioText, reference, referenceName, seriesOfName, value } from "../model.js";
+import {
+  MEASURES,
+  compare,
+  decided,
+  entrants,
+  ratioText,
+  reference,
+  referenceName,
+  seriesOfName,
+  value,
+} from "../model.js";
 import { geometricMean, median, profiles, quantile, within } from "../statistics.js";
 import { factor, percent, plural, sentence } from "../words.js";
 
@@ -13,13 +23,18 @@ const NAMED = 16; // rows of the ranking before "show all", and lines with marke
 export function overview(context) {
   const cells = entrants(context.model, context.state);
   const found = profiled(context, cells);
-  return [make("div", { class: "beside" }, [profileFigure(context, found), ranking(context, found)].filter(Boolean)), matrix(context, cells)];
+  return [
+    make("div", { class: "beside" }, [profileFigure(context, found), ranking(context, found)].filter(Boolean)),
+    matrix(context, cells),
+  ];
 }
 
 /** Returns the profiles with their series. */
 export function profiled({ model, state }, cells = entrants(model, state)) {
   const listed = [...cells.values()];
-  const values = listed.map((series) => new Map([...series].map(([name, run]) => [name, value(model, run, state.measure)])));
+  const values = listed.map(
+    (series) => new Map([...series].map(([name, run]) => [name, value(model, run, state.measure)])),
+  );
   return profiles(values, state.cells).map((profile) => ({
     ...profile,
     series: seriesOfName(model, state, profile.name),
@@ -37,7 +52,12 @@ function profileFigure({ model, state, choose }, found) {
   const measure = MEASURES[state.measure];
   const title = `How often is who within a factor of the best? ${sentence(measure.name)}`;
   if (!found.length)
-    return empty(title, state.cells === "common" ? "No cell has all of the selected contestants." : "No cell of this selection has two contestants with a time.");
+    return empty(
+      title,
+      state.cells === "common"
+        ? "No cell has all of the selected contestants."
+        : "No cell of this selection has two contestants with a time.",
+    );
   const cells = found[0].cells;
   const all = found.flatMap((one) => one.factors).sort((a, b) => a - b);
   const top = [2, 3, 5, 10, 20, 50, 100].find((t) => t >= quantile(all, 0.85)) ?? 100;
@@ -51,11 +71,21 @@ function profileFigure({ model, state, choose }, found) {
     one.factors.forEach((x, i) => {
       if (x <= top)
         points.push({
-          x, y: share(x), run: one.runs[i], current: one.runs[i].key === state.point,
-          lines: [one.series.label, `within ${factor(x)} times the best in ${percent(within(one, x))} of ${one.of} cells`, `this step: ${one.runs[i].cell.title}`],
+          x,
+          y: share(x),
+          run: one.runs[i],
+          current: one.runs[i].key === state.point,
+          lines: [
+            one.series.label,
+            `within ${factor(x)} times the best in ${percent(within(one, x))} of ${one.of} cells`,
+            `this step: ${one.runs[i].cell.title}`,
+          ],
         });
     });
-    const marks = [0, 1, 2].map((k) => top ** ((k + ((index * 7) % found.length) / found.length) / 3)).map((x) => ({ x, y: share(x) })).filter((mark) => mark.y > 0);
+    const marks = [0, 1, 2]
+      .map((k) => top ** ((k + ((index * 7) % found.length) / found.length) / 3))
+      .map((x) => ({ x, y: share(x) }))
+      .filter((mark) => mark.y > 0);
     return { one, steps, marks, strong: index < STRONG, named: index < NAMED || found.length <= NAMED + 4 };
   });
   return figure({
@@ -65,25 +95,44 @@ function profileFigure({ model, state, choose }, found) {
       `${plural(cells, "cell")}: scenes at their sizes, l and scalars${model.several.machines || model.several.commits ? ", by machine and commit" : ""}. ${BASIS[state.cells]}`,
     plot: (width) => ({
       height: Math.max(300, Math.min(440, width * 0.75)),
-      marginLeft: 52, marginRight: 20, marginBottom: 42, insetTop: 6,
+      marginLeft: 52,
+      marginRight: 20,
+      marginBottom: 42,
+      insetTop: 6,
       x: logScale({ domain: [1, top] }, width - 80, "within this factor of the best →", { tickFormat: (v) => `${v}×` }),
       y: { domain: [0, 100], label: "↑ share of cells, %", grid: true, ticks: 5 },
       marks: [
         Plot.ruleY([0], { stroke: "var(--soft)" }),
-        ...lines.toReversed().flatMap(({ one, steps, marks, strong, named }) => [
-          Plot.line(steps, { x: "x", y: "y", curve: "step-after", ...lineLook(one.series.contestant, strong ? 2 : 1.1), strokeOpacity: strong ? 1 : named ? 0.55 : 0.3 }),
-          Plot.dot(named ? marks : [], { x: "x", y: "y", ...dotLook(one.series.contestant, strong ? 4.5 : 3.5) }),
-        ]),
+        ...lines
+          .toReversed()
+          .flatMap(({ one, steps, marks, strong, named }) => [
+            Plot.line(steps, {
+              x: "x",
+              y: "y",
+              curve: "step-after",
+              ...lineLook(one.series.contestant, strong ? 2 : 1.1),
+              strokeOpacity: strong ? 1 : named ? 0.55 : 0.3,
+            }),
+            Plot.dot(named ? marks : [], { x: "x", y: "y", ...dotLook(one.series.contestant, strong ? 4.5 : 3.5) }),
+          ]),
       ],
     }),
     points,
     choose,
-    table: { head: ["strategy", ...SHARES.map((s) => (s === 1 ? "best in" : `within ${s}×`)), "median factor", "cells"], rows: found.map((one) => row(one)) },
+    table: {
+      head: ["strategy", ...SHARES.map((s) => (s === 1 ? "best in" : `within ${s}×`)), "median factor", "cells"],
+      rows: found.map((one) => row(one)),
+    },
   });
 }
 
 function row(one) {
-  return [one.series.label, ...SHARES.map((share) => percent(within(one, share))), factor(median(one.factors)), `${one.factors.length} of ${one.cells}`];
+  return [
+    one.series.label,
+    ...SHARES.map((share) => percent(within(one, share))),
+    factor(median(one.factors)),
+    `${one.factors.length} of ${one.cells}`,
+  ];
 }
 
 /** The legend of the profile, in order: who is it, and what do the lines say in numbers. */
@@ -94,27 +143,63 @@ function ranking({ state, set }, found) {
     make(
       "tr",
       { class: one.factors.length * 2 < one.cells && state.cells === "own" ? "few" : null },
-      make("th", { scope: "row" }, make("button", {
-        type: "button", class: "name", title: "compare the others with this one",
-        click: () => set({ against: one.name }),
-      }, symbol(one.series.contestant), make("span", { text: one.series.label }))),
+      make(
+        "th",
+        { scope: "row" },
+        make(
+          "button",
+          {
+            type: "button",
+            class: "name",
+            title: "compare the others with this one",
+            click: () => set({ against: one.name }),
+          },
+          symbol(one.series.contestant),
+          make("span", { text: one.series.label }),
+        ),
+      ),
       SHARES.map((share) => bar(within(one, share))),
       make("td", { class: "n", text: factor(median(one.factors)) }),
       make("td", { class: "n", text: `${one.factors.length}` }),
     );
   const first = found.length > NAMED + 4 ? NAMED : found.length;
   const body = make("tbody", {}, found.slice(0, first).map(line));
-  const more = first < found.length && make("button", { type: "button", text: `Show all ${found.length}`, click: () => { body.append(...found.slice(first).map(line)); more.remove(); } });
+  const more =
+    first < found.length &&
+    make("button", {
+      type: "button",
+      text: `Show all ${found.length}`,
+      click: () => {
+        body.append(...found.slice(first).map(line));
+        more.remove();
+      },
+    });
   return make(
     "section",
     { class: "ranking" },
-    make("div", { class: "scroll", tabindex: 0 }, make(
-      "table",
-      {},
-      make("caption", { text: "Ordered by the mean share of the best's speed. Pale: measured in fewer than half of the cells." }),
-      make("thead", {}, make("tr", {}, ["strategy", "best in", "within 1.25×", "within 2×", "median factor", "cells"].map((text, i) => make("th", { scope: "col", class: i ? "n" : null, text })))),
-      body,
-    )),
+    make(
+      "div",
+      { class: "scroll", tabindex: 0 },
+      make(
+        "table",
+        {},
+        make("caption", {
+          text: "Ordered by the mean share of the best's speed. Pale: measured in fewer than half of the cells.",
+        }),
+        make(
+          "thead",
+          {},
+          make(
+            "tr",
+            {},
+            ["strategy", "best in", "within 1.25×", "within 2×", "median factor", "cells"].map((text, i) =>
+              make("th", { scope: "col", class: i ? "n" : null, text }),
+            ),
+          ),
+        ),
+        body,
+      ),
+    ),
     more,
   );
 }
@@ -143,7 +228,21 @@ function matrix({ model, state, set, choose }, cells) {
     make("th", { scope: "col", class: "corner", text: "scene" }),
     names.map((name) => {
       const { label, contestant } = seriesOfName(model, state, name);
-      return make("th", { scope: "col", class: "tall" }, make("button", { type: "button", class: "name", title: `compare the others with ${label}`, click: () => set({ against: name }) }, symbol(contestant), make("span", { text: label })));
+      return make(
+        "th",
+        { scope: "col", class: "tall" },
+        make(
+          "button",
+          {
+            type: "button",
+            class: "name",
+            title: `compare the others with ${label}`,
+            click: () => set({ against: name }),
+          },
+          symbol(contestant),
+          make("span", { text: label }),
+        ),
+      );
     }),
   );
   let last = "";
@@ -153,14 +252,22 @@ function matrix({ model, state, set, choose }, cells) {
     return make(
       "tr",
       { class: first ? "first" : null },
-      make("th", { scope: "row", title: cell.title }, make("span", { class: "scene", text: cell.scene }), make("span", { class: "rest", text: cell.title.slice(cell.scene.length + 2) })),
+      make(
+        "th",
+        { scope: "row", title: cell.title },
+        make("span", { class: "scene", text: cell.scene }),
+        make("span", { class: "rest", text: cell.title.slice(cell.scene.length + 2) }),
+      ),
       names.map((name) => {
         const one = found.get(name);
         if (!one) return make("td", { class: "none", "aria-label": "not measured", text: "·" });
         const strength = Math.max(-1, Math.min(1, Math.log2(one.ratio.middle) / 3));
         const said = `${seriesOfName(model, state, name).label}, ${cell.title}: ${ratioText(one.ratio)}`;
         return make("td", {
-          tabindex: -1, "data-run": one.run.index, title: said, "aria-label": said,
+          tabindex: -1,
+          "data-run": one.run.index,
+          title: said,
+          "aria-label": said,
           class: `${decided(one.ratio) ? "sure" : ""} ${one.run.key === state.point ? "chosen" : ""}`,
           style: `--strength:${Math.round(Math.abs(strength) * 62)}%;--tone:var(--${strength > 0 ? "faster" : "slower"})`,
           text: factor(one.ratio.middle),
@@ -168,13 +275,36 @@ function matrix({ model, state, set, choose }, cells) {
       }),
     );
   });
-  const summary = make("tr", { class: "summary" }, make("th", { scope: "row", text: "geometric mean" }), names.map((name) => make("td", { text: factor(geometricMean(columns.get(name))) })));
-  const grid = make("table", { class: "matrix", role: "grid", "aria-label": title }, make("thead", {}, head), make("tbody", {}, body), make("tfoot", {}, summary));
+  const summary = make(
+    "tr",
+    { class: "summary" },
+    make("th", { scope: "row", text: "geometric mean" }),
+    names.map((name) => make("td", { text: factor(geometricMean(columns.get(name))) })),
+  );
+  const grid = make(
+    "table",
+    { class: "matrix", role: "grid", "aria-label": title },
+    make("thead", {}, head),
+    make("tbody", {}, body),
+    make("tfoot", {}, summary),
+  );
   walk(grid, (index) => choose(model.runs[index], grid));
   return make(
     "figure",
     {},
-    make("figcaption", {}, make("h3", { text: title }), make("p", { class: "reading" }, make("span", { class: "swatch faster", text: "blue" }), " is faster, ", make("span", { class: "swatch slower", text: "orange" }), " slower; bold where the 95 % interval excludes 1. A number leads to its measurement; a name becomes what the others are compared with. The geometric mean is over the cells that a strategy has.")),
+    make(
+      "figcaption",
+      {},
+      make("h3", { text: title }),
+      make(
+        "p",
+        { class: "reading" },
+        make("span", { class: "swatch faster", text: "blue" }),
+        " is faster, ",
+        make("span", { class: "swatch slower", text: "orange" }),
+        " slower; bold where the 95 % interval excludes 1. A number leads to its measurement; a name becomes what the others are compared with. The geometric mean is over the cells that a strategy has.",
+      ),
+    ),
     make("div", { class: "scroll matrix-scroll", tabindex: 0 }, grid),
   );
 }
@@ -210,5 +340,10 @@ function walk(grid, choose) {
 }
 
 export function empty(title, why) {
-  return make("figure", { class: "empty" }, make("figcaption", {}, make("h3", { text: title })), make("p", { class: "note", text: why }));
+  return make(
+    "figure",
+    { class: "empty" },
+    make("figcaption", {}, make("h3", { text: title })),
+    make("p", { class: "note", text: why }),
+  );
 }

@@ -10,9 +10,24 @@ export function runs({ model, state, set, choose }) {
   const columns = [
     { name: "strategy", of: (run) => run.contestant.label, text: (v) => v },
     { name: "scene", of: (run) => run.cell.title, text: (v) => v },
-    ...["motion", "update", "query"].map((phase) => ({ name: `${phase}, ms`, number: true, of: phase === "motion" ? (run) => difference(model, run) : (run) => value(model, run, phase), text: milliseconds })),
-    { name: `${measure.name}${measure.unit === "ms" ? ", ms" : ""}`, number: true, of: (run) => value(model, run, state.measure), text: measure.format },
-    { name: `against ${referenceName(model, state)}`, number: true, of: (run) => ratioOf(model, state, run)?.middle ?? null, text: (_, run) => ratioText(ratioOf(model, state, run)) },
+    ...["motion", "update", "query"].map((phase) => ({
+      name: `${phase}, ms`,
+      number: true,
+      of: phase === "motion" ? (run) => difference(model, run) : (run) => value(model, run, phase),
+      text: milliseconds,
+    })),
+    {
+      name: `${measure.name}${measure.unit === "ms" ? ", ms" : ""}`,
+      number: true,
+      of: (run) => value(model, run, state.measure),
+      text: measure.format,
+    },
+    {
+      name: `against ${referenceName(model, state)}`,
+      number: true,
+      of: (run) => ratioOf(model, state, run)?.middle ?? null,
+      text: (_, run) => ratioText(ratioOf(model, state, run)),
+    },
     { name: "worst frame, ms", number: true, of: (run) => run.worst, text: milliseconds },
     { name: "missed", number: true, of: (run) => run.missed, text: count },
     { name: "extra", number: true, of: (run) => run.extra, text: count },
@@ -28,19 +43,59 @@ export function runs({ model, state, set, choose }) {
     listed.sort((a, b) => (rank(a) < rank(b) ? -1 : rank(a) > rank(b) ? 1 : 0) * (down ? -1 : 1));
   }
   const row = (run) =>
-    make("tr", { class: run.key === state.point ? "chosen" : null }, columns.map(({ of, text, number }, i) => {
-      const words = text(of(run), run);
-      if (i) return make("td", { class: number ? "n" : null, text: run.refused && i === 5 ? "no time" : words });
-      return make("th", { scope: "row" }, make("button", { type: "button", class: "name", click: (event) => choose(run, event.currentTarget) }, symbol(run.contestant), make("span", { text: words })));
-    }));
+    make(
+      "tr",
+      { class: run.key === state.point ? "chosen" : null },
+      columns.map(({ of, text, number }, i) => {
+        const words = text(of(run), run);
+        if (i) return make("td", { class: number ? "n" : null, text: run.refused && i === 5 ? "no time" : words });
+        return make(
+          "th",
+          { scope: "row" },
+          make(
+            "button",
+            { type: "button", class: "name", click: (event) => choose(run, event.currentTarget) },
+            symbol(run.contestant),
+            make("span", { text: words }),
+          ),
+        );
+      }),
+    );
   const body = make("tbody", {}, listed.slice(0, FIRST).map(row));
-  const more = listed.length > FIRST && make("button", { type: "button", text: `Show all ${listed.length}`, click: () => { body.append(...listed.slice(FIRST).map(row)); more.remove(); } });
+  const more =
+    listed.length > FIRST &&
+    make("button", {
+      type: "button",
+      text: `Show all ${listed.length}`,
+      click: () => {
+        body.append(...listed.slice(FIRST).map(row));
+        more.remove();
+      },
+    });
   const head = columns.map(({ name, number }, i) =>
-    make("th", { scope: "col", class: number ? "n" : null, "aria-sort": by === i ? (down ? "descending" : "ascending") : null },
-      make("button", { type: "button", class: "name", text: name + (by === i ? (down ? " ↓" : " ↑") : ""), click: () => set({ sort: by === i && !down ? `d${i}` : `a${i}` }) })));
+    make(
+      "th",
+      { scope: "col", class: number ? "n" : null, "aria-sort": by === i ? (down ? "descending" : "ascending") : null },
+      make("button", {
+        type: "button",
+        class: "name",
+        text: name + (by === i ? (down ? " ↓" : " ↑") : ""),
+        click: () => set({ sort: by === i && !down ? `d${i}` : `a${i}` }),
+      }),
+    ),
+  );
   return [
-    make("div", { class: "toolbar" }, make("p", { class: "lead", text: `${plural(listed.length, "run")}. A name shows where its numbers come from.` }), make("button", { type: "button", text: "Download as CSV", click: () => download(columns, listed) })),
-    make("div", { class: "scroll", tabindex: 0 }, make("table", { class: "runs" }, make("thead", {}, make("tr", {}, head)), body)),
+    make(
+      "div",
+      { class: "toolbar" },
+      make("p", { class: "lead", text: `${plural(listed.length, "run")}. A name shows where its numbers come from.` }),
+      make("button", { type: "button", text: "Download as CSV", click: () => download(columns, listed) }),
+    ),
+    make(
+      "div",
+      { class: "scroll", tabindex: 0 },
+      make("table", { class: "runs" }, make("thead", {}, make("tr", {}, head)), body),
+    ),
     more,
   ];
 }
@@ -56,13 +111,35 @@ function ratioOf(model, state, run) {
 
 function download(columns, listed) {
   const quoted = (text) => `"${String(text ?? "").replaceAll('"', '""')}"`;
-  const names = ["id", "settings", "scene", "hash", "primitives", "scalar", "l", "commit", "machine", ...columns.slice(2).map((c) => c.name)];
+  const names = [
+    "id",
+    "settings",
+    "scene",
+    "hash",
+    "primitives",
+    "scalar",
+    "l",
+    "commit",
+    "machine",
+    ...columns.slice(2).map((c) => c.name),
+  ];
   const lines = listed.map((run) => [
-    run.contestant.id, run.contestant.key, run.cell.name, run.cell.hash, run.cell.primitives, run.cell.scalar, run.cell.l,
-    run.cell.commit.commit, run.cell.machine.label, ...columns.slice(2).map((c) => c.of(run)),
+    run.contestant.id,
+    run.contestant.key,
+    run.cell.name,
+    run.cell.hash,
+    run.cell.primitives,
+    run.cell.scalar,
+    run.cell.l,
+    run.cell.commit.commit,
+    run.cell.machine.label,
+    ...columns.slice(2).map((c) => c.of(run)),
   ]);
   const text = [names, ...lines].map((line) => line.map(quoted).join(",")).join("\n");
-  const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: "text/csv" })), download: "results.csv" });
+  const link = make("a", {
+    href: URL.createObjectURL(new Blob([text], { type: "text/csv" })),
+    download: "results.csv",
+  });
   link.click();
   URL.revokeObjectURL(link.href);
 }
