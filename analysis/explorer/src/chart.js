@@ -71,23 +71,29 @@ export function logAxis(values, { include = [], least = 1.5 } = {}) {
   return { domain: [low / margin, high * margin], clip, outside: sorted.filter((v) => clip(v)[1] !== 0).length };
 }
 
-/** Returns ticks of a logarithmic axis: 1, 2 and 5 times the powers of ten, as far as there is room. */
+/**
+ * Returns ticks of a logarithmic axis, as many as there is room for, all inside: 1, 2 and 5 times the powers of ten, or equal
+ * steps where these are too few.
+ */
 export function logTicks([low, high], room) {
-  for (const steps of [[1, 2, 5], [1, 3], [1]]) {
-    const ticks = [];
-    for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); ++power)
-      for (const step of steps) {
-        const value = Number(`${step}e${power}`);
-        if (value >= low * 0.999 && value <= high * 1.001) ticks.push(value);
-      }
-    if (ticks.length * 46 <= room || steps.length === 1) {
-      const every = Math.max(1, Math.ceil((ticks.length * 46) / room));
-      return ticks.length < 2
-        ? [low, Math.sqrt(low * high), high].map((v) => Number(v.toPrecision(2)))
-        : ticks.filter((_, i) => i % every === 0);
-    }
-  }
-  return [];
+  const most = Math.max(2, Math.floor(room / 46));
+  const inside = (value) => value >= low && value <= high;
+  const powers = [];
+  for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); ++power) powers.push(power);
+  const times = (steps) => powers.flatMap((power) => steps.map((step) => Number(`${step}e${power}`))).filter(inside);
+  if (times([1, 2, 5]).length < 3) return equalSteps(low, high, Math.min(most, 6));
+  const ticks = [[1, 2, 5], [1, 3], [1]].map(times).find((list) => list.length <= most) ?? times([1]);
+  const every = Math.ceil(ticks.length / most);
+  return ticks.filter((_, i) => i % every === 0);
+}
+
+function equalSteps(low, high, most) {
+  const least = (high - low) / most;
+  const power = 10 ** Math.floor(Math.log10(least));
+  const step = [1, 2, 5, 10].map((k) => k * power).find((one) => one >= least);
+  const ticks = [];
+  for (let k = Math.ceil(low / step); k * step <= high; ++k) ticks.push(Number((k * step).toPrecision(6)));
+  return ticks;
 }
 
 /** Writes tick labels: on logarithmic axes Plot leaves out those that D3 thinks too many, although `logTicks` chose them. */

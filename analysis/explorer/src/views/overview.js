@@ -103,18 +103,16 @@ function profileFigure({ model, state, choose }, found) {
       y: { domain: [0, 100], label: "↑ share of cells, %", grid: true, ticks: 5 },
       marks: [
         Plot.ruleY([0], { stroke: "var(--soft)" }),
-        ...lines
-          .toReversed()
-          .flatMap(({ one, steps, marks, strong, named }) => [
-            Plot.line(steps, {
-              x: "x",
-              y: "y",
-              curve: "step-after",
-              ...lineLook(one.series.contestant, strong ? 2 : 1.1),
-              strokeOpacity: strong ? 1 : named ? 0.55 : 0.3,
-            }),
-            Plot.dot(named ? marks : [], { x: "x", y: "y", ...dotLook(one.series.contestant, strong ? 4.5 : 3.5) }),
-          ]),
+        ...lines.toReversed().flatMap(({ one, steps, marks, strong, named }) => [
+          Plot.line(steps, {
+            x: "x",
+            y: "y",
+            curve: "step-after",
+            ...lineLook(one.series.contestant, strong ? 2 : 1.1),
+            strokeOpacity: strong ? 1 : named ? 0.55 : 0.3,
+          }),
+          Plot.dot(named ? marks : [], { x: "x", y: "y", ...dotLook(one.series.contestant, strong ? 4.5 : 3.5) }),
+        ]),
       ],
     }),
     points,
