@@ -79,9 +79,9 @@ def write(study: Study, folder: Path, title: str) -> Path:
 def page(content: dict[str, Any], script: str, style: str) -> str:
     """Returns the page. Its data cannot end the element that holds them."""
     data = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    names = [plan["name"] for plan in content["plans"] if plan["name"]]
+    names = list(dict.fromkeys(plan["name"] for plan in content["plans"] if plan["name"]))
     script = script.replace("</script", "<\\/script")
-    title = html.escape(content["title"] or ", ".join(dict.fromkeys(names)) or TITLE)
+    title = html.escape(content["title"] or (", ".join(names) if len(names) < 4 else f"{len(names)} studies") or TITLE)
     return f"""<!doctype html>
 <html lang="en">
 <head>

@@ -14,7 +14,7 @@ const NAMES = {
 };
 const NUMERIC = ["size", "l"];
 
-export function filters({ model, state, set }) {
+export function filters({ model, state, set, close }) {
   const groups = Object.keys(NAMES)
     .map((facet) => group(model, state, set, facet))
     .filter(Boolean);
@@ -31,6 +31,7 @@ export function filters({ model, state, set }) {
           text: "Clear all",
           click: () => set(Object.fromEntries(active.map((facet) => [facet, []]))),
         }),
+      make("button", { type: "button", class: "close-filters", text: "Done", click: close }),
     ),
     ...groups,
   ];

@@ -174,13 +174,20 @@ function drawPanel() {
 function drawFilters() {
   const open = new Map([...host.filters.querySelectorAll("details")].map((one) => [one.dataset.facet, one.open]));
   const focused = document.activeElement?.closest?.("#filters input");
-  host.filters.replaceChildren(...filters({ model, state, set }));
+  host.filters.replaceChildren(...filters({ model, state, set, close: () => showFilters(false) }));
   for (const one of host.filters.querySelectorAll("details"))
     if (open.has(one.dataset.facet)) one.open = open.get(one.dataset.facet);
   if (focused)
     host.filters.querySelector(`input[name="${focused.name}"][value="${CSS.escape(focused.value)}"]`)?.focus();
   const active = FACETS.filter((facet) => state[facet].length).length;
   host.open.textContent = active ? `Filters (${active})` : "Filters";
+}
+
+/** Opens or closes the filters, where the window is too narrow for them to stay. */
+function showFilters(open) {
+  document.body.classList.toggle("filters-open", open);
+  host.open.setAttribute("aria-expanded", open);
+  (open ? host.filters.querySelector("input, summary") : host.open)?.focus({ preventScroll: true });
 }
 
 /** Redraws what depends on the changed parts of the state. */
@@ -208,13 +215,18 @@ function markChosen() {
 function header() {
   const { data } = model;
   const named = data.plans.filter((plan) => plan.name);
+  // A study's question is the title; of several, a list that the filter of studies chooses from.
+  const names = named.map((plan) => plan.name);
   const title =
     data.title ||
-    (named.length === 1 ? named[0].name : named.length ? named.map((plan) => plan.name).join(" · ") : document.title);
+    (names.length > 3 ? plural(names.length, "study").replace("studys", "studies") : names.join(" · ")) ||
+    document.title;
   const about =
     named.length === 1
-      ? [named[0].description]
-      : named.map((plan) => `${plan.name}: ${plan.description || "no description"}`);
+      ? [make("p", { class: "question", text: named[0].description })]
+      : named.map((plan) =>
+          make("p", { class: "question" }, make("strong", { text: `${plan.name}.` }), ` ${plan.description}`),
+        );
   const facts = [
     plural(model.runs.length, "run"),
     plural(model.cells.length, "cell"),
@@ -250,7 +262,7 @@ function header() {
         theme,
       ),
     ),
-    about.filter(Boolean).map((text) => make("p", { class: "question", text })),
+    about.length > 3 ? make("details", { class: "notes" }, make("summary", { text: "What they ask" }), about) : about,
     make("p", { class: "facts", text: facts.join(" · ") }),
     data.notes.length > 0 &&
       make(
@@ -284,11 +296,9 @@ function build() {
     id: "open-filters",
     "aria-controls": "filters",
     "aria-expanded": "false",
-    click: () => {
-      const open = document.body.classList.toggle("filters-open");
-      host.open.setAttribute("aria-expanded", open);
-    },
+    click: () => showFilters(!document.body.classList.contains("filters-open")),
   });
+  host.filters.addEventListener("keydown", (event) => event.key === "Escape" && showFilters(false));
   host.tabs.append(
     ...views.map(([key, { name }]) =>
       make("button", {
