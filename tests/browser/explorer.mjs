@@ -356,6 +356,20 @@ for (const [which, views] of [
         await page.close();
       });
 
+await check("the filters of a narrow window are a drawer", async () => {
+  const page = await open("reference", "", { width: 390 });
+  const shown = () => page.$eval("#filters", (one) => getComputedStyle(one).display !== "none");
+  assert.equal(await shown(), false);
+  await page.click("#open-filters");
+  assert.equal(await shown(), true);
+  await page.click('input[name="scene"]');
+  assert.equal(await page.$eval("#open-filters", (button) => button.textContent), "Filters (1)");
+  await page.click(".close-filters");
+  assert.equal(await shown(), false);
+  assert.equal(await page.evaluate(() => document.activeElement.id), "open-filters");
+  await page.close();
+});
+
 await check("the switch changes the scheme", async () => {
   const page = await open("reference", "", { scheme: "dark" });
   const colour = () => page.evaluate(() => getComputedStyle(document.documentElement).backgroundColor);
