@@ -65,11 +65,11 @@ def program() -> tuple[str, str]:
         ) from None
 
 
-def write(study: Study, folder: Path, title: str) -> Path:
+def write(study: Study, folder: Path, title: str, claims: Optional[paper_claims.Claims] = None) -> Path:
     """Writes the page of a study that was loaded with ONE_OF_EACH_COMMIT; returns its path. Raises NotBuilt."""
     script, style = program()
     # Claims are judged on the newest measurements, as in the report.
-    claims = paper_claims.evaluate(load(folder), folder)
+    claims = claims or paper_claims.evaluate(load(folder), folder)
     content = explorer_data.data(study, title, claims, folder)
     path = folder / PAGE
     files.write_whole(path, page(content, script, style))

@@ -27,8 +27,11 @@ MACHINE_PARTS = ("cpu", "kernels", "simd", "compiler", "flags", "build_type", "o
 
 #: Columns of one run that are numbers, as they are in the page.
 NUMBERS = ("p50", "p99", "worst", "bytes", "build_ms", "pairs", "candidates", "missed_candidates", "missed", "extra", "protrusion",
-           "looseness", "verified_frames", "sampled_every")  # fmt: skip
-COUNTERS = ("certificates_failed", "values_written", "nodes_visited", "box_tests", "triangle_tests", "positions_fetched")
+           "looseness", "verified_frames")  # fmt: skip
+#: Counters that the page has, per frame.
+COUNTERS = ("certificates_failed", "values_written", "nodes_visited", "box_tests", "triangle_tests")
+COLUMNS = ("cell", "contestant", "session", "plan", "when", "kind", "repetitions", "limit", "every", *NUMBERS, *COUNTERS, "refused",
+           "times", "pace", "quality")  # fmt: skip
 
 
 def number(value: Any, digits: Optional[int] = None) -> Optional[float]:
@@ -57,8 +60,7 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
     contestants, cells, plans = Index(), Index(), Index()
     times = {int(run): rows for run, rows in study.repetitions.sort_values("repetition").groupby("run")}
     sessions = Index()
-    columns: dict[str, list[Any]] = {name: [] for name in ("cell", "contestant", "session", "plan", "when", "kind", "repetitions",
-                                                           "limit", "every", *NUMBERS, *COUNTERS, "refused", "times", "pace", "quality")}  # fmt: skip
+    columns: dict[str, list[Any]] = {name: [] for name in COLUMNS}
     cell_rows: list[pd.Series] = []
     contestant_rows: list[pd.Series] = []
     for index, row in runs.iterrows():

@@ -49,7 +49,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
         epilog="example: report.py results --title 'My cloth'",
     )
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
-    parser.add_argument("--title", default="BVH update strategies, measured", help="heading of the report")
+    parser.add_argument("--title", default=explore.TITLE, help="heading of the report")
     parser.add_argument(
         "--figures", choices=("main", "all", "paper", "none"), default="main",
         help="figures of one group per scene (default), of every group, only those of the paper and its claims, or none",
@@ -69,7 +69,8 @@ def main(arguments: Optional[list[str]] = None) -> int:
         paper_claims.write(claims, options.folder)
         page = write(study, options.folder, options.title, options.figures, targets, claims, explorer)
         if explorer:
-            explore.write(load(options.folder, ONE_OF_EACH_COMMIT), options.folder, "")
+            title = "" if options.title == explore.TITLE else options.title  # else the plan's question
+            explore.write(load(options.folder, ONE_OF_EACH_COMMIT), options.folder, title, claims)
     except (ResultError, ClaimError) as error:
         print(f"report: {error}", file=sys.stderr)
         return 2

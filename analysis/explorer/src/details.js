@@ -50,7 +50,7 @@ export function details(model, state, run, close) {
         ? "not visible"
         : `protrusion ${significant(run.protrusion, 2)}, looseness ${percent(run.looseness)}`,
     ],
-    ["Memory", bytes(run.bytes)],
+    ["Memory", `${bytes(run.bytes)}${run.build_ms === null ? "" : `, built in ${milliseconds(run.build_ms)} ms`}`],
     ["Measured", `${run.when.replace("T", " ").replace("Z", " UTC")}, commit ${cell.commit.label}`],
     [
       "Machine",

@@ -11,6 +11,9 @@ export const MEASURES = {
   p99: { name: "99th percentile of frames", unit: "ms", format: milliseconds, column: "p99" },
   worst: { name: "worst frame", unit: "ms", format: milliseconds, column: "worst" },
   memory: { name: "memory", unit: "bytes", format: bytes, column: "bytes" },
+  certificates_failed: { name: "events per frame", unit: "", format: count, column: "certificates_failed" },
+  values_written: { name: "values written per frame", unit: "", format: count, column: "values_written" },
+  nodes_visited: { name: "nodes visited per frame", unit: "", format: count, column: "nodes_visited" },
   box_tests: { name: "box tests per frame", unit: "", format: count, column: "box_tests" },
   triangle_tests: { name: "triangle tests per frame", unit: "", format: count, column: "triangle_tests" },
 };
