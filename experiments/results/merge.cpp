@@ -74,7 +74,7 @@ std::vector<Line> read_lines(const fs::path& file, std::vector<std::string>& not
     if (line.text.find_first_not_of(" \t\r") == std::string::npos) continue;
     line.record = json_or_nothing(line.text);
     if (line.record.is_discarded()) {
-      notes.push_back(line.place + " is left out: it " +
+      notes.push_back(line.place + " is skipped: it " +
                       (breaks_off ? "breaks off, as after an interrupted run" : "is not JSON"));
       continue;
     }

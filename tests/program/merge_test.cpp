@@ -105,12 +105,12 @@ TEST_F(Merge, ToldOfMachinesThatShareAKey) {
       << outcome.err;
 }
 
-TEST_F(Merge, UnreadableLinesOfKilledStudiesAreLeftOutWithANote) {
+TEST_F(Merge, UnreadableLinesOfKilledStudiesAreSkippedWithANote) {
   write("a", {record("k1", "r1", "2026-01-01T00:00:00Z")}, R"({"schema": 1, "key": "k2", "ru)");
   write("b", {record("k3", "r2", "2026-01-02T00:00:00Z")});
   const Outcome outcome = kbvh("merge b --out a");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_NE(outcome.err.find("a/results.jsonl line 2 is left out: it breaks off"), std::string::npos)
+  EXPECT_NE(outcome.err.find("a/results.jsonl line 2 is skipped: it breaks off"), std::string::npos)
       << outcome.err;
   // The broken line is terminated, and stays.
   EXPECT_NE(text("a/results.jsonl").find("\"ru\n{"), std::string::npos);
