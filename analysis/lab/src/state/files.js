@@ -1,0 +1,35 @@
+/** Opens files: states and scenes of the lab (JSON), meshes by the engine's own reader (OBJ, OBJ with PC2, glTF). */
+import {checkState} from './permalink.js';
+
+/** The largest mesh that the lab takes. */
+export const mostPrimitives = 40000;
+
+/** Opens what was dropped or chosen. Errors name the file and what is wrong. */
+export async function openFiles(lab, list) {
+  const files = Array.from(list);
+  if (!files.length) return;
+  const names = files.map((file) => file.name).join(', ');
+  try {
+    if (files.length === 1 && files[0].name.toLowerCase().endsWith('.json')) {
+      const text = await files[0].text();
+      let data;
+      try { data = JSON.parse(text); } catch (error) { throw new Error(`not JSON: ${error.message}`); }
+      await lab.setState(checkState(data));
+      return;
+    }
+    lab.say(`Reading ${names} …`);
+    const contents = await Promise.all(files.map(async (file) => ({name: file.name, bytes: await file.arrayBuffer()})));
+    let scene = null, failure = null;
+    await lab.enqueue('loading', `Reading ${names}`, async () => {
+      try { scene = await lab.engine.readScene(contents); } catch (error) { failure = error; }
+    });
+    if (failure) throw failure;
+    const primitives = scene.bodies.reduce((sum, body) => sum + (body.offsets ? body.offsets.length - 1 : body.indices.length / 3), 0);
+    if (primitives > mostPrimitives) throw new Error(`${primitives} primitives; the lab takes up to ${mostPrimitives}. The command-line program takes more.`);
+    lab.editing.forget();
+    const loaded = await lab.load({scene, sceneId: null, topology: lab.defaultTopology(lab.state.strategy, scene)}, {selection: {}});
+    if (loaded) lab.say(`Opened ${names}: ${primitives} primitives.`);
+  } catch (error) {
+    lab.store.set({error: `${names}: ${error.message}`});
+  }
+}
