@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "core/facade/implementation.hpp"
-#include "core/judge/session.hpp"
+#include "core/facade/judgement.hpp"
 #include "core/motion/admissible.hpp"
 
 namespace kbvh {
@@ -141,20 +141,9 @@ class TypedWorld final : public detail::WorldImplementation {
   void start(const std::string& strategy, const std::map<std::string, std::string>& params, double t,
              const std::map<std::string, std::string>& topology) override {
     check_not_started();
-    const StrategyEntry& entry = find_strategy(strategy);
-    for (const auto& [key, value] : topology)
-      if (key != "method" && key != "width" && key != "leaf_size")
-        throw std::invalid_argument("a topology has the keys method, width and leaf_size, not '" + key + "'");
-    const auto method = topology.find("method");
-    const BuilderConfig builder = suitable_builder(
-        entry.info, method == topology.end() ? std::nullopt : std::optional(build_method(method->second)),
-        number_of(topology, "width"), number_of(topology, "leaf_size"));
-    Scene<S> scene = scene_;  // the added bodies stay if the strategy does not suit them
-    if (scene.pairs.empty()) scene.pairs = all_pairs(scene.bodies);
-    validate(scene);
-    played_ = std::make_unique<Scene<S>>(std::move(scene));
-    auto session =
-        std::make_unique<Session<S>>(*played_, Contestant{&entry, params, builder}, CountingPolicy::counting);
+    const Contestant contestant = contestant_of(strategy, params, topology);
+    played_ = std::make_unique<Scene<S>>(whole_scene());
+    auto session = std::make_unique<Session<S>>(*played_, contestant, CountingPolicy::counting);
     session->reset(t);
     session_ = std::move(session);
     fetched_for_questions_ = 0;
@@ -357,7 +346,74 @@ class TypedWorld final : public detail::WorldImplementation {
     return true;
   }
 
+  WorldPositions current_positions(std::uint32_t body) override {
+    check_body(body);
+    const S* const numbers = fetched(body);
+    return {sizeof(S) == 4 ? Precision::float32 : Precision::float64,
+            session().playback().plans(body).vertex_count(), numbers};
+  }
+  std::vector<double> frame_times(std::uint32_t per_keyframe) const override {
+    if (per_keyframe == 0) throw std::invalid_argument("0 frames per keyframe interval");
+    return kbvh::frame_times(scene_, per_keyframe);
+  }
+  void true_pairs(std::vector<WorldPair>& out) override {
+    const std::vector<PrimitivePair> pairs = brute_force_pairs(session().scene(), session().playback());
+    replace(out, pairs);
+  }
+  bool audit(std::uint32_t body, WorldAudit& out) override {
+    check_body(body);
+    out = {};
+    const auto view = session().strategy().audit_view(body);
+    if (!view) return false;
+    out = facade::plain(kbvh::audit(*view, session().scene().bodies[body].primitives, fetched(body)));
+    return true;
+  }
+  WorldVerdict verify(const std::string& strategy, std::span<const double> frames,
+                      const std::map<std::string, std::string>& params,
+                      const std::map<std::string, std::string>& topology) const override {
+    facade::check_frames(frames);
+    for (const Body<S>& body : scene_.bodies)
+      if (body.plans.is_handed_in())
+        throw std::invalid_argument("body '" + body.name +
+                                    "' cannot be verified: its positions are set frame by frame");
+    const Contestant contestant = contestant_of(strategy, params, topology);
+    const Scene<S> scene = whole_scene();
+    Session<S> session(scene, contestant, CountingPolicy::counting);
+    Oracle<S> oracle(scene);
+    return facade::plain(kbvh::verify(session, frames, oracle));
+  }
+
  private:
+  static Contestant contestant_of(const std::string& strategy,
+                                  const std::map<std::string, std::string>& params,
+                                  const std::map<std::string, std::string>& topology) {
+    const StrategyEntry& entry = find_strategy(strategy);
+    for (const auto& [key, value] : topology)
+      if (key != "method" && key != "width" && key != "leaf_size")
+        throw std::invalid_argument("a topology has the keys method, width and leaf_size, not '" + key + "'");
+    const auto method = topology.find("method");
+    return {
+        &entry, params,
+        suitable_builder(
+            entry.info, method == topology.end() ? std::nullopt : std::optional(build_method(method->second)),
+            number_of(topology, "width"), number_of(topology, "leaf_size"))};
+  }
+  /// Copies the scene as it is played: the added bodies stay if a strategy does not suit them.
+  Scene<S> whole_scene() const {
+    Scene<S> scene = scene_;
+    if (scene.pairs.empty()) scene.pairs = all_pairs(scene.bodies);
+    validate(scene);
+    return scene;
+  }
+  /// Returns the positions of a body, evaluated for a question.
+  const S* fetched(std::uint32_t body) {
+    Playback<S>& playback = session().playback();
+    const std::uint64_t before = playback.fetched();
+    playback.fetch_all(body);
+    fetched_for_questions_ += playback.fetched() - before;
+    return playback.positions(body);
+  }
+
   std::uint32_t add(const std::string& name, const Connectivity& connectivity, std::span<const double> times,
                     std::vector<S> positions) {
     const std::size_t frames = times.size();
