@@ -37,7 +37,7 @@ def _ties() -> Scene:
 def small_scenes() -> list[Scene]:
     """Returns the scenes on which `check` plays a strategy, small enough for brute force.
 
-    >>> [one.name for one in small_scenes()]
+    >>> [one.name for one in kbvh.small_scenes()]
     ['soups', 'ties', 'waving_sheet-200-80', 'running_figures-400', 'tightening_knot-240']
     """
     return [
@@ -112,7 +112,7 @@ def check(
     shows them, against the vertices below them. By default on `small_scenes`. Errors of a strategy in Python are a broken
     guarantee; wrong parameters raise ConfigError.
 
-    >>> for verdict in check("bottom_up", small_scenes()[:2], precisions=["float32"]): print(verdict)
+    >>> for verdict in kbvh.check("bottom_up", kbvh.small_scenes()[:2], precisions=["float32"]): print(verdict)
     bottom_up on soups, float32: holds (11 frames, 284 pairs, 0 missed, 0 extra)
     bottom_up on ties, float32: holds (11 frames, 41 pairs, 0 missed, 0 extra)
     """

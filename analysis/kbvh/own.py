@@ -221,8 +221,8 @@ def register(cls: S) -> S:
     """Registers a strategy in this process, under its id: `kbvh.strategies`, worlds, `kbvh.check` and studies know it then. A
     class registered later with the same id takes its place. Usable as a decorator. Raises ConfigError.
 
-    >>> @register
-    ... class Everything(Strategy):
+    >>> @kbvh.register
+    ... class Everything(kbvh.Strategy):
     ...     '''All pairs of primitives.'''
     ...     id = "everything"
     ...     def candidates(self):

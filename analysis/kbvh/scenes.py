@@ -27,7 +27,7 @@ class Body:
     indices[offsets[p]:offsets[p + 1]]. Arrays are used as they are: nothing is copied before a world is made.
 
     >>> import numpy as np
-    >>> Body([[0, 1, 2]], np.zeros((2, 3, 3)), times=[0, 1]).keyframes
+    >>> kbvh.Body([[0, 1, 2]], np.zeros((2, 3, 3)), times=[0, 1]).keyframes
     2
     """
 
@@ -114,7 +114,7 @@ class Scene:
         """Returns the frames of a described scene, l per interval between keyframes, and its changes of plans in order of time,
         each to be made after the query of the frame at its time.
 
-        >>> frames, changes = scene("reversing_spheres", triangles=80, keyframes=30).script()
+        >>> frames, changes = kbvh.scene("reversing_spheres", triangles=80, keyframes=30).script()
         >>> len(frames), changes[0].velocities.shape[1]
         (30, 3)
         """
@@ -131,9 +131,9 @@ def scene(description: Union[str, Mapping[str, Any]], folder: PathLike = ".", **
     (triangles, keyframes, seed, obstacle, order, self), or bodies from files and by formula. Relative files are relative to
     `folder`. Raises InputError.
 
-    >>> scene("tablecloth", triangles=200, keyframes=2).bodies[0].positions.shape
+    >>> kbvh.scene("tablecloth", triangles=200, keyframes=2).bodies[0].positions.shape
     (2, 121, 3)
-    >>> [body.name for body in scene({"bodies": [{"shape": "sphere", "triangles": 80}]}).bodies]
+    >>> [body.name for body in kbvh.scene({"bodies": [{"shape": "sphere", "triangles": 80}]}).bodies]
     ['icosphere-80']
     """
     if isinstance(description, str):
@@ -157,7 +157,7 @@ def load(file: PathLike, motion: Optional[PathLike] = None, **keys: Any) -> Body
 def builtin_scenes() -> dict[str, str]:
     """Returns the names of the built-in scenes, with what they show.
 
-    >>> "tablecloth" in builtin_scenes()
+    >>> "tablecloth" in kbvh.builtin_scenes()
     True
     """
     return _core.builtin_scenes()
@@ -166,7 +166,7 @@ def builtin_scenes() -> dict[str, str]:
 def shapes() -> dict[str, str]:
     """Returns the names of the bodies that are made by formula, with their keys.
 
-    >>> "sphere" in shapes()
+    >>> "sphere" in kbvh.shapes()
     True
     """
     return _core.shapes()

@@ -13,7 +13,7 @@ def strategies() -> pd.DataFrame:
     """Returns one row per strategy, with its id as the index: title, family, language, guarantee, tightness, foresight, abilities,
     parameters (name to default), about (what it is and when it wins) and more.
 
-    >>> table = strategies()
+    >>> table = kbvh.strategies()
     >>> table.loc["bottom_up", "guarantee"]
     'exact'
     >>> table.loc["bottom_up", "language"]
@@ -29,7 +29,7 @@ def strategies() -> pd.DataFrame:
 def describe(strategy: str) -> dict[str, Any]:
     """Returns everything about one strategy; `parameters` is a frame with name, default, meaning and what is allowed.
 
-    >>> describe("drift_boxes")["parameters"].columns[:3].tolist()
+    >>> kbvh.describe("drift_boxes")["parameters"].columns[:3].tolist()
     ['name', 'default', 'meaning']
     """
     rows = {row["id"]: row for row in _core.list_strategies()}

@@ -47,7 +47,7 @@ def plan(given: Union[PathLike, Mapping[str, Any]]) -> pd.DataFrame:
     """Returns what a plan would measure, one row per study, scene and contestant, without running it. `given` is a plan
     (experiments/RESULTS.md) or its file. Raises InputError and ConfigError.
 
-    >>> frame = plan({"scenes": ["tablecloth"], "strategies": ["bottom_up", "lbvh"], "l": [1, 10]})
+    >>> frame = kbvh.plan({"scenes": ["tablecloth"], "strategies": ["bottom_up", "lbvh"], "l": [1, 10]})
     >>> frame[["scene", "strategy", "l"]].values.tolist()
     [['tablecloth', 'bottom_up', 1], ['tablecloth', 'bottom_up', 10], ['tablecloth', 'lbvh', 1], ['tablecloth', 'lbvh', 10]]
     """

@@ -51,7 +51,7 @@ def _ranges(first: Array, count: Array) -> npt.NDArray[np.intp]:
 def primitive_bounds(offsets: Array, indices: Array, positions: Array) -> Array:
     """Returns the boxes of primitives, [primitive][2][3]: lower and upper corners.
 
-    >>> primitive_bounds(np.array([0, 3]), np.array([0, 1, 2]), np.eye(3)).tolist()
+    >>> kbvh.primitive_bounds(np.array([0, 3]), np.array([0, 1, 2]), np.eye(3)).tolist()
     [[[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]]
     """
     if len(offsets) < 2:

@@ -36,7 +36,7 @@ def padded(positions: npt.ArrayLike, precision: str = "float32") -> Array:
     more number at the end, as vector instructions need it.
 
     >>> import numpy as np
-    >>> padded(np.ones((4, 3))).base.shape
+    >>> kbvh.padded(np.ones((4, 3))).base.shape
     (13,)
     """
     given = np.asarray(positions)
@@ -90,8 +90,8 @@ class World:
     Raises ValueError for wrong input (ConfigError for a strategy or parameter), RuntimeError for calls in the wrong order and
     for abilities that the strategy lacks; nothing has changed then.
 
-    >>> sheet = scene("waving_sheet", triangles=200, keyframes=3)
-    >>> world = World(sheet, "drift_boxes", precision="float64")
+    >>> sheet = kbvh.scene("waving_sheet", triangles=200, keyframes=3)
+    >>> world = kbvh.World(sheet, "drift_boxes", precision="float64")
     >>> world.advance(world.frames(l=2)[1])
     >>> len(world.pairs()) == len(world.true_pairs())
     True
@@ -146,7 +146,7 @@ class World:
     def play(self, l: int = 1) -> Iterator[float]:
         """Starts over and stops at each frame of the clip, for questions.
 
-        >>> world = World(scene("waving_sheet", triangles=200, keyframes=3), "bottom_up")
+        >>> world = kbvh.World(kbvh.scene("waving_sheet", triangles=200, keyframes=3), "bottom_up")
         >>> len([len(world.pairs()) for t in world.play(l=2)])
         5
         """
@@ -217,7 +217,7 @@ class World:
         """Returns the pairs that began and those that ended to intersect since the last call, with the fields of `pairs`. The
         first call after the start or `reset` begins all pairs.
 
-        >>> world = World(scene("waving_sheet", triangles=200, keyframes=3), "interval_join")
+        >>> world = kbvh.World(kbvh.scene("waving_sheet", triangles=200, keyframes=3), "interval_join")
         >>> held = set()
         >>> for t in world.play(l=4):
         ...     begun, ended = world.changes()
@@ -303,8 +303,3 @@ class World:
         strategy and time. `kbvh.check` says the same in words."""
         return self._core.verify(strategy, self.frames() if frames is None else frames, words(params), words(topology))
 
-
-def _doctest_names() -> dict[str, Any]:
-    from .scenes import scene
-
-    return {"scene": scene}

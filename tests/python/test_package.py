@@ -29,8 +29,7 @@ class Documentation(unittest.TestCase):
         tried = 0
         for name in ["kbvh", *(f"kbvh.{name}" for name in MODULES)]:
             module = importlib.import_module(name)
-            names = {**vars(module), **{word: getattr(kbvh, word) for word in ("scene", "World", "small_scenes", "strategies")}}
-            found = doctest.testmod(module, extraglobs=names)
+            found = doctest.testmod(module, extraglobs={"kbvh": kbvh})
             self.assertEqual(found.failed, 0, name)
             tried += found.attempted
         self.assertGreater(tried, 20)

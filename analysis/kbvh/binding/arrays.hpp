@@ -83,13 +83,10 @@ std::atomic<int>& unlocked_calls();
 
 /// Releases the interpreter's lock for its lifetime.
 class Unlocked {
- public:
-  Unlocked() { ++unlocked_calls(); }
-  ~Unlocked() { --unlocked_calls(); }
-  Unlocked(const Unlocked&) = delete;
-  Unlocked& operator=(const Unlocked&) = delete;
-
- private:
+  struct Counted {
+    Counted() { ++unlocked_calls(); }
+    ~Counted() { --unlocked_calls(); }
+  } counted_;  // counted while the lock is held
   py::gil_scoped_release released_;
 };
 

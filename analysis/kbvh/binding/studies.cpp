@@ -19,7 +19,13 @@ Plan plan_of(const std::string& text, const std::string& place, const std::strin
 /// Runs a plan; returns the printed tables and what became of the configurations.
 py::dict run(const std::string& text, const std::string& place, const std::string& folder,
              const std::string& out) {
+  static bool running = false;  // guarded by the interpreter's lock
+  if (running) throw std::logic_error("another study is running in this process");
   const Plan plan = plan_of(text, place, folder);
+  running = true;
+  struct Done {
+    ~Done() { running = false; }
+  } done;
   StudyOutcome outcome;
   PrintedText printed;
   {
