@@ -18,14 +18,14 @@ from . import results
 from .conformance import Verdict, check, small_scenes
 from .own import BodyView, Parameter, SceneView, Strategy, register
 from .scenes import Body, PlanChange, Scene, builtin_scenes, load, scene, shapes
-from .strategies import describe, strategies
+from .strategies import counters, describe, strategies
 from .studies import Run, plan, run
 from .trees import Tree, overlapping, primitive_bounds, refit
 from .world import Audit, Hierarchy, Step, World, padded
 
 __all__ = [
     "Audit", "Body", "BodyView", "ConfigError", "Hierarchy", "InputError", "KbvhError", "Parameter", "PlanChange", "Run",
-    "Scene", "SceneView", "Step", "Strategy", "Tree", "Verdict", "World", "builtin_scenes", "check", "describe", "load",
+    "Scene", "SceneView", "Step", "Strategy", "Tree", "Verdict", "World", "builtin_scenes", "check", "counters", "describe", "load",
     "overlapping", "padded", "plan", "primitive_bounds", "refit", "register", "results", "run", "scene", "shapes",
     "small_scenes", "strategies",
 ]  # fmt: skip

@@ -37,3 +37,12 @@ def describe(strategy: str) -> dict[str, Any]:
         raise _core.ConfigError(f"there is no strategy '{strategy}'; known are {', '.join(rows)}")
     columns = ["name", "default", "meaning", "admissible", "allowed", "least", "most", "whole"]
     return {**rows[strategy], "parameters": pd.DataFrame(rows[strategy]["parameters"], columns=columns)}
+
+
+def counters() -> dict[str, str]:
+    """Returns the counters that all strategies share, with what each counts.
+
+    >>> "box_tests" in kbvh.counters()
+    True
+    """
+    return _core.counter_meanings()

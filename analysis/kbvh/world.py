@@ -236,6 +236,27 @@ class World:
         feature_b, begin and end (seconds; they enclose the time of impact). One call must not pass `next_knot`."""
         return self._core.contacts(t)
 
+    def hits(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike, lengths: npt.ArrayLike = np.inf, query: str = "closest"
+    ) -> Array:
+        """Answers rays at the current time: the points origin + s * direction, [ray][3] each, with 0 <= s <= length. Returns for each
+        ray the body and primitive that it meets first (query "any": one that it meets) and s as parameter; 2**32 - 1 and infinity
+        for a miss. Only polygons are met.
+
+        >>> world = kbvh.World([kbvh.Body([0, 1, 2], np.eye(3))], "bottom_up")
+        >>> world.hits([[0, 0, 0], [5, 5, 5]], [[1, 1, 1], [1, 0, 0]]).tolist()
+        [(0, 0, 0.3333333333333333), (4294967295, 4294967295, inf)]
+        """
+        if query not in ("closest", "any"):
+            raise ValueError(f"a ray's query is closest or any, not '{query}'")
+        starts = np.atleast_2d(np.asarray(origins, dtype=float))
+        rays = np.empty((len(starts), 7))
+        try:
+            rays[:, :3], rays[:, 3:6], rays[:, 6] = starts, directions, lengths
+        except ValueError:
+            raise ValueError(f"{len(starts)} rays need origins and directions [ray][3], and lengths [ray]") from None
+        return self._core.hits(rays, query == "any")
+
     def next_knot(self) -> float:
         """Returns the next time at which the plan of any vertex bends; infinite if none does."""
         return self._core.next_knot()
@@ -268,7 +289,7 @@ class World:
         return None if found is None else Audit(**found)
 
     def counters(self) -> dict[str, int]:
-        """Returns what was counted since the last `reset`."""
+        """Returns what was counted since the last `reset`; `kbvh.counters()` says what each counter means."""
         return self._core.counters()
 
     @property

@@ -43,6 +43,7 @@ std::vector<std::string> words(const Capabilities& can) {
                                               {can.self_pairs, "self_pairs"},
                                               {can.time_budget, "time_budget"},
                                               {can.contacts, "contacts"},
+                                              {can.rays, "rays"},
                                               {can.changes, "changes"}};
   std::vector<std::string> out;
   for (const auto& [has, word] : all)

@@ -67,6 +67,33 @@ class Answers(unittest.TestCase):
         self.assertTrue(np.array_equal(root[0::2], tree.nodes["lower"][0]) and np.array_equal(root[1::2], tree.nodes["upper"][0]))
         self.assertIsNone(kbvh.World(falling(), "bottom_up").realisers(0))
 
+    def test_rays(self):
+        table = kbvh.strategies()
+        body = kbvh.scene({"bodies": [{"shape": "sphere", "triangles": 80}]}).bodies[0]
+        random = np.random.default_rng(2)
+        towards = random.normal(size=(50, 3))
+        origins = 3 * towards / np.linalg.norm(towards, axis=1, keepdims=True)
+        first, tried = None, 0
+        for id in table.index[table["abilities"].map(lambda words: "rays" in words)]:
+            if table.loc[id, "guarantee"] != "exact":
+                continue
+            world = kbvh.World([body], id, precision="float64") if "float64" in table.loc[id, "precisions"] else None
+            if world is None:
+                continue
+            hits = world.hits(origins, -origins)
+            self.assertTrue(np.all((hits["body"] == 0) & (hits["parameter"] > 0) & (hits["parameter"] < 1)), id)
+            self.assertTrue(np.all(world.hits(origins, origins, query="any")["body"] == 2**32 - 1), id)
+            self.assertTrue(np.all(world.hits(origins, -origins, 1e-3)["body"] == 2**32 - 1), id)
+            first = hits if first is None else first
+            self.assertEqual(hits.tolist(), first.tolist(), id)
+            tried += 1
+        self.assertGreater(tried, 2)
+        world = kbvh.World([body], "bottom_up")
+        with self.assertRaisesRegex(ValueError, "need origins and directions"):
+            world.hits(origins, origins[:7])
+        with self.assertRaisesRegex(ValueError, "closest or any, not 'all'"):
+            world.hits(origins, origins, query="all")
+
     def test_contacts_between_keyframes(self):
         world = kbvh.World(falling(), "bottom_up")
         found = world.contacts(1.0)

@@ -148,6 +148,13 @@ const py::dtype& contact_type() {
                                                  sizeof(WorldContact)));
   return type;
 }
+const py::dtype& hit_type() {
+  static const py::dtype& type = kept(structured({{"body", u4(), offsetof(WorldHit, body)},
+                                                  {"primitive", u4(), offsetof(WorldHit, primitive)},
+                                                  {"parameter", f8(), offsetof(WorldHit, parameter)}},
+                                                 sizeof(WorldHit)));
+  return type;
+}
 const py::dtype& node_type() {
   static const py::dtype& type = kept(structured({{"parent", u4(), offsetof(WorldNode, parent)},
                                                   {"first", u4(), offsetof(WorldNode, first)},

@@ -93,6 +93,21 @@ class PythonWorld {
     move([&] { world_.advance(t); });
   }
   double time() const { return world_.time(); }
+  /// `rays` is [ray][7]: origin, direction, length.
+  py::array hits(const py::object& rays, bool any) {
+    const std::vector<double> numbers = doubles_of(rays, "rays");
+    if (numbers.size() % 7 != 0)
+      throw std::invalid_argument(std::to_string(numbers.size()) + " numbers are no rays of 7 each");
+    std::vector<WorldRay> asked(numbers.size() / 7);
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      std::copy_n(&numbers[7 * i], 3, asked[i].origin);
+      std::copy_n(&numbers[7 * i + 3], 3, asked[i].direction);
+      asked[i].length = numbers[7 * i + 6];
+    }
+    std::vector<WorldHit> out;
+    alone([&] { world_.hits(any ? WorldRayQuery::any : WorldRayQuery::closest, asked, out); });
+    return records_of(std::move(out), hit_type());
+  }
   double next_knot() const { return world_.next_knot(); }
 
   /// Returns whether the array is used where it lies: one of 3n + 1 numbers in the world's precision.
@@ -377,6 +392,7 @@ void bind_world(py::module_& module) {
       .def("changes", &PythonWorld::changes)
       .def("spans", &PythonWorld::spans, arg("t"))
       .def("contacts", &PythonWorld::contacts, arg("t"))
+      .def("hits", &PythonWorld::hits, arg("rays"), arg("any"))
       .def("positions", &PythonWorld::positions, arg("body"))
       .def("positions_address", &PythonWorld::positions_address, arg("body"))
       .def("hierarchy", &PythonWorld::hierarchy, arg("body"))
@@ -391,9 +407,15 @@ void bind_world(py::module_& module) {
       .def("scheduled_events", &PythonWorld::scheduled_events)
       .def("step_event", &PythonWorld::step_event, arg("until"));
   module.def("list_strategies", &listed);
+  module.def("counter_meanings", [] {
+    py::dict out;
+    for (const auto& [name, meaning] : World::counter_meanings()) out[py::str(name)] = meaning;
+    return out;
+  });
   module.attr("pair_type") = pair_type();
   module.attr("span_type") = span_type();
   module.attr("contact_type") = contact_type();
+  module.attr("hit_type") = hit_type();
   module.attr("node_type") = node_type();
   module.attr("watch_type") = watch_type();
   module.attr("event_type") = event_type();
