@@ -1,7 +1,7 @@
 """Builds the wheel of the package kbvh: CMake builds and installs it, setuptools packs what was installed.
 
-KBVH_PYTHON_BUILD   a build folder with KBVH_PYTHON that exists already; nothing else is built then
-KBVH_CMAKE          further arguments of cmake, such as -DKBVH_COUNTING_ONLY=OFF
+KBVH_PYTHON_BUILD   the build folder, such as build/python; what is built there need not be built again
+KBVH_CMAKE          further arguments of cmake for a new build folder, such as -DKBVH_COUNTING_ONLY=OFF
 """
 
 import os
@@ -21,19 +21,21 @@ class CMakeBuild(build_ext):
     """Leaves the package, as CMake installs it, where setuptools collects it."""
 
     def run(self) -> None:
-        build = Path(os.environ.get("KBVH_PYTHON_BUILD") or Path(self.build_temp).resolve() / "cmake")
-        if "KBVH_PYTHON_BUILD" not in os.environ:
+        build = Path(os.environ.get("KBVH_PYTHON_BUILD") or Path(self.build_temp) / "cmake").resolve()
+        jobs = os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or str(os.cpu_count() or 1)
+        if not (build / "CMakeCache.txt").exists():
             options = ["-DCMAKE_BUILD_TYPE=Release", "-DKBVH_PYTHON=ON", "-DKBVH_COUNTING_ONLY=ON", "-DKBVH_UNITY=ON"]
             options += ["-DKBVH_BUILD_TESTS=OFF", f"-DKBVH_PYTHON_EXECUTABLE={sys.executable}"]
             options += shlex.split(os.environ.get("KBVH_CMAKE", ""))
-            jobs = os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or str(os.cpu_count() or 1)
             subprocess.run(["cmake", "-S", SOURCE, "-B", build, *options], check=True)
-            subprocess.run(["cmake", "--build", build, "--target", "kbvh_python", "--parallel", jobs], check=True)
+        subprocess.run(["cmake", "--build", build, "--target", "kbvh_python", "--parallel", jobs], check=True)
         staged = build / "wheel"
         shutil.rmtree(staged, ignore_errors=True)
         subprocess.run(["cmake", "--install", build, "--component", "python", "--prefix", staged], check=True)
         (package,) = staged.rglob("kbvh/__init__.py")
-        self.copy_tree(str(package.parent), str(Path(self.build_lib) / "kbvh"))
+        target = Path(self.build_lib) / "kbvh"
+        shutil.rmtree(target, ignore_errors=True)
+        self.copy_tree(str(package.parent), str(target))
 
     def get_outputs(self) -> list:
         return [str(path) for path in (Path(self.build_lib) / "kbvh").rglob("*") if path.is_file()]
