@@ -3,6 +3,7 @@
 
 #include "core/scene/geometry_change.hpp"
 #include "core/scene/pairs.hpp"
+#include "core/scene/rays.hpp"
 
 namespace kbvh {
 
@@ -58,6 +59,19 @@ class AnswersSweeps {
   virtual void prepare_sweep(double /*t*/) {}
   /// Implements `Strategy::swept_pairs`. The strategy stood at t0; `time()` is already t1.
   virtual void find_swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) = 0;
+};
+
+/// Answers which primitives rays meet.
+template <class S>
+class AnswersRays {
+ public:
+  virtual ~AnswersRays() = default;
+
+ protected:
+  friend class Strategy<S>;
+  /// Implements `Strategy::hits_at`: sets hits[i] to the answer to rays[i]; there are as many of both. The
+  /// strategy stands at t. Lazy strategies refresh what the rays read, positions included.
+  virtual void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) = 0;
 };
 
 /// Follows flight plans that change at run time.

@@ -62,6 +62,7 @@ struct Capabilities {
       false;  ///< AnswersSelfPairs: pairs within a body; without it, scenes that ask for them are refused
   bool contacts = false;  ///< AnswersSweeps: the broad phase of continuous collision detection
   bool changes = false;   ///< AnswersChanges: changes of answers without a comparison of full answers
+  bool rays = false;      ///< AnswersRays: hits_at
 };
 
 /// The topologies that a strategy accepts. A strategy that builds its own hierarchy (a peer library) accepts
@@ -84,6 +85,8 @@ struct Info {
   bool baseline = false;
   Tightness tightness = Tightness::tight;
   Guarantee guarantee = Guarantee::exact;
+  /// The promise that `hits_at` makes: exact, or approximate for a peer's own test of rays and triangles.
+  Guarantee rays_guarantee = Guarantee::exact;
   PositionUse positions = PositionUse::all;
   Declared declares{};
   TopologyNeeds topology{};
@@ -221,6 +224,20 @@ class Strategy {
     query.find_swept_pairs(t0, t1, before, out);
   }
 
+  /// Answers rays at t, hits[i] being the answer to rays[i]: all primitives of the scene, whatever its pairs
+  /// of bodies. Positions are fetched as needed. Throws std::invalid_argument, naming the ray, if a
+  /// coordinate or direction is not finite or beyond admissible_magnitude<S>, or a length is negative or not
+  /// a number.
+  void hits_at(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) {
+    AnswersRays<S>& able_to = able(abilities().rays, "rays");
+    if (hits.size() != rays.size())
+      throw std::invalid_argument(std::to_string(rays.size()) + " rays take as many answers, not " +
+                                  std::to_string(hits.size()));
+    check_rays(rays);
+    stand_at(t);
+    able_to.find_hits(t, query, rays, hits);
+  }
+
   /// Reports that the plans of some vertices changed at t; the motion view shows the new plans. Each new plan
   /// starts from the stored position at t. The strategy must have been advanced to t before.
   void flight_plans_changed(double t, std::span<const PlanChange<S>> changes) {
@@ -317,6 +334,7 @@ class Strategy {
   struct Abilities {
     AnswersSpans<S>* spans;
     AnswersSweeps<S>* sweeps;
+    AnswersRays<S>* rays;
     TakesPlanChanges<S>* plan_changes;
     TakesGeometryChanges<S>* geometry_changes;
     EventSource<S>* events;
@@ -325,9 +343,10 @@ class Strategy {
   /// Determined at the first call, because the object is not complete during construction.
   const Abilities& abilities() {
     if (!abilities_)
-      abilities_ = {dynamic_cast<AnswersSpans<S>*>(this),     dynamic_cast<AnswersSweeps<S>*>(this),
-                    dynamic_cast<TakesPlanChanges<S>*>(this), dynamic_cast<TakesGeometryChanges<S>*>(this),
-                    dynamic_cast<EventSource<S>*>(this),      dynamic_cast<AnswersChanges<S>*>(this)};
+      abilities_ = {dynamic_cast<AnswersSpans<S>*>(this),         dynamic_cast<AnswersSweeps<S>*>(this),
+                    dynamic_cast<AnswersRays<S>*>(this),          dynamic_cast<TakesPlanChanges<S>*>(this),
+                    dynamic_cast<TakesGeometryChanges<S>*>(this), dynamic_cast<EventSource<S>*>(this),
+                    dynamic_cast<AnswersChanges<S>*>(this)};
     return *abilities_;
   }
   template <class Interface>

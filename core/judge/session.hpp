@@ -93,6 +93,10 @@ class Session {
   void changes(Answer answer, PairBuffer& begun, PairBuffer& ended, PhaseTimes& times) {
     timed(times.traversal, [&] { strategy_->changes_at(playback_.time(), answer, begun, ended); });
   }
+  /// Answers rays at the current time (Strategy::hits_at). Everything counts as traversal.
+  void hits(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, PhaseTimes& times) {
+    timed(times.traversal, [&] { strategy_->hits_at(playback_.time(), query, rays, hits); });
+  }
   /// Performs the first event if it is due by time `until` (Strategy::step_event); the motion keeps its time
   /// until the next `advance`.
   bool step_event(double until, EventDescription<S>& out) { return strategy_->step_event(until, out); }

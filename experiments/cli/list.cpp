@@ -40,7 +40,8 @@ std::vector<std::string> capabilities_of(const Info& info) {
                                               {info.can.self_pairs, "self_pairs"},
                                               {info.can.time_budget, "time_budget"},
                                               {info.can.contacts, "contacts"},
-                                              {info.can.changes, "changes"}};
+                                              {info.can.changes, "changes"},
+                                              {info.can.rays, "rays"}};
   std::vector<std::string> words;
   for (const auto& [can, word] : all)
     if (can) words.push_back(word);
@@ -84,6 +85,7 @@ json strategy_json(const Info& info) {
           {"foresight", word(info.foresight)},
           {"tightness", word(info.tightness)},
           {"guarantee", word(info.guarantee)},
+          {"rays_guarantee", word(info.rays_guarantee)},
           {"positions", info.positions == PositionUse::all       ? "all"
                         : info.positions == PositionUse::fetched ? "fetched"
                                                                  : "varying"},

@@ -162,7 +162,8 @@ json scene_rows(const Target& target, const std::vector<TargetGroup>& groups) {
   std::vector<std::pair<std::string, json>> rows;  // by hash of the scene
   for (const TargetGroup& group : groups) {
     if (!is_measured_as(target, group)) continue;
-    const std::string hash = group.scene.at("hash").get<std::string>();
+    // One scene may be asked for pairs and for rays.
+    const std::string hash = group.scene.at("hash").get<std::string>() + group.scene.value("rays", "");
     const auto known =
         std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == hash; });
     if (known == rows.end())

@@ -21,6 +21,7 @@
 #include "experiments/run/bench_harness.hpp"
 #include "experiments/scenes/scene_card.hpp"
 #include "experiments/study/contact_measurement.hpp"
+#include "experiments/study/ray_measurement.hpp"
 #include "experiments/study/targets.hpp"
 
 namespace kbvh::experiments {
@@ -38,8 +39,11 @@ constexpr std::size_t keyframes_shown = 4;
 /// One run of a plan: the state shared by all its groups.
 class Runner {
  public:
-  Runner(Harness harness, const std::filesystem::path& out)
-      : harness_(harness), machine_(machine()), run_(now_utc() + "-" + std::to_string(::getpid())) {
+  Runner(Harness harness, const Plan& plan, const std::filesystem::path& out)
+      : harness_(harness),
+        plan_{{"name", plan.name}, {"description", plan.description}},
+        machine_(machine()),
+        run_(now_utc() + "-" + std::to_string(::getpid())) {
     if (out.empty()) return;
     store_ = std::make_unique<ResultStore>(out);
     std::error_code error;
@@ -62,6 +66,7 @@ class Runner {
       const LoadedScene loaded = load(spec, making_);
       for (const std::string& text : loaded.notes) note("note: " + text);
       card_ = store_ ? show_scene(loaded) : "";
+      scene_object_ = spec.object;
       for (const std::string& scalar : study.scalars) {
         if (scalar == "float")
           scene<float>(study, contestants, loaded);
@@ -133,22 +138,34 @@ class Runner {
       contact_group(study, contestants, loaded, scene, script);
       return;
     }
+    if (study.rays) {
+      for_each_l(study, loaded, scene, script, [&](std::uint32_t l, const std::vector<double>& frames) {
+        ray_group(study, contestants, loaded, scene, script, l, frames);
+      });
+      return;
+    }
     Oracle<S> oracle(scene, cache_folder(), hash(script));
     if (!oracle.problem().empty()) note("warning: " + oracle.problem());
+    for_each_l(study, loaded, scene, script, [&](std::uint32_t l, const std::vector<double>& frames) {
+      group(study, contestants, loaded, scene, script, oracle, l, frames);
+    });
+    const std::string before = oracle.problem();
+    oracle.keep();
+    if (oracle.problem() != before) note("warning: " + oracle.problem());
+  }
+
+  /// Calls work(l, frames) for each l of the study; once for a scene with frame times of its own.
+  template <class S, class Work>
+  void for_each_l(const Study& study, const LoadedScene& loaded, const Scene<S>& scene,
+                  const PlanScript<S>& script, const Work& work) {
     std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
     if (has_own_frames(loaded)) {
       if (per_keyframe != std::vector<std::uint32_t>{1})
         note("note: " + scene.name + " defines its own frame times: l does not apply and counts as 1");
       per_keyframe = {1};
     }
-    for (const std::uint32_t l : per_keyframe) {
-      const std::size_t most = study.frames_limit > 0 ? study.frames_limit : SIZE_MAX;
-      const std::vector<double> frames = frames_of(scene, loaded, script, l, most);
-      group(study, contestants, loaded, scene, script, oracle, l, frames);
-    }
-    const std::string before = oracle.problem();
-    oracle.keep();
-    if (oracle.problem() != before) note("warning: " + oracle.problem());
+    const std::size_t most = study.frames_limit > 0 ? study.frames_limit : SIZE_MAX;
+    for (const std::uint32_t l : per_keyframe) work(l, frames_of(scene, loaded, script, l, most));
   }
 
   /// Measures all contestants on one scene, in one scalar, at one l: the content of one table.
@@ -169,6 +186,23 @@ class Runner {
     Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script, study.changes);
     measure_all(study, contestants, loaded, about_scene, title, measurement,
                 [&](const Info& info) { return unsuitable(info, scene, script); });
+  }
+
+  /// Does the same for rays.
+  template <class S>
+  void ray_group(const Study& study, const std::vector<ContestantSpec>& contestants,
+                 const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script,
+                 std::uint32_t l, const std::vector<double>& frames) {
+    json about_scene = scene_record(scene, loaded, l, frames, script);
+    about_scene["name"] = scene.name + suffix_of(*study.rays);
+    about_scene["rays"] = text_of(*study.rays);
+    RayMeasurement<S> measurement(scene, frames, *study.rays, script.empty() ? nullptr : &script);
+    measure_all(study, contestants, loaded, about_scene,
+                scene.name + ", l = " + std::to_string(l) + suffix_of(*study.rays), measurement,
+                [&](const Info& info) -> std::string {
+                  if (!info.can.rays) return "answers no rays";
+                  return unsuitable(info, scene, script);
+                });
   }
 
   /// Does the same for contacts from each keyframe to the next.
@@ -221,6 +255,7 @@ class Runner {
       json record{{"schema", results_schema},
                   {"kind", word(harness_)},
                   {"run", run_},
+                  {"plan", plan_},
                   {"study", study.name},
                   {"commit", commit()},
                   {"dirty", dirty()},
@@ -228,6 +263,7 @@ class Runner {
                   {"seed", loaded.seed},
                   {"scene", about_scene},
                   {"strategy", strategy_record(spec)}};
+      record["again"] = again_record(scene_object_, about_scene, record["strategy"], study);
       record["key"] =
           configuration_key(harness_, program_identity(), about_scene, record["strategy"], study, machine_);
       if (const json* known = known_record(record["key"], title + ": " + spec.label)) {
@@ -349,11 +385,13 @@ class Runner {
   }
 
   Harness harness_;
+  json plan_;  // its name and description
   json machine_;
   std::string run_;
   std::unique_ptr<ResultStore> store_;
   std::map<std::string, json> of_this_run_;  // by key, where there is no store
   std::string card_;                         // of the current scene
+  json scene_object_;                        // the current scene in a plan
   Progress progress_;
   const MakeProgress making_ = [this](const std::string& what, double fraction) {
     progress_.show(what + (fraction > 0 ? ": " + std::to_string(int(100 * fraction)) + " %" : ""));
@@ -374,7 +412,7 @@ StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::
   for (const auto& list : contestants) try_parameters(list);
   check_target_contestants(plan, contestants);
   for (const std::string& text : std::set<std::string>(notes.begin(), notes.end())) say("note: " + text);
-  Runner runner(harness, out);
+  Runner runner(harness, plan, out);
   for (std::size_t i = 0; i < plan.studies.size(); ++i) runner.study(plan.studies[i], contestants[i]);
   runner.targets(plan);
   return runner.outcome();

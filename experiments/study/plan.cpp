@@ -79,7 +79,7 @@ StrategyRequest read_strategy(const json& value, const std::string& place) {
 std::optional<Answer> read_answer(const JsonReader& keys, const std::string& text) {
   if (text == "none") return {};
   for (const Answer answer : {Answer::candidates, Answer::pairs})
-    if (text == word(answer)) return answer;
+    if (text == experiments::word(answer)) return answer;
   keys.fail("changes", "expected candidates, pairs or none, got '" + text + "'");
 }
 
@@ -119,6 +119,15 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
   if (const auto continuous = keys.truth("continuous")) study.continuous = *continuous;
   if (const auto answer = keys.word("changes")) study.changes = read_answer(keys, *answer);
   if (study.changes && study.continuous) keys.fail("changes", "contacts between keyframes have none");
+  if (const auto rays = keys.word("rays")) {
+    try {
+      study.rays = ray_study(*rays);
+    } catch (const std::invalid_argument& problem) {
+      keys.fail("rays", problem.what());
+    }
+  }
+  if (study.rays && (study.continuous || study.changes))
+    keys.fail("rays", "a study asks for one of rays, contacts and changes");
   if (const auto every = keys.whole("oracle_every", ranges::positive)) study.oracle_every = *every;
 }
 

@@ -9,6 +9,7 @@
 #include "core/contract/queries.hpp"
 #include "experiments/scenes/scene_spec.hpp"
 #include "experiments/study/contestants.hpp"
+#include "experiments/study/ray_measurement.hpp"
 #include "experiments/study/targets.hpp"
 
 namespace kbvh::experiments {
@@ -33,6 +34,7 @@ struct Study {
   std::uint64_t oracle_every = 1;  ///< verify every n-th frame (and the last)
   bool continuous = false;         ///< contacts between keyframes instead of pairs at frames
   std::optional<Answer> changes;   ///< the changes of this answer instead of pairs at frames
+  std::optional<RayStudy> rays;    ///< rays at frames instead of pairs
 };
 
 /// Names an answer in plans and results.

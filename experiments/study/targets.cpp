@@ -127,7 +127,8 @@ void check_target_scenes(const Plan& plan) {
       for (const Study& study : plan.studies) {
         if (!measures(study, target)) continue;
         for (const SceneSpec& spec : study.scenes) {
-          const std::string name = given_name(spec);
+          std::string name = given_name(spec);
+          if (!name.empty() && study.rays) name += suffix_of(*study.rays);
           if (!name.empty() && !has(known, name)) known.push_back(name);
           if (name == scene) meanings.insert(spec.said);
         }

@@ -152,6 +152,39 @@ TEST(Allocation, NoneOnceWarmWhereChangesAreAsked) {
   }
 }
 
+/// The same for rays, at every frame.
+template <class S>
+std::string allocations_of_rays(const StrategyEntry& entry, const TestScene<S>& test) {
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  std::vector<Ray<S>> rays;
+  for (int i = 0; i < 32; ++i)
+    rays.push_back({{S(-3), S(0.11 * i - 1.7), S(0.05 * i - 0.8)}, {S(1), S(0.3), S(0.02 * i - 0.3)}});
+  std::vector<RayHit> hits(rays.size());
+  PhaseTimes times;
+  for (int round = 0; round < 3; ++round)
+    for (const double t : test.frames) {
+      t == test.frames[0] ? session.reset(t) : session.advance(t, times);
+      const std::uint64_t before = allocations;
+      for (const RayQuery query : {RayQuery::closest, RayQuery::any})
+        session.hits(query, rays, std::span<RayHit>(hits), times);
+      if (round == 2 && t != test.frames[0] && allocations != before)
+        return "t = " + std::to_string(t) + ": " + std::to_string(allocations - before) + " allocations";
+    }
+  return {};
+}
+
+TEST(Allocation, NoneOfRaysOnceWarm) {
+  for (const char* const name : {"soups", "sheets", "four_bodies_own_keyframes"}) {
+    const auto in_float = synthetic_scene<float>(name, 3);
+    const auto in_double = synthetic_scene<double>(name, 3);
+    for (const StrategyEntry& entry : registry()) {
+      if (!entry.info.can.rays || entry.info.rays_guarantee != Guarantee::exact) continue;
+      EXPECT_EQ(allocations_of_rays(entry, in_float), "") << entry.info.id << " on " << name << ", float";
+      EXPECT_EQ(allocations_of_rays(entry, in_double), "") << entry.info.id << " on " << name << ", double";
+    }
+  }
+}
+
 TEST(Allocation, NoneOnceWarmWhereTreesAreRestructured) {
   using Params = std::map<std::string, std::string>;
   const std::pair<const char*, Params> eager[] = {
