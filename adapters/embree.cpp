@@ -45,7 +45,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "adapters/embree.hpp"
+#include "embree.hpp"
 #include "core/base/assert.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
