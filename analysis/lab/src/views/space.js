@@ -148,7 +148,7 @@ export class Space {
       const d = new THREE.Vector3(...[0, 1, 2].map((axis) => (k >> axis & 1 ? this.box.max : this.box.min).getComponent(axis))).sub(centre);
       distance = Math.max(distance, d.dot(toCamera) + Math.max(Math.abs(d.dot(across)) / wide, Math.abs(d.dot(up)) / tall));
     }
-    this.camera.position.copy(centre).addScaledVector(toCamera, distance);
+    this.camera.position.copy(centre).addScaledVector(toCamera, distance *= 0.86);
     this.camera.near = distance / 100;
     this.camera.far = distance * 10;
     this.camera.updateProjectionMatrix();
