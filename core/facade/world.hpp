@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace kbvh {
@@ -269,6 +270,8 @@ class World {
   static std::vector<std::string> strategies();
   /// Describes all strategies, in the same order.
   static std::vector<WorldStrategy> strategy_descriptions();
+  /// Returns the names of the counters that all strategies share, and what each counts.
+  static std::vector<std::pair<std::string, std::string>> counter_meanings();
 
  private:
   std::unique_ptr<detail::WorldImplementation> implementation_;

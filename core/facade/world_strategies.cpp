@@ -26,6 +26,12 @@ std::vector<std::string> World::strategies() {
   for (const StrategyEntry& entry : registry()) ids.push_back(entry.info.id);
   return ids;
 }
+std::vector<std::pair<std::string, std::string>> World::counter_meanings() {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (std::size_t c = 0; c < std::size_t(Counter::count); ++c)
+    all.emplace_back(name(Counter(c)), meaning(Counter(c)));
+  return all;
+}
 std::vector<WorldStrategy> World::strategy_descriptions() {
   std::vector<WorldStrategy> all;
   for (const StrategyEntry& entry : registry()) {

@@ -17,6 +17,9 @@ export class Host {
     this.#strategies ??= (await this.#newModule()).call('strategies');
     return this.#strategies;
   }
+  async counters() {
+    return (await this.#newModule()).call('counters');
+  }
   async load(config) {
     const timeline = new Timeline(await this.#newModule(), config);
     this.#timeline = timeline; // the old one stays if the new one fails
@@ -81,7 +84,7 @@ function matches({ event, touched }, { body, node, vertex }) {
 }
 
 /** Reads mesh files, given as {name, bytes}, with the program's own readers, as a scene of the format kbvh-scene. */
-function sceneOf(module, files, { clip = '', framesPerSecond = 0, l = 10 }) {
+function sceneOf(module, files, { clip = '', framesPerSecond = 0, l = 10, selfPairs = false }) {
   const ending = (name) => name.slice(name.lastIndexOf('.') + 1).toLowerCase();
   const known = new Set();
   for (const { name, bytes } of files) {
@@ -102,6 +105,6 @@ function sceneOf(module, files, { clip = '', framesPerSecond = 0, l = 10 }) {
   });
   return {
     format: 'kbvh-scene', version: 1, name: stem(meshes[0].name), dimension: 3, bodies, frames: { l },
-    ...(bodies.length === 1 ? { pairs: [[0, 0]] } : {}),
+    ...(selfPairs ? { pairs: bodies.flatMap((_, a) => bodies.slice(a).map((__, b) => [a, a + b])) } : {}),
   };
 }

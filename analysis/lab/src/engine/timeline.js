@@ -8,7 +8,7 @@ import { checkedScene, frameTimes, overlaidKeyframes } from './scene.js';
 
 const SNAPSHOT_AFTER = 25; // milliseconds of replay
 const SNAPSHOT_PER_MIB = 2; // and as many for each MiB to copy
-const SNAPSHOT_BUDGET = 192 << 20; // bytes
+const SNAPSHOT_BYTES = 192 << 20; // of all of them
 const NOTHING = { positions: false, nodes: false, pairs: false, queue: false, counters: false };
 
 export class Timeline {
@@ -24,16 +24,18 @@ export class Timeline {
   #eventsSinceStop = 0;
   #snapshots = new Map(); // stop -> memory
   #seconds = 0;
+  #snapshotBytes;
   #shownPairs = new Uint32Array(0);
 
   /** Loads a scene into a fresh module and starts a strategy. */
-  constructor(module, { scene, strategy, params = {}, topology = {}, precision = 'float64', t0 }) {
+  constructor(module, { scene, strategy, params = {}, topology = {}, precision = 'float64', t0, snapshotBytes = SNAPSHOT_BYTES }) {
     const { bodies, pairs, l } = checkedScene(scene);
     if (precision !== 'float64' && precision !== 'float32')
       throw new Error(`the precision is "${precision}", not float64 or float32`);
     const texts = (map) => Object.fromEntries(Object.entries(map).map(([key, value]) => [key, String(value)]));
     const keyframes = overlaidKeyframes(bodies);
     this.#module = module;
+    this.#snapshotBytes = snapshotBytes;
     this.#bodies = bodies.length;
     this.#end = keyframes[keyframes.length - 1];
     const begin = t0 ?? keyframes[0];
@@ -274,7 +276,7 @@ export class Timeline {
     this.#snapshots.set(this.#stop, this.#module.snapshot());
     let bytes = 0;
     for (const memory of this.#snapshots.values()) bytes += memory.byteLength;
-    while (bytes > SNAPSHOT_BUDGET && this.#snapshots.size > 2) {
+    while (bytes > this.#snapshotBytes) {
       // Drops the one whose absence costs least: the replay between its neighbours.
       const places = [...this.#snapshots.keys()].sort((a, b) => a - b);
       let cheapest = null;
