@@ -181,8 +181,9 @@ export class Space {
         const corners = cornersOf(tree, node), on = isLit(lit, b, node);
         if (b === selection.body && node === selection.node) { chosen = {tree, node, corners}; }
         colour.set(on ? colours.lit : colours.level(tree.depth[node]));
-        for (const corner of edges) { lines.push(...corners[corner]); lineColours.push(colour.r, colour.g, colour.b); }
-        if (on && lit.count <= 24) for (let side = 0; side < 6; ++side) if (isLit(lit, b, node, side)) quads.push(...quad(corners, side));
+        const drawn = view.boxes === 'side' ? sideEdges(selection.side) : edges;
+        for (const corner of drawn) { lines.push(...corners[corner]); lineColours.push(colour.r, colour.g, colour.b); }
+        if (on && lit.count <= 24) for (let side = 0; side < 6; ++side) if (isLit(lit, b, node, side) && (view.boxes !== 'side' || side === selection.side)) quads.push(...quad(corners, side));
       }
     });
     if (lines.length) {
@@ -266,6 +267,12 @@ export class Space {
 }
 
 const cornersOf = (tree, node) => Array.from({length: 8}, (_, k) => [0, 1, 2].map((axis) => tree.bounds[6 * node + (k >> axis & 1 ? 3 : 0) + axis]));
+
+/** The edges of one side of a box, as pairs of corners. */
+function sideEdges(side) {
+  const on = (corner) => (corner >> (side >> 1) & 1) === (side & 1);
+  return edges.filter((_, i) => on(edges[i - i % 2]) && on(edges[i - i % 2 + 1]));
+}
 
 /** Two triangles that cover a side of a box. */
 function quad(corners, side) {

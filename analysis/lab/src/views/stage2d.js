@@ -76,18 +76,20 @@ export function Stage2d({lab, state, source, which}) {
       const nodes = shownNodes(tree, b, view, selection, lit), fill = nodes.filter((node) => isLit(lit, b, node)).length <= 5;
       for (const node of nodes) {
         const [x0, y0, x1, y1] = rect(node), chosen = b === selection.body && node === selection.node;
-        if (fill && isLit(lit, b, node)) { c.fillStyle = colours.litSoft; c.globalAlpha = 0.45; c.fillRect(x0, y0, x1 - x0, y1 - y0); c.globalAlpha = 1; }
+        if (fill && view.boxes !== 'side' && isLit(lit, b, node)) { c.fillStyle = colours.litSoft; c.globalAlpha = 0.45; c.fillRect(x0, y0, x1 - x0, y1 - y0); c.globalAlpha = 1; }
         c.strokeStyle = chosen ? colours.ink : colours.level(tree.depth[node]);
         c.lineWidth = chosen ? 3 : Math.max(1, 2.4 - 0.4 * tree.depth[node]);
-        c.strokeRect(x0, y0, x1 - x0, y1 - y0);
+        if (view.boxes !== 'side') c.strokeRect(x0, y0, x1 - x0, y1 - y0);
       }
       for (const node of nodes) {
         const [x0, y0, x1, y1] = rect(node), ends = [[x0, y0, x0, y1], [x1, y0, x1, y1], [x0, y1, x1, y1], [x0, y0, x1, y0]];
         for (let side = 0; side < 4; ++side) {
           const chosen = b === selection.body && node === selection.node && side === selection.side;
-          if (!chosen && !isLit(lit, b, node, side)) continue;
-          c.strokeStyle = chosen ? colours.realiser : colours.lit;
-          c.lineWidth = chosen ? 5 : 4;
+          const lone = view.boxes === 'side' && side === selection.side;
+          if (view.boxes === 'side' && !lone) continue;
+          if (!chosen && !lone && !isLit(lit, b, node, side)) continue;
+          c.strokeStyle = chosen ? colours.realiser : isLit(lit, b, node, side) ? colours.lit : colours.level(tree.depth[node]);
+          c.lineWidth = chosen ? 5 : lone ? Math.max(2, 5 - tree.depth[node]) : 4;
           stroke(c, ...ends[side]);
         }
       }
