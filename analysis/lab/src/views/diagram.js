@@ -2,7 +2,7 @@
  * The value-time diagram of one side of one node: every vertex below the node as a line, the envelope that the bound must
  * follow, the present certificate, and the events where lines cross. Wheel or + and - zoom, dragging moves.
  */
-import {html, Canvas, font, haloText, pointerAt, ticks, tickText, useMemo, useRef, useState} from './dom.js';
+import {html, Canvas, font, haloText, pointerAt, ticks, tickText, useMemo, usePinch, useRef, useState} from './dom.js';
 import {envelope} from '../math/envelope.js';
 import {axisNames, axisOf, isUpper, sideName, valueAt} from '../math/plans.js';
 import {linesBelow} from '../text/tenure.js';
@@ -16,6 +16,7 @@ const manyLines = 500;
 export function Diagram({lab, state}) {
   const {trees, selection, scene, info, at, history, precision} = state;
   const [zoom, setZoom] = useState(null);  // {t0, t1, v0, v1}
+  const pinch = usePinch((middle, factor) => zoomAt(middle, 1 / factor));
   const hits = useRef([]), drag = useRef(null), frame = useRef(null), hover = useRef(null);
   const tree = trees[selection.body], {node, side} = selection;
   const known = tree && node < tree.size;
@@ -166,7 +167,7 @@ export function Diagram({lab, state}) {
       haloText(c, text, Math.max(left + 2, x), height - bottom - 8, colours.challenger, colours.panel);
     }
     if (fromBelow && X(fromBelow.time) > left && X(fromBelow.time) < width - right) {
-      const text = `before that, from below: v${fromBelow.loser} takes over in node ${fromBelow.node}`;
+      const text = `${certificate ? 'before that' : 'next'}, from below: v${fromBelow.loser} takes over in node ${fromBelow.node}`;
       const x = Math.min(X(fromBelow.time) + 6, width - right - c.measureText(text).width);
       haloText(c, text, Math.max(left + 2, x), height - bottom - 24, colours.ink, colours.panel);
     }
@@ -254,12 +255,13 @@ export function Diagram({lab, state}) {
       (realiser === null ? '' : `Vertex ${realiser} leads. `) + (certificate ? `Vertex ${certificate.loser} overtakes at ${when(certificate).text}.` : 'No overtaking is scheduled.');
   return html`<${Canvas} draw=${draw} role="img" tabIndex="0" data-view="diagram" aria-label=${`${label} Plus and minus zoom, 0 shows all, c shows the crossing.`}
       onKeyDown=${onKeyDown} onWheel=${(event) => { event.preventDefault(); zoomAt(pointerAt(event), event.deltaY > 0 ? 1.2 : 1 / 1.2, !event.shiftKey); }}
-      onPointerDown=${(event) => { const p = pointerAt(event), hit = pickEvent(p); const knot = pickKnot(p);
+      onPointerDown=${(event) => { if (pinch.down(event)) { drag.current = null; return; } const p = pointerAt(event), hit = pickEvent(p); const knot = pickKnot(p);
         if (knot) { setZoom(view); lab.pause(); lab.editing.remember(); lab.select({vertex: knot.vertex}); drag.current = {knot, p, from: p}; event.currentTarget.setPointerCapture(event.pointerId); return; }
         if (hit) { chooseEvent(lab, hit.place); return; } drag.current = {p, from: p}; event.currentTarget.setPointerCapture(event.pointerId); }}
-      onPointerMove=${(event) => { const p = pointerAt(event); if (drag.current?.knot) { dragKnot(drag.current.knot, p); return; } if (drag.current) { shift(p[0] - drag.current.p[0], p[1] - drag.current.p[1]); drag.current.p = p; return; }
+      onPointerMove=${(event) => { if (pinch.move(event)) return; const p = pointerAt(event); if (drag.current?.knot) { dragKnot(drag.current.knot, p); return; } if (drag.current) { shift(p[0] - drag.current.p[0], p[1] - drag.current.p[1]); drag.current.p = p; return; }
         const id = pickLine(p); if (id !== hover.current) { hover.current = id; event.currentTarget.title = id === null ? '' : `vertex ${id}`; } event.currentTarget.style.cursor = pickKnot(p) ? 'ns-resize' : pickEvent(p) ? 'pointer' : id !== null ? 'pointer' : 'grab'; }}
-      onPointerUp=${(event) => { const p = pointerAt(event), d = drag.current; drag.current = null; if (d && !d.knot && Math.hypot(p[0] - d.from[0], p[1] - d.from[1]) < 4) { setZoom(zoom); const id = pickLine(p); if (id !== null) lab.select({vertex: id}); } }}
+      onPointerCancel=${(event) => { pinch.up(event); drag.current = null; }}
+      onPointerUp=${(event) => { pinch.up(event); const p = pointerAt(event), d = drag.current; drag.current = null; if (d && !d.knot && Math.hypot(p[0] - d.from[0], p[1] - d.from[1]) < 4) { setZoom(zoom); const id = pickLine(p); if (id !== null) lab.select({vertex: id}); } }}
       onDblClick=${() => setZoom(null)} />
     <div class="diagram-tools"><button onClick=${toEvent} disabled=${!certificate} title="Zoom on the crossing (c)">crossing</button>
       <button onClick=${() => setZoom(null)} disabled=${!zoom} title="Show all (0)">all</button></div>`;

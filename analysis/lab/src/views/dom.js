@@ -74,6 +74,33 @@ export function pointerAt(event) {
   return [event.clientX - box.left, event.clientY - box.top];
 }
 
+/**
+ * Two fingers zoom. Returns handlers that see pointers first: `down`, `move` and `up` return true while two fingers are on
+ * the canvas; `zoomAt([x, y], factor)` is called with the middle and the change of the distance.
+ */
+export function usePinch(zoomAt) {
+  const fingers = useRef(new Map()), last = useRef(0), call = useRef(zoomAt);
+  call.current = zoomAt;
+  const distance = ([[x0, y0], [x1, y1]]) => Math.max(1, Math.hypot(x0 - x1, y0 - y1));
+  return {
+    down(event) {
+      fingers.current.set(event.pointerId, pointerAt(event));
+      if (fingers.current.size === 2) last.current = distance([...fingers.current.values()]);
+      return fingers.current.size === 2;
+    },
+    move(event) {
+      if (!fingers.current.has(event.pointerId)) return false;
+      fingers.current.set(event.pointerId, pointerAt(event));
+      if (fingers.current.size !== 2) return false;
+      const [a, b] = [...fingers.current.values()], now = distance([a, b]);
+      call.current([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], now / last.current);
+      last.current = now;
+      return true;
+    },
+    up(event) { fingers.current.delete(event.pointerId); return false; },
+  };
+}
+
 /** Sets the font of a canvas: size in pixels. */
 export function font(context, size = 12, weight = 400) {
   context.font = `${weight} ${size}px system-ui, "Segoe UI", "DejaVu Sans", sans-serif`;

@@ -1,5 +1,5 @@
 /** The scene in the plane: primitives, boxes, flight plans; points can be picked, and dragged while editing. */
-import {html, Canvas, font, haloText, pointerAt, ticks, tickText, useRef, useState} from './dom.js';
+import {html, Canvas, font, haloText, pointerAt, ticks, tickText, usePinch, useRef, useState} from './dom.js';
 import {isLit} from '../state/lit.js';
 import {shownNodes} from './shown.js';
 import {positionAt} from '../math/plans.js';
@@ -139,6 +139,7 @@ export function Stage2d({lab, state, source, which}) {
     });
   };
 
+  const pinch = usePinch((middle, factor) => zoomAt(middle, factor));
   const pickVertex = ([px, py]) => {
     const {X, Y} = frame.current;
     let best = null;
@@ -166,6 +167,7 @@ export function Stage2d({lab, state, source, which}) {
     return best;
   };
   const onPointerDown = (event) => {
+    if (pinch.down(event)) { drag.current = null; return; }
     const p = pointerAt(event), hit = pickVertex(p);
     event.currentTarget.setPointerCapture(event.pointerId);
     if (hit) lab.select({body: hit.body, vertex: hit.vertex});
@@ -176,6 +178,7 @@ export function Stage2d({lab, state, source, which}) {
     } else drag.current = {kind: 'pan', p, from: p, hit, z: {x: frame.current.x, y: frame.current.y, scale: frame.current.scale}};
   };
   const onPointerMove = (event) => {
+    if (pinch.move(event)) return;
     const p = pointerAt(event), d = drag.current;
     if (!d) { event.currentTarget.style.cursor = pickVertex(p) ? (view.edit ? 'move' : 'pointer') : 'grab'; return; }
     const f = frame.current;
@@ -183,6 +186,7 @@ export function Stage2d({lab, state, source, which}) {
     else if (Math.hypot(p[0] - d.from[0], p[1] - d.from[1]) > 3) setZoom({scale: d.z.scale, x: d.z.x - (p[0] - d.from[0]) / d.z.scale, y: d.z.y + (p[1] - d.from[1]) / d.z.scale});
   };
   const onPointerUp = (event) => {
+    pinch.up(event);
     const d = drag.current, p = pointerAt(event);
     drag.current = null;
     if (d?.kind === 'pan' && !d.hit && Math.hypot(p[0] - d.from[0], p[1] - d.from[1]) <= 3) { const box = pickBox(p); if (box) lab.select({body: box.body, node: box.node, side: box.side}); }
@@ -203,7 +207,7 @@ export function Stage2d({lab, state, source, which}) {
     act();
   };
   return html`<${Canvas} draw=${draw} role="img" tabIndex="0" data-view="stage" aria-label=${`${scene.name} in the plane at ${at.time.toFixed(4)} seconds. Plus and minus zoom, arrows move, 0 shows all, v and Shift v choose a vertex.`}
-    onPointerDown=${onPointerDown} onPointerMove=${onPointerMove} onPointerUp=${onPointerUp} onKeyDown=${onKeyDown}
+    onPointerDown=${onPointerDown} onPointerMove=${onPointerMove} onPointerUp=${onPointerUp} onPointerCancel=${onPointerUp} onKeyDown=${onKeyDown}
     onWheel=${(event) => { event.preventDefault(); zoomAt(pointerAt(event), event.deltaY > 0 ? 1 / 1.15 : 1.15); }} onDblClick=${() => setZoom(null)} />`;
 }
 
