@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 
-import { startBrowser } from './support/page.mjs';
+import { built, startBrowser } from './support/page.mjs';
 
 let browser;
 before(async () => { browser = await startBrowser(); });
@@ -153,6 +153,21 @@ test('a link keeps the whole state', () => withPage({ hash: '#scene=overtake-8' 
   const again = await second.lab(async (lab) => ({ state: lab.getState(), hash: await lab.engine.checkpoint() }));
   assert.deepEqual(again.state, given.state);
   assert.equal(again.hash, given.hash);
+  assert.deepEqual(second.problems, []);
+  await second.page.close();
+}));
+
+test('a saved file keeps the whole state, and the page in one file reads it', () => withPage({ hash: '#scene=strip-4' }, async ({ lab }) => {
+  const saved = await lab(async (lab) => { await lab.seek(0.5); await lab.event(1); lab.view({ panel: 'box' }); return lab.getState(); });
+  const second = await browser.open({ file: built.replace('index.html', 'lab.html') });
+  await second.page.evaluate((text) => {
+    const data = new DataTransfer();
+    data.items.add(new File([text], 'state.kbvh-lab.json'));
+    document.querySelector('.kbvh-lab').dispatchEvent(new DragEvent('drop', { dataTransfer: data, bubbles: true, cancelable: true }));
+  }, JSON.stringify(saved));
+  await second.page.waitForFunction(() => document.querySelector('[data-kbvh-lab-page]').lab.state.sceneId === 'strip-4');
+  await second.settle();
+  assert.deepEqual(await second.lab((lab) => lab.getState()), saved);
   assert.deepEqual(second.problems, []);
   await second.page.close();
 }));

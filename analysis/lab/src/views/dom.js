@@ -23,7 +23,7 @@ export function coloursOf(element) {
   const colours = {};
   for (const name of names) colours[name.replace(/-(.)/g, (_, c) => c.toUpperCase())] = style.getPropertyValue(`--${name}`).trim();
   colours.body = (b) => [colours.body0, colours.body1, colours.body2][b % 3];
-  colours.level = (depth) => [colours.level0, colours.level1, colours.level2, colours.level3, colours.level4, colours.level5][depth % 6];
+  colours.level = (depth) => [colours.level0, colours.level1, colours.level2, colours.level3, colours.level4, colours.level5][Math.min(depth, 5)];
   return colours;
 }
 
