@@ -46,9 +46,18 @@ export async function openFiles(lab, list) {
     const contents = await Promise.all(files.map(async (file) => ({name: file.name, bytes: await file.arrayBuffer()})));
     await show(lab, names, contents);
   } catch (error) {
-    lab.store.set({error: `${names}: ${error.message}`});
+    lab.store.set({error: `${names}: ${plain(error.message)}`});
   }
 }
+
+/** The animations that the reader names when it asks for one: "choose a clip of: 0 'Walk', 1 'Run'"; else null. */
+function clipsOf(message) {
+  const list = /choose a clip of: (.*)$/.exec(message)?.[1];
+  return list ? Array.from(list.matchAll(/(\d+) '([^']*)'/g), ([, id, title]) => ({id, title: title || `animation ${id}`})) : null;
+}
+
+/** A message without the folder in which the engine sees files. */
+const plain = (message) => message.replaceAll('/files/', '');
 
 /** Reads files by the engine and loads the scene. */
 async function show(lab, names, contents, options = {}) {
@@ -56,6 +65,14 @@ async function show(lab, names, contents, options = {}) {
   await lab.enqueue('loading', `Reading ${names}`, async () => {
     try { scene = await lab.engine.readScene(contents, options); } catch (error) { failure = error; }
   });
+  const clips = failure && clipsOf(failure.message);
+  if (clips) {
+    lab.store.set({choice: {text: `${names} has ${clips.length} animations. Which one?`, options: clips.map(({id, title}) => ({title, act: () => {
+      lab.store.set({choice: null});
+      return show(lab, names, contents, {...options, clip: id}).catch((error) => lab.store.set({error: `${names}: ${plain(error.message)}`}));
+    }}))}});
+    return;
+  }
   if (failure) throw failure;
   const primitives = scene.bodies.reduce((sum, body) => sum + (body.offsets ? body.offsets.length - 1 : body.indices.length / 3), 0);
   if (primitives > mostPrimitives) throw new Error(`${primitives} primitives; the lab takes up to ${mostPrimitives}. The command-line program takes more.`);

@@ -19,6 +19,7 @@ export function initialState() {
     phase: 'empty',
     task: '',                // what is being loaded or computed, in words
     error: '',               // the last error, in words
+    choice: null,            // a question to the user: {text, options: [{title, act}]}
     notice: '',              // what the last action did, for the live region
     strategies: [],          // from the engine
     meanings: new Map(),     // of counters, by name

@@ -22,7 +22,7 @@ export function Diagram({lab, state}) {
   const known = tree && node < tree.size;
   const total = known ? tree.verticesBelow(node).length : 0, few = total <= manyLines;
   const always = !known || few ? [] : specialVertices(tree, node, side, selection.vertex, at?.queue ?? []);
-  const lines = useMemo(() => known ? linesBelow(scene, tree, node, side, precision, manyLines / 2, always) : [], [scene, known && tree.childStart, node, side, precision, always.join()]);
+  const lines = useMemo(() => known ? linesBelow(scene, tree, node, side, precision, few ? Infinity : manyLines / 2, always) : [], [scene, known && tree.childStart, node, side, precision, always.join()]);
   const pieces = useMemo(() => few && info ? envelope(lines, isUpper(side), info.begin, info.end) : [], [lines, info]);
   const whole = useMemo(() => extent(lines, info), [lines, info]);
   if (!known || !at) return html`<div class="empty">Choose a node that has a box.</div>`;

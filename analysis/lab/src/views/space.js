@@ -121,6 +121,7 @@ export class Space {
       return {object, geometry, wire};
     });
     this.box = boxOf(state.scene);
+    this.camera.up.set(0, 0, 1);
     if (!sameSpace) this.fit();
   }
 

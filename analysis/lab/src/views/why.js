@@ -41,8 +41,9 @@ function EventList({lab, state}) {
     const row = now.current, list = row?.closest('.event-list');
     if (list) list.scrollTop = row.offsetTop - list.clientHeight / 2;
   }, [at.eventsDone, history.length]);
-  return html`<h3 class="list-head">${count(history.length, 'event')} performed, ${scheduled} scheduled</h3>
+  return html`<h3 class="list-head">${count(at.eventsDone, 'event')} performed, ${scheduled} scheduled</h3>
     <ol class="event-list" aria-label="Events around now" tabIndex="0">
+    ${at.eventsDone > history.length && html`<li class="more">The first ${at.eventsDone} events are not listed: too many.</li>`}
     ${history.length > past.length && html`<li class="more">… ${history.length - past.length} earlier</li>`}
     ${past.map((step) => html`<li><button class=${`event past ${selection.event?.done === step.index ? 'chosen' : ''}`} onClick=${() => chooseEvent(lab, {done: step.index})}>
       <span class="event-time">${clock(step.event, info.end - info.begin)}</span> ${title(step.event, info.bodies)}</button></li>`)}
