@@ -77,6 +77,7 @@ async function show(lab, names, contents, options = {}) {
   const primitives = scene.bodies.reduce((sum, body) => sum + (body.offsets ? body.offsets.length - 1 : body.indices.length / 3), 0);
   if (primitives > mostPrimitives) throw new Error(`${primitives} primitives; the lab takes up to ${mostPrimitives}. The command-line program takes more.`);
   lab.editing.forget();
+  lab.view({up: contents.some(({name}) => /\.gl(b|tf)$/i.test(name)) ? 'y' : 'z'});  // glTF says that y points up
   const loaded = await lab.load({scene, sceneId: null, topology: lab.defaultTopology(lab.state.strategy, scene)}, {selection: {}});
   if (loaded) lab.say(`Opened ${names}: ${primitives} primitives.`);
 }

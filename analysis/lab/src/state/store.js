@@ -45,7 +45,7 @@ export function initialState() {
 
 /** What is shown, and how. Kept in links. */
 export function defaultView() {
-  return {boxes: 'level', level: 'all', paths: true, labels: true, panel: 'why', theme: 'auto', follow: true, edit: false, drag: 'keyframe', zoom: null};
+  return {boxes: 'level', level: 'all', up: 'z', paths: true, labels: true, panel: 'why', theme: 'auto', follow: true, edit: false, drag: 'keyframe', zoom: null};
 }
 
 /** Creates a store. `set(patch)` merges and notifies; `subscribe(fn)` returns the function that ends it. */
