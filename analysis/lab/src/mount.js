@@ -108,7 +108,8 @@ function Tabs({lab, state, shown}) {
 
 function TreeTools({lab, state}) {
   const {info, selection, lit} = state;
-  return html`<span class="hint">${state.at && lit.count ? `${lit.count} ${lit.by === 'realiser' ? (lit.count === 1 ? 'side has a new realiser' : 'sides have new realisers') : 'bounds rewritten'}` : ''}</span>
+  const since = state.step ? 'by this event' : info?.hasEvents ? 'since the frame before' : 'since the last view';
+  return html`<span class="hint">${state.at && lit.count ? `${lit.count} ${lit.by === 'realiser' ? (lit.count === 1 ? 'side has a new realiser' : 'sides have new realisers') : 'bounds rewritten'} ${since}` : ''}</span>
     ${info?.bodies.length > 1 && html`<label>Body <select value=${String(selection.body)} onChange=${(event) => lab.select({body: Number(event.currentTarget.value)})}>${info.bodies.map((body, b) => html`<option value=${String(b)}>${body.name}</option>`)}</select></label>`}`;
 }
 

@@ -4,6 +4,7 @@ import {Tree} from '../math/hierarchy.js';
 import {Comparison} from './compare.js';
 import {Editing} from './editing.js';
 import {difference, nothingLit, touched} from './lit.js';
+import {title, when} from '../text/why.js';
 import {checkScene, checkState} from './permalink.js';
 import {createStore, defaultView} from './store.js';
 import {sceneById} from './scenes.js';
@@ -201,8 +202,8 @@ export class Lab {
       if (!info.hasEvents) { this.say('This strategy has no events: it works frame by frame.'); return; }
       if (direction > 0) {
         const {step, state} = await this.engine.event(info.end, this.#want());
-        if (!step) this.say('No further event in this clip.');
         this.#arrive(state, step);
+        this.say(step ? `Event ${step.index + 1} at ${when(step.event).text}: ${title(step.event, info.bodies)}.` : 'No further event in this clip.');
       } else {
         if (!at.eventsDone) { this.say('No event before this time.'); return; }
         const undone = history[at.eventsDone - 1] ?? null;
@@ -314,7 +315,7 @@ export class Lab {
     const flats = at.hierarchies?.map((hierarchy) => hierarchy?.flat ?? null);
     const trees = flats ? flats.map((flat, b) => !flat ? null
         : old.trees[b] ? old.trees[b].next(flat, old.info.bodies[b]) : new Tree(flat, b, old.info.bodies[b])) : old.trees;
-    const lit = step ? touched(step, trees) : old.at && flats ? difference(old.trees, trees) : nothingLit;
+    const lit = step ? touched([step], trees) : old.at && flats ? difference(old.trees, trees) : nothingLit;
     const selection = this.#selectionIn(trees, old.selection);
     this.store.set({
       at: {...at, queue: at.queue ?? old.at?.queue ?? []}, trees, lit, step, notice: '',
@@ -345,12 +346,23 @@ export class Lab {
     return tree && selection.node >= tree.size ? {...selection, node: 0} : selection;
   }
 
+  /** Fetches the events that the history lacks; after a move in time, lights what changed since the frame before. */
   async #followHistory() {
     const {info, at, history} = this.state;
-    if (!info?.hasEvents || at.eventsDone <= history.length) return;
-    if (at.eventsDone - history.length > manyEvents) return;
-    const more = await this.engine.history(history.length);
-    this.store.set({history: [...history, ...more.filter((step) => step.index >= history.length)]});
+    if (!info?.hasEvents || at.eventsDone - history.length > manyEvents) return;
+    if (at.eventsDone > history.length) {
+      const more = await this.engine.history(history.length);
+      this.store.set({history: [...history, ...more.filter((step) => step.index >= history.length)]});
+    }
+    if (!this.state.step) this.#lightFrame();
+  }
+
+  #lightFrame() {
+    const {at, frames, history, trees} = this.state;
+    const frame = frameAt(frames, at.time), from = frames[frame] === at.time ? frames[frame - 1] ?? -Infinity : frames[frame];
+    let first = history.length;
+    while (first > 0 && history[first - 1].event.time > from) --first;
+    this.store.set({lit: touched(history.slice(first), trees)});
   }
 
   async #refresh() {

@@ -220,9 +220,16 @@ export function dragVertex(lab, {body, vertex}, position, precision) {
   else {
     const keyframe = nearestKeyframe(scene.bodies[body], at.time), p = scene.bodies[body].positions[keyframe];
     const tidy = (x) => Math.round(x * 1024) / 1024;
-    const target = scene.bodies[body].times[keyframe] === at.time ? position : [0, 1, 2].map((axis) => p[3 * vertex + axis] + by[axis]);
+    const share = shareOf(scene.bodies[body].times, keyframe, at.time);
+    const target = share === 1 ? position : [0, 1, 2].map((axis) => p[3 * vertex + axis] + by[axis] / share);
     lab.editing.apply('setKeyframe', {body, vertex, keyframe, position: target.map(tidy)}, {remember: false});
   }
+}
+
+/** How much of a keyframe's move a vertex makes at time t: 1 at the keyframe, 1/2 half-way to the next one. */
+function shareOf(times, keyframe, t) {
+  const next = times[keyframe + Math.sign(t - times[keyframe])];
+  return t === times[keyframe] || next === undefined ? 1 : 1 - Math.abs(t - times[keyframe]) / Math.abs(next - times[keyframe]);
 }
 
 /** Moves the chosen vertex by a small step: Shift and an arrow key (Page keys for z). */
