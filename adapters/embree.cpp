@@ -29,9 +29,13 @@
 // state is restored. Upper bounds are an ulp or two larger, because Embree's builder asserts that the box of
 // all primitives is not a point.
 //
+// Rays. rtcIntersect1 and rtcOccluded1 on triangle geometry, body after body: the fan of each polygon in a
+// compact scene that is refitted like the others (with geometry=triangles and bodies of triangles, by the
+// update itself; otherwise at the first rays of a frame, so the time of rays then includes that refit).
+// Embree decides in float without a bound on its error, and may miss rays through edges and corners: its
+// answers are Embree's own, marked approximate, and their differences from the truth are counted.
+//
 // The hierarchy is not visible, so there is no audit. Float scenes only.
-#include <embree3/rtcore.h>
-
 #include <Eigen/Core>
 #include <atomic>
 #include <cstring>
@@ -40,10 +44,8 @@
 #include <thread>
 #include <type_traits>
 #include <utility>
-#if defined(__SSE__)
-#include <xmmintrin.h>
-#endif
 
+#include "adapters/embree.hpp"
 #include "core/base/assert.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
@@ -51,66 +53,10 @@
 namespace kbvh {
 namespace {
 
-/// Restores the floating-point state: Embree flushes denormals and may leave that mode set.
-class KeepFloatingPointState {
- public:
-#if defined(__SSE__)
-  KeepFloatingPointState() : state_(_mm_getcsr()) {}
-  ~KeepFloatingPointState() {
-    _mm_setcsr(state_);
-  }
-
- private:
-  unsigned state_;
-#else
-  KeepFloatingPointState() {}
-  ~KeepFloatingPointState() {}
-#endif
-};
-
-struct ReleaseDevice {
-  using pointer = RTCDevice;
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-};
-struct ReleaseScene {
-  using pointer = RTCScene;
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-};
-struct ReleaseGeometry {
-  using pointer = RTCGeometry;
-  void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
-};
-
-using DevicePointer = std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseDevice>;
-using ScenePointer = std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene>;
-using GeometryPointer = std::unique_ptr<std::remove_pointer_t<RTCGeometry>, ReleaseGeometry>;
-
-/// A scene of one geometry that is refitted at each commit.
-struct RefitScene {
-  ScenePointer scene;  // none for an empty body
-  GeometryPointer geometry;
-
-  RTCGeometry make(RTCDevice device, RTCGeometryType type) {
-    scene.reset(rtcNewScene(device));
-    rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_LOW);
-    rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_COMPACT);
-    geometry.reset(rtcNewGeometry(device, type));
-    rtcSetGeometryBuildQuality(geometry.get(), RTC_BUILD_QUALITY_REFIT);
-    return geometry.get();
-  }
-  void build() {
-    rtcCommitGeometry(geometry.get());
-    rtcAttachGeometry(scene.get(), geometry.get());
-    rtcCommitScene(scene.get());
-  }
-  void refit() {
-    rtcCommitGeometry(geometry.get());
-    rtcCommitScene(scene.get());
-  }
-};
-
 template <class S, class Count>
-class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+class EmbreeRefit final : public CountedStrategy<S, Count>,
+                          public AnswersRays<S>,
+                          public TakesPlanChanges<S> {
   static_assert(std::is_same_v<S, float>);
 
  public:
@@ -183,6 +129,34 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
     return {};
   }
 
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    const KeepFloatingPointState keep;
+    for (BodyState& state : bodies_) bring_fans_up_to_date(state);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      hits[i] = {};
+      RTCRayHit found = ray_of(rays[i]);
+      for (BodyState& state : bodies_) {
+        if (!state.fans().scene) continue;
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        if (query == RayQuery::any) {
+          rtcOccluded1(state.fans().scene.get(), &context, &found.ray);
+          if (found.ray.tfar >= 0) continue;
+          hits[i] = {state.body, RayHit::none, std::numeric_limits<double>::quiet_NaN()};
+          break;
+        }
+        found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        rtcIntersect1(state.fans().scene.get(), &context, &found);
+        if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+        const std::uint32_t fan = found.hit.primID;
+        hits[i] = {state.body, state.fan_primitives.empty() ? fan : state.fan_primitives[fan],
+                   double(found.ray.tfar)};
+      }
+    }
+    check();
+  }
+
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     for (const auto& change : changes) bodies_[change.body].moves = true;
   }
@@ -191,7 +165,9 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
   std::size_t bytes() const override {
     std::size_t total = std::size_t(memory_.load()) + bodies_.size() * sizeof(BodyState);
     for (const BodyState& state : bodies_)
-      total += state.own_vertices.size() * sizeof(float) + state.own_indices.size() * sizeof(std::uint32_t);
+      total += state.own_vertices.size() * sizeof(float) +
+               (state.own_indices.size() + state.fan_indices.size() + state.fan_primitives.size()) *
+                   sizeof(std::uint32_t);
     return total;
   }
 
@@ -210,6 +186,13 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
     std::vector<float>
         own_vertices;  // three per primitive and padding, for bodies with primitives other than triangles
     std::vector<std::uint32_t> own_indices;
+    // For rays, made at the first of them.
+    RefitScene own_fans;  // unless `triangles` serves
+    bool fans_are_triangles = false, fans_are_old = true;
+    const float* fan_vertices = nullptr;
+    std::vector<std::uint32_t> fan_indices, fan_primitives;  // empty for bodies of triangles
+
+    RefitScene& fans() { return fans_are_triangles ? triangles : own_fans; }
   };
   struct Collected {
     BodyPair bodies{};
@@ -282,6 +265,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
   void update(BodyState& state) {
     if (!state.boxes.scene) return;
     const KeepFloatingPointState keep;
+    state.fans_are_old = true;
     if (refits_ == Refits::triangles) {
       state.positions = this->sampled_.positions(state.body);
       share_vertices(state);
@@ -299,6 +283,43 @@ class EmbreeRefit final : public CountedStrategy<S, Count>, public TakesPlanChan
     state.positions = this->sampled_.positions(state.body);
     state.boxes.refit();
     state.boxes_are_old = false;
+  }
+
+  /// Makes or refits the triangles that rays meet.
+  void bring_fans_up_to_date(BodyState& state) {
+    const Primitives& primitives = *state.primitives;
+    if (!state.boxes.scene || primitives.kind != PrimitiveKind::polygons || !state.fans_are_old) return;
+    state.fans_are_old = false;
+    state.positions = this->sampled_.positions(state.body);
+    state.fans_are_triangles = refits_ == Refits::triangles && state.only_triangles;
+    if (state.fans_are_triangles) return;
+    const bool fresh = !state.own_fans.scene;
+    if (fresh) {
+      RTCGeometry geometry = state.own_fans.make(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
+      if (!state.only_triangles) list_fans(state);
+      const auto& indices = state.only_triangles ? primitives.vertices : state.fan_indices;
+      rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices.data(), 0,
+                                 3 * sizeof(std::uint32_t), indices.size() / 3);
+    }
+    if (state.positions != state.fan_vertices)
+      rtcSetSharedGeometryBuffer(state.own_fans.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                 state.positions, 0, 3 * sizeof(float),
+                                 this->scene_.vertex_count(state.body));
+    else
+      rtcUpdateGeometryBuffer(state.own_fans.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0);
+    state.fan_vertices = state.positions;
+    fresh ? state.own_fans.build() : state.own_fans.refit();
+  }
+  static void list_fans(BodyState& state) {
+    for (std::uint32_t p = 0; p < state.primitives->count(); ++p) {
+      const auto vertices = (*state.primitives)[p];
+      const std::size_t last = vertices.size() - 1, triangles = last < 2 ? 1 : last - 1;
+      for (std::size_t i = 0; i < triangles; ++i) {
+        for (const std::size_t corner : {std::size_t(0), i + 1, i + 2})
+          state.fan_indices.push_back(vertices[std::min(corner, last)]);
+        state.fan_primitives.push_back(p);
+      }
+    }
   }
 
   using Lanes = Eigen::Array4f;
@@ -429,6 +450,7 @@ KBVH_STRATEGY(embree) {
   info.citation = "Wald et al. 2014 (Embree 3.13)";
   info.tightness = Tightness::conservative;
   info.guarantee = Guarantee::candidate_superset;
+  info.rays_guarantee = Guarantee::approximate;
   info.positions = PositionUse::all;
   info.topology.own = true;
   info.own_scalar = "float";

@@ -222,6 +222,8 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "scene_name": record.text("scene.name"),
         "origin": record.text("scene.origin", ""),
         "changes": _changes(record),
+        "answer": record.text("scene.changes", ""),
+        "changed_per_frame": _changed_per_frame(record),
         "hash": str(record.get("scene.hash", "")),
         "card": str(record.get("scene.card", "")),
         "scalar": record.text("scene.scalar"),
@@ -309,6 +311,13 @@ def _changes(record: _Record) -> str:
     """Describes the script of plan changes; empty without one."""
     steps, changes = record.number("scene.script.steps", 0), record.number("scene.script.changes", 0)
     return f"{changes:.0f} of single vertices, in {steps:.0f} frames" if changes else ""
+
+
+def _changed_per_frame(record: _Record) -> float:
+    """Returns the pairs that begin or end per frame; unknown unless answers were asked as changes."""
+    steps = record.number("scene.frames", math.nan) - 1
+    changed = record.number("changes.begun", math.nan) + record.number("changes.ended", math.nan)
+    return changed / steps if steps > 0 else math.nan
 
 
 def _moving(bodies: Any) -> float:

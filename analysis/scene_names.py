@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pandas as pd
+
+#: The end of a scene's name that tells what was asked instead of pairs at frames.
+ANSWER = re.compile(r"( \((contacts|changes of (candidates|pairs))\))?$")
 
 
 def family(name: str, bodies: Any) -> str:
     """Removes the numbers of primitives from a scene's name, so that its sizes belong together.
 
-    `tablecloth-2048-200` is `tablecloth` if its bodies have 2048 and 200 primitives.
+    `tablecloth-2048-200` is `tablecloth` if its bodies have 2048 and 200 primitives. The kind of answer stays: "(contacts)",
+    "(changes of pairs)".
     """
+    answer = ANSWER.search(name)[0]
+    name = name.removesuffix(answer)
     listed = bodies if isinstance(bodies, list) else []
     counts = {str(body.get("primitives")) for body in listed if isinstance(body, dict)}
     head, *rest = name.split("-")
-    return "-".join([head, *(part for part in rest if part not in counts)])
+    return "-".join([head, *(part for part in rest if part not in counts)]) + answer
 
 
 def told_apart(runs: pd.DataFrame) -> tuple[pd.Series, list[str]]:

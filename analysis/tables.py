@@ -121,6 +121,10 @@ def _facts(first: pd.Series, several_machines: bool) -> str:
         parts.append(text.plural(int(first["keyframes"]), "keyframe"))
     if first["hash"]:
         parts.append(f"hash {first['hash'][:12]}")
+    if first["answer"]:
+        parts.append(
+            f"asked as changes of {first['answer']}: {text.significant(first['changed_per_frame'], 3)} pairs begin or end per frame"
+        )
     if several_machines:
         parts.append(first["machine"])
     return ", ".join(parts)

@@ -82,7 +82,7 @@ const std::vector<Candidate>& candidates() {
 /// Counts nothing itself: its counters are those of its instances, with the triangle tests of silent ones, so
 /// it is no CountedStrategy.
 template <class S, class Count>
-class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
+class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
 
@@ -118,6 +118,8 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
     changes_ = false;
     chosen_candidates_ = 0;
     touching_.clear();
+    for (Reported& one : reported_) one.start_over();
+    switches_ = 0;
     changed_.clear();
     body_changed_.assign(this->scene_.body_count(), 0);
     seen_ = {};
@@ -136,6 +138,7 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
                      (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
                      seen_.candidates > 2 * chosen_candidates_ || 2 * seen_.candidates < chosen_candidates_;
     if (step_ > 0 && due) choose(t);
+    if (active_ != last) ++switches_;
     Runner& runner = runners_[active_];
     if (runner.all_positions) fetch_all();
     if (active_ == last || runner.fresh) {
@@ -167,6 +170,29 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
 
   void confirm_candidates(double t, PairBuffer& pairs) override {
     runners_[active_].strategy->confirm(t, pairs);
+  }
+
+  /// Forwards; a strategy that has become active since the last call begins all pairs, and is compared with
+  /// what the one before has reported.
+  void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
+    Reported& reported = reported_[std::size_t(answer)];
+    Strategy<S>& strategy = *runners_[active_].strategy;
+    if (reported.switches == switches_) {
+      strategy.changes_at(t, answer, begun, ended);
+    } else {
+      reported.switches = switches_;
+      strategy.changes_at(t, answer, now_, none_);
+      before_.clear();
+      reported.pairs.append_to(before_);
+      difference_.find(before_, now_, begun, ended);
+    }
+    for (const PrimitivePair& pair : ended) reported.pairs.erase(pair);
+    for (const PrimitivePair& pair : begun) reported.pairs.insert(pair);
+    // Pairs that intersect stand for the candidates among which they are.
+    if (runners_[active_].all_positions || seen_.candidates == 0)
+      seen_.candidates = double(reported.pairs.size());
+    touching_.clear();
+    reported.pairs.sample(samples, touching_);
   }
 
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
@@ -205,7 +231,9 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
 
   std::size_t bytes() const override {
     std::size_t total =
-        touching_.capacity() * sizeof(PrimitivePair) + changed_.capacity() * sizeof(PlanChange<S>);
+        (touching_.capacity() + now_.capacity() + before_.capacity()) * sizeof(PrimitivePair) +
+        changed_.capacity() * sizeof(PlanChange<S>) + difference_.bytes() + reported_[0].pairs.bytes() +
+        reported_[1].pairs.bytes();
     for (const Runner& runner : runners_) total += runner.strategy->bytes();
     return total;
   }
@@ -368,6 +396,15 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
     if (sum > 0) seen_.spread = std::max(seen_.spread, 1 - common / sum);
   }
 
+  /// What answers as changes add up to.
+  struct Reported {
+    PairSet pairs;
+    int switches = 0;  ///< of the active strategy, at the last answer
+    void start_over() {
+      pairs.clear();
+      switches = 0;
+    }
+  };
   struct Velocities {
     std::uint32_t count = 0;  ///< none: the body rests
     double of[samples][3] = {}, mean[3] = {};
@@ -386,7 +423,11 @@ class Auto final : public Strategy<S>, public TakesPlanChanges<S> {
   bool changes_ = false;                ///< plans changed since the last frame
   std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first change of each body
   std::vector<std::uint8_t> body_changed_;
-  PairBuffer touching_;  ///< sample of the candidates of the last frame
+  PairBuffer touching_;   ///< sample of the candidates of the last frame
+  Reported reported_[2];  ///< [Answer]
+  int switches_ = 0;      ///< changes of the active strategy since `reset`
+  PairBuffer now_, none_, before_;
+  PairDifference difference_;
   Seen seen_;
 };
 

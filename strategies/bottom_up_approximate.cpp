@@ -96,6 +96,7 @@ KBVH_STRATEGY(bottom_up_approximate) {
       .citation = "van den Bergen 1997",
       .tightness = Tightness::none,
       .guarantee = Guarantee::approximate,
+      .rays_guarantee = Guarantee::approximate,
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"positions",
                       "plain",

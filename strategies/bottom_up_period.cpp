@@ -7,6 +7,7 @@
 #include "core/base/heap_block.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
+#include "core/topology/ray_traversal.hpp"
 
 namespace kbvh {
 namespace {
@@ -22,8 +23,30 @@ struct PeriodNode {
   bool is_leaf() const { return left == nullptr; }
 };
 
+/// The nodes as a tree for `follow_ray`.
+template <class S>
+struct PeriodTree {
+  using Node = const PeriodNode<S>*;
+  Node top;
+
+  Node root() const { return top; }
+  const Box<S>& box(Node node) const { return node->box; }
+  template <class Visit>
+  void children(Node node, Visit&& visit) const {
+    visit(node->left);
+    visit(node->right);
+  }
+  template <class Test>
+  bool leaf(Node node, Test&& test) const {
+    if (node->is_leaf()) test(node->primitive);
+    return node->is_leaf();
+  }
+};
+
 template <class S, class Count>
-class BottomUpPeriod final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+class BottomUpPeriod final : public CountedStrategy<S, Count>,
+                             public AnswersRays<S>,
+                             public TakesPlanChanges<S> {
   using Node = PeriodNode<S>;
 
  public:
@@ -62,6 +85,16 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>, public TakesPlanC
     return {};
   }
 
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    find_hits_by_body(
+        this->scene_, this->sampled_, query, rays, hits, [&](std::uint32_t body, RaySearch<S>& search) {
+          return roots_[body] != nullptr &&
+                 follow_ray(PeriodTree<S>{roots_[body]}, search, body, this->scene_.primitives(body),
+                            this->sampled_.positions(body), ray_stack_, this->count_, this->triangle_stats_);
+        });
+  }
+
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     plans_changed_ = true;
   }
@@ -74,7 +107,7 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>, public TakesPlanC
 
   std::size_t bytes() const override {
     std::size_t total = near_bodies_.bytes() + nodes_.size() * heap_block_bytes(sizeof(Node)) +
-                        nodes_.capacity() * sizeof(nodes_[0]);
+                        nodes_.capacity() * sizeof(nodes_[0]) + ray_stack_.capacity() * sizeof(ray_stack_[0]);
     for (const Topology& topology : topologies_) total += topology.bytes();
     return total;
   }
@@ -145,6 +178,7 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>, public TakesPlanC
   Topologies topologies_;
   std::vector<std::unique_ptr<Node>> nodes_;
   std::vector<Node*> roots_;
+  std::vector<RayNode<const Node*>> ray_stack_;
   bool plans_changed_ = false;
 };
 

@@ -5,6 +5,7 @@
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
+#include "core/topology/ray_traversal.hpp"
 
 namespace kbvh {
 namespace {
@@ -25,7 +26,9 @@ struct RecursiveBody {
 
 /// Both recursions are as deep as the topologies: log2 n for the median.
 template <class S, class Count>
-class BottomUpRecursive final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+class BottomUpRecursive final : public CountedStrategy<S, Count>,
+                                public AnswersRays<S>,
+                                public TakesPlanChanges<S> {
   using Body = RecursiveBody<S>;
 
  public:
@@ -65,6 +68,18 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>, public TakesPl
     return {};
   }
 
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    find_hits_by_body(
+        this->scene_, this->sampled_, query, rays, hits, [&](std::uint32_t index, RaySearch<S>& search) {
+          const Body& body = bodies_[index];
+          if (body.topology.empty()) return false;
+          const TopologyTree tree{body.topology, [&](std::uint32_t node) { return body.boxes[node]; }};
+          return follow_ray(tree, search, index, *body.primitives, body.positions, ray_stack_, this->count_,
+                            this->triangle_stats_);
+        });
+  }
+
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     plans_changed_ = true;
   }
@@ -76,7 +91,7 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>, public TakesPl
   }
 
   std::size_t bytes() const override {
-    std::size_t total = near_bodies_.bytes();
+    std::size_t total = near_bodies_.bytes() + ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
     for (const Body& body : bodies_) total += body.topology.bytes() + body.boxes.size() * sizeof(Box<S>);
     return total;
   }
@@ -146,6 +161,7 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>, public TakesPl
 
   NearBodies near_bodies_;
   std::vector<Body> bodies_;
+  std::vector<RayNode<std::uint32_t>> ray_stack_;
   bool plans_changed_ = false;
 };
 

@@ -4,6 +4,7 @@
 #include "core/contract/registry.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/scene/self_pairs.hpp"
+#include "core/topology/ray_traversal.hpp"
 
 namespace kbvh {
 namespace {
@@ -12,6 +13,7 @@ template <class S, class Count>
 class BruteForce final : public CountedStrategy<S, Count>,
                          public AnswersSelfPairs,
                          public AnswersSweeps<S>,
+                         public AnswersRays<S>,
                          public TakesPlanChanges<S>,
                          public TakesGeometryChanges<S> {
  public:
@@ -69,6 +71,22 @@ class BruteForce final : public CountedStrategy<S, Count>,
           if (overlap(swept[pair.first][i], swept[pair.second][j]))
             out.push_back({pair.first, i, pair.second, j});
     this->count_.add(Counter::box_tests, tests);
+  }
+
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    find_hits_by_body(
+        this->scene_, this->sampled_, query, rays, hits, [&](std::uint32_t body, RaySearch<S>& search) {
+          const RaySlabs slabs(search.line());
+          const Primitives& primitives = this->scene_.primitives(body);
+          this->count_.add(Counter::box_tests, boxes_[body].size());
+          double near = 0;
+          for (std::uint32_t p = 0; p < boxes_[body].size(); ++p)
+            if (primitives.alive(p) && slabs.meet(boxes_[body][p], search.limit(), near) &&
+                search.offer(body, p, primitives[p], this->sampled_.positions(body), this->triangle_stats_))
+              return true;
+          return false;
+        });
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}

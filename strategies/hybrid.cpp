@@ -115,6 +115,8 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
   WideSide<S> lazy_side(std::uint32_t body) {
     return {.hierarchy = &this->hierarchies_[body], .body = body, .stale = bodies_[body].stale.data()};
   }
+  WideSide<S> ray_side(std::uint32_t body) override { return lazy_side(body); }
+  void make_row(std::uint32_t body, std::uint32_t node) override { make_current(body, node); }
   bool is_stale(const LazyBody<S>& lazy, std::uint32_t node) const {
     if (lazy.root_of[node] == none) return false;
     return lazy.stale[below_ == Below::subtree ? lazy.root_of[node] : node] != 0;

@@ -9,6 +9,7 @@
 #include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/linear/interval_join.hpp"
+#include "core/families/linear/join_changes.hpp"
 #include "core/families/linear/linear_bounds.hpp"
 #include "core/families/linear/triangle_span_filter.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
@@ -48,6 +49,7 @@ struct WorkAhead {
 template <class S, class Count, Foresight F>
 class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
                                    public AnswersSelfPairs,
+                                   public AnswersChanges<S>,
                                    public AnswersSweeps<S>,
                                    public TakesPlanChanges<S> {
   static constexpr bool works_ahead = F == Foresight::whole_clip;
@@ -65,6 +67,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
         now_(together_ ? 2 : scene.pairs().size()),
         next_(now_.joins.size()),
         by_spans_(now_.joins.size(), false),
+        changes_(now_.joins.size()),
         updates_(scene.body_count()) {
     const bool spans = params.word("triangle_tests") == "spans";
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
@@ -80,6 +83,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     for (Joins<S>* one : {&now_, &next_})
       for (auto& answers : one->answers) answers.clear_counts();
     bounds_.start();
+    changes_.start_over();
     new_segment();
     before_ = t;
     plans_changed_ = false;
@@ -114,6 +118,22 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     return {};
   }
 
+  void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
+    if (!joined_) join();
+    const float fraction = float(bounds_.fraction(t));
+    for (std::size_t i = 0; i < now_.joins.size(); ++i) {
+      if (by_spans_[i])
+        now_.answers[i].move_to(bounds_.segment(), this->scene_, now_.joins[i], fraction);
+      else
+        now_.joins[i].move_to(fraction);
+    }
+    const auto confirm = [this](PairBuffer& pairs) {
+      confirm_pairs(this->scene_, this->sampled_, pairs, this->triangle_stats_);
+    };
+    changes_.find(answer, parts(), confirm, begun, ended);
+    if constexpr (works_ahead) join_ahead(bounds_.ahead(), share_due());
+  }
+
   /// Undecided pairs are tested at the frame's positions.
   void confirm_candidates(double t, PairBuffer& pairs) override {
     if (!any_by_spans_ || pairs != answered_) return Strategy<S>::confirm_candidates(t, pairs);
@@ -136,6 +156,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     if (plans_changed_) return;  // lines may have no end: the sweep's own ends are known only when it is over
     bounds_.enter();
     if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
+    changes_.leave_segment(parts());
     ahead_ = {};
     joined_ = false;
     if (!sweeps_.empty()) return;
@@ -170,7 +191,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   }
 
   std::size_t bytes() const override {
-    std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes() + query_.bytes() +
+    std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes() + query_.bytes() + changes_.bytes() +
+                        parts_.capacity() * sizeof(parts_[0]) +
                         (answered_.capacity() + to_test_.capacity()) * sizeof(PrimitivePair) +
                         blocks_.capacity() * sizeof(Block) + joined_bodies_.capacity() * sizeof(BodyPair);
     for (const auto& sweep : sweeps_) total += sweep.bytes();
@@ -224,6 +246,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
   void new_segment() {
     if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
+    changes_.leave_segment(parts());
     joined_ = false;
     if (bounds_.came_ahead() && ahead_.joins_begun) {
       join_ahead(bounds_.segment(), 1);
@@ -234,6 +257,13 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     ahead_.pacer = {this->time(), bounds_.end()};
     if constexpr (works_ahead)
       if (bounds_.start_ahead(motion_.from(bounds_.end()))) ahead_.stage = Stage::bounds;
+  }
+  /// Returns the joins of the current segment. Valid until the next call.
+  std::span<const typename JoinChanges<S>::Part> parts() {
+    parts_.clear();
+    for (std::size_t i = 0; i < now_.joins.size(); ++i)
+      parts_.push_back({&now_.joins[i], by_spans_[i] ? &now_.answers[i] : nullptr});
+    return parts_;
   }
   void join() {
     for (std::size_t i = 0; i < now_.joins.size(); ++i) {
@@ -318,6 +348,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   };
   std::vector<Block> blocks_;
   PairBuffer answered_, to_test_;
+  JoinChanges<S> changes_;
+  std::vector<typename JoinChanges<S>::Part> parts_;
   LinearCounts<S> updates_;
 };
 

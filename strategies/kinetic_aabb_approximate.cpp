@@ -40,6 +40,7 @@ KBVH_STRATEGY(kinetic_aabb_approximate) {
       .citation = "Zachmann & Weller 2006, s.4, Algorithm 3",
       .tightness = Tightness::none,
       .guarantee = Guarantee::approximate,
+      .rays_guarantee = Guarantee::approximate,
       .positions = PositionUse::fetched,
       .declares = {.event_driven = true, .continuous = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},

@@ -12,6 +12,7 @@
 #include "core/families/events/event_log.hpp"
 #include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
+#include "core/families/wide/wide_rays.hpp"
 
 namespace kbvh {
 namespace {
@@ -27,6 +28,7 @@ BoxTreeConstruction construction(const Params& params, LeafBoxes leaf_boxes, std
 
 template <class S, class Count>
 class KineticBox final : public CountedStrategy<S, Count>,
+                         public AnswersRays<S>,
                          public EventSource<S>,
                          public TakesPlanChanges<S>,
                          public TakesGeometryChanges<S> {
@@ -106,6 +108,21 @@ class KineticBox final : public CountedStrategy<S, Count>,
     return status;
   }
 
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    std::uint64_t tests = 0;
+    for (std::uint32_t body = 0; body < rows_.size(); ++body)
+      this->count_.add(Counter::positions_fetched, rows_[body].make_visited(tree_of(body), motion_, body));
+    rays_.find(
+        query, rays, hits,
+        [&](std::uint32_t body) -> WideSide<S> {
+          return {.hierarchy = &rows_[body].hierarchy(), .body = body, .stale = rows_[body].stale()};
+        },
+        [&](std::uint32_t body, std::uint32_t node) { make_wanted(body, node); }, this->triangle_stats_,
+        tests);
+    this->count_.add(Counter::box_tests, tests);
+  }
+
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
     on_forest([&](auto& forest) { forest.plans_changed(t, changes); });
     plans_changed_ = true;
@@ -170,7 +187,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
 
   std::size_t bytes() const override {
     std::size_t total = on_forest([](auto& forest) { return forest.bytes(); });
-    total += near_bodies_.bytes() + query_.bytes();
+    total += near_bodies_.bytes() + query_.bytes() + rays_.bytes();
     for (const auto& rows : rows_) total += rows.bytes();
     for (const auto& cache : caches_) total += cache.bytes();
     for (const auto& degradation : degradations_) total += degradation.bytes();
@@ -259,6 +276,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
   LeafBoxes leaf_boxes_;
   std::vector<BoxTreeRows<S>> rows_;  ///< [body]
   WideQuery<S> query_{this->scene_, this->sampled_};
+  WideRays<S> rays_{this->scene_, this->sampled_};
   std::uint64_t first_step_ = 0;
   std::vector<std::uint32_t> order_;
   bool rebuilds_;

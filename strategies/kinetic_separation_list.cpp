@@ -11,15 +11,18 @@
 #include "core/families/separation/kinetic_collision.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "core/topology/leaf_pairs.hpp"
+#include "core/topology/ray_traversal.hpp"
 
 namespace kbvh {
 namespace {
 
 template <class S, class Count>
 class KineticSeparationList final : public CountedStrategy<S, Count>,
+                                    public AnswersChanges<S>,
                                     public AnswersSelfPairs,
                                     public AnswersSpans<S>,
                                     public AnswersSweeps<S>,
+                                    public AnswersRays<S>,
                                     public EventSource<S>,
                                     public TakesPlanChanges<S>,
                                     public TakesGeometryChanges<S> {
@@ -33,6 +36,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
                         const Params& params)
       : CountedStrategy<S, Count>(scene, motion), motion_(motion), rows_(scene, motion) {
     for (const Topology& topology : topologies) by_rows_ = by_rows_ || topology.leaf_size > 1;
+    notes_changes_ = !by_rows_ && !has_self_pairs(scene.pairs());
     const int look_ahead = std::stoi(params.word("look_ahead"));
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       vertices_ += motion.plans(body).vertex_count();
@@ -89,6 +93,45 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
     this->count_.add(Counter::positions_fetched, reads);
     many_candidates_ = 4 * (out.size() - before) > vertices_;
     return {};
+  }
+
+  /// Candidates that are the leaves of the list begin and end at its events. All others, and pairs of
+  /// triangles, are tested at every frame, so that a comparison costs little beside the tests.
+  void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
+    if (!notes_changes_ || answer != Answer::candidates)
+      return this->compare_answers(t, answer, begun, ended);
+    on_collision([&](auto& collision) {
+      LeafOverlaps& overlaps = collision.list().overlaps();
+      if (overlaps.is_noting()) return overlaps.take_changes(begun, ended);
+      find_candidates(t, begun, {});
+      overlaps.start_noting();
+    });
+  }
+
+  /// Follows rays node by node, in boxes that are computed from their realisers.
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    on_collision([&](auto& collision) {
+      auto& forest = collision.forest();
+      while (ray_boxes_.size() < this->scene_.body_count()) ray_boxes_.emplace_back(0);
+      for (std::uint32_t body = 0; body < ray_boxes_.size(); ++body) {
+        ray_boxes_[body].resize(forest.tree(body).topology().size());
+        ray_boxes_[body].new_frame();
+      }
+      find_hits_by_body(
+          this->scene_, this->sampled_, query, rays, hits, [&](std::uint32_t body, RaySearch<S>& search) {
+            const Topology& topology = forest.tree(body).topology();
+            if (topology.empty()) return false;
+            RealiserBoxes<S> boxes(forest.tree(body).realisers(0), this->sampled_, body, ray_boxes_[body]);
+            const TopologyTree tree{topology, [&](std::uint32_t node) {
+                                      boxes.ensure(node);
+                                      return boxes(node);
+                                    }};
+            return follow_ray(tree, search, body, this->scene_.primitives(body),
+                              this->sampled_.positions(body), ray_stack_, this->count_,
+                              this->triangle_stats_);
+          });
+    });
   }
 
   void find_spans(double t0, double t1, SpanBuffer& out) override {
@@ -199,8 +242,10 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   }
 
   std::size_t bytes() const override {
-    return rows_.bytes() + open_.capacity() * sizeof(std::uint32_t) +
-           on_collision([](auto& collision) { return collision.bytes(); });
+    std::size_t total = rows_.bytes() + open_.capacity() * sizeof(std::uint32_t) +
+                        ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
+    for (const auto& boxes : ray_boxes_) total += boxes.bytes();
+    return total + on_collision([](auto& collision) { return collision.bytes(); });
   }
 
  protected:
@@ -295,8 +340,11 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
                std::unique_ptr<Collision<AvlOrHeapEventQueue>>>
       collision_;
   ClipMotion<S> motion_;
-  bool by_rows_ = false;      ///< leaves have several primitives
-  KineticRowsQuery<S> rows_;  ///< empty unless by_rows_
+  bool by_rows_ = false;                ///< leaves have several primitives
+  bool notes_changes_ = false;          ///< the list's leaves are the candidates
+  KineticRowsQuery<S> rows_;            ///< empty unless by_rows_
+  std::vector<BoxCache<S>> ray_boxes_;  ///< [body], made at the first request for rays
+  std::vector<RayNode<std::uint32_t>> ray_stack_;
   std::uint64_t first_step_ = 0;
   std::size_t vertices_ = 0;      ///< of the initial scene
   bool many_candidates_ = false;  ///< in the last frame

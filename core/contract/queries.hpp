@@ -3,6 +3,7 @@
 
 #include "core/scene/geometry_change.hpp"
 #include "core/scene/pairs.hpp"
+#include "core/scene/rays.hpp"
 
 namespace kbvh {
 
@@ -26,6 +27,26 @@ class AnswersSpans {
   virtual void find_spans(double t0, double t1, SpanBuffer& out) = 0;
 };
 
+/// The two answers of a frame.
+enum class Answer : std::uint8_t {
+  candidates,  ///< of `Strategy::candidates_at`
+  pairs,       ///< of `Strategy::pairs_at`
+};
+
+/// Answers in its own way what has changed, at a cost in proportion to the changes.
+template <class S>
+class AnswersChanges {
+ public:
+  virtual ~AnswersChanges() = default;
+
+ protected:
+  friend class Strategy<S>;
+  /// Implements `Strategy::changes_at`: appends the difference between the answer at t and that of the last
+  /// call with the same `answer` since `reset_to`. A strategy that cannot do better for some answer calls
+  /// `compare_answers`, for that answer always.
+  virtual void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) = 0;
+};
+
 /// Answers which primitives may touch between two times: the broad phase of continuous collision detection.
 template <class S>
 class AnswersSweeps {
@@ -38,6 +59,19 @@ class AnswersSweeps {
   virtual void prepare_sweep(double /*t*/) {}
   /// Implements `Strategy::swept_pairs`. The strategy stood at t0; `time()` is already t1.
   virtual void find_swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) = 0;
+};
+
+/// Answers which primitives rays meet.
+template <class S>
+class AnswersRays {
+ public:
+  virtual ~AnswersRays() = default;
+
+ protected:
+  friend class Strategy<S>;
+  /// Implements `Strategy::hits_at`: sets hits[i] to the answer to rays[i]; there are as many of both. The
+  /// strategy stands at t. Lazy strategies refresh what the rays read, positions included.
+  virtual void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) = 0;
 };
 
 /// Follows flight plans that change at run time.

@@ -47,7 +47,9 @@ Capabilities capabilities(const Declared& declared) {
           .geometry_changes = has<T, TakesGeometryChanges<S>>(),
           .spans = has<T, AnswersSpans<S>>(),
           .self_pairs = has<T, AnswersSelfPairs>(),
-          .contacts = has<T, AnswersSweeps<S>>()};
+          .contacts = has<T, AnswersSweeps<S>>(),
+          .changes = has<T, AnswersChanges<S>>(),
+          .rays = has<T, AnswersRays<S>>()};
 }
 template <template <class, class> class T, class S, class Count>
 std::unique_ptr<Strategy<S>> construct(const SceneView<S>& scene, Playback<S>& playback,

@@ -13,6 +13,7 @@
 #include "core/contract/queries.hpp"
 #include "core/scene/geometry_change.hpp"
 #include "core/scene/motion_view.hpp"
+#include "core/scene/pair_difference.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/topology/builders.hpp"
 #include "core/topology/topology.hpp"
@@ -60,6 +61,8 @@ struct Capabilities {
   bool self_pairs =
       false;  ///< AnswersSelfPairs: pairs within a body; without it, scenes that ask for them are refused
   bool contacts = false;  ///< AnswersSweeps: the broad phase of continuous collision detection
+  bool changes = false;   ///< AnswersChanges: changes of answers without a comparison of full answers
+  bool rays = false;      ///< AnswersRays: hits_at
 };
 
 /// The topologies that a strategy accepts. A strategy that builds its own hierarchy (a peer library) accepts
@@ -82,6 +85,8 @@ struct Info {
   bool baseline = false;
   Tightness tightness = Tightness::tight;
   Guarantee guarantee = Guarantee::exact;
+  /// The promise that `hits_at` makes: exact, or approximate for a peer's own test of rays and triangles.
+  Guarantee rays_guarantee = Guarantee::exact;
   PositionUse positions = PositionUse::all;
   Declared declares{};
   TopologyNeeds topology{};
@@ -136,6 +141,7 @@ class Strategy {
     triangle_stats_ = {};
     previous_time_ = time_ = t;
     between_frames_ = false;
+    for (AnswerHistory& history : histories_) history.clear();
     reset_to(t);
     start_counting();
   }
@@ -167,6 +173,21 @@ class Strategy {
     const QueryStatus status = candidates_at(t, out, budget);
     confirm(t, out);
     return status;
+  }
+
+  /// Replaces `begun` and `ended` by the difference between an answer at t and the last one that a call with
+  /// the same `answer` described since `reset`; the first call begins all pairs. All changes added up equal
+  /// `candidates_at` or `pairs_at`, which may be called in between. Every strategy answers: if it does not
+  /// derive from AnswersChanges, two full answers are compared, in linear time.
+  void changes_at(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) {
+    stand_at(t);
+    if (&begun == &ended) throw std::invalid_argument("changes need two buffers, not one twice");
+    begun.clear();
+    ended.clear();
+    if (AnswersChanges<S>* query = abilities().changes)
+      query->find_changes(t, answer, begun, ended);
+    else
+      compare_answers(t, answer, begun, ended);
   }
 
   /// Appends the pairs over [t0, t1] with closed spans that enclose every contact of the exact plan and of
@@ -201,6 +222,20 @@ class Strategy {
     stand_at(t0);
     move_to(t1);
     query.find_swept_pairs(t0, t1, before, out);
+  }
+
+  /// Answers rays at t, hits[i] being the answer to rays[i]: all primitives of the scene, whatever its pairs
+  /// of bodies. Positions are fetched as needed. Throws std::invalid_argument, naming the ray, if a
+  /// coordinate or direction is not finite or beyond admissible_magnitude<S>, or a length is negative or not
+  /// a number.
+  void hits_at(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) {
+    AnswersRays<S>& able_to = able(abilities().rays, "rays");
+    if (hits.size() != rays.size())
+      throw std::invalid_argument(std::to_string(rays.size()) + " rays take as many answers, not " +
+                                  std::to_string(hits.size()));
+    check_rays(rays);
+    stand_at(t);
+    able_to.find_hits(t, query, rays, hits);
   }
 
   /// Reports that the plans of some vertices changed at t; the motion view shows the new plans. Each new plan
@@ -256,7 +291,7 @@ class Strategy {
     Counters table = counted();
     table[Counter::triangle_tests] += triangle_stats_.tests;
     table[Counter::triangle_tests_exact] += triangle_stats_.exact;
-    table[Counter::bytes] = bytes();
+    table[Counter::bytes] = bytes() + histories_[0].bytes() + histories_[1].bytes();
     return table;
   }
 
@@ -270,6 +305,15 @@ class Strategy {
   /// Implements `confirm`.
   virtual void confirm_candidates(double /*t*/, PairBuffer& pairs) {
     confirm_pairs(scene_, sampled_, pairs, triangle_stats_);
+  }
+  /// Finds the full answer at t, and appends its difference from the last one that this function found since
+  /// `reset`.
+  void compare_answers(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) {
+    AnswerHistory& history = histories_[std::size_t(answer)];
+    PairBuffer& found = history.next();
+    find_candidates(t, found, Budget{});
+    if (answer == Answer::pairs) confirm_candidates(t, found);
+    history.take_next(begun, ended);
   }
   /// Sets all counts to zero; called after `reset_to`.
   virtual void start_counting() {}
@@ -290,16 +334,19 @@ class Strategy {
   struct Abilities {
     AnswersSpans<S>* spans;
     AnswersSweeps<S>* sweeps;
+    AnswersRays<S>* rays;
     TakesPlanChanges<S>* plan_changes;
     TakesGeometryChanges<S>* geometry_changes;
     EventSource<S>* events;
+    AnswersChanges<S>* changes;
   };
   /// Determined at the first call, because the object is not complete during construction.
   const Abilities& abilities() {
     if (!abilities_)
-      abilities_ = {dynamic_cast<AnswersSpans<S>*>(this), dynamic_cast<AnswersSweeps<S>*>(this),
-                    dynamic_cast<TakesPlanChanges<S>*>(this), dynamic_cast<TakesGeometryChanges<S>*>(this),
-                    dynamic_cast<EventSource<S>*>(this)};
+      abilities_ = {dynamic_cast<AnswersSpans<S>*>(this),         dynamic_cast<AnswersSweeps<S>*>(this),
+                    dynamic_cast<AnswersRays<S>*>(this),          dynamic_cast<TakesPlanChanges<S>*>(this),
+                    dynamic_cast<TakesGeometryChanges<S>*>(this), dynamic_cast<EventSource<S>*>(this),
+                    dynamic_cast<AnswersChanges<S>*>(this)};
     return *abilities_;
   }
   template <class Interface>
@@ -331,6 +378,7 @@ class Strategy {
   double time_ = 0, previous_time_ = 0;
   double earliest_ = 0;  ///< earliest time of the next `advance`, between frames
   bool between_frames_ = false;
+  AnswerHistory histories_[2];  ///< [Answer] of `compare_answers`
   std::optional<Abilities> abilities_;
 };
 

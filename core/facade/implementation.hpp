@@ -29,9 +29,11 @@ class detail::WorldImplementation {
   virtual void change_plans(const std::vector<WorldPlan>& plans) = 0;
   virtual void change_geometry(const WorldEdit& edit) = 0;
   virtual void pairs(std::vector<WorldPair>& out) = 0;
+  virtual void changes(std::vector<WorldPair>& begun, std::vector<WorldPair>& ended) = 0;
   virtual void spans(double t, std::vector<WorldSpan>& out) = 0;
   virtual void contacts(double t, std::vector<WorldContact>& out) = 0;
   virtual double next_knot() const = 0;
+  virtual void hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vector<WorldHit>& out) = 0;
   virtual void positions(std::uint32_t body, std::vector<double>& out) = 0;
   virtual void positions(std::uint32_t body, double t, std::vector<double>& out) const = 0;
   virtual bool hierarchy(std::uint32_t body, WorldHierarchy& out) const = 0;

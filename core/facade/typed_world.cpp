@@ -75,6 +75,23 @@ static_assert(int(WorldEvent::Kind::window) == int(EventKind::window) &&
 WorldPair plain(const PrimitivePair& pair) {
   return {pair.body_a, pair.primitive_a, pair.body_b, pair.primitive_b};
 }
+void replace(std::vector<WorldPair>& out, const PairBuffer& pairs) {
+  out.clear();
+  for (const PrimitivePair& pair : pairs) out.push_back(plain(pair));
+}
+
+/// Rounds a ray to the world's precision.
+template <class S>
+Ray<S> typed(const WorldRay& ray) {
+  Ray<S> made{};
+  for (int axis = 0; axis < 3; ++axis) {
+    made.origin[axis] = S(ray.origin[axis]);
+    made.direction[axis] = S(ray.direction[axis]);
+  }
+  made.length = S(ray.length);
+  return made;
+}
+static_assert(WorldHit::none == RayHit::none && int(WorldRayQuery::any) == int(RayQuery::any));
 
 std::optional<std::uint32_t> number_of(const std::map<std::string, std::string>& words,
                                        const std::string& key) {
@@ -193,8 +210,13 @@ class TypedWorld final : public detail::WorldImplementation {
 
   void pairs(std::vector<WorldPair>& out) override {
     session().query(pairs_, ignored_);
-    out.clear();
-    for (const PrimitivePair& pair : pairs_) out.push_back(plain(pair));
+    replace(out, pairs_);
+  }
+  void changes(std::vector<WorldPair>& begun, std::vector<WorldPair>& ended) override {
+    if (&begun == &ended) throw std::invalid_argument("changes need two lists, not one twice");
+    session().changes(Answer::pairs, pairs_, ended_, ignored_);
+    replace(begun, pairs_);
+    replace(ended, ended_);
   }
   void spans(double t, std::vector<WorldSpan>& out) override {
     if (!session().info().can.spans)
@@ -216,6 +238,14 @@ class TypedWorld final : public detail::WorldImplementation {
                      contact.feature_b, contact.begin, contact.end});
   }
   double next_knot() const override { return session().next_knot(); }
+  void hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vector<WorldHit>& out) override {
+    rays_.clear();
+    for (const WorldRay& ray : rays) rays_.push_back(typed<S>(ray));
+    hits_.resize(rays.size());
+    session().hits(RayQuery(query), rays_, std::span<RayHit>(hits_), ignored_);
+    out.clear();
+    for (const RayHit& hit : hits_) out.push_back({hit.body, hit.primitive, hit.parameter});
+  }
 
   void positions(std::uint32_t body, std::vector<double>& out) override {
     check_body(body);
@@ -411,9 +441,11 @@ class TypedWorld final : public detail::WorldImplementation {
   std::vector<Copies> given_;                        ///< [body]
   mutable std::uint64_t fetched_for_questions_ = 0;  ///< positions that are no work of the strategy
   PhaseTimes ignored_;
-  PairBuffer pairs_;
+  PairBuffer pairs_, ended_;
   SpanBuffer spans_;
   ContactBuffer contacts_;
+  std::vector<Ray<S>> rays_;
+  std::vector<RayHit> hits_;
   EventDescription<S> done_;
 };
 

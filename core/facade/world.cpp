@@ -58,6 +58,9 @@ void World::change_geometry(const WorldEdit& edit) {
 void World::pairs(std::vector<WorldPair>& out) {
   implementation_->pairs(out);
 }
+void World::changes(std::vector<WorldPair>& begun, std::vector<WorldPair>& ended) {
+  implementation_->changes(begun, ended);
+}
 void World::spans(double t, std::vector<WorldSpan>& out) {
   implementation_->spans(t, out);
 }
@@ -66,6 +69,9 @@ void World::contacts(double t, std::vector<WorldContact>& out) {
 }
 double World::next_knot() const {
   return implementation_->next_knot();
+}
+void World::hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vector<WorldHit>& out) {
+  implementation_->hits(query, rays, out);
 }
 void World::positions(std::uint32_t body, std::vector<double>& out) {
   implementation_->positions(body, out);

@@ -1,6 +1,7 @@
 #pragma once
 #include <compare>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <span>
@@ -47,6 +48,25 @@ struct WorldContact {
   enum class Kind : std::uint8_t { vertex_face, edge_edge } kind;
   std::uint32_t body_a, feature_a, body_b, feature_b;
   double begin, end;  ///< seconds; enclose the time of impact
+};
+
+/// The points origin + s * direction with 0 <= s <= length. A zero direction makes the ray a point.
+struct WorldRay {
+  double origin[3] = {0, 0, 0}, direction[3] = {0, 0, 0};
+  double length = std::numeric_limits<double>::infinity();
+};
+
+/// What is asked of a ray: the primitive that it meets first (of several, the smallest body and primitive),
+/// or one of those that it meets.
+enum class WorldRayQuery : std::uint8_t { closest, any };
+
+/// The answer to a ray. Polygons are met, from both sides, edges and corners included; points and control
+/// nets are not.
+struct WorldHit {
+  static constexpr std::uint32_t none = ~std::uint32_t(0);
+  std::uint32_t body = none, primitive = none;                 ///< none: a miss
+  double parameter = std::numeric_limits<double>::infinity();  ///< s where the ray first meets the primitive
+  bool operator==(const WorldHit&) const = default;
 };
 
 /// A node of a body's hierarchy and its box. Parents have smaller numbers than their children; node 0 is the
@@ -227,11 +247,19 @@ class World {
   /// Replaces `out` by the pairs of primitives that intersect at the current time, under the strategy's
   /// guarantee.
   void pairs(std::vector<WorldPair>& out);
+  /// Replaces `begun` and `ended` by the pairs that began and ended to intersect since the last call, as
+  /// contact events of a simulator. The first call after `start` or `reset` begins all pairs. Added up, the
+  /// changes equal `pairs`, which may be called in between. Throws std::invalid_argument if both lists are
+  /// the same one.
+  void changes(std::vector<WorldPair>& begun, std::vector<WorldPair>& ended);
   /// Advances to t and replaces `out` by the pairs of the elapsed time.
   void spans(double t, std::vector<WorldSpan>& out);
   /// Advances to t and replaces `out` by the contacts of the elapsed time, in which every vertex moves on a
   /// straight line. One call must not pass `next_knot`; no frame may be queried between two calls.
   void contacts(double t, std::vector<WorldContact>& out);
+  /// Replaces `out` by the answers to rays at the current time, one for each, under the strategy's guarantee
+  /// of rays. Rays are rounded to the world's precision.
+  void hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vector<WorldHit>& out);
   /// Returns the next time at which the plan of any vertex bends; infinite if none does.
   double next_knot() const;
   /// Replaces `out` by the positions of a body at the current time.

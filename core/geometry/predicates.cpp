@@ -1,12 +1,9 @@
 #include "core/geometry/predicates.hpp"
 
-#include <algorithm>
-#include <bit>
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cstdint>
-#include <limits>
 
-#include "core/base/library_gaps.hpp"
+#include "core/geometry/scaled_integers.hpp"
 
 namespace kbvh {
 namespace {
@@ -16,23 +13,6 @@ __extension__ typedef __int128 Int128;
 using Int512 = boost::multiprecision::number<boost::multiprecision::cpp_int_backend<
     512, 512, boost::multiprecision::signed_magnitude, boost::multiprecision::unchecked, void>>;
 using IntAny = boost::multiprecision::cpp_int;
-
-/// A finite double as mantissa * 2^exponent with an odd mantissa; zero has mantissa 0.
-struct Dyadic {
-  std::int64_t mantissa = 0;
-  int exponent = 0;
-};
-
-Dyadic to_dyadic(double x) {
-  const auto bits = bit_cast<std::uint64_t>(x);
-  const int biased = static_cast<int>((bits >> 52) & 0x7ff);
-  std::uint64_t mantissa = bits & 0xfffffffffffffULL;
-  if (biased != 0) mantissa |= 0x10000000000000ULL;
-  if (mantissa == 0) return {};
-  const int zeros = std::countr_zero(mantissa);
-  const auto magnitude = static_cast<std::int64_t>(mantissa >> zeros);
-  return {(bits >> 63) != 0 ? -magnitude : magnitude, std::max(biased, 1) - 1075 + zeros};
-}
 
 template <class Integer>
 inline void shift_left(Integer& x, int bits) {
@@ -44,36 +24,15 @@ inline void shift_left(Integer& x, int bits) {
   x <<= bits;
 }
 
-/// N doubles as integers times a common power of two. A common factor does not change the sign of a
-/// determinant.
-template <int N>
-struct Scaled {
-  Dyadic values[N];
-  int lowest = std::numeric_limits<int>::max();
-  int width = 0;  // bits of the largest magnitude, after scaling by 2^-lowest
-
-  /// Computes the scaling; call it after all values are set.
-  void measure() {
-    int top = std::numeric_limits<int>::min();
-    for (const Dyadic& value : values) {
-      if (value.mantissa == 0) continue;
-      const auto magnitude =
-          static_cast<std::uint64_t>(value.mantissa < 0 ? -value.mantissa : value.mantissa);
-      lowest = std::min(lowest, value.exponent);
-      top = std::max(top, value.exponent + static_cast<int>(std::bit_width(magnitude)));
-    }
-    width = top > lowest ? top - lowest : 0;
-  }
-
-  template <class Integer>
-  Integer get(int i) const {
-    if (values[i].mantissa == 0) return Integer(0);
-    // A left shift of a negative number multiplies it, by C++20 and for signed_magnitude integers.
-    Integer result(values[i].mantissa);
-    shift_left(result, values[i].exponent - lowest);
-    return result;
-  }
-};
+/// Returns value i as an integer.
+template <class Integer, int N>
+Integer get(const scaled::Scaled<N>& s, int i) {
+  if (s.values[i].mantissa == 0) return Integer(0);
+  // A left shift of a negative number multiplies it, by C++20 and for signed_magnitude integers.
+  Integer result(s.values[i].mantissa);
+  shift_left(result, s.values[i].exponent - s.lowest);
+  return result;
+}
 
 template <class Integer>
 int sign_of(const Integer& x) {
@@ -81,9 +40,9 @@ int sign_of(const Integer& x) {
 }
 
 template <class Integer>
-int orient3d_integer(const Scaled<12>& s) {
+int orient3d_integer(const scaled::Scaled<12>& s) {
   Integer v[12];
-  for (int i = 0; i < 12; ++i) v[i] = s.get<Integer>(i);
+  for (int i = 0; i < 12; ++i) v[i] = get<Integer>(s, i);
   Integer e[9];
   for (int i = 0; i < 9; ++i) e[i] = v[i + 3] - v[i % 3];
   const Integer x = e[1] * e[5] - e[2] * e[4];
@@ -96,9 +55,9 @@ int orient3d_integer(const Scaled<12>& s) {
 /// The same for coordinates of at most 60 bits: differences are below 2^61, minors below 2^123 and the sums
 /// of the half products below 3 * 2^125. Everything fits into 128 bits except the determinant, which is kept
 /// as high * 2^64 + low.
-int orient3d_narrow(const Scaled<12>& s) {
+int orient3d_narrow(const scaled::Scaled<12>& s) {
   std::int64_t v[12];
-  for (int i = 0; i < 12; ++i) v[i] = s.get<std::int64_t>(i);
+  for (int i = 0; i < 12; ++i) v[i] = get<std::int64_t>(s, i);
   std::int64_t e[9];
   for (int i = 0; i < 9; ++i) e[i] = v[i + 3] - v[i % 3];
   const Int128 minors[3] = {Int128(e[1]) * e[5] - Int128(e[2]) * e[4],
@@ -115,9 +74,9 @@ int orient3d_narrow(const Scaled<12>& s) {
 }
 
 template <class Integer>
-int orient2d_integer(const Scaled<6>& s) {
+int orient2d_integer(const scaled::Scaled<6>& s) {
   Integer v[6];
-  for (int i = 0; i < 6; ++i) v[i] = s.get<Integer>(i);
+  for (int i = 0; i < 6; ++i) v[i] = get<Integer>(s, i);
   const Integer bx = v[2] - v[0], by = v[3] - v[1], cx = v[4] - v[0], cy = v[5] - v[1];
   const Integer left = bx * cy, right = by * cx;
   return left > right ? 1 : left < right ? -1 : 0;
@@ -129,9 +88,9 @@ int orient3d_exact(const double* a, const double* b, const double* c, const doub
   // Points on an axis-aligned plane (floors, tables) are the most common coplanar input.
   for (int axis = 0; axis < 3; ++axis)
     if (a[axis] == b[axis] && a[axis] == c[axis] && a[axis] == d[axis]) return 0;
-  Scaled<12> s;
+  scaled::Scaled<12> s;
   const double* points[4] = {a, b, c, d};
-  for (int i = 0; i < 12; ++i) s.values[i] = to_dyadic(points[i / 3][i % 3]);
+  for (int i = 0; i < 12; ++i) s.values[i] = scaled::odd_multiple(points[i / 3][i % 3]);
   s.measure();
   if (s.width <= 60) return orient3d_narrow(s);
   // |det| < 6 * 2^(3 (width + 1)), which for 168 bits is below 2^510.
@@ -141,11 +100,11 @@ int orient3d_exact(const double* a, const double* b, const double* c, const doub
 int orient2d_exact(const double* a, const double* b, const double* c, Projection p) {
   for (int axis : {p.u, p.v})
     if (a[axis] == b[axis] && a[axis] == c[axis]) return 0;
-  Scaled<6> s;
+  scaled::Scaled<6> s;
   const double* points[3] = {a, b, c};
   for (int i = 0; i < 3; ++i) {
-    s.values[2 * i] = to_dyadic(points[i][p.u]);
-    s.values[2 * i + 1] = to_dyadic(points[i][p.v]);
+    s.values[2 * i] = scaled::odd_multiple(points[i][p.u]);
+    s.values[2 * i + 1] = scaled::odd_multiple(points[i][p.v]);
   }
   s.measure();
   // A product of two differences is below 2^(2 (width + 1)).

@@ -88,6 +88,15 @@ class Session {
     timed(times.triangle_tests, [&] { strategy_->confirm(playback_.time(), pairs); });
     return status;
   }
+  /// Replaces `begun` and `ended` by the changes of an answer at the current time (Strategy::changes_at). All
+  /// of it counts as traversal, triangle tests included.
+  void changes(Answer answer, PairBuffer& begun, PairBuffer& ended, PhaseTimes& times) {
+    timed(times.traversal, [&] { strategy_->changes_at(playback_.time(), answer, begun, ended); });
+  }
+  /// Answers rays at the current time (Strategy::hits_at). Everything counts as traversal.
+  void hits(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, PhaseTimes& times) {
+    timed(times.traversal, [&] { strategy_->hits_at(playback_.time(), query, rays, hits); });
+  }
   /// Performs the first event if it is due by time `until` (Strategy::step_event); the motion keeps its time
   /// until the next `advance`.
   bool step_event(double until, EventDescription<S>& out) { return strategy_->step_event(until, out); }

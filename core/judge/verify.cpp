@@ -5,12 +5,12 @@
 
 namespace kbvh {
 
-namespace {
-
 std::string text(const PrimitivePair& pair) {
   return "(" + std::to_string(pair.body_a) + ":" + std::to_string(pair.primitive_a) + ", " +
          std::to_string(pair.body_b) + ":" + std::to_string(pair.primitive_b) + ")";
 }
+
+namespace {
 
 template <class S>
 bool well_formed(const Scene<S>& scene, const PrimitivePair& pair) {

@@ -41,6 +41,9 @@ struct VerifyOptions {
   std::uint64_t quality_samples = 0;  ///< maximum number of entries of `over_time`; each costs an SAH build
 };
 
+/// Names a pair in messages: "(body:primitive, body:primitive)".
+std::string text(const PrimitivePair& pair);
+
 /// Runs a contestant over the frames and compares each frame with the oracle: candidates contain the truth;
 /// confirmed pairs equal it, each once and canonical; boxes that were read are valid, and tight if declared.
 /// `session` must be fresh. The script's times must be frames (std::invalid_argument); where geometry

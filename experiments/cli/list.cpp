@@ -39,7 +39,9 @@ std::vector<std::string> capabilities_of(const Info& info) {
                                               {info.can.spans, "spans"},
                                               {info.can.self_pairs, "self_pairs"},
                                               {info.can.time_budget, "time_budget"},
-                                              {info.can.contacts, "contacts"}};
+                                              {info.can.contacts, "contacts"},
+                                              {info.can.changes, "changes"},
+                                              {info.can.rays, "rays"}};
   std::vector<std::string> words;
   for (const auto& [can, word] : all)
     if (can) words.push_back(word);
@@ -83,6 +85,7 @@ json strategy_json(const Info& info) {
           {"foresight", word(info.foresight)},
           {"tightness", word(info.tightness)},
           {"guarantee", word(info.guarantee)},
+          {"rays_guarantee", word(info.rays_guarantee)},
           {"positions", info.positions == PositionUse::all       ? "all"
                         : info.positions == PositionUse::fetched ? "fetched"
                                                                  : "varying"},

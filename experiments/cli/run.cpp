@@ -143,6 +143,11 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
       command.add_flag(
           "--continuous", o->continuous,
           "find contacts of vertices and faces, and of edges, between keyframes: exact, l does not apply"),
+      add_text(command, "--changes", o->changes,
+               "ask each frame what began and ended since the last one, of: candidates, pairs"),
+      add_text(command, "--rays", o->rays,
+               "ask for rays instead of pairs: coherent or incoherent, then :count and :any, as in "
+               "incoherent:10000:any"),
       command.add_flag(
           "--self", o->self,
           "also find pairs within every body, of primitives that share no vertex; of one body: self=true"),
@@ -216,6 +221,8 @@ json plan_of(const StudyOptions& options) {
   if (!options.l.empty()) plan["l"] = options.l;
   if (!options.scalars.empty()) plan["scalars"] = options.scalars;
   if (options.continuous) plan["continuous"] = true;
+  if (!options.changes.empty()) plan["changes"] = options.changes;
+  if (!options.rays.empty()) plan["rays"] = options.rays;
   set_common(plan, options);
   return plan;
 }

@@ -79,6 +79,8 @@ std::string wrong_scene(const json& scene) {
   }
   if (scene.contains("continuous") && !scene.at("continuous").is_boolean())
     return "scene.continuous is not true or false";
+  if (scene.contains("changes") && !scene.at("changes").is_string()) return "scene.changes is not a text";
+  if (scene.contains("rays") && !scene.at("rays").is_string()) return "scene.rays is not a text";
   if (!scene.contains("script")) return {};
   if (!scene.at("script").is_object()) return "scene.script is not an object";
   return wrong(scene.at("script"), "scene.script.", {{"steps", Kind::whole}, {"changes", Kind::whole}});
@@ -130,6 +132,10 @@ std::string unusable(const json& record) {
     what = "the field verified.looseness is missing or not a number";
   if (what.empty() && !record.contains("times")) what = "the field times is missing";
   if (what.empty()) what = wrong_times(record.at("times"));
+  if (what.empty() && record.contains("changes"))
+    what = !record.at("changes").is_object()
+               ? "changes is not an object"
+               : wrong(record.at("changes"), "changes.", {{"begun", Kind::whole}, {"ended", Kind::whole}});
   for (const char* text : {"choice", "refused", "run"})
     if (what.empty() && record.contains(text)) what = wrong(record, "", {{text, Kind::text}});
   return what;

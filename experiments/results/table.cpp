@@ -46,6 +46,14 @@ std::string own_counters(const json& record) {
   return text;
 }
 
+/// Formats the pairs that begin or end per frame.
+std::string changes_per_frame(const json& record) {
+  const json changes = record.value("changes", json::object());
+  const double frames = record.at("scene").at("frames").get<double>() - 1;
+  const double sum = changes.value("begun", 0.0) + changes.value("ended", 0.0);
+  return frames > 0 ? fmt::format("{:.4g}", sum / frames) : "-";
+}
+
 std::string fraction(double value) {
   return value == 0 ? "0" : fmt::format("{:.3g}", value);
 }
@@ -143,6 +151,8 @@ std::string results_table(const std::vector<json>& records) {
                     [&](const json& body) { return body.value("kind", std::string()) == kind; }))
       text += fmt::format("  pairs with {} are candidates: overlapping boxes, without a test of contact\n",
                           kind == "points" ? "points" : "control nets");
+  const bool as_changes = scene.contains("changes");
+  if (as_changes) head.push_back("changes");
   for (const char* column : {"x refit", "with motion", "missed", "extra", "protrusion", "looseness"})
     head.push_back(column);
   std::vector<std::vector<std::string>> rows{head};
@@ -153,13 +163,14 @@ std::string results_table(const std::vector<json>& records) {
     std::vector<std::string> row{label};
     if (has_times(record)) {
       for (const char* phase : phases) row.push_back(milliseconds(median_phase(record, phase)));
+      if (as_changes) row.push_back(changes_per_frame(record));
       for (const char* phase : {"total", "total_with_motion"})
         row.push_back(refit == nullptr
                           ? "-"
                           : fmt::format("{:.3g}", median_phase(*refit, phase) / median_phase(record, phase)));
     } else {
       row.push_back("refused");
-      row.resize(1 + phases.size() + 2);
+      row.resize(head.size() - 4);
       refusals += "  " + label + " is refused a time: " + record.value("refused", std::string()) + "\n";
     }
     row.push_back(std::to_string(verified.at("missed").get<std::uint64_t>()));

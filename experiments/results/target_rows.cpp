@@ -101,13 +101,20 @@ json side_json(const Side& side) {
           {"run", record.value("run", std::string())}};
 }
 
-/// Returns whether the table has the target's scalar and l.
+/// Returns whether the table has the target's scalar, l and kind of answer.
 bool is_measured_as(const Target& target, const TargetGroup& group) {
-  return group.scene.at("scalar") == target.scalar && group.scene.at("per_keyframe") == target.per_keyframe;
+  return group.scene.at("scalar") == target.scalar && group.scene.at("per_keyframe") == target.per_keyframe &&
+         group.scene.value("changes", std::string()) == target.changes;
+}
+
+/// Returns a scene's name in the tables that a target reads.
+std::string name_in_tables(const Target& target, const std::string& scene) {
+  return name_with_changes(scene, target.changes);
 }
 
 bool is_counted(const Target& target, const std::string& scene) {
-  return std::find(target.scenes.begin(), target.scenes.end(), scene) != target.scenes.end();
+  return std::any_of(target.scenes.begin(), target.scenes.end(),
+                     [&](const std::string& one) { return name_in_tables(target, one) == scene; });
 }
 
 /// Returns the table on which a side is measured: `group`, or the first table of the selector's own scene.
@@ -115,7 +122,7 @@ Side side_of(const TargetSelector& selector, const Target& target, const TargetG
              const std::vector<TargetGroup>& groups) {
   if (selector.scene.empty()) return side_of(selector, group.records);
   for (const TargetGroup& other : groups)
-    if (is_measured_as(target, other) && other.scene.at("name") == selector.scene)
+    if (is_measured_as(target, other) && other.scene.at("name") == name_in_tables(target, selector.scene))
       return side_of(selector, other.records);
   Side side;
   side.missing = "'" + selector.scene + "' was left out";
@@ -155,7 +162,8 @@ json scene_rows(const Target& target, const std::vector<TargetGroup>& groups) {
   std::vector<std::pair<std::string, json>> rows;  // by hash of the scene
   for (const TargetGroup& group : groups) {
     if (!is_measured_as(target, group)) continue;
-    const std::string hash = group.scene.at("hash").get<std::string>();
+    // One scene may be asked for pairs and for rays.
+    const std::string hash = group.scene.at("hash").get<std::string>() + group.scene.value("rays", "");
     const auto known =
         std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == hash; });
     if (known == rows.end())
@@ -168,7 +176,8 @@ json scene_rows(const Target& target, const std::vector<TargetGroup>& groups) {
   for (auto& [hash, row] : rows)
     if (!row.at("ratio").is_null() || row.at("counts").get<bool>()) list.push_back(std::move(row));
   for (const std::string& scene : target.scenes)
-    if (std::none_of(list.begin(), list.end(), [&](const json& row) { return row.at("scene") == scene; }))
+    if (std::none_of(list.begin(), list.end(),
+                     [&](const json& row) { return row.at("scene") == name_in_tables(target, scene); }))
       list.push_back({{"scene", scene},
                       {"order", nullptr},
                       {"triangles", nullptr},
@@ -221,6 +230,7 @@ json target_row(const Target& target, const std::vector<TargetGroup>& groups) {
            {"scenes", target.scenes},
            {"over", target.mean ? "geometric_mean" : "worst"},
            {"scalar", target.scalar},
+           {"changes", target.changes},
            {"l", target.per_keyframe},
            {"numerator", selector_json(target.numerator)},
            {"denominator", selector_json(target.denominator)},

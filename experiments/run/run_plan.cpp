@@ -21,6 +21,7 @@
 #include "experiments/run/bench_harness.hpp"
 #include "experiments/scenes/scene_card.hpp"
 #include "experiments/study/contact_measurement.hpp"
+#include "experiments/study/ray_measurement.hpp"
 #include "experiments/study/targets.hpp"
 
 namespace kbvh::experiments {
@@ -133,22 +134,34 @@ class Runner {
       contact_group(study, contestants, loaded, scene, script);
       return;
     }
+    if (study.rays) {
+      for_each_l(study, loaded, scene, script, [&](std::uint32_t l, const std::vector<double>& frames) {
+        ray_group(study, contestants, loaded, scene, script, l, frames);
+      });
+      return;
+    }
     Oracle<S> oracle(scene, cache_folder(), hash(script));
     if (!oracle.problem().empty()) note("warning: " + oracle.problem());
+    for_each_l(study, loaded, scene, script, [&](std::uint32_t l, const std::vector<double>& frames) {
+      group(study, contestants, loaded, scene, script, oracle, l, frames);
+    });
+    const std::string before = oracle.problem();
+    oracle.keep();
+    if (oracle.problem() != before) note("warning: " + oracle.problem());
+  }
+
+  /// Calls work(l, frames) for each l of the study; once for a scene with frame times of its own.
+  template <class S, class Work>
+  void for_each_l(const Study& study, const LoadedScene& loaded, const Scene<S>& scene,
+                  const PlanScript<S>& script, const Work& work) {
     std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
     if (has_own_frames(loaded)) {
       if (per_keyframe != std::vector<std::uint32_t>{1})
         note("note: " + scene.name + " defines its own frame times: l does not apply and counts as 1");
       per_keyframe = {1};
     }
-    for (const std::uint32_t l : per_keyframe) {
-      const std::size_t most = study.frames_limit > 0 ? study.frames_limit : SIZE_MAX;
-      const std::vector<double> frames = frames_of(scene, loaded, script, l, most);
-      group(study, contestants, loaded, scene, script, oracle, l, frames);
-    }
-    const std::string before = oracle.problem();
-    oracle.keep();
-    if (oracle.problem() != before) note("warning: " + oracle.problem());
+    const std::size_t most = study.frames_limit > 0 ? study.frames_limit : SIZE_MAX;
+    for (const std::uint32_t l : per_keyframe) work(l, frames_of(scene, loaded, script, l, most));
   }
 
   /// Measures all contestants on one scene, in one scalar, at one l: the content of one table.
@@ -157,14 +170,35 @@ class Runner {
              const Scene<S>& scene, const PlanScript<S>& script, Oracle<S>& oracle, std::uint32_t l,
              const std::vector<double>& frames) {
     json about_scene = scene_record(scene, loaded, l, frames, script);
-    const std::string title = scene.name + ", l = " + std::to_string(l);
+    if (study.changes) {
+      about_scene["changes"] = word(*study.changes);
+      about_scene["name"] = name_with_changes(scene.name, word(*study.changes));
+    }
+    const std::string title = about_scene["name"].get<std::string>() + ", l = " + std::to_string(l);
     if (l > 1 && study.oracle_every % l == 0)
       note("warning: with oracle_every " + std::to_string(study.oracle_every) +
            " and l = " + std::to_string(l) +
            " only keyframes are compared with the truth; take a number without common factors");
-    Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script);
+    Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script, study.changes);
     measure_all(study, contestants, loaded, about_scene, title, measurement,
                 [&](const Info& info) { return unsuitable(info, scene, script); });
+  }
+
+  /// Does the same for rays.
+  template <class S>
+  void ray_group(const Study& study, const std::vector<ContestantSpec>& contestants,
+                 const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script,
+                 std::uint32_t l, const std::vector<double>& frames) {
+    json about_scene = scene_record(scene, loaded, l, frames, script);
+    about_scene["name"] = scene.name + suffix_of(*study.rays);
+    about_scene["rays"] = text_of(*study.rays);
+    RayMeasurement<S> measurement(scene, frames, *study.rays, script.empty() ? nullptr : &script);
+    measure_all(study, contestants, loaded, about_scene,
+                scene.name + ", l = " + std::to_string(l) + suffix_of(*study.rays), measurement,
+                [&](const Info& info) -> std::string {
+                  if (!info.can.rays) return "answers no rays";
+                  return unsuitable(info, scene, script);
+                });
   }
 
   /// Does the same for contacts from each keyframe to the next.

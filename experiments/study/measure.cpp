@@ -27,7 +27,7 @@ constexpr std::size_t time_parts = 16;
 
 template <class S>
 ClipTimes play_clip(Session<S>& session, std::span<const double> frames, const PlanScript<S>* script,
-                    PairBuffer& pairs) {
+                    FrameQuery& query) {
   ScriptCursor<S> cursor(script);
   ClipTimes times;
   times.frames.reserve(frames.size());
@@ -38,13 +38,13 @@ ClipTimes play_clip(Session<S>& session, std::span<const double> frames, const P
     // The first frame belongs to the reset, which has no update to compare; its query runs anyway, because
     // lazy strategies work there.
     PhaseTimes ignored;
-    session.query(pairs, ignored);
+    query.ask(session, ignored);
     follow(session, cursor.at(frames[0]), ignored);
   }
   for (std::size_t f = frames.size() > 1 ? 1 : 0; f < frames.size(); ++f) {
     PhaseTimes frame;
     session.advance(frames[f], frame);
-    session.query(pairs, frame);
+    query.ask(session, frame);
     follow(session, cursor.at(frames[f]), frame);
     times.frames.push_back(frame);
   }
@@ -53,14 +53,14 @@ ClipTimes play_clip(Session<S>& session, std::span<const double> frames, const P
 
 template <class S>
 void warm_up(Session<S>& session, std::span<const double> frames, const PlanScript<S>* script,
-             PairBuffer& pairs) {
+             FrameQuery& query) {
   ScriptCursor<S> cursor(script);
   const auto begin = std::chrono::steady_clock::now();
   PhaseTimes ignored;
   session.reset(frames[0]);
   for (std::size_t f = 0; f < frames.size() && (f == 0 || seconds_since(begin) < warm_up_seconds); ++f) {
     if (f > 0) session.advance(frames[f], ignored);
-    session.query(pairs, ignored);
+    query.ask(session, ignored);
     follow(session, cursor.at(frames[f]), ignored);
   }
 }
@@ -68,10 +68,9 @@ void warm_up(Session<S>& session, std::span<const double> frames, const PlanScri
 /// Counts over every frame: the verifying instance confirms only the frames that it compares.
 template <class S>
 Counters count_clip(const Scene<S>& scene, const Contestant& contestant, std::span<const double> frames,
-                    const PlanScript<S>* script) {
+                    const PlanScript<S>* script, FrameQuery& query) {
   Session<S> session(scene, contestant, CountingPolicy::counting);
-  PairBuffer pairs;
-  play_clip(session, frames, script, pairs);
+  play_clip(session, frames, script, query);
   return session.strategy().counters();
 }
 
@@ -124,14 +123,21 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
       measured.verification = verify<S>(session, frames_, *oracle_, script_, {oracle_every, quality_samples});
       measured.counters = session.strategy().counters();
     }
+    if (query_.changes && measured.verification.holds()) {
+      Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
+      measured.changes = verify_changes<S>(session, frames_, *oracle_, script_,
+                                           {oracle_every, VerifyChangesOptions::Calls::every_frame});
+      measured.verification.first_violation = measured.changes.first_violation;
+    }
     if (!measured.verification.holds()) {
       measured.refused = measured.verification.first_violation;
     } else {
-      if (oracle_every > 1) measured.counters = count_clip<S>(*scene_, spec.contestant(), frames_, script_);
+      if (oracle_every > 1 || query_.changes)
+        measured.counters = count_clip<S>(*scene_, spec.contestant(), frames_, script_, query_);
       const auto begin = std::chrono::steady_clock::now();
       entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
       measured.build_seconds = seconds_since(begin);
-      warm_up<S>(*entrant.session, frames_, script_, pairs_);
+      warm_up<S>(*entrant.session, frames_, script_, query_);
     }
   });
   entrants_.push_back(std::move(entrant));
@@ -141,10 +147,17 @@ template <class S>
 const ClipTimes* Measurement<S>::play(std::size_t i) {
   Entrant<S>& entrant = entrants_[i];
   const bool played = entrant.attempt([&] {
-    entrant.measured.repetitions.push_back(play_clip<S>(*entrant.session, frames_, script_, pairs_));
+    entrant.measured.repetitions.push_back(play_clip<S>(*entrant.session, frames_, script_, query_));
     entrant.measured.choice = entrant.session->strategy().choice();
   });
   return played ? &entrant.measured.repetitions.back() : nullptr;
+}
+
+template <class S>
+json Measurement<S>::extras(std::size_t i) const {
+  if (!query_.changes) return json::object();
+  const ChangesVerification& changes = entrants_[i].measured.changes;
+  return {{"changes", {{"begun", changes.begun}, {"ended", changes.ended}}}};
 }
 
 template class Measurement<float>;

@@ -2,11 +2,13 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/judge/verify.hpp"
+#include "core/judge/verify_changes.hpp"
 #include "experiments/study/contestants.hpp"
 
 namespace kbvh::experiments {
@@ -24,6 +26,7 @@ struct ClipTimes {
 struct Measured {
   const ContestantSpec* spec = nullptr;
   Verification verification;
+  ChangesVerification changes;  ///< of answers as changes
   std::uint64_t sampled_every = 1;
   Counters counters;
   std::string refused;      ///< the reason for a missing time, or empty
@@ -63,19 +66,33 @@ struct Entrant {
 /// Receives progress messages; may be empty.
 using MeasureProgress = std::function<void(const std::string&)>;
 
+/// The question of every frame, with room for its answer.
+struct FrameQuery {
+  std::optional<Answer> changes{};  ///< the changes of this answer; otherwise the pairs
+  PairBuffer pairs{}, ended{};
+
+  template <class S>
+  void ask(Session<S>& session, PhaseTimes& times) {
+    if (changes)
+      session.changes(*changes, pairs, ended, times);
+    else
+      session.query(pairs, times);
+  }
+};
+
 /// Measures contestants on one scene, in one scalar, at one l.
 template <class S>
 class Measurement {
  public:
   /// The script, if given, is replayed to every contestant; its times must be frames, and the oracle must be
-  /// made for it.
+  /// made for it. With `changes`, frames ask for the changes of this answer instead of the pairs.
   Measurement(const Scene<S>& scene, std::vector<double> frames, Oracle<S>& oracle,
-              const PlanScript<S>* script = nullptr)
-      : scene_(&scene), frames_(std::move(frames)), oracle_(&oracle), script_(script) {}
+              const PlanScript<S>* script = nullptr, std::optional<Answer> changes = {})
+      : scene_(&scene), frames_(std::move(frames)), oracle_(&oracle), script_(script), query_{changes} {}
 
-  /// Verifies a contestant over all frames, comparing every n-th with the oracle, and counts its work. If its
-  /// guarantee holds, creates the silent instance that will be timed. Exceptions of the strategy count as a
-  /// broken guarantee; ConfigError is passed on.
+  /// Verifies a contestant over all frames, comparing every n-th with the oracle, and counts its work; its
+  /// changes, too, if these are asked. If its guarantee holds, creates the silent instance that will be
+  /// timed. Exceptions of the strategy count as a broken guarantee; ConfigError is passed on.
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
 
   std::size_t size() const { return entrants_.size(); }
@@ -87,7 +104,7 @@ class Measurement {
   const ClipTimes* play(std::size_t i);
   const std::vector<double>& frames() const { return frames_; }
   /// Returns additional members of a contestant's record.
-  nlohmann::json extras(std::size_t /*i*/) const { return nlohmann::json::object(); }
+  nlohmann::json extras(std::size_t i) const;
 
  private:
   const Scene<S>* scene_;
@@ -95,7 +112,7 @@ class Measurement {
   Oracle<S>* oracle_;
   const PlanScript<S>* script_;
   std::vector<Entrant<S>> entrants_;
-  PairBuffer pairs_;
+  FrameQuery query_;
 };
 
 extern template class Measurement<float>;

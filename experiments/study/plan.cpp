@@ -75,6 +75,14 @@ StrategyRequest read_strategy(const json& value, const std::string& place) {
   return request;
 }
 
+/// Reads whose changes are asked; "none" overrides the level above.
+std::optional<Answer> read_answer(const JsonReader& keys, const std::string& text) {
+  if (text == "none") return {};
+  for (const Answer answer : {Answer::candidates, Answer::pairs})
+    if (text == word(answer)) return answer;
+  keys.fail("changes", "expected candidates, pairs or none, got '" + text + "'");
+}
+
 /// Reads the keys of a study over the current content of `study`.
 void read_study(JsonReader& keys, Study& study, const std::filesystem::path& folder) {
   const std::string& place = keys.place();
@@ -109,10 +117,29 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
     study.repetitions = std::uint32_t(*count);
   if (const auto limit = keys.whole("frames_limit", ranges::any)) study.frames_limit = *limit;
   if (const auto continuous = keys.truth("continuous")) study.continuous = *continuous;
+  if (const auto answer = keys.word("changes")) study.changes = read_answer(keys, *answer);
+  if (study.changes && study.continuous) keys.fail("changes", "contacts between keyframes have none");
+  if (const auto rays = keys.word("rays")) {
+    try {
+      study.rays = ray_study(*rays);
+    } catch (const std::invalid_argument& problem) {
+      keys.fail("rays", problem.what());
+    }
+  }
+  if (study.rays && (study.continuous || study.changes))
+    keys.fail("rays", "a study asks for one of rays, contacts and changes");
   if (const auto every = keys.whole("oracle_every", ranges::positive)) study.oracle_every = *every;
 }
 
 }  // namespace
+
+const char* word(Answer answer) {
+  return answer == Answer::candidates ? "candidates" : "pairs";
+}
+
+std::string name_with_changes(const std::string& scene, const std::string& changes) {
+  return changes.empty() ? scene : scene + " (changes of " + changes + ")";
+}
 
 Plan read_plan(const json& value, const std::string& place, const std::filesystem::path& folder) {
   JsonReader keys(value, place);

@@ -2,11 +2,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/contract/queries.hpp"
 #include "experiments/scenes/scene_spec.hpp"
 #include "experiments/study/contestants.hpp"
+#include "experiments/study/ray_measurement.hpp"
 #include "experiments/study/targets.hpp"
 
 namespace kbvh::experiments {
@@ -30,7 +33,14 @@ struct Study {
   std::uint64_t frames_limit = 0;  ///< only so many first frames; 0: all
   std::uint64_t oracle_every = 1;  ///< verify every n-th frame (and the last)
   bool continuous = false;         ///< contacts between keyframes instead of pairs at frames
+  std::optional<Answer> changes;   ///< the changes of this answer instead of pairs at frames
+  std::optional<RayStudy> rays;    ///< rays at frames instead of pairs
 };
+
+/// Names an answer in plans and results.
+const char* word(Answer answer);
+/// Returns the name of a scene in the tables of a study with `changes`.
+std::string name_with_changes(const std::string& scene, const std::string& changes);
 
 /// A plan: one or more studies, run one after the other into the same results.
 struct Plan {

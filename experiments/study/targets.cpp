@@ -77,6 +77,10 @@ Target read_target(const json& value, const std::string& place) {
   target.scalar = needed_word(keys, "scalar");
   if (target.scalar != "float" && target.scalar != "double")
     keys.fail("scalar", "expected float or double, got '" + target.scalar + "'");
+  target.changes = keys.word("changes").value_or("");
+  if (!target.changes.empty() && target.changes != word(Answer::candidates) &&
+      target.changes != word(Answer::pairs))
+    keys.fail("changes", "expected candidates or pairs, got '" + target.changes + "'");
   target.per_keyframe = std::uint32_t(needed(keys, "l", keys.whole("l", ranges::frames_per_keyframe)));
   target.at_least = needed(keys, "at_least", keys.number("at_least"));
   target.aim = needed(keys, "aim", keys.number("aim"));
@@ -88,13 +92,15 @@ Target read_target(const json& value, const std::string& place) {
   return target;
 }
 
-/// Returns whether the study measures in this scalar and l.
+/// Returns whether the study measures in this scalar and l, and the same kind of answer.
 bool measures(const Study& study, const Target& target) {
-  return has(study.scalars, target.scalar) && has(study.per_keyframe, target.per_keyframe);
+  return has(study.scalars, target.scalar) && has(study.per_keyframe, target.per_keyframe) &&
+         target.changes == (study.changes ? word(*study.changes) : "");
 }
 
 std::string conditions(const Target& target) {
-  return fmt::format("in {} at l = {}", target.scalar, target.per_keyframe);
+  const std::string as = target.changes.empty() ? "" : " as changes of " + target.changes;
+  return fmt::format("in {} at l = {}{}", target.scalar, target.per_keyframe, as);
 }
 
 }  // namespace
@@ -121,7 +127,8 @@ void check_target_scenes(const Plan& plan) {
       for (const Study& study : plan.studies) {
         if (!measures(study, target)) continue;
         for (const SceneSpec& spec : study.scenes) {
-          const std::string name = given_name(spec);
+          std::string name = given_name(spec);
+          if (!name.empty() && study.rays) name += suffix_of(*study.rays);
           if (!name.empty() && !has(known, name)) known.push_back(name);
           if (name == scene) meanings.insert(spec.said);
         }

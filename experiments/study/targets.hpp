@@ -29,6 +29,7 @@ struct Target {
   std::vector<std::string> scenes;  ///< the worst of these counts, or all
   bool mean = false;                ///< their geometric mean counts, not the worst
   std::string scalar;
+  std::string changes;  ///< "candidates" or "pairs": of studies that ask for these changes; empty: of others
   std::uint32_t per_keyframe = 10;
   double at_least = 0, aim = 0;
   std::string place;  ///< for messages

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <map>
 
+#include "core/judge/ray_oracle.hpp"
 #include "core/judge/verify.hpp"
 #include "scenes.hpp"
+#include "tests/support/ray_sets.hpp"
 
 namespace {
 using namespace kbvh;
@@ -232,6 +234,48 @@ TEST(Embree, LeavesTheFloatingPointStateAlone) {
     EXPECT_NE(denormal * .5f, 0);
     session.query(pairs, times);
     EXPECT_NE(denormal * .5f, 0);
+  }
+}
+
+/// A peer's own test of rays may differ from the exact answer, but not often on triangles in general
+/// position.
+TEST(Peers, RaysDifferFromTheTruthSeldom) {
+  for (const std::uint32_t corners : {3u, 4u}) {
+    const Scene<float> scene = adapters_test::scene<float>(
+        "soup", {adapters_test::soup<float>({.primitives = 80, .corners = corners, .size = .5}),
+                 adapters_test::soup<float>({.primitives = 60, .corners = corners, .size = .5, .seed = 2})});
+    const auto frames = frame_times(scene, 2);
+    for_each_peer(scene, [&](const Contestant& contestant) {
+      if (!contestant.entry->info.can.rays) return;
+      SCOPED_TRACE(describe(contestant.entry->info, contestant.params));
+      EXPECT_EQ(contestant.entry->info.rays_guarantee, Guarantee::approximate);
+      Session<float> session(scene, contestant, CountingPolicy::silent);
+      PhaseTimes ignored;
+      PairBuffer pairs;
+      std::size_t hits = 0, others = 0, asked = 0;
+      for (std::size_t f = 0; f < frames.size(); ++f) {
+        f == 0 ? session.reset(frames[0]) : session.advance(frames[f], ignored);
+        if (f % 2 == 1) session.query(pairs, ignored);
+        const auto rays = test::rays_at(scene, session.playback(), 100, std::uint32_t(f));
+        std::vector<Ray<float>> general;  // the first kind: through the scene
+        for (std::size_t i = 0; i < rays.size(); i += 8) general.push_back(rays[i]);
+        std::vector<RayHit> found(general.size()), any(general.size()), truth(general.size());
+        session.hits(RayQuery::closest, general, std::span<RayHit>(found), ignored);
+        session.hits(RayQuery::any, general, std::span<RayHit>(any), ignored);
+        brute_force_hits<float>(scene, session.playback(), RayQuery::closest, general,
+                                std::span<RayHit>(truth));
+        for (std::size_t i = 0; i < general.size(); ++i) {
+          ++asked;
+          hits += truth[i] ? 1 : 0;
+          const bool same = bool(found[i]) == bool(truth[i]) && bool(any[i]) == bool(truth[i]) &&
+                            found[i].body == truth[i].body && found[i].primitive == truth[i].primitive &&
+                            (!truth[i] || std::abs(found[i].parameter / truth[i].parameter - 1) < 1e-3);
+          others += same ? 0 : 1;
+        }
+      }
+      EXPECT_GT(hits, 20u);
+      EXPECT_LE(50 * others, asked);
+    });
   }
 }
 

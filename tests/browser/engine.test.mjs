@@ -241,6 +241,9 @@ test('an edit after single events happens at the time of the last one', async ()
   const { host, info } = await loaded({ scene: soups(), strategy: 'kinetic_aabb', snapshotBytes: 0 });
   for (let i = 0; i < 9; ++i) host.event(info.end, { counters: true });
   const { time } = host.state();
+  const between = host.checkpoint();
+  assert.match(await refusal(() => host.changePlans([{ body: 0, vertex: 1, times: [0], positions: [0, 0, 0] }])), /0/);
+  assert.equal(host.checkpoint(), between, 'a refused edit changes nothing');
   const state = host.changePlans([{ body: 0, vertex: 1, velocity: [0, 2, 0] }]);
   assert.equal(state.time, time);
   assert.ok(!state.betweenFrames);

@@ -60,9 +60,9 @@ std::set<std::string> keys_of(const json& value, const std::filesystem::path& fo
 json other(const std::string& key, const json& value) {
   static const std::set<std::string> free{"name",  "description", "optional", "id",
                                           "shape", "builtin",     "file",     "motion"};
-  static const std::map<std::string, json> words{{"median", "sah"},   {"portable", "auto"},
-                                                 {"z:30", "z:31"},    {"float", "double"},
-                                                 {"given", "points"}, {"shuffled", "renumbered"}};
+  static const std::map<std::string, json> words{
+      {"median", "sah"},   {"portable", "auto"},       {"z:30", "z:31"},       {"float", "double"},
+      {"given", "points"}, {"shuffled", "renumbered"}, {"pairs", "candidates"}};
   if (free.contains(key)) return nullptr;
   if (value.is_boolean()) return !value.get<bool>();
   if (value.is_string()) return words.at(value.get<std::string>());
@@ -134,6 +134,11 @@ TEST(Keys, SeeEveryFieldOfAPlan) {
        {"frames_limit", 3},
        {"oracle_every", 1},
        {"continuous", false}});
+  expect_every_field_counts({{"scenes", {"random_soups"}},
+                             {"strategies", strategies},
+                             {"changes", "pairs"},
+                             {"l", {3}},
+                             {"scalars", {"float"}}});
   expect_every_field_counts({{"scenes", json::parse(R"([{"builtin": "reversing_spheres", "triangles": 80,
                                  "obstacle": 80, "keyframes": 6}])")},
                              {"strategies", strategies}});
@@ -239,9 +244,10 @@ TEST(Keys, SeeTheMachineTheProgramAndTheHarness) {
   std::set<std::string> keys;
   std::size_t altered = 0;
   const auto add = [&](Harness harness, const std::string& program, const json& about, const json& who,
-                       const json& machine, bool continuous = false) {
+                       const json& machine, bool continuous = false, std::optional<Answer> changes = {}) {
     Study study;
     study.continuous = continuous;
+    study.changes = changes;
     keys.insert(configuration_key(harness, program, about, who, study, machine));
     ++altered;
   };
@@ -249,6 +255,8 @@ TEST(Keys, SeeTheMachineTheProgramAndTheHarness) {
   add(Harness::google_benchmark, "p", scene, strategy, here);
   add(Harness::rounds, "q", scene, strategy, here);
   add(Harness::rounds, "p", scene, strategy, here, true);
+  for (const Answer answer : {Answer::candidates, Answer::pairs})
+    add(Harness::rounds, "p", scene, strategy, here, false, answer);
   for (const auto& [name, value] : here.items()) {
     json machine = here;
     machine[name] = "another";

@@ -80,6 +80,8 @@ const std::map<std::string, std::vector<Option>> all_options{
       {"--seconds", Kind::number, "1"},
       {"--repro", Kind::names, "repro.json"},
       {"--out", Kind::free, "out"}}},
+    {"lab",
+     {{"--port", Kind::number, "0"}, {"--folder", Kind::names, "lab"}, {"--study", Kind::names, "out"}}},
     {"ccd", {{"--seconds", Kind::number, "1"}, {"--out", Kind::free, "out"}}}};
 
 const std::vector<std::string> nonsense{"-1",
@@ -182,7 +184,7 @@ TEST_F(Options, NonsenseIsRefusedInOneSentence) {
     for (const Option& option : options) {
       std::vector<std::string> words{command};
       if (command == "scene") words.push_back("turning_box");
-      if (option.name == "--study") words.insert(words.end(), {"--plan", "plan.json"});
+      if (option.name == "--study" && command != "lab") words.insert(words.end(), {"--plan", "plan.json"});
       const auto with = [&](const std::vector<std::string>& more) {
         std::vector<std::string> all = words;
         all.insert(all.end(), more.begin(), more.end());

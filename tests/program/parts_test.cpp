@@ -143,13 +143,17 @@ TEST(Plan, WhatIsGivenTwiceIsMeasuredOnce) {
 
 TEST(Plan, ErrorsNameFileKeyAndValue) {
   EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
-            "p.json: there is no key 'repetition'; known are builder, continuous, description, frames_limit, "
-            "l, name, "
+            "p.json: there is no key 'repetition'; known are builder, changes, continuous, description, "
+            "frames_limit, l, name, "
             "oracle_every, params, repetitions, scalars, scenes, strategies, studies, targets; did you mean "
             "'repetitions'?");
   EXPECT_TRUE(contains(plan_complaint("{\n  \"scenes\": ]\n}"), "p.json: line 2, column 13"));
   EXPECT_TRUE(contains(plan_complaint("[]"), "p.json: expected an object"));
   EXPECT_TRUE(contains(plan_complaint("{}"), "p.json: scenes: is missing"));
+  EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "changes": "contacts"})"),
+            "p.json: changes: expected candidates, pairs or none, got 'contacts'");
+  EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "changes": "pairs", "continuous": true})"),
+            "p.json: changes: contacts between keyframes have none");
   EXPECT_TRUE(contains(plan_complaint(R"({"scenes": []})"), "p.json: scenes: the list is empty"));
   EXPECT_TRUE(contains(plan_complaint(R"({"scenes": "nowhere"})"),
                        "p.json: scenes[0]: there is no built-in scene 'nowhere'; known are tablecloth"));

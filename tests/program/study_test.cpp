@@ -92,6 +92,37 @@ TEST_F(Binary, ContactsBetweenKeyframesAreMeasuredAndKept) {
   EXPECT_EQ(records().size(), found.size() + 1);
 }
 
+TEST_F(Binary, ChangesAreMeasuredAndKept) {
+  const std::string command = "run --scene waving_sheet --triangles 200 --keyframes 4 --repetitions 2 --l 5 ";
+  const std::string who = "--strategies bottom_up,interval_join,kinetic_separation_list,auto --out out ";
+  const Outcome first = kbvh(command + who + "--changes pairs");
+  EXPECT_EQ(first.code, 0) << first.err;
+  EXPECT_NE(first.out.find("(changes of pairs), l = 5"), std::string::npos) << first.out;
+  const auto found = records();
+  ASSERT_EQ(found.size(), 4u);
+  for (const json& record : found) {
+    EXPECT_EQ(record.at("scene").at("changes"), "pairs");
+    EXPECT_TRUE(record.at("verified").at("holds")) << record.at("verified").dump();
+    EXPECT_EQ(record.at("changes"), found[0].at("changes"));
+    EXPECT_GT(record.at("changes").at("begun"), 0);
+    for (const json& repetition : record.at("times").at("repetitions")) {
+      EXPECT_GT(repetition.at("traversal"), 0);
+      EXPECT_EQ(repetition.at("triangle_tests"), 0);
+    }
+  }
+  // Not measured again; other answers are another thing.
+  EXPECT_EQ(kbvh(command + who + "--changes pairs").code, 0);
+  EXPECT_EQ(records().size(), 4u);
+  EXPECT_EQ(kbvh(command + who + "--changes candidates").code, 0);
+  EXPECT_EQ(records().size(), 8u);
+  EXPECT_EQ(kbvh(command + who).code, 0);
+  EXPECT_EQ(records().size(), 12u);
+  const Outcome wrong = kbvh(command + who + "--changes contacts");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_NE(wrong.err.find("expected candidates, pairs or none, got 'contacts'"), std::string::npos)
+      << wrong.err;
+}
+
 TEST_F(Binary, ContactsAreMeasuredWherePlansChange) {
   const Outcome run = kbvh(
       "run --scene reversing_spheres --triangles 160 --repetitions 1 --continuous --strategies "

@@ -71,8 +71,8 @@ TEST(Targets, ErrorsNameFileTargetAndKey) {
   for (const char* key : {"what", "numerator", "denominator", "scenes", "scalar", "l", "at_least", "aim"})
     EXPECT_EQ(without(key), std::string("p.json: targets[0]: ") + key + ": is missing");
   EXPECT_EQ(with("/extra", 1),
-            "p.json: targets[0]: there is no key 'extra'; known are aim, at_least, denominator, l, note, "
-            "numerator, over, scalar, scenes, what");
+            "p.json: targets[0]: there is no key 'extra'; known are aim, at_least, changes, denominator, l, "
+            "note, numerator, over, scalar, scenes, what");
   EXPECT_EQ(with("/numerator/extra", 1),
             "p.json: targets[0]: numerator: there is no key 'extra'; known are builder, or, params, phase, "
             "scene, strategy");
@@ -104,7 +104,16 @@ TEST(Targets, ScenesMustBeMeasuredAndToldApart) {
             none + "'turning_box' in float at l = 2; there are sheet, sheet-shuffled, soup");
   EXPECT_EQ(with("/l", 3), none + "'sheet' in float at l = 3; there are none with a name");
   EXPECT_EQ(with("/scalar", "double"), none + "'sheet' in double at l = 2; there are none with a name");
+  EXPECT_EQ(with("/changes", "pairs"),
+            none + "'sheet' in float at l = 2 as changes of pairs; there are none with a name");
+  EXPECT_EQ(with("/changes", "contacts"),
+            "p.json: targets[0]: changes: expected candidates or pairs, got 'contacts'");
   json plan = example_plan();
+  plan["changes"] = "pairs";
+  EXPECT_EQ(start_complaint(plan), none + "'sheet' in float at l = 2; there are none with a name");
+  plan["targets"][0]["changes"] = "pairs";
+  EXPECT_EQ(start_complaint(plan), "nothing was thrown");
+  plan = example_plan();
   plan["scenes"][0]["triangles"] = {50, 98};
   EXPECT_EQ(start_complaint(plan), "p.json: targets[0]: scenes: 'sheet' is the name of several scenes");
   plan = example_plan();
@@ -350,6 +359,23 @@ TEST(Targets, OtherScalarsAndFramesDoNotMix) {
   groups = example_groups();
   groups[0].scene["scalar"] = "double";
   EXPECT_EQ(row_of(example_plan(), groups).at("verdict"), "unmeasured");
+}
+
+TEST(Targets, ChangesDoNotMixWithFullAnswers) {
+  auto groups = example_groups();
+  groups[0].scene["changes"] = "pairs";
+  groups[0].scene["name"] = "sheet (changes of pairs)";
+  EXPECT_EQ(row_of(example_plan(), groups).at("verdict"), "unmeasured");
+  json plan = example_plan();
+  plan["changes"] = "pairs";
+  plan["targets"][0]["changes"] = "pairs";
+  plan["targets"][0]["scenes"] = "sheet";
+  const json row = row_of(plan, groups);
+  EXPECT_EQ(row.at("measured"), 3.0);
+  EXPECT_EQ(row.at("changes"), "pairs");
+  EXPECT_EQ(row.at("per_scene")[0].at("scene"), "sheet (changes of pairs)");
+  groups[0].scene["changes"] = "candidates";
+  EXPECT_EQ(row_of(plan, groups).at("verdict"), "unmeasured");
 }
 
 TEST(Targets, TableShowsRowsAndScenes) {

@@ -66,10 +66,19 @@ namespace {
 /// is not the strategy's doing.
 template <class S>
 std::string allocations_when_warm(const StrategyEntry& entry, const TestScene<S>& test,
-                                  const std::map<std::string, std::string>& params = {}) {
-  Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred}, CountingPolicy::silent);
+                                  const std::map<std::string, std::string>& params = {},
+                                  std::optional<Answer> changes = {},
+                                  const std::optional<BuilderConfig>& builder = {}) {
+  Session<S> session(test.scene, {&entry, params, builder.value_or(entry.info.topology.preferred)},
+                     CountingPolicy::silent);
   PhaseTimes times;
-  PairBuffer pairs;
+  PairBuffer pairs, ended;
+  const auto query = [&] {
+    if (changes)
+      session.changes(*changes, pairs, ended, times);
+    else
+      session.query(pairs, times);
+  };
   for (int round = 0; round < 3; ++round) {
     ScriptCursor<S> cursor(test.script.steps.empty() ? nullptr : &test.script);
     const auto follow = [&](double t) -> std::uint64_t {
@@ -85,7 +94,7 @@ std::string allocations_when_warm(const StrategyEntry& entry, const TestScene<S>
       const double t = test.frames[f];
       if (f == 0) {
         session.reset(t);
-        session.query(pairs, times);
+        query();
         follow(t);
         held = session.strategy().bytes();
         continue;
@@ -93,7 +102,7 @@ std::string allocations_when_warm(const StrategyEntry& entry, const TestScene<S>
       const std::uint64_t before = allocations;
       session.advance(t, times);
       const std::uint64_t advanced = allocations;
-      session.query(pairs, times);
+      query();
       const std::uint64_t queried = allocations, followed = follow(t);
       if (round < 2) continue;
       if (queried != before || followed != 0)
@@ -117,6 +126,61 @@ TEST(Allocation, NoneOnceWarm) {
       if (entry.info.guarantee != Guarantee::exact || entry.info.id == "rebuild") continue;
       EXPECT_EQ(allocations_when_warm(entry, in_float), "") << entry.info.id << " on " << name << ", float";
       EXPECT_EQ(allocations_when_warm(entry, in_double), "") << entry.info.id << " on " << name << ", double";
+    }
+  }
+}
+
+TEST(Allocation, NoneOnceWarmWhereChangesAreAsked) {
+  for (const char* const name : {"soups", "four_bodies_own_keyframes", "plan_changes"}) {
+    const auto in_float = synthetic_scene<float>(name, 7);
+    const auto in_double = synthetic_scene<double>(name, 7);
+    for (const StrategyEntry& entry : registry()) {
+      if (entry.info.guarantee != Guarantee::exact || entry.info.id == "rebuild" ||
+          (!in_float.script.steps.empty() && !entry.info.can.plan_changes))
+        continue;
+      BuilderConfig builder = entry.info.topology.preferred;
+      for (const Answer answer : {Answer::candidates, Answer::pairs}) {
+        EXPECT_EQ(allocations_when_warm(entry, in_float, {}, answer), "") << entry.info.id << " on " << name;
+        if (!entry.info.can.changes) continue;
+        builder.leaf_size = 1;
+        EXPECT_EQ(allocations_when_warm(entry, in_float, {}, answer, builder), "")
+            << entry.info.id << " on " << name;
+        if (entry.info.id == "kinetic_separation_list") continue;  // see the next test but one
+        EXPECT_EQ(allocations_when_warm(entry, in_double, {}, answer), "") << entry.info.id << " on " << name;
+      }
+    }
+  }
+}
+
+/// The same for rays, at every frame.
+template <class S>
+std::string allocations_of_rays(const StrategyEntry& entry, const TestScene<S>& test) {
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  std::vector<Ray<S>> rays;
+  for (int i = 0; i < 32; ++i)
+    rays.push_back({{S(-3), S(0.11 * i - 1.7), S(0.05 * i - 0.8)}, {S(1), S(0.3), S(0.02 * i - 0.3)}});
+  std::vector<RayHit> hits(rays.size());
+  PhaseTimes times;
+  for (int round = 0; round < 3; ++round)
+    for (const double t : test.frames) {
+      t == test.frames[0] ? session.reset(t) : session.advance(t, times);
+      const std::uint64_t before = allocations;
+      for (const RayQuery query : {RayQuery::closest, RayQuery::any})
+        session.hits(query, rays, std::span<RayHit>(hits), times);
+      if (round == 2 && t != test.frames[0] && allocations != before)
+        return "t = " + std::to_string(t) + ": " + std::to_string(allocations - before) + " allocations";
+    }
+  return {};
+}
+
+TEST(Allocation, NoneOfRaysOnceWarm) {
+  for (const char* const name : {"soups", "sheets", "four_bodies_own_keyframes"}) {
+    const auto in_float = synthetic_scene<float>(name, 3);
+    const auto in_double = synthetic_scene<double>(name, 3);
+    for (const StrategyEntry& entry : registry()) {
+      if (!entry.info.can.rays || entry.info.rays_guarantee != Guarantee::exact) continue;
+      EXPECT_EQ(allocations_of_rays(entry, in_float), "") << entry.info.id << " on " << name << ", float";
+      EXPECT_EQ(allocations_of_rays(entry, in_double), "") << entry.info.id << " on " << name << ", double";
     }
   }
 }

@@ -53,9 +53,11 @@ class Careless : public CountedStrategy<S, Count> {
 /// The same with every ability.
 template <class S, class Count>
 class Able : public Careless<S, Count>,
+             public AnswersChanges<S>,
              public AnswersSelfPairs,
              public AnswersSpans<S>,
              public AnswersSweeps<S>,
+             public AnswersRays<S>,
              public TakesPlanChanges<S>,
              public TakesGeometryChanges<S> {
  public:
@@ -63,9 +65,13 @@ class Able : public Careless<S, Count>,
   std::vector<std::string> calls;
 
  protected:
+  void find_changes(double, Answer, PairBuffer&, PairBuffer&) override { calls.push_back("changes"); }
   void find_spans(double, double, SpanBuffer&) override { calls.push_back("spans"); }
   void find_swept_pairs(double, double, std::span<const S* const>, PairBuffer&) override {
     calls.push_back("sweep");
+  }
+  void find_hits(double, RayQuery, std::span<const Ray<S>>, std::span<RayHit>) override {
+    calls.push_back("rays");
   }
   void follow_plans(double, std::span<const PlanChange<S>>) override { calls.push_back("plans"); }
   void follow_geometry(double, const GeometryChange<S>&) override { calls.push_back("geometry"); }
@@ -118,14 +124,18 @@ TEST(Contract, AbilitiesAreThoseOfTheClass) {
                   .geometry_changes = true,
                   .spans = true,
                   .self_pairs = true,
-                  .contacts = true};
+                  .contacts = true,
+                  .changes = true,
+                  .rays = true};
   boasting.declares.continuous = true;
   const Capabilities none = make_entry<Careless>(boasting).info.can;
   EXPECT_FALSE(none.event_driven || none.events || none.plan_changes || none.geometry_changes || none.spans ||
-               none.self_pairs || none.contacts || none.restructures || none.time_budget);
+               none.self_pairs || none.contacts || none.changes || none.rays || none.restructures ||
+               none.time_budget);
   EXPECT_TRUE(none.continuous);
   const Capabilities all = make_entry<Able>(described("able")).info.can;
-  EXPECT_TRUE(all.plan_changes && all.geometry_changes && all.spans && all.self_pairs && all.contacts);
+  EXPECT_TRUE(all.plan_changes && all.geometry_changes && all.spans && all.self_pairs && all.contacts &&
+              all.changes && all.rays);
   EXPECT_FALSE(all.events || all.continuous);
 }
 
@@ -137,6 +147,7 @@ TEST(Contract, WhatAClassCannotDoThrows) {
   EXPECT_THROW(made.strategy.spans(0, 1, spans), std::logic_error);
   EXPECT_THROW(made.strategy.start_sweep(0), std::logic_error);
   EXPECT_THROW(made.strategy.swept_pairs(0, 1, {}, made.pairs), std::logic_error);
+  EXPECT_THROW(made.strategy.hits_at(0, RayQuery::any, {}, {}), std::logic_error);
   EXPECT_THROW(made.strategy.flight_plans_changed(0, {}), std::logic_error);
   EXPECT_THROW(made.strategy.geometry_changed(0, {}), std::logic_error);
   EXPECT_THROW(made.strategy.step_event(1, event), std::logic_error);
@@ -164,6 +175,7 @@ TEST(Contract, NoFlagLies) {
     EXPECT_EQ(refused([&] { strategy.flight_plans_changed(0, {}); }), !can.plan_changes) << entry.info.id;
     EXPECT_EQ(refused([&] { strategy.geometry_changed(0, {}); }), !can.geometry_changes) << entry.info.id;
     EXPECT_EQ(refused([&] { strategy.start_sweep(0); }), !can.contacts) << entry.info.id;
+    EXPECT_EQ(refused([&] { strategy.hits_at(0, RayQuery::any, {}, {}); }), !can.rays) << entry.info.id;
     EventDescription<float> event;
     EXPECT_EQ(refused([&] { strategy.step_event(0, event); }), !can.events) << entry.info.id;
     EXPECT_EQ(strategy.events() != nullptr, can.events) << entry.info.id;
@@ -191,6 +203,9 @@ TEST(Contract, TheBaseClassChecksTimes) {
   EXPECT_EQ(strategy.before(), 1);
   EXPECT_THROW(strategy.candidates_at(1, made.pairs, {}), std::invalid_argument);
   EXPECT_THROW(strategy.confirm(3, made.pairs), std::invalid_argument);
+  PairBuffer ended;
+  EXPECT_THROW(strategy.changes_at(1, Answer::pairs, made.pairs, ended), std::invalid_argument);
+  EXPECT_THROW(strategy.changes_at(2, Answer::pairs, ended, ended), std::invalid_argument);
   EXPECT_EQ(strategy.queries, 0);
   strategy.candidates_at(2, made.pairs, {});
   SpanBuffer spans;
@@ -200,14 +215,21 @@ TEST(Contract, TheBaseClassChecksTimes) {
   EXPECT_THROW(strategy.start_sweep(3), std::invalid_argument);
   EXPECT_THROW(strategy.flight_plans_changed(1, {}), std::invalid_argument);
   EXPECT_THROW(strategy.geometry_changed(1, {}), std::invalid_argument);
+  EXPECT_THROW(strategy.hits_at(1, RayQuery::any, {}, {}), std::invalid_argument);
+  RayHit hit;
+  EXPECT_THROW(strategy.hits_at(2, RayQuery::any, {}, {&hit, 1}), std::invalid_argument);
   const float* const none[] = {nullptr};
   EXPECT_THROW(strategy.swept_pairs(2, 3, none, made.pairs), std::invalid_argument);  // two bodies
   EXPECT_TRUE(strategy.calls.empty());
+  made.pairs = {{0, 1, 1, 2}};  // of a frame before
+  strategy.changes_at(2, Answer::candidates, made.pairs, ended);
+  EXPECT_TRUE(made.pairs.empty());
   strategy.spans(2, 3, spans);
   const float* const both[] = {nullptr, nullptr};
   strategy.swept_pairs(3, 4, both, made.pairs);
   strategy.flight_plans_changed(4, {});
-  EXPECT_EQ(strategy.calls, (std::vector<std::string>{"spans", "sweep", "plans"}));
+  strategy.hits_at(4, RayQuery::any, {}, {});
+  EXPECT_EQ(strategy.calls, (std::vector<std::string>{"changes", "spans", "sweep", "plans", "rays"}));
   EXPECT_EQ(strategy.now(), 4);
   EXPECT_EQ(strategy.before(), 3);
 }

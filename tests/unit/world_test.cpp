@@ -13,6 +13,7 @@
 #include "core/contract/registry.hpp"
 #include "core/judge/audit.hpp"
 #include "experiments/theory/kinetic_log.hpp"
+#include "tests/support/ray_sets.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
@@ -111,11 +112,122 @@ TEST(World, ShowsBoxesAroundVolumes) {
   }
 }
 
+/// Whether the pairs that began and ended add up to the world's pairs, after each of some frames and after a
+/// reset.
+void expect_changes_add_up(const std::string& id, const TestScene<float>& test) {
+  SCOPED_TRACE(id);
+  World world = world_of(test.scene);
+  const std::vector<double> frames = frame_times(test.scene, 7);
+  world.start(id, {}, frames[0]);
+  std::vector<WorldPair> held, begun, ended, pairs;
+  const auto take = [&] {
+    world.changes(begun, ended);
+    for (const WorldPair& pair : ended) {
+      const auto found = std::find(held.begin(), held.end(), pair);
+      ASSERT_NE(found, held.end());
+      held.erase(found);
+    }
+    for (const WorldPair& pair : begun) {
+      ASSERT_EQ(std::find(held.begin(), held.end(), pair), held.end());
+      held.push_back(pair);
+    }
+    world.pairs(pairs);
+    ASSERT_TRUE(std::is_permutation(held.begin(), held.end(), pairs.begin(), pairs.end()));
+  };
+  std::size_t changed = 0;
+  for (int round = 0; round < 2; ++round) {
+    if (round == 1) world.reset(frames[0]);
+    held.clear();  // a reset begins all pairs again
+    for (std::size_t f = 0; f < frames.size(); f += 1 + f % 3) {
+      if (f > 0) world.advance(frames[f]);
+      take();
+      if (f > 0) changed += begun.size() + ended.size();
+    }
+  }
+  EXPECT_GT(changed, 20u);
+  EXPECT_THROW(world.changes(begun, begun), std::invalid_argument);
+}
+
+TEST(World, TellsWhatBeganAndEnded) {
+  const auto test = synthetic_scene<float>("soups", 7);
+  for (const char* const id :
+       {"bottom_up", "interval_join", "interval_join_ahead", "kinetic_separation_list", "auto"})
+    expect_changes_add_up(id, test);
+  World world;
+  std::vector<WorldPair> begun, ended;
+  EXPECT_THROW(world.changes(begun, ended), std::logic_error) << "not started";
+}
+
 const std::vector<std::uint32_t> triangle{0, 1, 2};
 std::vector<float> triangle_at(float z, bool padded = false) {
   std::vector<float> positions{0, 0, z, 1, 0, z, 0, 1, z};
   if (padded) positions.push_back(0);
   return positions;
+}
+
+template <class S>
+void expect_the_same_hits(const char* id) {
+  SCOPED_TRACE(id);
+  const StrategyEntry& entry = find_strategy(id);
+  const TestScene<S> test = synthetic_scene<S>("soups", 3);
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+  World world = world_of(test.scene);
+  const std::vector<double> frames = frame_times(test.scene, 3);
+  world.start(id, {}, frames[0]);
+  session.reset(frames[0]);
+  PhaseTimes times;
+  std::size_t hits = 0;
+  for (const double t : frames) {
+    if (t > frames[0]) {
+      session.advance(t, times);
+      world.advance(t);
+    }
+    session.playback().evaluate_all();
+    const std::vector<Ray<S>> rays = rays_at(test.scene, session.playback(), 5, 1);
+    std::vector<WorldRay> plain;
+    for (const Ray<S>& ray : rays) {
+      WorldRay& made = plain.emplace_back();
+      std::copy_n(ray.origin, 3, made.origin);
+      std::copy_n(ray.direction, 3, made.direction);
+      made.length = double(ray.length);
+    }
+    for (const WorldRayQuery query : {WorldRayQuery::closest, WorldRayQuery::any}) {
+      std::vector<RayHit> expected(rays.size());
+      std::vector<WorldHit> found(1000);  // is replaced
+      session.hits(RayQuery(query), rays, std::span<RayHit>(expected), times);
+      world.hits(query, plain, found);
+      ASSERT_EQ(found.size(), expected.size());
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        ASSERT_EQ(found[i], (WorldHit{expected[i].body, expected[i].primitive, expected[i].parameter})) << i;
+        hits += expected[i] ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(hits, 50U);
+}
+
+TEST(World, RaysMeetWhatTheLibrarySays) {
+  for (const char* id : {"bottom_up", "kinetic_aabb", "lbvh"}) {
+    expect_the_same_hits<float>(id);
+    expect_the_same_hits<double>(id);
+  }
+  World world;
+  const std::vector<float> positions{0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const std::vector<std::uint32_t> triangle{0, 1, 2};
+  world.add_body("triangle", {triangle}, std::span<const float>(positions));
+  std::vector<WorldHit> hits{{7, 7, 7}};
+  EXPECT_THROW(world.hits(WorldRayQuery::any, {}, hits), std::logic_error);
+  world.start("sweep");
+  EXPECT_THROW(world.hits(WorldRayQuery::any, {}, hits), std::logic_error);
+  World other;
+  other.add_body("triangle", {triangle}, std::span<const float>(positions));
+  other.start("bottom_up");
+  const std::vector<WorldRay> wrong{{{0.25, 0.25, 1}, {0, 0, -1}}, {{0, 0, 1}, {0, 0, -1}, -2}};
+  EXPECT_THROW(other.hits(WorldRayQuery::any, wrong, hits), std::invalid_argument);
+  EXPECT_EQ(hits[0].body, 7U);
+  const std::vector<WorldRay> right{{{0.25, 0.25, 1}, {0, 0, -1}}, {{0.25, 0.25, 1}, {0, 0, 1}}};
+  other.hits(WorldRayQuery::closest, right, hits);
+  EXPECT_EQ(hits, (std::vector<WorldHit>{{0, 0, 1}, {}}));
 }
 
 TEST(World, PositionsFrameByFrame) {

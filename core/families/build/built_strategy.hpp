@@ -5,6 +5,7 @@
 #include "core/families/build/built_tree.hpp"
 #include "core/families/build/curve_order.hpp"
 #include "core/families/wide/wide_query.hpp"
+#include "core/families/wide/wide_rays.hpp"
 
 namespace kbvh {
 
@@ -14,7 +15,7 @@ namespace kbvh {
 ///   bytes()
 /// Of the given topologies, only the leaf size counts.
 template <class S, class Count, class Builder>
-class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>> {
+class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public AnswersRays<S> {
   using Base = BuiltEachFrame<S, Count, BuiltTree<S>>;
 
  protected:
@@ -32,6 +33,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>> {
 
   void reset_to(double t) override {
     Base::reset_to(t);
+    rays_.start_over();
     check_layouts(
         this->scene_.pairs(), [&](std::uint32_t body) -> const auto& { return bodies_[body]; });
   }
@@ -62,7 +64,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>> {
     return view;
   }
   std::size_t bytes() const override {
-    return Base::bytes() + builder_.bytes() + order_.bytes() + query_.bytes();
+    return Base::bytes() + builder_.bytes() + order_.bytes() + query_.bytes() + rays_.bytes();
   }
 
  protected:
@@ -70,6 +72,13 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>> {
     take_boxes(body);
     builder_.build(bodies_[body], order_, lists_[body]);
     count_boxes(body);
+  }
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    std::uint64_t tests = 0;
+    const auto side_of = [&](std::uint32_t body) -> WideSide<S> { return {&bodies_[body], body}; };
+    rays_.find(query, rays, hits, side_of, this->triangle_stats_, tests);
+    this->count_.add(Counter::box_tests, tests);
   }
   /// Computes the boxes of a tree that keeps its shape.
   void refit(std::uint32_t body) {
@@ -93,6 +102,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>> {
   Builder builder_;
   CurveOrder<S> order_;
   WideQuery<S> query_{this->scene_, this->sampled_};
+  WideRays<S> rays_{this->scene_, this->sampled_};
 };
 
 }  // namespace kbvh

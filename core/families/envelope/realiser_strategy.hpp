@@ -8,13 +8,14 @@
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/realiser_rows.hpp"
 #include "core/families/wide/wide_query.hpp"
+#include "core/families/wide/wide_rays.hpp"
 
 namespace kbvh {
 
 /// The shared part of strategies that keep the realisers of a wide hierarchy's boxes instead of the boxes
 /// (RealiserRows). Queries run on the kernels of a refit's query.
 template <class S, class Count>
-class RealiserStrategy : public CountedStrategy<S, Count> {
+class RealiserStrategy : public CountedStrategy<S, Count>, public AnswersRays<S> {
  public:
   RealiserStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies)
       : CountedStrategy<S, Count>(scene, motion),
@@ -30,14 +31,8 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     std::uint64_t tests = 0;
-    std::uint64_t reads = 0;
-    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
-      Body& body = bodies_[index];
-      reads += body.rows.make_visited(this->sampled_, index, places_of(body));
-    }
-    const auto side_of = [&](std::uint32_t body) -> WideSide<S> {
-      return {.hierarchy = &hierarchy(body), .body = body, .stale = bodies_[body].rows.stale()};
-    };
+    std::uint64_t reads = make_visited();
+    const auto side_of = [&](std::uint32_t body) { return lazy_side(body); };
     const auto make = [&](std::uint32_t index, std::uint32_t node) {
       Body& body = bodies_[index];
       reads += body.rows.make_wanted(node, this->sampled_, index, places_of(body));
@@ -68,7 +63,7 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
   }
 
   std::size_t bytes() const override {
-    std::size_t total = near_bodies_.bytes() + query_.bytes();
+    std::size_t total = near_bodies_.bytes() + query_.bytes() + rays_.bytes();
     for (const Body& body : bodies_)
       total += body.rows.bytes() + body.realisers.size() * sizeof(std::uint32_t);
     return total;
@@ -97,7 +92,34 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
   NearBodies near_bodies_;
   std::vector<Body> bodies_;
 
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    std::uint64_t tests = 0;
+    std::uint64_t reads = make_visited();
+    rays_.find(
+        query, rays, hits, [&](std::uint32_t body) { return lazy_side(body); },
+        [&](std::uint32_t index, std::uint32_t node) {
+          Body& body = bodies_[index];
+          reads += body.rows.make_wanted(node, this->sampled_, index, places_of(body));
+        },
+        this->triangle_stats_, tests);
+    this->count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::positions_fetched, reads);
+  }
+
  private:
+  /// Computes the boxes that recent queries visited, at least those of roots. Returns the positions read.
+  std::uint64_t make_visited() {
+    std::uint64_t reads = 0;
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+      Body& body = bodies_[index];
+      reads += body.rows.make_visited(this->sampled_, index, places_of(body));
+    }
+    return reads;
+  }
+  WideSide<S> lazy_side(std::uint32_t body) {
+    return {.hierarchy = &hierarchy(body), .body = body, .stale = bodies_[body].rows.stale()};
+  }
   /// Returns a callable for RealiserRows.
   static auto places_of(const Body& body) {
     return
@@ -120,6 +142,7 @@ class RealiserStrategy : public CountedStrategy<S, Count> {
   }
 
   WideQuery<S> query_{this->scene_, this->sampled_};
+  WideRays<S> rays_{this->scene_, this->sampled_};
 };
 
 }  // namespace kbvh

@@ -14,6 +14,7 @@
 #include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/volumes/aligned_box.hpp"
 #include "core/topology/leaf_pairs.hpp"
+#include "core/topology/ray_traversal.hpp"
 
 namespace kbvh {
 
@@ -27,7 +28,7 @@ enum class KineticQuery : std::uint8_t {
 /// selectable kinds of KineticForest, of boxes or of k-DOPs. The clock of a forest's queue decides about
 /// events; k-DOPs need an EventClock. Queries of k-DOPs go node by node.
 template <class S, class Count, class... Forests>
-class KineticTreeStrategy : public CountedStrategy<S, Count> {
+class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays<S> {
   /// A forest, and the volumes of its trees at the current frame.
   template <class ForestType>
   struct Kind {
@@ -167,11 +168,35 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
     return on_kind([&](auto& kind) {
       std::size_t total = kind.forest.bytes();
       for (const auto& volumes : kind.volumes) total += volumes.bytes();
-      return total + near_bodies_.bytes() + rows_.bytes() + stack_.capacity() * sizeof(NodePair);
+      return total + near_bodies_.bytes() + rows_.bytes() + stack_.capacity() * sizeof(NodePair) +
+             ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
     });
   }
 
  protected:
+  /// Follows rays node by node, in the boxes around volumes.
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    on_kind([&](auto& kind) {
+      if constexpr (of_boxes<decltype(kind)>)
+        for (std::uint32_t body = 0; by_rows_ && body < kind.volumes.size(); ++body)
+          kind.volumes[body].resize(kind.forest.tree(body).topology().size());
+      find_hits_by_body(this->scene_, this->sampled_, query, rays, hits,
+                        [&](std::uint32_t body, RaySearch<S>& search) {
+                          const Topology& topology = kind.forest.tree(body).topology();
+                          if (topology.empty()) return false;
+                          auto&& volumes = view(kind, body);
+                          const TopologyTree tree{topology, [&](std::uint32_t node) {
+                                                    volumes.ensure(node);
+                                                    return enclosing_box(volumes(node));
+                                                  }};
+                          return follow_ray(tree, search, body, this->scene_.primitives(body),
+                                            this->sampled_.positions(body), ray_stack_, this->count_,
+                                            this->triangle_stats_);
+                        });
+    });
+  }
+
   /// Applies changes of plans; for `follow_plans` of derived classes.
   void change_plans(double t, std::span<const PlanChange<S>> changes) {
     on_kind([&](auto& kind) {
@@ -252,6 +277,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count> {
   bool by_rows_;
   KineticRowsQuery<S> rows_;  ///< empty for queries node by node
   std::vector<NodePair> stack_;
+  std::vector<RayNode<std::uint32_t>> ray_stack_;
   std::uint64_t first_step_ = 0;
 };
 

@@ -61,6 +61,7 @@ void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>&
   leaf_pairs_room_ = leaf_pairs;
   node_tests_ = 0;
   reading_ = false;
+  following_ = {};
   throughout_ = count_ = 0;
   traversal_ = {};
   leaf_join_ = {};
@@ -209,10 +210,7 @@ void IntervalJoin<S>::start_reading() {
     next_ending_.resize(count_);
     place_.resize(count_);
   }
-  for (std::size_t i = 0; i < throughout_; ++i) {
-    const BodyPair bodies = bodies_of(i);
-    alive_[i] = {bodies.first, sorted_[i].primitive_a, bodies.second, sorted_[i].primitive_b};
-  }
+  for (std::size_t i = 0; i < throughout_; ++i) alive_[i] = primitives_of(i);
   next_ = alive_count_ = std::uint32_t(throughout_);
   waiting_.clear();
   std::fill(std::begin(ending_), std::end(ending_), none);
@@ -226,9 +224,9 @@ void IntervalJoin<S>::begin_pair(std::uint32_t index) {
   next_ending_[index] = ending_[bucket];
   ending_[bucket] = index;
   place_[index] = place;
-  const BodyPair bodies = bodies_of(index);
-  alive_[place] = {bodies.first, pair.primitive_a, bodies.second, pair.primitive_b};
+  alive_[place] = primitives_of(index);
   alive_places_[place] = index;
+  following_.touch(index);
 }
 
 template <class S>
@@ -237,10 +235,11 @@ void IntervalJoin<S>::end_pair(std::uint32_t index) {
   alive_[place] = alive_[last];
   alive_places_[place] = alive_places_[last];
   place_[alive_places_[place]] = place;
+  following_.touch(index);
 }
 
 template <class S>
-void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
+void IntervalJoin<S>::move_to(float fraction) {
   if (!reading_) start_reading();
   const std::uint32_t bucket = FractionBuckets::of(fraction);
   // Beginning pairs: all of earlier buckets, some of the current one.
@@ -271,7 +270,6 @@ void IntervalJoin<S>::read(float fraction, PairBuffer& out) {
       link = &next_ending_[index];
     }
   }
-  out.insert(out.end(), alive_.begin(), alive_.begin() + std::ptrdiff_t(alive_count_));
 }
 
 template <class S>

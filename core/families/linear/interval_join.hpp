@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/families/linear/linear_segment.hpp"
+#include "core/families/linear/pair_marks.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/scene/self_pairs.hpp"
 
@@ -56,7 +57,26 @@ class IntervalJoin {
 
   /// Appends the pairs whose boxes overlap at a fraction of the segment. Fractions must not decrease within a
   /// segment. O(pairs that begin or end since the last call), plus one copy of the overlapping pairs.
-  void read(float fraction, PairBuffer& out);
+  void read(float fraction, PairBuffer& out) {
+    move_to(fraction);
+    out.insert(out.end(), alive_.begin(), alive_.begin() + std::ptrdiff_t(alive_count_));
+  }
+  /// Does the same without the copy: O(pairs that begin or end). Afterwards the functions below tell which
+  /// pairs overlap.
+  void move_to(float fraction);
+  bool overlaps(std::uint32_t pair) const {
+    if (pair < throughout_) return true;
+    const std::uint32_t place = place_[pair];
+    return place >= throughout_ && place < alive_count_ && alive_places_[place] == pair;
+  }
+  /// Calls use(pair) for every overlapping pair.
+  template <class Use>
+  void for_overlapping(const Use& use) const {
+    for (std::uint32_t place = 0; place < alive_count_; ++place)
+      use(place < throughout_ ? place : alive_places_[place]);
+  }
+  /// Touches these marks whenever a pair begins or ends to overlap, until the next join.
+  void follow(const FollowingMarks& marks) { following_ = marks; }
 
   /// Returns all pairs of the segment: first those that overlap from its start to its end, then the others
   /// roughly in the order of their start.
@@ -68,6 +88,11 @@ class IntervalJoin {
   /// Returns the bodies of one of `pairs`, by its index.
   BodyPair bodies_of(std::size_t pair) const {
     return bodies_.size() == 1 ? bodies_[0] : bodies_[bodies_of_[pair]];
+  }
+  /// Returns one of `pairs`, by its index, with its bodies.
+  PrimitivePair primitives_of(std::size_t pair) const {
+    const BodyPair bodies = bodies_of(pair);
+    return {bodies.first, sorted_[pair].primitive_a, bodies.second, sorted_[pair].primitive_b};
   }
 
   std::size_t bytes() const;
@@ -126,6 +151,7 @@ class IntervalJoin {
   /// Alive pairs, in lists by the bucket of their end.
   std::uint32_t ending_[FractionBuckets::count] = {}, present_ = 0;
   std::vector<std::uint32_t> next_ending_;
+  FollowingMarks following_;
 };
 
 extern template class IntervalJoin<float>;

@@ -18,6 +18,9 @@ void TriangleSpanFilter<S>::begin(const IntervalJoin<S>& join, When when) {
   const auto pairs = join.pairs();
   next_.resize(std::max(next_.size(), pairs.size()));
   time_.resize(next_.size());
+  place_.resize(next_.size());
+  state_.assign(pairs.size(), State::apart);
+  following_ = {};
   std::fill(std::begin(head_), std::end(head_), none);
   bucket_ = 0;
   last_ = -1;
@@ -58,6 +61,29 @@ void TriangleSpanFilter<S>::wait(std::uint32_t pair, float until) {
 }
 
 template <class S>
+void TriangleSpanFilter<S>::intersect(std::uint32_t pair, float until) {
+  place_[pair] = std::uint32_t(intersecting_.size());
+  intersecting_.push_back(pair);
+  set_state(pair, State::intersecting);
+  wait(pair, until);
+}
+
+template <class S>
+void TriangleSpanFilter<S>::cease_to_intersect(std::uint32_t pair) {
+  const std::uint32_t last = intersecting_.back();
+  intersecting_[place_[pair]] = last;
+  place_[last] = place_[pair];
+  intersecting_.pop_back();
+  set_state(pair, State::apart);
+}
+
+template <class S>
+void TriangleSpanFilter<S>::leave_open(std::uint32_t pair, float until) {
+  open_.push_back({pair, until});
+  set_state(pair, State::open);
+}
+
+template <class S>
 void TriangleSpanFilter<S>::collect_due(const IntervalJoin<S>& join, float fraction) {
   due_.clear();
   const std::uint32_t present = FractionBuckets::of(fraction);
@@ -68,22 +94,25 @@ void TriangleSpanFilter<S>::collect_due(const IntervalJoin<S>& join, float fract
     bucket_ = bucket;
     while (pair != none) {
       const std::uint32_t next = next_[pair];
-      if (time_[pair] > fraction)
+      if (!is_due(pair, fraction)) {
         wait(pair, time_[pair]);  // later in the current bucket
-      else if (pairs[pair].end >= fraction)
-        due_.push_back(pair);
+      } else {
+        if (state_[pair] == State::intersecting) cease_to_intersect(pair);
+        if (pairs[pair].end >= fraction) due_.push_back(pair);
+      }
       pair = next;
     }
   }
-  for (std::vector<Item>* list : {&intersecting_, &open_}) {
-    std::size_t kept = 0;
-    for (const Item item : *list)
-      if (fraction <= item.until)
-        (*list)[kept++] = item;
-      else if (pairs[item.pair].end >= fraction)
-        due_.push_back(item.pair);
-    list->resize(kept);
+  std::size_t kept = 0;
+  for (const Item item : open_) {
+    if (fraction <= item.until) {
+      open_[kept++] = item;
+      continue;
+    }
+    set_state(item.pair, State::apart);
+    if (pairs[item.pair].end >= fraction) due_.push_back(item.pair);
   }
+  open_.resize(kept);
 }
 
 template <class S>
@@ -138,7 +167,7 @@ void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const Scene
     if (verdicts_[k] == SpanVerdict::open)
       due_[left++] = pair;
     else if (verdicts_[k] == SpanVerdict::intersect)
-      intersecting_.push_back({pair, until});
+      intersect(pair, until);
     else if (until < pairs[pair].end)
       wait(pair, until);
   }
@@ -151,13 +180,12 @@ void TriangleSpanFilter<S>::attempt_all(const LinearSegment<S>& segment, const S
                                         const IntervalJoin<S>& join, float fraction) {
   attempt(segment, scene, join, fraction, 1);
   attempt(segment, scene, join, fraction, 0.25F);
-  for (const std::uint32_t pair : due_)
-    open_.push_back({pair, fraction + (join.pairs()[pair].end - fraction) / 4});
+  for (const std::uint32_t pair : due_) leave_open(pair, fraction + (join.pairs()[pair].end - fraction) / 4);
 }
 
 template <class S>
-std::size_t TriangleSpanFilter<S>::read(const LinearSegment<S>& segment, const SceneView<S>& scene,
-                                        const IntervalJoin<S>& join, float fraction, PairBuffer& out) {
+void TriangleSpanFilter<S>::move_to(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                    const IntervalJoin<S>& join, float fraction) {
   if (fraction > last_) step_ = fraction - std::max(last_, 0.0F);
   last_ = fraction;
   collect_due(join, fraction);
@@ -168,26 +196,30 @@ std::size_t TriangleSpanFilter<S>::read(const LinearSegment<S>& segment, const S
     if (pairs[pair].end >= fraction + step_)
       due_[worth++] = pair;
     else
-      open_.push_back({pair, fraction});
+      leave_open(pair, fraction);
   due_.resize(worth);
   decided_ += intersecting_.size();
   attempt_all(segment, scene, join, fraction);
+}
+
+template <class S>
+std::size_t TriangleSpanFilter<S>::read(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                        const IntervalJoin<S>& join, float fraction, PairBuffer& out) {
+  move_to(segment, scene, join, fraction);
   const std::size_t before = out.size();
   out.resize(before + intersecting_.size() + open_.size());
   PrimitivePair* to = out.data() + before;
-  for (const std::vector<Item>* list : {&intersecting_, &open_})
-    for (const Item item : *list) {
-      const BodyPair bodies = join.bodies_of(item.pair);
-      *to++ = {bodies.first, pairs[item.pair].primitive_a, bodies.second, pairs[item.pair].primitive_b};
-    }
+  for (const std::uint32_t pair : intersecting_) *to++ = join.primitives_of(pair);
+  for (const Item item : open_) *to++ = join.primitives_of(item.pair);
   return open_.size();
 }
 
 template <class S>
 std::size_t TriangleSpanFilter<S>::bytes() const {
-  return (intersecting_.capacity() + open_.capacity()) * sizeof(Item) +
-         (next_.capacity() + due_.capacity()) * sizeof(std::uint32_t) + time_.capacity() * sizeof(float) +
-         tries_.capacity() * sizeof(SpanPair<S>) + verdicts_.capacity();
+  return open_.capacity() * sizeof(Item) + state_.capacity() +
+         (intersecting_.capacity() + place_.capacity() + next_.capacity() + due_.capacity()) *
+             sizeof(std::uint32_t) +
+         time_.capacity() * sizeof(float) + tries_.capacity() * sizeof(SpanPair<S>) + verdicts_.capacity();
 }
 
 bool all_triangles(const Primitives& primitives) {

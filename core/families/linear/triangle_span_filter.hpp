@@ -30,6 +30,20 @@ class TriangleSpanFilter {
   /// may intersect; returns the number of the latter. Fractions must not decrease within a segment.
   std::size_t read(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                    float fraction, PairBuffer& out);
+  /// Does the same without the list: O(pairs whose state changes or is open). Afterwards the functions below
+  /// tell the states.
+  void move_to(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
+               float fraction);
+  bool intersects(std::uint32_t pair) const { return state_[pair] == State::intersecting; }
+  /// Returns whether the pair is a candidate.
+  bool may_intersect(std::uint32_t pair) const { return state_[pair] != State::apart; }
+  /// Calls use(pair) for every pair whose triangles have to be tested at the frame.
+  template <class Use>
+  void for_open(const Use& use) const {
+    for (const Item item : open_) use(item.pair);
+  }
+  /// Touches these marks whenever the state of a pair changes, until the next start.
+  void follow(const FollowingMarks& marks) { following_ = marks; }
 
   /// Return the attempts to decide a pair for a span, and the pairs that frames reported as decided, since
   /// these counts were cleared.
@@ -40,11 +54,25 @@ class TriangleSpanFilter {
 
  private:
   static constexpr std::uint32_t none = ~std::uint32_t(0);
-  /// A pair by its index in the join, and the time until which its state holds.
+  /// An open pair by its index in the join, and the time until which it is not attempted again.
   struct Item {
     std::uint32_t pair;
     float until;
   };
+  /// The state of a pair until its proof expires. A pair that has not begun counts as apart.
+  enum class State : std::uint8_t { apart, intersecting, open };
+  void set_state(std::uint32_t pair, State state) {
+    state_[pair] = state;
+    following_.touch(pair);
+  }
+  void intersect(std::uint32_t pair, float until);
+  void cease_to_intersect(std::uint32_t pair);
+  void leave_open(std::uint32_t pair, float until);
+  bool is_due(std::uint32_t pair, float fraction) const {
+    // A proof that a pair intersects holds to the end of its span, that instant included: the span may end
+    // with the segment, at a frame.
+    return state_[pair] == State::intersecting ? time_[pair] < fraction : time_[pair] <= fraction;
+  }
   void wait(std::uint32_t pair, float until);
   void collect_due(const IntervalJoin<S>& join, float fraction);
   enum class When : std::uint8_t { now, ahead };
@@ -54,9 +82,12 @@ class TriangleSpanFilter {
   void attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                    float fraction);
 
-  std::size_t asked_ = 0;  ///< pairs attempted ahead of time
-  std::vector<Item> intersecting_, open_;
-  /// Pairs in lists by the bucket of their next time.
+  std::size_t asked_ = 0;                            ///< pairs attempted ahead of time
+  std::vector<std::uint32_t> intersecting_, place_;  ///< pairs by index in the join, and the inverse map
+  std::vector<Item> open_;
+  std::vector<State> state_;  ///< [pair]
+  FollowingMarks following_;
+  /// Pairs that are not open, in lists by the bucket of their next time.
   std::vector<std::uint32_t> next_;
   std::vector<float> time_;
   std::uint32_t head_[FractionBuckets::count] = {}, bucket_ = 0;

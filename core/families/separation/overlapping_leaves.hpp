@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -34,6 +35,7 @@ class LeafOverlaps {
   void clear() {
     for (auto& leaves : leaves_) leaves.clear();
     for (auto& primitives : primitives_) primitives.clear();
+    notes_changes_ = false;
   }
   /// Returns the overlapping leaves of one body pair, unordered.
   std::span<const OverlappingLeaves> of(std::size_t body_pair) const { return leaves_[body_pair]; }
@@ -45,7 +47,9 @@ class LeafOverlaps {
     auto& leaves = leaves_[pair.bodies];
     pair.place = std::uint32_t(leaves.size());
     leaves.push_back({pair.a, pair.b, slot, since});
-    if (stores_primitives(tree, pair.bodies)) primitives_[pair.bodies].push_back(primitives(tree, pair));
+    if (!stores_primitives(tree, pair.bodies)) return;
+    primitives_[pair.bodies].push_back(primitives(tree, pair));
+    note(primitives_[pair.bodies].back(), 1);
   }
   void end(PairTree& tree, std::uint32_t slot, double until) {
     BoxPair& pair = tree[slot];
@@ -55,6 +59,7 @@ class LeafOverlaps {
     leaves[pair.place] = leaves.back();
     leaves.pop_back();
     if (auto& stored = primitives_[pair.bodies]; !stored.empty()) {
+      note(stored[pair.place], -1);
       stored[pair.place] = stored.back();
       stored.pop_back();
     }
@@ -64,11 +69,27 @@ class LeafOverlaps {
   /// Rereads the primitives of all leaves, after a change of geometry.
   void reread_primitives(const PairTree& tree) {
     for (std::uint32_t bodies = 0; bodies < leaves_.size(); ++bodies) {
+      for (const PrimitivePair& pair : primitives_[bodies]) note(pair, -1);
       primitives_[bodies].clear();
       if (leaves_[bodies].empty() || !stores_primitives(tree, bodies)) continue;
       for (const OverlappingLeaves& leaf : leaves_[bodies])
         primitives_[bodies].push_back(primitives(tree, tree[leaf.slot]));
+      for (const PrimitivePair& pair : primitives_[bodies]) note(pair, 1);
     }
+  }
+
+  /// Starts to note the primitive pairs that begin and end, until `clear`.
+  void start_noting() {
+    notes_changes_ = true;
+    changes_.clear();
+  }
+  bool is_noting() const { return notes_changes_; }
+  /// Appends the primitive pairs that have begun and those that have ended since the last call, or since
+  /// `start_noting`. O(n log n) in the overlaps that began or ended.
+  void take_changes(PairBuffer& begun, PairBuffer& ended) {
+    add_up_changes();
+    for (const Change& change : changes_) (change.by > 0 ? begun : ended).push_back(change.pair);
+    changes_.clear();
   }
 
   /// Starts recording ended overlaps. Overlaps that last already count from t.
@@ -84,7 +105,8 @@ class LeafOverlaps {
     return ended_;
   }
   std::size_t bytes() const {
-    std::size_t total = leaves_.capacity() * sizeof(leaves_[0]) + ended_.capacity() * sizeof(EndedOverlap);
+    std::size_t total = leaves_.capacity() * sizeof(leaves_[0]) + ended_.capacity() * sizeof(EndedOverlap) +
+                        changes_.capacity() * sizeof(Change);
     for (const auto& leaves : leaves_) total += leaves.capacity() * sizeof(OverlappingLeaves);
     for (const auto& primitives : primitives_)
       total += sizeof primitives + primitives.capacity() * sizeof(PrimitivePair);
@@ -92,10 +114,33 @@ class LeafOverlaps {
   }
 
  private:
+  /// A primitive pair of two leaves whose overlap began (1) or ended (-1).
+  struct Change {
+    PrimitivePair pair;
+    int by;
+  };
   static bool stores_primitives(const PairTree& tree, std::uint32_t bodies) {
     const BodyPair& pair = tree.body_pair(bodies);
     return pair.first != pair.second && tree.topology(pair.first).leaf_size == 1 &&
            tree.topology(pair.second).leaf_size == 1;
+  }
+  void note(const PrimitivePair& pair, int by) {
+    if (!notes_changes_) return;
+    changes_.push_back({pair, by});
+    if (changes_.size() >= add_up_at_) add_up_changes();
+  }
+  /// Keeps one change of each pair, and none if it is as before.
+  void add_up_changes() {
+    std::sort(changes_.begin(), changes_.end(),
+              [](const Change& a, const Change& b) { return a.pair < b.pair; });
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < changes_.size();) {
+      Change sum = changes_[i];
+      for (++i; i < changes_.size() && changes_[i].pair == sum.pair; ++i) sum.by += changes_[i].by;
+      if (sum.by != 0) changes_[kept++] = sum;
+    }
+    changes_.resize(kept);
+    add_up_at_ = std::max<std::size_t>(1024, 4 * kept);
   }
   static PrimitivePair primitives(const PairTree& tree, const BoxPair& pair) {
     const auto primitive = [&](int side) {
@@ -110,6 +155,9 @@ class LeafOverlaps {
   std::vector<std::vector<PrimitivePair>> primitives_;  ///< [body pair]
   bool recording_ = false;
   std::vector<EndedOverlap> ended_;
+  bool notes_changes_ = false;
+  std::vector<Change> changes_;
+  std::size_t add_up_at_ = 1024;  ///< bounds the list where no changes are asked
 };
 
 }  // namespace kbvh

@@ -278,6 +278,8 @@ class SeparationList {
   /// Stops recording, and returns the overlaps that ended since `start_spans`. Overlaps that last are in
   /// `leaf_pairs`.
   std::span<const EndedOverlap> stop_spans() { return leaves_.stop_spans(); }
+  /// Returns the overlapping leaves, which can note changes of the pairs that `primitive_pairs` returns.
+  LeafOverlaps& overlaps() { return leaves_; }
 
   std::uint64_t steps() const { return queue_.steps(); }
   std::size_t bytes() const {

@@ -7,6 +7,7 @@
 #include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/volumes/aligned_box.hpp"
 #include "core/topology/leaf_pairs.hpp"
+#include "core/topology/ray_traversal.hpp"
 
 namespace kbvh {
 
@@ -15,6 +16,7 @@ namespace kbvh {
 /// body's hierarchy, as VolumeHierarchy and DopHierarchy are.
 template <class S, class Count, class... Hierarchies>
 class HierarchyStrategy : public CountedStrategy<S, Count>,
+                          public AnswersRays<S>,
                           public TakesPlanChanges<S>,
                           public TakesGeometryChanges<S>,
                           public AnswersSelfPairs {
@@ -97,7 +99,8 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
   std::size_t bytes() const override {
     return std::visit(
         [&](const auto& state) {
-          std::size_t total = near_bodies_.bytes() + state.scratch.bytes();
+          std::size_t total = near_bodies_.bytes() + state.scratch.bytes() +
+                              ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
           for (const auto& body : state.bodies) total += body.bytes();
           return total;
         },
@@ -105,6 +108,23 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
   }
 
  protected:
+  /// Follows rays node by node, in the boxes around volumes.
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    on_bodies([&](const auto& bodies) {
+      find_hits_by_body(this->scene_, this->sampled_, query, rays, hits,
+                        [&](std::uint32_t body, RaySearch<S>& search) {
+                          if (bodies[body].empty()) return false;
+                          const TopologyTree tree{bodies[body].topology(), [&](std::uint32_t node) {
+                                                    return enclosing_box(bodies[body].volume(node));
+                                                  }};
+                          return follow_ray(tree, search, body, this->scene_.primitives(body),
+                                            this->sampled_.positions(body), ray_stack_, this->count_,
+                                            this->triangle_stats_);
+                        });
+    });
+  }
+
   /// Calls work(bodies) with the hierarchies of all bodies, of the used kind.
   template <class Work>
   decltype(auto) on_bodies(Work&& work) {
@@ -170,6 +190,7 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
 
   NearBodies near_bodies_;
   std::variant<State<Hierarchies>...> state_;
+  std::vector<RayNode<std::uint32_t>> ray_stack_;
   bool plans_changed_ = false;
 };
 

@@ -5,6 +5,7 @@
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
 #include "core/families/wide/wide_query.hpp"
+#include "core/families/wide/wide_rays.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/topology/topology_edit.hpp"
 
@@ -16,11 +17,11 @@ inline Box<S> leaf_box(std::span<const std::uint32_t> vertices, const S* positio
   return LaneBox<S>::of(vertices, positions).box();
 }
 
-/// The shared part of strategies with stored boxes, including the query: a derived class only implements
+/// The shared part of strategies with stored boxes, including pairs and rays: a derived class only implements
 /// `update(body)`. Bodies that cannot move are updated at `reset` only. Most strategies derive from
 /// StoredHierarchyStrategy, which also accepts changes of plans.
 template <class S, class Count>
-class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
+class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>, public AnswersRays<S> {
  public:
   FixedPlansHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion,
                               Topologies topologies, const Params& /*params*/,
@@ -37,6 +38,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
   void reset_to(double /*t*/) override {
     plans_changed_ = false;
     near_bodies_.start_over();
+    rays_.start_over();
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
       hierarchies_[body].undo_edits(this->scene_.primitives(body));
       hierarchies_[body].positions_changed();
@@ -76,7 +78,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
   std::size_t bytes() const override {
     std::size_t total = 0;
     for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
-    return total + near_bodies_.bytes() + query_.bytes() + (swept_ ? swept_->bytes() : 0);
+    return total + near_bodies_.bytes() + query_.bytes() + rays_.bytes() + (swept_ ? swept_->bytes() : 0);
   }
 
  protected:
@@ -102,6 +104,18 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
       update(body_change.body);
     }
   }
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    std::uint64_t tests = 0;
+    rays_.find(
+        query, rays, hits, [&](std::uint32_t body) { return ray_side(body); },
+        [&](std::uint32_t body, std::uint32_t node) { make_row(body, node); }, this->triangle_stats_, tests);
+    this->count_.add(Counter::box_tests, tests);
+  }
+  /// Returns what rays read of a body; lazy strategies add the marks of stale nodes, for which `make_row` is
+  /// called then.
+  virtual WideSide<S> ray_side(std::uint32_t body) { return side(body); }
+  virtual void make_row(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
   /// Called when the topology of a body's hierarchy has changed, to update dependent data.
   virtual void topology_changed(std::uint32_t /*body*/) {}
   /// Implements the broad phase of contacts by one refit to both ends of the motion, on the topologies at its
@@ -148,6 +162,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count> {
   std::vector<WideHierarchy<S>> hierarchies_;
   NearBodies near_bodies_;
   WideQuery<S> query_{this->scene_, this->sampled_};
+  WideRays<S> rays_{this->scene_, this->sampled_};
   bool plans_changed_ = false;
   std::optional<SweptHierarchies<S>> swept_;  ///< made at the first request for contacts
 };

@@ -3,6 +3,7 @@
 #include "core/families/wide/kernels/wide_inflate.hpp"
 #include "core/families/wide/kernels/wide_linear.hpp"
 #include "core/families/wide/kernels/wide_overlap.hpp"
+#include "core/families/wide/kernels/wide_rays.hpp"
 #include "core/families/wide/kernels/wide_realisers.hpp"
 #include "core/families/wide/kernels/wide_refit.hpp"
 #include "core/kernels/kernel_set.hpp"
@@ -13,6 +14,7 @@ KBVH_DEFINE_KERNEL_CHOICE(BoundsKernels, bounds_kernels, bounds)
 KBVH_DEFINE_KERNEL_CHOICE(WideInflateKernels, wide_inflate_kernels, wide_inflate)
 KBVH_DEFINE_KERNEL_CHOICE(WideLinearKernels, wide_linear_kernels, wide_linear)
 KBVH_DEFINE_KERNEL_CHOICE(WideOverlapKernels, wide_overlap_kernels, wide_overlap)
+KBVH_DEFINE_KERNEL_CHOICE(WideRayKernels, wide_ray_kernels, wide_rays)
 KBVH_DEFINE_KERNEL_CHOICE(WideRealiserKernels, wide_realiser_kernels, wide_realisers)
 KBVH_DEFINE_KERNEL_CHOICE(WideRefitKernels, wide_refit_kernels, wide_refit)
 

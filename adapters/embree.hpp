@@ -1,0 +1,89 @@
+#pragma once
+// Owners of Embree's objects, and what the adapter asks of them.
+#include <embree3/rtcore.h>
+
+#include <memory>
+#include <type_traits>
+#if defined(__SSE__)
+#include <xmmintrin.h>
+#endif
+
+#include "core/scene/rays.hpp"
+
+namespace kbvh {
+
+/// Restores the floating-point state: Embree flushes denormals and may leave that mode set.
+class KeepFloatingPointState {
+ public:
+#if defined(__SSE__)
+  KeepFloatingPointState() : state_(_mm_getcsr()) {}
+  ~KeepFloatingPointState() {
+    _mm_setcsr(state_);
+  }
+
+ private:
+  unsigned state_;
+#else
+  KeepFloatingPointState() {}
+  ~KeepFloatingPointState() {}
+#endif
+};
+
+struct ReleaseDevice {
+  using pointer = RTCDevice;
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+};
+struct ReleaseScene {
+  using pointer = RTCScene;
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+};
+struct ReleaseGeometry {
+  using pointer = RTCGeometry;
+  void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+};
+
+using DevicePointer = std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseDevice>;
+using ScenePointer = std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene>;
+using GeometryPointer = std::unique_ptr<std::remove_pointer_t<RTCGeometry>, ReleaseGeometry>;
+
+/// A scene of one geometry that is refitted at each commit.
+struct RefitScene {
+  ScenePointer scene;  // none for an empty body
+  GeometryPointer geometry;
+
+  RTCGeometry make(RTCDevice device, RTCGeometryType type) {
+    scene.reset(rtcNewScene(device));
+    rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_LOW);
+    rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_COMPACT);
+    geometry.reset(rtcNewGeometry(device, type));
+    rtcSetGeometryBuildQuality(geometry.get(), RTC_BUILD_QUALITY_REFIT);
+    return geometry.get();
+  }
+  void build() {
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometry(scene.get(), geometry.get());
+    rtcCommitScene(scene.get());
+  }
+  void refit() {
+    rtcCommitGeometry(geometry.get());
+    rtcCommitScene(scene.get());
+  }
+};
+
+/// Returns a ray as Embree takes it; geometry identifiers are those of no hit.
+inline RTCRayHit ray_of(const Ray<float>& ray) {
+  RTCRayHit made{};
+  made.ray.org_x = ray.origin[0];
+  made.ray.org_y = ray.origin[1];
+  made.ray.org_z = ray.origin[2];
+  made.ray.dir_x = ray.direction[0];
+  made.ray.dir_y = ray.direction[1];
+  made.ray.dir_z = ray.direction[2];
+  made.ray.tnear = 0;
+  made.ray.tfar = ray.length;
+  made.ray.mask = ~0U;
+  made.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  return made;
+}
+
+}  // namespace kbvh

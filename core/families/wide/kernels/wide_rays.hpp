@@ -1,0 +1,74 @@
+#pragma once
+#include <cstdint>
+
+#include "core/families/wide/kernels/wide_layout.hpp"
+#include "core/kernels/kernel_tables.hpp"
+
+namespace kbvh {
+
+enum class KernelSet : std::uint8_t;
+
+/// A ray as the traversal reads it: along each axis it enters a box at (row + add) * scale of one of the six
+/// rows of the children's boxes, and leaves it at (row - add) * -scale of another.
+template <class S>
+struct WideRay {
+  std::uint32_t enter_row[3], leave_row[3];
+  S add[3], scale[3];
+  S origin[3], direction[3];
+  S limit;  ///< nothing beyond this parameter can be the answer
+};
+
+/// A node, or a leaf as in `WidePair`, and the parameter at which the ray enters it.
+template <class S>
+struct WideRayItem {
+  S near;
+  std::uint32_t item;
+};
+
+/// One ray in one hierarchy: a traversal that can pause and resume; the caller provides memory.
+template <class S>
+struct WideRayJob {
+  WideRay<S>* ray;
+  WideArrays<S> tree;
+  const std::uint32_t* first_entry;  ///< [leaf], as in WideLeafLists
+  const std::uint32_t* end_entry;    ///< [leaf]
+  const std::uint32_t* entries;      ///< the primitives of leaves
+  /// Primitive p has the corners vertices[offsets[p] .. offsets[p + 1]); null: entries are decided without a
+  /// filter.
+  const std::uint32_t* offsets;
+  const std::uint32_t* vertices;
+  const S* positions;         ///< [vertex][3], one scalar past the end
+  const std::uint8_t* stale;  ///< [node]: not 0 while its children's boxes must be made; null: none
+  WideRayItem<S>* stack;
+  std::size_t depth, room;
+  void* context;
+  void (*make)(void* context, std::uint32_t node);         ///< makes the boxes of a node's children
+  bool (*decide)(void* context, std::uint32_t primitive);  ///< may lower the limit; true ends the search
+  std::uint64_t tests;
+  bool over;
+};
+/// The largest number of items that one step may push.
+inline constexpr std::size_t max_items_per_step = 8;
+
+/// Follows rays, nearer children first. Boxes are closed and tested conservatively: an item is left out only
+/// if the ray certainly misses its box within the limit. A filter leaves out primitives of three corners that
+/// the ray certainly misses; all others are decided by the caller.
+template <class S>
+struct WideRayKernels {
+  /// Continues until the stack is empty, the search is over, or a step might exceed the free space.
+  using Follow = void (*)(WideRayJob<S>& job);
+  Follow width2, width4, width8;
+  Follow follow(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
+};
+KBVH_DECLARE_KERNELS(WideRayKernels<float>, wide_rays_float)
+KBVH_DECLARE_KERNELS(WideRayKernels<double>, wide_rays_double)
+
+/// Returns the kernels of one instruction set.
+template <class S>
+const WideRayKernels<S>& wide_ray_kernels(KernelSet set);
+template <>
+const WideRayKernels<float>& wide_ray_kernels(KernelSet set);
+template <>
+const WideRayKernels<double>& wide_ray_kernels(KernelSet set);
+
+}  // namespace kbvh

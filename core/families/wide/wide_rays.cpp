@@ -1,0 +1,190 @@
+#include "core/families/wide/wide_rays.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/topology/builders.hpp"
+
+namespace kbvh {
+
+namespace {
+
+/// The tree over bodies is built anew when its boxes have grown by this factor.
+constexpr double bodies_worn_out = 1.5;
+
+/// Returns a number of the scalar that is not below x.
+template <class S>
+S at_least(double x) {
+  const S rounded = S(x);
+  return double(rounded) < x ? std::nextafter(rounded, std::numeric_limits<S>::infinity()) : rounded;
+}
+
+template <class S>
+WideRay<S> wide_ray(const Ray<S>& ray) {
+  WideRay<S> wide{};
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    const S direction = ray.direction[axis];
+    S inverse = 1 / direction;
+    // Too small to be inverted: the axis rejects nothing (see RaySlabs).
+    if (direction != 0 && std::isinf(inverse)) inverse = std::numeric_limits<S>::quiet_NaN();
+    // Rows hold lower, and upper with the other sign.
+    const bool back = std::signbit(inverse);
+    wide.enter_row[axis] = back ? axis + 3 : axis;
+    wide.leave_row[axis] = back ? axis : axis + 3;
+    wide.add[axis] = back ? ray.origin[axis] : -ray.origin[axis];
+    wide.scale[axis] = back ? -inverse : inverse;
+    wide.origin[axis] = ray.origin[axis];
+    wide.direction[axis] = direction;
+  }
+  wide.limit = ray.length;
+  return wide;
+}
+
+template <class S>
+double summed_area(const WideHierarchy<S>& hierarchy) {
+  double sum = 0;
+  for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node)
+    if (!hierarchy.topology().nodes[node].is_leaf()) sum += surface_area(hierarchy.box(node));
+  return sum;
+}
+
+}  // namespace
+
+template <class S>
+void WideRays<S>::refit_bodies() {
+  const auto has_polygons = [&](std::uint32_t body) {
+    return scene_.primitives(body).kind == PrimitiveKind::polygons && !sides_[body].hierarchy->empty();
+  };
+  // Bodies may become empty, or get their first primitive.
+  std::size_t next = 0;
+  bool same = true;
+  for (std::uint32_t body = 0; body < sides_.size(); ++body)
+    if (has_polygons(body)) same = same && next < ids_.size() && ids_[next++] == body;
+  same = same && next == ids_.size();
+  if (!same) {
+    ids_.clear();
+    primitives_ = {};
+    for (std::uint32_t body = 0; body < sides_.size(); ++body)
+      if (has_polygons(body)) {
+        const auto i = std::uint32_t(ids_.size());
+        primitives_.add(std::vector<std::uint32_t>{2 * i, 2 * i + 1});
+        ids_.push_back(body);
+      }
+    corners_.assign(6 * ids_.size() + 1, S(0));
+    built_area_ = -1;
+  }
+  for (std::size_t i = 0; i < ids_.size(); ++i) {
+    const Box<S> box = sides_[ids_[i]].hierarchy->root_box();
+    std::copy_n(box.lower, 3, corners_.data() + 6 * i);
+    std::copy_n(box.upper, 3, corners_.data() + 6 * i + 3);
+  }
+  const auto build = [&] {
+    bodies_.assign(build_topology(primitives_, corners_.data(),
+                                  {.method = BuildMethod::median, .width = 8, .leaf_size = 1}),
+                   primitives_, active_kernel_set());
+  };
+  if (built_area_ < 0) build();
+  if (ids_.empty()) return;
+  bodies_.refit(corners_.data());
+  if (ids_.size() <= 8) {  // one node, whatever its children
+    built_area_ = 0;
+    return;
+  }
+  const double area = summed_area(bodies_);
+  if (built_area_ < 0) built_area_ = area;
+  if (area <= bodies_worn_out * built_area_) return;
+  build();
+  bodies_.refit(corners_.data());
+  built_area_ = summed_area(bodies_);
+}
+
+template <class S>
+void WideRays<S>::follow(WideTree<S>& tree, WideRayJob<S>& job, std::vector<WideRayItem<S>>& stack) {
+  const WideLeafLists leaves = tree.leaf_lists();
+  job.ray = &ray_;
+  job.tree = tree.arrays();
+  job.first_entry = leaves.first_entry;
+  job.end_entry = leaves.end_entry;
+  job.entries = leaves.primitives;
+  job.context = this;
+  stack.resize(std::max<std::size_t>(stack.size(), 256));
+  stack[0] = {S(0), 0};
+  job.depth = 1;
+  const auto kernel = wide_ray_kernels<S>(tree.kernels()).follow(tree.width());
+  for (;;) {
+    job.stack = stack.data();
+    job.room = stack.size();
+    kernel(job);
+    if (job.depth == 0 || job.over) break;
+    stack.resize(2 * stack.size());
+  }
+  tests_ += job.tests;
+}
+
+template <class S>
+bool WideRays<S>::enter(std::uint32_t body) {
+  const WideSide<S>& side = sides_[body];
+  const Primitives& primitives = scene_.primitives(body);
+  motion_.fetch_all(body);
+  body_ = body;
+  WideRayJob<S> job{};
+  job.offsets = primitives.offsets.data();
+  job.vertices = primitives.vertices.data();
+  job.positions = motion_.positions(body);
+  job.stale = side.stale;
+  job.make = [](void* context, std::uint32_t node) {
+    auto& rays = *static_cast<WideRays*>(context);
+    rays.make_(rays.make_context_, rays.body_, node);
+  };
+  job.decide = [](void* context, std::uint32_t primitive) {
+    auto& rays = *static_cast<WideRays*>(context);
+    const double limit = rays.search_->limit();
+    const bool over =
+        rays.search_->offer(rays.body_, primitive, rays.scene_.primitives(rays.body_)[primitive],
+                            rays.motion_.positions(rays.body_), *rays.stats_);
+    if (rays.search_->limit() != limit) rays.ray_.limit = at_least<S>(rays.search_->limit());
+    return over;
+  };
+  follow(*side.hierarchy, job, stack_);
+  return job.over;
+}
+
+template <class S>
+void WideRays<S>::run(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits,
+                      TriangleTestStats& stats, std::uint64_t& tests) {
+  refit_bodies();
+  stats_ = &stats;
+  tests_ = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    RaySearch<S> search(rays[i], query);
+    search_ = &search;
+    ray_ = wide_ray(rays[i]);
+    if (ids_.size() == 1) {
+      enter(ids_[0]);
+    } else if (!ids_.empty()) {
+      WideRayJob<S> job{};
+      job.decide = [](void* context, std::uint32_t primitive) {
+        auto& all = *static_cast<WideRays*>(context);
+        return all.enter(all.ids_[primitive]);
+      };
+      follow(bodies_, job, body_stack_);
+    }
+    hits[i] = search.hit();
+  }
+  search_ = nullptr;
+  tests += tests_;
+}
+
+template <class S>
+std::size_t WideRays<S>::bytes() const {
+  return bodies_.bytes() +
+         (primitives_.offsets.capacity() + primitives_.vertices.capacity() + ids_.capacity()) *
+             sizeof(std::uint32_t) +
+         corners_.capacity() * sizeof(S) + sides_.capacity() * sizeof(WideSide<S>) +
+         (body_stack_.capacity() + stack_.capacity()) * sizeof(WideRayItem<S>);
+}
+
+template class WideRays<float>;
+template class WideRays<double>;
+
+}  // namespace kbvh

@@ -1,0 +1,98 @@
+#include "core/judge/ray_oracle.hpp"
+
+#include <vector>
+
+namespace kbvh {
+
+namespace {
+
+std::string text(const RayHit& hit) {
+  if (!hit) return "a miss";
+  return std::to_string(hit.body) + ":" + std::to_string(hit.primitive) + " at " +
+         std::to_string(hit.parameter);
+}
+
+/// Returns the answer to a ray if there were no other primitive than that of `found`.
+template <class S>
+RayHit alone(const Scene<S>& scene, const Playback<S>& playback, const Ray<S>& ray, const RayHit& found) {
+  if (found.body >= scene.bodies.size()) return {};
+  const Primitives& primitives = scene.bodies[found.body].primitives;
+  if (primitives.kind != PrimitiveKind::polygons || found.primitive >= primitives.count() ||
+      !primitives.alive(found.primitive))
+    return {};
+  TriangleTestStats stats;
+  RaySearch<S> search(ray, RayQuery::any);
+  search.offer(found.body, found.primitive, primitives[found.primitive], playback.positions(found.body),
+               stats);
+  return search.hit();
+}
+
+}  // namespace
+
+template <class S>
+void brute_force_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
+                      std::span<const Ray<S>> rays, std::span<RayHit> hits) {
+  playback.evaluate_all();
+  TriangleTestStats stats;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    RaySearch<S> search(rays[i], query);
+    bool over = false;
+    for (std::uint32_t body = 0; body < scene.bodies.size() && !over; ++body) {
+      const Primitives& primitives = scene.bodies[body].primitives;
+      if (primitives.kind != PrimitiveKind::polygons) continue;
+      for (std::uint32_t p = 0; p < primitives.count() && !over; ++p)
+        over = primitives.alive(p) && search.offer(body, p, primitives[p], playback.positions(body), stats);
+    }
+    hits[i] = search.hit();
+  }
+}
+
+void RayCheck::add(const RayCheck& other) {
+  rays += other.rays;
+  hits += other.hits;
+  missed += other.missed;
+  extra += other.extra;
+  misplaced += other.misplaced;
+  if (first_violation.empty()) first_violation = other.first_violation;
+}
+
+template <class S>
+RayCheck check_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
+                    std::span<const Ray<S>> rays, std::span<const RayHit> found) {
+  std::vector<RayHit> truth(rays.size());
+  brute_force_hits(scene, playback, RayQuery::closest, rays, std::span<RayHit>(truth));
+  return compare_hits(scene, playback, query, rays, found, std::span<const RayHit>(truth));
+}
+
+template <class S>
+RayCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQuery query,
+                      std::span<const Ray<S>> rays, std::span<const RayHit> found,
+                      std::span<const RayHit> truth) {
+  RayCheck check;
+  check.rays = rays.size();
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    check.hits += truth[i] ? 1 : 0;
+    const bool same = query == RayQuery::closest || !found[i] || !truth[i]
+                          ? found[i] == truth[i]
+                          : alone(scene, playback, rays[i], found[i]) == found[i];
+    if (same) continue;
+    ++(!found[i] ? check.missed : !truth[i] ? check.extra : check.misplaced);
+    if (check.first_violation.empty())
+      check.first_violation =
+          "ray " + std::to_string(i) + ": " + text(found[i]) + " instead of " + text(truth[i]);
+  }
+  return check;
+}
+
+#define KBVH_INSTANTIATE(S)                                                                              \
+  template void brute_force_hits(const Scene<S>&, Playback<S>&, RayQuery, std::span<const Ray<S>>,       \
+                                 std::span<RayHit>);                                                     \
+  template RayCheck compare_hits(const Scene<S>&, const Playback<S>&, RayQuery, std::span<const Ray<S>>, \
+                                 std::span<const RayHit>, std::span<const RayHit>);                      \
+  template RayCheck check_hits(const Scene<S>&, Playback<S>&, RayQuery, std::span<const Ray<S>>,         \
+                               std::span<const RayHit>);
+KBVH_INSTANTIATE(float)
+KBVH_INSTANTIATE(double)
+#undef KBVH_INSTANTIATE
+
+}  // namespace kbvh

@@ -1,0 +1,43 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "core/scene/playback.hpp"
+#include "core/scene/rays.hpp"
+
+namespace kbvh {
+
+/// Answers rays at the playback's current time by testing every living polygon exactly: no boxes; it shares
+/// only the exact test and comparison with strategies. O(rays x primitives).
+template <class S>
+void brute_force_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
+                      std::span<const Ray<S>> rays, std::span<RayHit> hits);
+
+/// The comparison of answers to rays with the truth.
+struct RayCheck {
+  std::uint64_t rays = 0;
+  std::uint64_t hits = 0;       ///< rays that truly meet something
+  std::uint64_t missed = 0;     ///< of these, reported as misses
+  std::uint64_t extra = 0;      ///< rays that meet nothing, reported as hits
+  std::uint64_t misplaced = 0;  ///< hits of another primitive, or at another parameter, than the truth
+  std::string first_violation;  ///< the first of these: ray, answer and truth; or empty
+
+  void add(const RayCheck& other);
+  /// Returns whether all answers are exact.
+  bool holds() const { return missed + extra + misplaced == 0; }
+};
+
+/// Compares answers at the playback's current time with the closest hits `truth`: closest hits must be equal;
+/// of any hits, the primitive must be met at that parameter.
+template <class S>
+RayCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQuery query,
+                      std::span<const Ray<S>> rays, std::span<const RayHit> found,
+                      std::span<const RayHit> truth);
+
+/// Does the same with the truth by brute force.
+template <class S>
+RayCheck check_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
+                    std::span<const Ray<S>> rays, std::span<const RayHit> found);
+
+}  // namespace kbvh

@@ -1,0 +1,78 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "core/scene/pairs.hpp"
+
+namespace kbvh {
+
+/// Finds the pairs that two answers do not share. Time is linear in the answers, in any order of pairs. Where
+/// both list most pairs in the same order, as consecutive answers of one structure do, they are walked side
+/// by side, and only the pairs around a difference are looked up in a table. Allocates only if a table is
+/// needed that is larger than ever before.
+class PairDifference {
+ public:
+  /// Appends the pairs of `after` that `before` lacks to `begun`, and those of `before` that `after` lacks to
+  /// `ended`. Each answer contains a pair at most once.
+  void find(std::span<const PrimitivePair> before, std::span<const PrimitivePair> after, PairBuffer& begun,
+            PairBuffer& ended);
+  std::size_t bytes() const;
+
+ private:
+  void walk(std::span<const PrimitivePair> before, std::span<const PrimitivePair> after);
+  void look_up(PairBuffer& begun, PairBuffer& ended);
+
+  PairBuffer left_before_, left_after_;  ///< pairs without a partner at their place
+  std::vector<std::uint64_t> table_;     ///< stamp of the call, and index into left_before_
+  std::vector<std::uint8_t> met_;        ///< [left_before_]
+  std::uint32_t stamp_ = 0;
+};
+
+/// The last answer of one kind, for answers as changes.
+class AnswerHistory {
+ public:
+  /// Forgets the last answer: the next one begins as a whole.
+  void clear() { last_.clear(); }
+  /// Returns an empty buffer for the next answer.
+  PairBuffer& next() {
+    next_.clear();
+    return next_;
+  }
+  /// Appends the difference from the last answer to the one in `next`, which becomes the last.
+  void take_next(PairBuffer& begun, PairBuffer& ended) {
+    difference_.find(last_, next_, begun, ended);
+    last_.swap(next_);
+  }
+  std::size_t bytes() const {
+    return (last_.capacity() + next_.capacity()) * sizeof(PrimitivePair) + difference_.bytes();
+  }
+
+ private:
+  PairBuffer last_, next_;
+  PairDifference difference_;
+};
+
+/// A set of pairs that follows changes, O(1) each (linear probing; Knuth, TAOCP 3, 6.4, Algorithms L and R).
+/// Allocates only if there are more pairs than ever before.
+class PairSet {
+ public:
+  void clear();
+  /// Return false, and change nothing, if the pair is in the set already, or is not in it.
+  bool insert(const PrimitivePair& pair);
+  bool erase(const PrimitivePair& pair);
+  std::size_t size() const { return size_; }
+  /// Appends all pairs, in no particular order. O(largest size so far).
+  void append_to(PairBuffer& out) const;
+  /// Appends some pairs, at most `most`, spread over the set. O(most).
+  void sample(std::size_t most, PairBuffer& out) const;
+  std::size_t bytes() const { return slots_.capacity() * sizeof(PrimitivePair); }
+
+ private:
+  std::size_t find(const PrimitivePair& pair) const;
+  void grow();
+
+  PairBuffer slots_;  ///< a power of two; `free` where there is no pair
+  std::size_t size_ = 0;
+};
+
+}  // namespace kbvh

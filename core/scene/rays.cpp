@@ -1,0 +1,63 @@
+#include "core/scene/rays.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+
+namespace kbvh {
+
+template <class S>
+bool RaySearch<S>::offer(std::uint32_t body, std::uint32_t primitive, std::span<const std::uint32_t> vertices,
+                         const S* positions, TriangleTestStats& stats) {
+  // As in polygons_intersect: fewer than three vertices are a segment or a point.
+  const std::size_t triangles = vertices.size() < 3 ? 1 : vertices.size() - 2;
+  for (std::size_t i = 0; i < triangles; ++i) {
+    double corners[9];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t place = c == 0 ? 0 : std::min(i + c, vertices.size() - 1);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        corners[3 * c + axis] = double(positions[std::size_t(3) * vertices[place] + axis]);
+    }
+    RayMeeting meeting;
+    if (!ray_meets_triangle(line_, corners, meeting, stats)) continue;
+    if (hit_) {
+      int order = 0;
+      if (meeting.parameter + meeting.error < best_.parameter - best_.error)
+        order = -1;
+      else if (meeting.parameter - meeting.error > best_.parameter + best_.error)
+        order = 1;
+      else
+        order = compare_meetings(line_, corners, corners_);
+      if (order > 0) continue;
+      if (order == 0 && std::tie(hit_.body, hit_.primitive) <= std::tie(body, primitive)) continue;
+    }
+    hit_ = {body, primitive, meeting.parameter};
+    best_ = meeting;
+    std::copy_n(corners, 9, corners_);
+  }
+  return query_ == RayQuery::any && hit_;
+}
+
+template <class S>
+void check_rays(std::span<const Ray<S>> rays) {
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Ray<S>& ray = rays[i];
+    for (const S* values : {ray.origin, ray.direction})
+      for (int axis = 0; axis < 3; ++axis)
+        if (!(std::abs(values[axis]) <= admissible_magnitude<S>))
+          throw std::invalid_argument("ray " + std::to_string(i) + ": " +
+                                      (values == ray.origin ? "origin" : "direction") + " has " +
+                                      std::to_string(values[axis]) + " on axis " + std::to_string(axis));
+    if (!(ray.length >= 0))
+      throw std::invalid_argument("ray " + std::to_string(i) + ": length " + std::to_string(ray.length));
+  }
+}
+
+template void check_rays(std::span<const Ray<float>>);
+template void check_rays(std::span<const Ray<double>>);
+template class RaySearch<float>;
+template class RaySearch<double>;
+
+}  // namespace kbvh

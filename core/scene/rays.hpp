@@ -1,0 +1,78 @@
+#pragma once
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "core/geometry/ray_triangle.hpp"
+#include "core/scene/scene.hpp"
+
+namespace kbvh {
+
+/// The points origin + s * direction with 0 <= s <= length. The direction may have any length; if it is zero,
+/// the ray is the point `origin`.
+template <class S>
+struct Ray {
+  S origin[3];
+  S direction[3];
+  S length = std::numeric_limits<S>::infinity();
+};
+
+/// Throws std::invalid_argument, naming the first ray with a coordinate or direction that is not finite or
+/// beyond admissible_magnitude<S>, or with a length that is negative or not a number.
+template <class S>
+void check_rays(std::span<const Ray<S>> rays);
+
+/// What is asked of a ray.
+enum class RayQuery : std::uint8_t {
+  closest,  ///< the primitive that the ray meets first; of several, the smallest (body, primitive)
+  any,      ///< one of the primitives that the ray meets
+};
+
+/// The answer to one ray. Polygons are closed fans of triangles and are met exactly (core/geometry/
+/// ray_triangle.hpp), in both directions; points and control nets are not met.
+struct RayHit {
+  static constexpr std::uint32_t none = ~std::uint32_t(0);
+  std::uint32_t body = none;       ///< none: a miss
+  std::uint32_t primitive = none;  ///< of a hit, none only in answers of peers that do not name it
+  /// The parameter s at which the ray meets the primitive first; infinite for a miss. It differs from the
+  /// exact one by a factor of at most 1 +- 2^-40.
+  double parameter = std::numeric_limits<double>::infinity();
+
+  explicit operator bool() const { return body != none; }
+  bool operator==(const RayHit&) const = default;
+};
+
+/// The search for the answer to one ray: compares its candidates exactly.
+template <class S>
+class RaySearch {
+ public:
+  RaySearch(const Ray<S>& ray, RayQuery query) : query_(query) {
+    for (int axis = 0; axis < 3; ++axis) {
+      line_.origin[axis] = double(ray.origin[axis]);
+      line_.direction[axis] = double(ray.direction[axis]);
+    }
+    line_.length = double(ray.length);
+  }
+
+  /// Tests a polygon; `positions` are those of its body. Returns whether the search is over: any hit is
+  /// wanted, and there is one.
+  bool offer(std::uint32_t body, std::uint32_t primitive, std::span<const std::uint32_t> vertices,
+             const S* positions, TriangleTestStats& stats);
+
+  /// Returns a parameter beyond which nothing can be the answer.
+  double limit() const { return hit_ ? best_.parameter + best_.error : line_.length; }
+  const RayLine& line() const { return line_; }
+  const RayHit& hit() const { return hit_; }
+
+ private:
+  RayLine line_;
+  RayQuery query_;
+  RayHit hit_;
+  RayMeeting best_;
+  double corners_[9] = {};  ///< of the triangle that is met first
+};
+
+extern template class RaySearch<float>;
+extern template class RaySearch<double>;
+
+}  // namespace kbvh

@@ -1,0 +1,75 @@
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/judge/ray_oracle.hpp"
+#include "experiments/study/measure.hpp"
+
+namespace kbvh::experiments {
+
+/// The rays of a study: the same at every frame, for all contestants.
+struct RayStudy {
+  enum class Pattern : std::uint8_t {
+    coherent,    ///< a square grid of pixels of a camera that sees the scene's box
+    incoherent,  ///< from random points of the scene's box in random directions
+  };
+  Pattern pattern = Pattern::coherent;
+  std::uint32_t count = 16384;  ///< of coherent ones, the next smaller square
+  RayQuery query = RayQuery::closest;
+  bool operator==(const RayStudy&) const = default;
+};
+
+/// Reads "coherent", "incoherent:10000", "coherent:4096:any". Throws std::invalid_argument that names the
+/// wrong part.
+RayStudy ray_study(std::string_view text);
+/// Returns the text with all its parts.
+std::string text_of(const RayStudy& study);
+
+/// Returns what tables add to the name of a scene: " (coherent rays)", " (incoherent rays, any)".
+std::string suffix_of(const RayStudy& study);
+
+/// Makes the rays for the box around a scene's first, middle and last frame. Deterministic.
+template <class S>
+std::vector<Ray<S>> make_rays(const RayStudy& study, const Scene<S>& scene,
+                              const std::vector<double>& frames);
+
+/// Like Measurement, for rays instead of pairs: every frame is one update, and one call with all rays.
+template <class S>
+class RayMeasurement {
+ public:
+  RayMeasurement(const Scene<S>& scene, std::vector<double> frames, const RayStudy& study,
+                 const PlanScript<S>* script);
+
+  /// Verifies a contestant, comparing some of the rays of every n-th frame and of the last with brute force.
+  void add(const ContestantSpec& spec, std::uint64_t oracle_every);
+  std::size_t size() const { return entrants_.size(); }
+  Measured& operator[](std::size_t i) { return entrants_[i].measured; }
+  bool timed(std::size_t i) const { return entrants_[i].session != nullptr; }
+  const ClipTimes* play(std::size_t i);
+  nlohmann::json extras(std::size_t i) const;
+
+ private:
+  struct RayEntrant : Entrant<S> {
+    RayCheck check;
+    std::uint64_t hits = 0;  ///< of all rays at all frames
+    /// Bodies of polygons that no ray of a frame meets, summed over frames: what occlusion culling by these
+    /// rays skips.
+    std::uint64_t hidden_bodies = 0;
+  };
+  const Scene<S>* scene_;
+  std::vector<double> frames_;
+  RayStudy study_;
+  const PlanScript<S>* script_;
+  std::vector<Ray<S>> rays_;
+  std::vector<std::size_t> compared_;       ///< indices of the rays that are compared with brute force
+  std::vector<std::vector<RayHit>> truth_;  ///< [frame], of these; empty until needed
+  std::vector<RayHit> hits_;
+  std::vector<RayEntrant> entrants_;
+};
+
+extern template class RayMeasurement<float>;
+extern template class RayMeasurement<double>;
+
+}  // namespace kbvh::experiments

@@ -1,0 +1,329 @@
+// Rays: the exact test against rational arithmetic, slabs that never lose a box, and the wide traversal with
+// every set of kernels, width and leaf size against all primitives.
+
+#include "core/scene/rays.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+
+#include "core/families/wide/wide_rays.hpp"
+#include "core/geometry/ray_box.hpp"
+#include "core/judge/ray_oracle.hpp"
+#include "core/topology/builders.hpp"
+#include "tests/support/polygon_soups.hpp"
+#include "tests/support/rational_geometry.hpp"
+#include "tests/support/ray_sets.hpp"
+
+namespace kbvh {
+namespace {
+
+using test::exact;
+using test::Rational;
+
+/// The first parameter of the ray at which it meets the triangle, by definition: the least s of the points
+/// o + s d = a + u (b - a) + v (c - a) with s, u, v >= 0 and u + v <= 1. The least one is a corner of this
+/// set: some of the four conditions hold with equality, and there is one solution.
+std::optional<Rational> first_meeting(const RayLine& ray, const double* corners) {
+  Rational rows[7][4];  // coefficients of s, u, v, and the right side
+  for (int axis = 0; axis < 3; ++axis) {
+    rows[axis][0] = exact(ray.direction[axis]);
+    rows[axis][1] = exact(corners[axis]) - exact(corners[3 + axis]);
+    rows[axis][2] = exact(corners[axis]) - exact(corners[6 + axis]);
+    rows[axis][3] = exact(corners[axis]) - exact(ray.origin[axis]);
+  }
+  for (int k = 0; k < 3; ++k)
+    for (int c = 0; c < 4; ++c) rows[3 + k][c] = c == k ? 1 : 0;
+  rows[6][0] = 0;
+  for (int c = 1; c < 4; ++c) rows[6][c] = 1;
+  std::optional<Rational> least;
+  for (unsigned active = 0; active < 16; ++active) {
+    std::vector<std::array<Rational, 4>> system;
+    for (unsigned row = 0; row < 7; ++row)
+      if (row < 3 || (active >> (row - 3) & 1) != 0)
+        system.push_back({rows[row][0], rows[row][1], rows[row][2], rows[row][3]});
+    std::size_t rank = 0;
+    for (std::size_t column = 0; column < 3; ++column) {
+      std::size_t pivot = rank;
+      while (pivot < system.size() && system[pivot][column] == 0) ++pivot;
+      if (pivot == system.size()) break;
+      std::swap(system[pivot], system[rank]);
+      for (std::size_t row = 0; row < system.size(); ++row) {
+        if (row == rank || system[row][column] == 0) continue;
+        const Rational factor = system[row][column] / system[rank][column];
+        for (std::size_t c = 0; c < 4; ++c) system[row][c] -= factor * system[rank][c];
+      }
+      ++rank;
+    }
+    if (rank < 3) continue;
+    bool solved = true;
+    for (std::size_t row = 3; row < system.size(); ++row) solved = solved && system[row][3] == 0;
+    if (!solved) continue;
+    const Rational s = system[0][3] / system[0][0], u = system[1][3] / system[1][1],
+                   v = system[2][3] / system[2][2];
+    if (s < 0 || u < 0 || v < 0 || u + v > 1) continue;
+    if (!least || s < *least) least = s;
+  }
+  if (least && std::isfinite(ray.length) && *least > exact(ray.length)) return {};
+  return least;
+}
+
+/// Numbers for rays and triangles, from whole numbers with many coincidences to full mantissas and wide
+/// ranges.
+class Numbers {
+ public:
+  Numbers(std::uint32_t seed, int kind) : random_(seed), kind_(kind) {}
+  double operator()() {
+    switch (kind_) {
+      case 0:
+        return double(int(random_() % 3)) - 1;
+      case 1:
+        return double(int(random_() % 9)) - 4;
+      case 2:
+        return double(float(unit()));
+      case 3:
+        return unit();
+      case 4:
+        return std::ldexp(unit(), int(random_() % 60) - 30);
+      default:
+        return random_() % 4 == 0 ? 0
+                                  : std::ldexp(double(int(random_() % 7)) - 3, int(random_() % 300) - 150);
+    }
+  }
+  double unit() { return double(random_()) / double(1U << 31) - 1 + std::ldexp(double(random_()), -60); }
+  std::uint32_t below(std::uint32_t n) { return random_() % n; }
+
+ private:
+  std::mt19937 random_;
+  int kind_;
+};
+
+struct Case {
+  RayLine ray;
+  double corners[2][9];
+};
+
+Case make_case(Numbers& number) {
+  Case made{};
+  for (auto& triangle : made.corners)
+    for (double& x : triangle) x = number();
+  for (int axis = 0; axis < 3; ++axis) {
+    made.ray.origin[axis] = number();
+    made.ray.direction[axis] = number();
+  }
+  made.ray.length = HUGE_VAL;
+  const std::uint32_t shape = number.below(8);
+  double* first = made.corners[0];
+  if (shape < 3)  // at a corner, or at a point of an edge or near it
+    for (int axis = 0; axis < 3; ++axis) {
+      const double on = shape == 0 ? first[axis] : (first[axis] + first[3 + axis]) / 2;
+      made.ray.direction[axis] = on - made.ray.origin[axis];
+    }
+  if (shape == 3) std::copy_n(first, 3, made.ray.origin);
+  if (shape == 4) std::copy_n(first + 3, 3, first + 6);    // a segment
+  if (shape == 5) std::copy_n(first, 6, made.corners[1]);  // a common edge
+  if (number.below(3) == 0) made.ray.length = std::fabs(number());
+  if (number.below(8) == 0) made.ray.length = 1;
+  return made;
+}
+
+TEST(RayTriangle, DecidesLikeRationalArithmetic) {
+  TriangleTestStats stats;
+  std::uint64_t met = 0, ties = 0, compared = 0;
+  for (int kind = 0; kind < 6; ++kind) {
+    Numbers number(std::uint32_t(kind) + 1, kind);
+    for (int i = 0; i < 4000; ++i) {
+      const Case made = make_case(number);
+      std::optional<Rational> truth[2];
+      bool both = true;
+      for (int k = 0; k < 2; ++k) {
+        truth[k] = first_meeting(made.ray, made.corners[k]);
+        RayMeeting meeting;
+        const bool meets = ray_meets_triangle(made.ray, made.corners[k], meeting, stats);
+        ASSERT_EQ(meets, truth[k].has_value()) << "kind " << kind << ", case " << i;
+        both = both && meets;
+        if (!meets) continue;
+        ++met;
+        const Rational difference = exact(meeting.parameter) - *truth[k];
+        ASSERT_LE(abs(difference), exact(meeting.error)) << "kind " << kind << ", case " << i;
+        if (meeting.parameter > 1e-290) {
+          ASSERT_LE(meeting.error, 0x1p-41 * meeting.parameter);
+        }
+      }
+      if (!both) continue;
+      ++compared;
+      const int order = compare_meetings(made.ray, made.corners[0], made.corners[1]);
+      ties += order == 0 ? 1 : 0;
+      ASSERT_EQ(order < 0, *truth[0] < *truth[1]) << "kind " << kind << ", case " << i;
+      ASSERT_EQ(order > 0, *truth[0] > *truth[1]) << "kind " << kind << ", case " << i;
+    }
+  }
+  // The test says something about every branch.
+  EXPECT_GT(met, 4000U);
+  EXPECT_GT(compared, 500U);
+  EXPECT_GT(ties, 50U);
+  EXPECT_GT(stats.exact, 3000U);
+  EXPECT_GT(stats.filtered, 3000U);
+}
+
+TEST(RayTriangle, IsSymmetricInItsCorners) {
+  TriangleTestStats stats;
+  Numbers number(7, 1);
+  for (int i = 0; i < 3000; ++i) {
+    const Case made = make_case(number);
+    RayMeeting first;
+    const bool meets = ray_meets_triangle(made.ray, made.corners[0], first, stats);
+    std::array<std::size_t, 3> order{0, 1, 2};
+    do {
+      double turned[9];
+      for (std::size_t c = 0; c < 3; ++c) std::copy_n(made.corners[0] + 3 * order[c], 3, turned + 3 * c);
+      RayMeeting other;
+      ASSERT_EQ(ray_meets_triangle(made.ray, turned, other, stats), meets) << i;
+      if (meets) {
+        ASSERT_EQ(compare_meetings(made.ray, made.corners[0], turned), 0) << i;
+      }
+    } while (std::next_permutation(order.begin(), order.end()));
+  }
+}
+
+TEST(RaySlabs, NeverLoseABox) {
+  std::uint64_t met = 0, left_out = 0;
+  for (int kind = 0; kind < 6; ++kind) {
+    Numbers number(std::uint32_t(kind) + 11, kind);
+    for (int i = 0; i < 20000; ++i) {
+      const Case made = make_case(number);
+      Box<double> box;
+      box.extend(made.corners[0]);
+      box.extend(made.corners[0] + 3);
+      Rational first = 0;
+      std::optional<Rational> last;
+      if (std::isfinite(made.ray.length)) last = exact(made.ray.length);
+      bool meets = true;
+      for (int axis = 0; axis < 3; ++axis) {
+        const Rational d = exact(made.ray.direction[axis]), o = exact(made.ray.origin[axis]);
+        const Rational lower = exact(box.lower[axis]), upper = exact(box.upper[axis]);
+        if (d == 0) {
+          meets = meets && lower <= o && o <= upper;
+          continue;
+        }
+        Rational enter = (lower - o) / d, leave = (upper - o) / d;
+        if (enter > leave) std::swap(enter, leave);
+        if (enter > first) first = enter;
+        if (!last || leave < *last) last = leave;
+      }
+      meets = meets && (!last || first <= *last);
+      double near = 0;
+      const bool found = RaySlabs(made.ray).meet(box, made.ray.length, near);
+      ASSERT_TRUE(found || !meets) << "kind " << kind << ", case " << i;
+      if (meets && first < Rational(1e300)) {
+        ASSERT_TRUE(RaySlabs::within(near, first.convert_to<double>() * (1 + 0x1p-52))) << kind << ", " << i;
+      }
+      met += meets ? 1 : 0;
+      left_out += found ? 0 : 1;
+    }
+  }
+  EXPECT_GT(met, 20000U);
+  EXPECT_GT(left_out, 20000U);
+}
+
+TEST(RaySearch, OfEqualHitsTheSmallestCounts) {
+  const float positions[] = {0, 0, 1, 2, 0, 1, 0, 2, 1};
+  const std::vector<std::uint32_t> triangle{0, 1, 2};
+  TriangleTestStats stats;
+  const Ray<float> ray{{0.5F, 0.5F, 0}, {0, 0, 2}};
+  RaySearch<float> search(ray, RayQuery::closest);
+  for (const auto& [body, primitive] : {std::pair(1U, 3U), {1U, 2U}, {2U, 0U}, {1U, 4U}})
+    EXPECT_FALSE(search.offer(body, primitive, triangle, positions, stats));
+  EXPECT_EQ(search.hit(), (RayHit{1, 2, 0.5}));
+  RaySearch<float> any(ray, RayQuery::any);
+  EXPECT_TRUE(any.offer(4, 4, triangle, positions, stats));
+  EXPECT_EQ(any.hit(), (RayHit{4, 4, 0.5}));
+}
+
+TEST(CheckRays, NamesTheRayAndTheValue) {
+  const float nan = std::nanf(""), infinity = HUGE_VALF;
+  const auto message = [](const Ray<float>& ray) -> std::string {
+    const std::vector<Ray<float>> rays{{{0, 0, 0}, {1, 0, 0}}, ray};
+    try {
+      check_rays(std::span<const Ray<float>>(rays));
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return {};
+  };
+  EXPECT_EQ(message({{0, 0, 0}, {0, 0, 0}, 0}), "");
+  EXPECT_NE(message({{0, nan, 0}, {1, 0, 0}}).find("ray 1: origin has nan on axis 1"), std::string::npos);
+  EXPECT_NE(message({{0, 0, 0}, {1, 0, infinity}}).find("ray 1: direction has inf on axis 2"),
+            std::string::npos);
+  EXPECT_NE(message({{2e30F, 0, 0}, {1, 0, 0}}).find("origin"), std::string::npos);
+  EXPECT_NE(message({{0, 0, 0}, {1, 0, 0}, -1}).find("length -1"), std::string::npos);
+  EXPECT_NE(message({{0, 0, 0}, {1, 0, 0}, nan}).find("length nan"), std::string::npos);
+}
+
+/// Answers of wide hierarchies over all bodies of a scene, made by one set of kernels.
+template <class S>
+std::vector<RayHit> wide_hits(const Scene<S>& scene, Playback<S>& playback, const BuilderConfig& builder,
+                              KernelSet set, RayQuery query, std::span<const Ray<S>> rays,
+                              std::uint64_t& tests) {
+  const SceneView<S> view(scene);
+  std::vector<WideHierarchy<S>> hierarchies(scene.bodies.size());
+  for (std::uint32_t body = 0; body < hierarchies.size(); ++body) {
+    const auto boxes = primitive_boxes(view.primitives(body), playback.positions(body));
+    hierarchies[body].assign(build_topology<S>(boxes, builder), view.primitives(body), set);
+    hierarchies[body].refit(playback.positions(body));
+  }
+  WideRays<S> wide(view, SampledMotion<S>(playback));
+  std::vector<RayHit> hits(rays.size());
+  TriangleTestStats stats;
+  wide.find(
+      query, rays, std::span<RayHit>(hits),
+      [&](std::uint32_t body) -> WideSide<S> {
+        return {&hierarchies[body], body};
+      },
+      stats, tests);
+  return hits;
+}
+
+template <class S>
+void check_wide_rays() {
+  std::uint64_t hit = 0;
+  for (const std::uint32_t primitives : {1U, 7U, 90U}) {
+    test::Random random(primitives);
+    const Scene<S> scene = test::polygon_soups<S>(primitives, random);
+    Playback<S> playback(scene);
+    playback.evaluate_all();
+    const std::vector<Ray<S>> rays = test::rays_at(scene, playback, 24, primitives);
+    for (const std::uint32_t width : {2U, 4U, 8U})
+      for (const std::uint32_t leaf : {1U, 3U, 5U, 16U})
+        for (const RayQuery query : {RayQuery::closest, RayQuery::any}) {
+          std::uint64_t first_tests = 0;
+          for (const KernelSet set : supported_kernel_sets()) {
+            std::uint64_t tests = 0;
+            const std::vector<RayHit> hits =
+                wide_hits<S>(scene, playback, {.method = BuildMethod::sah, .width = width, .leaf_size = leaf},
+                             set, query, rays, tests);
+            const RayCheck check = check_hits<S>(scene, playback, query, rays, std::span<const RayHit>(hits));
+            ASSERT_TRUE(check.holds()) << name(set) << ", width " << width << ", leaf " << leaf << ", "
+                                       << primitives << ": " << check.first_violation;
+            hit += check.hits;
+            // All sets of kernels visit the same boxes.
+            if (first_tests == 0) first_tests = tests;
+            ASSERT_EQ(tests, first_tests) << name(set);
+          }
+        }
+  }
+  EXPECT_GT(hit, 5000U);
+}
+
+TEST(WideRays, EveryKernelAnswersLikeAllPrimitivesInFloat) {
+  check_wide_rays<float>();
+}
+TEST(WideRays, EveryKernelAnswersLikeAllPrimitivesInDouble) {
+  check_wide_rays<double>();
+}
+
+}  // namespace
+}  // namespace kbvh
