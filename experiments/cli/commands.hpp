@@ -17,6 +17,8 @@ void add_list(CLI::App& program, Action& action);
 void add_run(CLI::App& program, Action& action);
 void add_bench(CLI::App& program, Action& action);
 void add_report(CLI::App& program, Action& action);
+void add_explore(CLI::App& program, Action& action);
+void add_merge(CLI::App& program, Action& action);
 void add_scene(CLI::App& program, Action& action);
 void add_theory(CLI::App& program, Action& action);
 void add_stress(CLI::App& program, Action& action);

@@ -128,6 +128,8 @@ int run_program(int argc, const char* const* argv) {
   add_run(program, action);
   add_bench(program, action);
   add_report(program, action);
+  add_explore(program, action);
+  add_merge(program, action);
   add_scene(program, action);
   add_theory(program, action);
   add_stress(program, action);

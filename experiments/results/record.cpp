@@ -81,6 +81,21 @@ json script_record(const PlanScript<S>& script, double end) {
 template json script_record(const PlanScript<float>&, double);
 template json script_record(const PlanScript<double>&, double);
 
+json again_record(const json& scene_object, const json& scene, const json& strategy, const Study& study) {
+  json request{{"id", strategy.at("id")}, {"params", strategy.at("params")}};
+  if (!strategy.at("builder").is_null()) request["builder"] = strategy.at("builder");
+  json plan{{"scenes", json::array({scene_object})},
+            {"strategies", json::array({request})},
+            {"scalars", json::array({scene.at("scalar")})},
+            {"l", json::array({scene.at("per_keyframe")})},
+            {"repetitions", study.repetitions},
+            {"oracle_every", study.oracle_every}};
+  if (study.frames_limit > 0) plan["frames_limit"] = study.frames_limit;
+  if (study.continuous) plan["continuous"] = true;
+  if (study.changes) plan["changes"] = word(*study.changes);
+  return plan;
+}
+
 std::string configuration_key(Harness harness, const std::string& program, const json& scene,
                               const json& strategy, const Study& study, const json& machine) {
   // nlohmann's objects are sorted by key, so the text does not depend on the order of insertion.

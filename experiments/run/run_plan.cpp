@@ -39,8 +39,11 @@ constexpr std::size_t keyframes_shown = 4;
 /// One run of a plan: the state shared by all its groups.
 class Runner {
  public:
-  Runner(Harness harness, const std::filesystem::path& out)
-      : harness_(harness), machine_(machine()), run_(now_utc() + "-" + std::to_string(::getpid())) {
+  Runner(Harness harness, const Plan& plan, const std::filesystem::path& out)
+      : harness_(harness),
+        plan_{{"name", plan.name}, {"description", plan.description}},
+        machine_(machine()),
+        run_(now_utc() + "-" + std::to_string(::getpid())) {
     if (out.empty()) return;
     store_ = std::make_unique<ResultStore>(out);
     std::error_code error;
@@ -63,6 +66,7 @@ class Runner {
       const LoadedScene loaded = load(spec, making_);
       for (const std::string& text : loaded.notes) note("note: " + text);
       card_ = store_ ? show_scene(loaded) : "";
+      scene_object_ = spec.object;
       for (const std::string& scalar : study.scalars) {
         if (scalar == "float")
           scene<float>(study, contestants, loaded);
@@ -251,6 +255,7 @@ class Runner {
       json record{{"schema", results_schema},
                   {"kind", word(harness_)},
                   {"run", run_},
+                  {"plan", plan_},
                   {"study", study.name},
                   {"commit", commit()},
                   {"dirty", dirty()},
@@ -258,6 +263,7 @@ class Runner {
                   {"seed", loaded.seed},
                   {"scene", about_scene},
                   {"strategy", strategy_record(spec)}};
+      record["again"] = again_record(scene_object_, about_scene, record["strategy"], study);
       record["key"] =
           configuration_key(harness_, program_identity(), about_scene, record["strategy"], study, machine_);
       if (const json* known = known_record(record["key"], title + ": " + spec.label)) {
@@ -379,11 +385,13 @@ class Runner {
   }
 
   Harness harness_;
+  json plan_;  // its name and description
   json machine_;
   std::string run_;
   std::unique_ptr<ResultStore> store_;
   std::map<std::string, json> of_this_run_;  // by key, where there is no store
   std::string card_;                         // of the current scene
+  json scene_object_;                        // the current scene in a plan
   Progress progress_;
   const MakeProgress making_ = [this](const std::string& what, double fraction) {
     progress_.show(what + (fraction > 0 ? ": " + std::to_string(int(100 * fraction)) + " %" : ""));
@@ -404,7 +412,7 @@ StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::
   for (const auto& list : contestants) try_parameters(list);
   check_target_contestants(plan, contestants);
   for (const std::string& text : std::set<std::string>(notes.begin(), notes.end())) say("note: " + text);
-  Runner runner(harness, out);
+  Runner runner(harness, plan, out);
   for (std::size_t i = 0; i < plan.studies.size(); ++i) runner.study(plan.studies[i], contestants[i]);
   runner.targets(plan);
   return runner.outcome();

@@ -79,7 +79,7 @@ StrategyRequest read_strategy(const json& value, const std::string& place) {
 std::optional<Answer> read_answer(const JsonReader& keys, const std::string& text) {
   if (text == "none") return {};
   for (const Answer answer : {Answer::candidates, Answer::pairs})
-    if (text == word(answer)) return answer;
+    if (text == experiments::word(answer)) return answer;
   keys.fail("changes", "expected candidates, pairs or none, got '" + text + "'");
 }
 
