@@ -30,6 +30,7 @@ export function Header({lab, state, compact, onHelp}) {
       <option value="">nothing</option>${ordered(strategies).map((s) => html`<option value=${s.id}>${s.title}</option>`)}</select></label>
     <button aria-expanded=${open} onClick=${() => setOpen(!open)} title="Parameters of the strategy, precision">Settings</button>
     <span class="spring"></span>
+    ${!compact && html`<a href="lessons/index.html">Course</a>`}
     ${!compact && html`<button onClick=${() => file.current.click()} title="Open OBJ, OBJ with PC2, glTF, or a scene or state of the lab">Open…</button>
     <input ref=${file} type="file" class="sr" tabIndex="-1" multiple aria-label="Open files" onChange=${(event) => { openFiles(lab, event.currentTarget.files); event.currentTarget.value = ''; }} />`}
     <button onClick=${() => save(lab)} title="Save the whole state as a file">Save</button>
