@@ -76,7 +76,7 @@ function Page({lab, views, options}) {
           <label class="check" title="Each event that is performed becomes the chosen node and side"><input type="checkbox" checked=${view.follow} onChange=${() => lab.view({follow: !view.follow})} /> follow events</label>`}><${Timeline} lab=${lab} state=${state} /><//>`}
         ${has('stage') && html`<${Panel} id="stage" title="Scene" tools=${html`<${StageTools} lab=${lab} state=${state} />`}><${StageView} lab=${lab} state=${state} /><//>`}
         ${has('tree') && html`<${Panel} id="tree" title="Tree" tools=${html`<${TreeTools} lab=${lab} state=${state} />`}><${TreeView} lab=${lab} state=${state} /><//>`}
-        ${has('diagram') && html`<${Panel} id="diagram" title="Value over time" tools=${html`<${SideTools} lab=${lab} state=${state} />`}><${Diagram} key=${`${state.selection.body} ${state.selection.node} ${state.selection.side} ${state.sceneId ?? state.scene?.name}`} lab=${lab} state=${state} /><//>`}
+        ${has('diagram') && html`<${Panel} id="diagram" title="Value over time" tools=${html`<${SideTools} lab=${lab} state=${state} />`}><${Diagram} key=${`${state.selection.body} ${state.selection.node} ${state.selection.side} ${state.scene?.name}`} lab=${lab} state=${state} /><//>`}
         ${has('gauges') && html`<${Panel} id="gauges" title="Quality of the structure"><${Gauges} state=${state} /><//>`}
         ${has('panels') && html`<${Tabs} lab=${lab} state=${state} shown=${options.panels} />`}
       </main>

@@ -17,7 +17,7 @@ export function Diagram({lab, state}) {
   const {trees, selection, scene, info, at, history, precision} = state;
   const [zoom, setZoom] = useState(null);  // {t0, t1, v0, v1}
   const pinch = usePinch((middle, factor) => zoomAt(middle, 1 / factor));
-  const hits = useRef([]), drag = useRef(null), frame = useRef(null), hover = useRef(null);
+  const hits = useRef([]), drag = useRef(null), frame = useRef({width: 400, height: 300}), hover = useRef(null);
   const tree = trees[selection.body], {node, side} = selection;
   const known = tree && node < tree.size;
   const total = known ? tree.verticesBelow(node).length : 0, few = total <= manyLines;

@@ -18,6 +18,7 @@ export function Stage2d({lab, state, source, which}) {
     return {...z, X: (x) => width / 2 + 14 + (x - z.x) * z.scale, Y: (y) => height / 2 - 8 - (y - z.y) * z.scale,
             backX: (px) => z.x + (px - width / 2 - 14) / z.scale, backY: (py) => z.y - (py - height / 2 + 8) / z.scale};
   };
+  frame.current ??= {width: 300, height: 200, ...place({width: 300, height: 200})};  // until the first drawing
   const vertices = scene.bodies.reduce((sum, body) => sum + body.vertices, 0);
   const points = scene.bodies.every((body) => body.shape === 'points');
   const labels = view.labels && vertices <= (points ? 80 : 24);
