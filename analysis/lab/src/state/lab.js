@@ -9,8 +9,8 @@ import {checkScene, checkState} from './permalink.js';
 import {createStore, defaultView} from './store.js';
 import {sceneById} from './scenes.js';
 
-/** From this many nodes on, frames that are only played ask the engine for less. */
-const manyNodes = 4000;
+/** A scene of more nodes, or vertices, is large: it is played on its frames and without the queue. */
+const manyNodes = 4000, manyVertices = 3000;
 /** History is followed while playing only up to this number of events. */
 const manyEvents = 20000;
 
@@ -299,14 +299,14 @@ export class Lab {
 
   // ---- The engine's answers
 
-  /** What to ask of the engine: less while a large scene plays. */
+  /** What to ask of the engine: while a large scene plays, no queue, which is made of objects. */
   #want() {
-    const light = this.state.phase === 'playing' && this.#nodes() > manyNodes;
-    return {positions: true, nodes: !light, flat: !light, pairs: true, queue: !light, counters: true, queueLimit: 4000, pairsLimit: 20000};
+    const light = this.state.phase === 'playing' && this.#large();
+    return {positions: true, nodes: true, flat: true, pairs: true, queue: !light, counters: true, queueLimit: 4000, pairsLimit: 20000};
   }
 
-  /** Whether frames between those of the scene, and all nodes of each frame, would cost too much while playing. */
-  #large() { return this.#nodes() > manyNodes || this.state.scene.bodies.reduce((sum, body) => sum + body.vertices, 0) > 3000; }
+  /** Whether times between the frames of the scene would cost too much while playing. */
+  #large() { return this.#nodes() > manyNodes || this.state.scene.bodies.reduce((sum, body) => sum + body.vertices, 0) > manyVertices; }
 
   #nodes() { return this.state.trees.reduce((sum, tree) => sum + (tree?.size ?? 0), 0); }
 
