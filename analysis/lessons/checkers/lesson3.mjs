@@ -36,7 +36,7 @@ export const sevenLeaders = {
 
 export const hiddenEvents = {
   title: "events that the lead does not see",
-  start: () => state(scenes.race4()),
+  start: () => state(scenes.race()),
   async check(lab, api) {
     const { steps } = await api.trace(play(lab.getState()));
     const upper = steps.filter((step) => step.event.side === 1);

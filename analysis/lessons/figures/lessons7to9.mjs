@@ -31,7 +31,7 @@ export function bvTestTree({ combs: { trace } }) {
   };
   return picture("The tree of box tests of the two combs; the separation list is its set of leaves",
     text(20, 44, `the combs at ${frame.time} s: pairs of nodes (lower comb, upper comb)`, "bold"), draw(root),
-    text(20, 520, "grey: overlaps, descended", "quiet"), text(310, 520, "blue: apart, in the list", "a"), text(580, 520, "orange: overlapping leaves, in the list", "b"));
+    text(16, 520, "grey: overlaps, descended", "quiet"), text(290, 520, "blue: apart, in the list", "a"), text(545, 520, "orange: overlapping leaves, in the list", "b"));
 }
 
 export function combsNow({ combs: { request, trace } }) {

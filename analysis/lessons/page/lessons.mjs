@@ -139,6 +139,7 @@ for (const section of document.querySelectorAll(".exercise")) {
     say("Playing your scene …", "");
     try {
       const lab = mounted.get(place) ?? (await open(place, all[place.dataset.lab].state));
+      if (!lab?.getState().scene?.bodies.length) throw new Error("it has no body");
       const { ok, message } = await checker.check(lab, await api());
       say(message, ok ? "right" : "wrong");
     } catch (error) {
