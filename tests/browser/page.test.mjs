@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 
-import { startBrowser } from './support/page.mjs';
+import { built, startBrowser } from './support/page.mjs';
 
 let browser;
 before(async () => { browser = await startBrowser(); });
@@ -157,6 +157,21 @@ test('a link keeps the whole state', () => withPage({ hash: '#scene=overtake-8' 
   await second.page.close();
 }));
 
+test('a saved file keeps the whole state, and the page in one file reads it', () => withPage({ hash: '#scene=strip-4' }, async ({ lab }) => {
+  const saved = await lab(async (lab) => { await lab.seek(0.5); await lab.event(1); lab.view({ panel: 'box' }); return lab.getState(); });
+  const second = await browser.open({ file: built.replace('index.html', 'lab.html') });
+  await second.page.evaluate((text) => {
+    const data = new DataTransfer();
+    data.items.add(new File([text], 'state.kbvh-lab.json'));
+    document.querySelector('.kbvh-lab').dispatchEvent(new DragEvent('drop', { dataTransfer: data, bubbles: true, cancelable: true }));
+  }, JSON.stringify(saved));
+  await second.page.waitForFunction(() => document.querySelector('[data-kbvh-lab-page]').lab.state.sceneId === 'strip-4');
+  await second.settle();
+  assert.deepEqual(await second.lab((lab) => lab.getState()), saved);
+  assert.deepEqual(second.problems, []);
+  await second.page.close();
+}));
+
 test('damaged links and wrong files are refused in words, and nothing is lost', () => withPage({ hash: '#s=abcdefg' }, async ({ page, lab, settle }) => {
   assert.match(await page.$eval('.banner', (banner) => banner.textContent), /damaged/);
   const drop = (name, text) => page.evaluate(async (name, text) => {
@@ -213,6 +228,46 @@ test('dragging a vertex recomputes everything; undo brings the scene back', () =
   await page.keyboard.up('Control');
   await settle();
   assert.deepEqual(await lab(({ state }) => ({ x: state.scene.bodies[0].positions[1][0], events: state.history.map((step) => step.event.time) })), first);
+}));
+
+test('dragging a keyframe in the diagram, and a vertex in space', () => withPage({ hash: '#scene=overtake-8' }, async ({ page, lab, settle }) => {
+  await lab(async (lab) => { lab.view({ edit: true }); lab.select({ node: 0, side: 1, vertex: 1 }); await lab.seek(0.5); });
+  await settle();
+  const diagram = await (await page.$('[data-view=diagram]')).boundingBox();
+  const knot = await lab(({ state }, width, height) => {
+    // The place of vertex 1's second keyframe, by the margins of the diagram around the whole clip.
+    const xs = state.scene.bodies[0].positions.flatMap((p) => p.filter((_, i) => i % 3 === 0)), low = Math.min(...xs), high = Math.max(...xs), more = (high - low) * 0.07;
+    return { x: 52 + (1 + 0.03) / (2 + 0.06) * (width - 92), y: 14 + (high + more - state.scene.bodies[0].positions[1][3]) / (high - low + 2 * more) * (height - 50), unit: (height - 50) / (high - low + 2 * more), value: state.scene.bodies[0].positions[1][3] };
+  }, diagram.width, diagram.height);
+  await page.mouse.move(diagram.x + knot.x, diagram.y + knot.y);
+  await page.mouse.down();
+  for (let k = 1; k <= 6; ++k) await page.mouse.move(diagram.x + knot.x, diagram.y + knot.y + 15 * k);
+  await page.mouse.up();
+  await settle();
+  const moved = await lab(({ state }) => ({ value: state.scene.bodies[0].positions[1][3], undo: state.undo }));
+  assert.ok(Math.abs(moved.value - (knot.value - 90 / knot.unit)) < 4 / knot.unit, `${knot.value} became ${moved.value}`);
+  assert.equal(moved.undo, 1);
+
+  await lab(async (lab) => { await lab.setState({ format: 'kbvh-lab', version: 1, sceneId: 'points-64', time: 0, view: { edit: true } }); });
+  await settle();
+  await page.waitForFunction(() => document.querySelector('.space canvas'));
+  const stage = await (await page.$('[data-view=stage]')).boundingBox();
+  let spot = null;
+  for (let y = 30; y < stage.height - 10 && !spot; y += 12)
+    for (let x = 20; x < stage.width - 20 && !spot; x += 12) {
+      await page.mouse.move(stage.x + x, stage.y + y);
+      await page.mouse.down();
+      if (await lab(({ state }) => state.undo) > 0) spot = { x: stage.x + x, y: stage.y + y };
+      else await page.mouse.up();
+    }
+  assert.ok(spot, 'a vertex was found on the stage');
+  const before = await lab(({ state }) => state.scene.bodies[0].positions[0].slice(3 * state.selection.vertex, 3 * state.selection.vertex + 3));
+  for (let k = 1; k <= 5; ++k) await page.mouse.move(spot.x + 5 * k, spot.y - 5 * k);
+  await page.mouse.up();
+  await settle();
+  const after = await lab(({ state }) => state.scene.bodies[0].positions[0].slice(3 * state.selection.vertex, 3 * state.selection.vertex + 3));
+  assert.ok(Math.hypot(...after.map((x, axis) => x - before[axis])) > 0.05, `${before} became ${after}`);
+  assert.ok(after[2] > before[2], 'upwards on the screen is upwards in space');
 }));
 
 test('editing: keyframes, insertion, deletion, ties, and what is refused', () => withPage({ hash: '#scene=strip-4' }, async ({ page, lab, settle }) => {

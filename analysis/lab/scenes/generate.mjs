@@ -55,7 +55,7 @@ function overtake() {
 /** Point i is highest in turn: x_i(t) = 2 i t - i^2 (scaled). The upper envelope has as many pieces as points. */
 function parade() {
   const n = 8;
-  const at = (t) => Array.from({length: n}, (_, i) => [(2 * i * t - i * i) / 4, i * 0.5, 0]).flat();
+  const at = (t) => Array.from({length: n}, (_, i) => [(2 * i * t - i * i) / 4, i * 2, 0]).flat();
   return scene('Everyone leads once',
       'Eight points on straight lines, tangents of one parabola: each is the rightmost for a while.', 2,
       [points('points', [0, 8], [at(0), at(8)])], 16);

@@ -1,5 +1,6 @@
 /** The page of the lab: mounts one lab that fills the window and keeps its state in the address when asked. */
 import {mountLab} from './mount.js';
+import {studyScenes} from './state/files.js';
 import {decodeState} from './state/permalink.js';
 
 export {mountLab};
@@ -21,6 +22,7 @@ async function start(element) {
   const lab = await mountLab(element, state);
   if (problem) lab.store.set({error: problem});
   element.lab = lab;
+  lab.store.set({study: await studyScenes()});
   window.addEventListener('hashchange', async () => {
     try {
       const next = await stateFromAddress();

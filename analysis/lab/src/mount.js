@@ -68,6 +68,8 @@ function Page({lab, views, options}) {
     <div class="lab-inner">
       ${has('header') && html`<${Header} lab=${lab} state=${state} compact=${options.compact} onHelp=${() => setHelp(true)} />`}
       ${error && html`<div class="banner error" role="alert"><span>${error}</span><button onClick=${() => lab.store.set({error: ''})} aria-label="Dismiss">✕</button></div>`}
+      ${state.choice && html`<div class="banner choice" role="group" aria-label=${state.choice.text}><span>${state.choice.text}</span>
+        <span class="row">${state.choice.options.map(({title, act}) => html`<button onClick=${act}>${title}</button>`)}</span><button onClick=${() => lab.store.set({choice: null})} aria-label="Dismiss">✕</button></div>`}
       ${has('transport') && html`<${Transport} lab=${lab} state=${state} />`}
       <main class="lab-grid">
         ${has('timeline') && html`<${Panel} id="timeline" title="Event queue" tools=${html`<span class="hint wide-only">◆ a bound changes hands ● boxes meet ○ boxes part</span>
@@ -106,7 +108,8 @@ function Tabs({lab, state, shown}) {
 
 function TreeTools({lab, state}) {
   const {info, selection, lit} = state;
-  return html`<span class="hint">${state.at && lit.count ? `${lit.count} ${lit.by === 'realiser' ? (lit.count === 1 ? 'side has a new realiser' : 'sides have new realisers') : 'bounds rewritten'}` : ''}</span>
+  const since = state.step ? 'by this event' : info?.hasEvents ? 'since the frame before' : 'since the last view';
+  return html`<span class="hint">${state.at && lit.count ? `${lit.count} ${lit.by === 'realiser' ? (lit.count === 1 ? 'side has a new realiser' : 'sides have new realisers') : 'bounds rewritten'} ${since}` : ''}</span>
     ${info?.bodies.length > 1 && html`<label>Body <select value=${String(selection.body)} onChange=${(event) => lab.select({body: Number(event.currentTarget.value)})}>${info.bodies.map((body, b) => html`<option value=${String(b)}>${body.name}</option>`)}</select></label>`}`;
 }
 

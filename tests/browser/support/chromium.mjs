@@ -8,14 +8,14 @@ import { join } from 'node:path';
 const require = createRequire(new URL('../../../analysis/lab/package.json', import.meta.url));
 const puppeteer = require('puppeteer-core');
 
-/** Starts a browser with an empty profile; `close` ends it and removes the profile. */
-export async function startBrowser() {
+/** Starts a browser with an empty profile and perhaps more flags; `close` ends it and removes the profile. */
+export async function startBrowser(flags = ['--disable-gpu']) {
   const profile = mkdtempSync(join(tmpdir(), 'kbvh-chromium-'));
   const browser = await puppeteer.launch({
     executablePath: process.env.KBVH_CHROMIUM ?? '/usr/bin/chromium',
     headless: true,
     userDataDir: profile,
-    args: ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking',
+    args: ['--no-sandbox', ...flags, '--disable-quic', '--no-first-run', '--disable-background-networking',
       '--disable-component-update', '--disable-sync', '--allow-file-access-from-files=false'],
     protocolTimeout: 300000,
   });

@@ -1,31 +1,21 @@
 // Opens the built page of the lab in Chromium, without a network, and gives tests handles to it.
 
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+import { existsSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
 
+import { startBrowser as startChromium } from './chromium.mjs';
+
 const root = fileURLToPath(new URL('../../..', import.meta.url));
-const { default: puppeteer } = await import(pathToFileURL(join(root, 'analysis/lab/node_modules/puppeteer-core/lib/esm/puppeteer/puppeteer-core.js')).href);
 
 /** The page as built by experiments/lab. */
 export const built = join(root, 'build/lab/index.html');
 if (!existsSync(built)) throw new Error(`${built} is missing: run experiments/lab`);
 
-const flags = ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking',
-  '--disable-component-update', '--disable-sync', '--no-first-run'];
-
-/** Starts a browser; `open` gives pages, `close` ends it. */
+/** Starts a browser that draws WebGL in software; `open` gives pages, `close` ends it. */
 export async function startBrowser() {
-  const profile = mkdtempSync(join(tmpdir(), 'kbvh-lab-'));
-  const browser = await puppeteer.launch({ executablePath: process.env.KBVH_CHROMIUM ?? '/usr/bin/chromium', headless: true, args: flags, userDataDir: profile });
-  return {
-    open: (options) => open(browser, options),
-    async close() {
-      await browser.close();
-      rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
-    },
-  };
+  const { browser, close } = await startChromium(['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader']);
+  return { open: (options) => open(browser, options), close };
 }
 
 /**

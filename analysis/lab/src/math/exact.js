@@ -36,8 +36,8 @@ export const isZero = (a) => a.n === 0n;
 /** The nearest double, good enough for labels. */
 export function toNumber({n, d}) {
   const size = (x) => (x < 0n ? -x : x).toString(2).length;
-  const shift = BigInt(Math.max(0, Math.max(size(n), size(d)) - 1000));
-  return Number(n >> shift) / Number(d >> shift);
+  const above = Math.max(0, size(n) - 1000), below = Math.max(0, size(d) - 1000);
+  return Number(n >> BigInt(above)) / Number(d >> BigInt(below)) * 2 ** (above - below);
 }
 
 /**

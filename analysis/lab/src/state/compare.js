@@ -55,15 +55,13 @@ export class Comparison {
   async frame(t) {
     const {compare, phase} = this.lab.state;
     if (!compare?.info || !this.engine) return;
-    const nodes = compare.trees.reduce((sum, tree) => sum + (tree?.size ?? 0), 0);
-    const light = phase === 'playing' && nodes > 4000;
-    const at = await this.engine.frame(t, {positions: true, nodes: !light, flat: !light, pairs: true, queue: !light, counters: true, queueLimit: 4000, pairsLimit: 20000});
+    const at = await this.engine.frame(t, {positions: true, nodes: true, flat: true, pairs: true, queue: phase !== 'playing', counters: true, queueLimit: 4000, pairsLimit: 20000});
     const now = this.lab.state.compare;
     if (!now) return;
     const flats = at.hierarchies?.map((hierarchy) => hierarchy?.flat ?? null);
     const trees = flats ? flats.map((flat, b) => !flat ? null
         : now.trees[b] ? now.trees[b].next(flat, now.info.bodies[b]) : new Tree(flat, b, now.info.bodies[b])) : now.trees;
-    this.lab.store.set({compare: {...now, at, trees, lit: now.at && flats ? difference(now.trees, trees) : nothingLit}});
+    this.lab.store.set({compare: {...now, at: {...at, queue: at.queue ?? now.at?.queue ?? []}, trees, lit: now.at && flats ? difference(now.trees, trees) : nothingLit}});
   }
 
   /** Plays the clip once with each strategy in the background and keeps the counters of every frame. */

@@ -4,12 +4,13 @@ import {Tree} from '../math/hierarchy.js';
 import {Comparison} from './compare.js';
 import {Editing} from './editing.js';
 import {difference, nothingLit, touched} from './lit.js';
+import {title, when} from '../text/why.js';
 import {checkScene, checkState} from './permalink.js';
 import {createStore, defaultView} from './store.js';
 import {sceneById} from './scenes.js';
 
-/** From this many nodes on, frames that are only played ask the engine for less. */
-const manyNodes = 4000;
+/** A scene of more nodes, or vertices, is large: it is played on its frames and without the queue. */
+const manyNodes = 4000, manyVertices = 3000;
 /** History is followed while playing only up to this number of events. */
 const manyEvents = 20000;
 
@@ -201,8 +202,8 @@ export class Lab {
       if (!info.hasEvents) { this.say('This strategy has no events: it works frame by frame.'); return; }
       if (direction > 0) {
         const {step, state} = await this.engine.event(info.end, this.#want());
-        if (!step) this.say('No further event in this clip.');
         this.#arrive(state, step);
+        this.say(step ? `Event ${step.index + 1} at ${when(step.event).text}: ${title(step.event, info.bodies)}.` : 'No further event in this clip.');
       } else {
         if (!at.eventsDone) { this.say('No event before this time.'); return; }
         const undone = history[at.eventsDone - 1] ?? null;
@@ -298,14 +299,14 @@ export class Lab {
 
   // ---- The engine's answers
 
-  /** What to ask of the engine: less while a large scene plays. */
+  /** What to ask of the engine: while a large scene plays, no queue, which is made of objects. */
   #want() {
-    const light = this.state.phase === 'playing' && this.#nodes() > manyNodes;
-    return {positions: true, nodes: !light, flat: !light, pairs: true, queue: !light, counters: true, queueLimit: 4000, pairsLimit: 20000};
+    const light = this.state.phase === 'playing' && this.#large();
+    return {positions: true, nodes: true, flat: true, pairs: true, queue: !light, counters: true, queueLimit: 4000, pairsLimit: 20000};
   }
 
-  /** Whether frames between those of the scene, and all nodes of each frame, would cost too much while playing. */
-  #large() { return this.#nodes() > manyNodes || this.state.scene.bodies.reduce((sum, body) => sum + body.vertices, 0) > 3000; }
+  /** Whether times between the frames of the scene would cost too much while playing. */
+  #large() { return this.#nodes() > manyNodes || this.state.scene.bodies.reduce((sum, body) => sum + body.vertices, 0) > manyVertices; }
 
   #nodes() { return this.state.trees.reduce((sum, tree) => sum + (tree?.size ?? 0), 0); }
 
@@ -314,7 +315,7 @@ export class Lab {
     const flats = at.hierarchies?.map((hierarchy) => hierarchy?.flat ?? null);
     const trees = flats ? flats.map((flat, b) => !flat ? null
         : old.trees[b] ? old.trees[b].next(flat, old.info.bodies[b]) : new Tree(flat, b, old.info.bodies[b])) : old.trees;
-    const lit = step ? touched(step, trees) : old.at && flats ? difference(old.trees, trees) : nothingLit;
+    const lit = step ? touched([step], trees) : old.at && flats ? difference(old.trees, trees) : nothingLit;
     const selection = this.#selectionIn(trees, old.selection);
     this.store.set({
       at: {...at, queue: at.queue ?? old.at?.queue ?? []}, trees, lit, step, notice: '',
@@ -345,12 +346,23 @@ export class Lab {
     return tree && selection.node >= tree.size ? {...selection, node: 0} : selection;
   }
 
+  /** Fetches the events that the history lacks; after a move in time, lights what changed since the frame before. */
   async #followHistory() {
     const {info, at, history} = this.state;
-    if (!info?.hasEvents || at.eventsDone <= history.length) return;
-    if (at.eventsDone - history.length > manyEvents) return;
-    const more = await this.engine.history(history.length);
-    this.store.set({history: [...history, ...more.filter((step) => step.index >= history.length)]});
+    if (!info?.hasEvents || at.eventsDone - history.length > manyEvents) return;
+    if (at.eventsDone > history.length) {
+      const more = await this.engine.history(history.length);
+      this.store.set({history: [...history, ...more.filter((step) => step.index >= history.length)]});
+    }
+    if (!this.state.step) this.#lightFrame();
+  }
+
+  #lightFrame() {
+    const {at, frames, history, trees} = this.state;
+    const frame = frameAt(frames, at.time), from = frames[frame] === at.time ? frames[frame - 1] ?? -Infinity : frames[frame];
+    let first = history.length;
+    while (first > 0 && history[first - 1].event.time > from) --first;
+    this.store.set({lit: touched(history.slice(first), trees)});
   }
 
   async #refresh() {

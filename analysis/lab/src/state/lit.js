@@ -23,14 +23,16 @@ export function difference(before, now) {
   return {sides, by, count};
 }
 
-/** The same from the list of bounds that one event touched. */
-export function touched(step, trees) {
+/** The same from the bounds that events touched. */
+export function touched(steps, trees) {
   const sides = trees.map((tree) => tree ? new Uint8Array(tree.size) : null);
   let count = 0;
-  for (const change of step.touched) {
-    if (sides[change.body]) sides[change.body][change.node] |= 1 << change.side;
-    ++count;
-  }
+  for (const {touched: changes} of steps)
+    for (const {body, node, side} of changes) {
+      if (!sides[body] || side > 5 || (sides[body][node] >> side & 1)) continue;
+      sides[body][node] |= 1 << side;
+      ++count;
+    }
   return {sides, by: 'realiser', count};
 }
 

@@ -19,9 +19,11 @@ export function initialState() {
     phase: 'empty',
     task: '',                // what is being loaded or computed, in words
     error: '',               // the last error, in words
+    choice: null,            // a question to the user: {text, options: [{title, act}]}
     notice: '',              // what the last action did, for the live region
     strategies: [],          // from the engine
     meanings: new Map(),     // of counters, by name
+    study: [],               // scenes of a study beside the page: {name, framesPerSecond, files}
     scene: null, sceneId: null,
     strategy: 'kinetic_aabb', params: {}, topology: {}, precision: 'float64',
     info: null,              // what load() returned
@@ -43,7 +45,7 @@ export function initialState() {
 
 /** What is shown, and how. Kept in links. */
 export function defaultView() {
-  return {boxes: 'level', level: 'all', paths: true, labels: true, panel: 'why', theme: 'auto', follow: true, edit: false, drag: 'keyframe', zoom: null};
+  return {boxes: 'level', level: 'all', up: 'z', paths: true, labels: true, panel: 'why', theme: 'auto', follow: true, edit: false, drag: 'keyframe', zoom: null};
 }
 
 /** Creates a store. `set(patch)` merges and notifies; `subscribe(fn)` returns the function that ends it. */

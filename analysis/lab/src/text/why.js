@@ -35,8 +35,8 @@ export function when(event) {
   return {text: spelled.exactly && spelled.text.includes('/') ? `${spelled.text} s (${decimal})` : `${spelled.text} s`, exactly: spelled.exactly};
 }
 
-/** The time of an event in decimals, for lists. */
-export const clock = (event) => `${short(event.time, 5)} s`;
+/** The time of an event in decimals, for lists: as many as a clip of `span` seconds needs. */
+export const clock = (event, span) => `${event.time.toFixed(Math.max(2, Math.min(9, 5 - Math.ceil(Math.log10(span || 1))))).replace('-', '\u2212')} s`;
 
 /**
  * The story of an event.

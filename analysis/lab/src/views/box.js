@@ -37,7 +37,7 @@ export function BoxPanel({lab, state}) {
       <tbody>${rows.map((row) => html`<tr class=${[selection.side === row.side && 'chosen', isLit(lit, selection.body, node, row.side) && 'lit'].filter(Boolean).join(' ')}>
         <th scope="row"><button class="side-button" aria-pressed=${selection.side === row.side} onClick=${() => lab.select({side: row.side})}>${sideName(row.side)}</button></th>
         <td class="number">${short(row.bound)}</td>
-        <td>${row.vertex === null ? html`<span class="muted">${tree.realisers ? 'inherited' : 'not kept'}</span>` : html`<button class="ref ref-vertex" onClick=${() => lab.select({vertex: row.vertex})}>vertex ${row.vertex}</button>`}</td>
+        <td>${row.vertex === null ? html`<span class="muted">${tree.realisers ? 'inherited from above' : 'not kept'}</span>` : html`<button class="ref ref-vertex" onClick=${() => lab.select({vertex: row.vertex})}>vertex ${row.vertex}</button>`}</td>
         <td class="number">${row.vertex === null || !info.hasEvents ? '–' : row.sinceStep === null ? 'the start' : html`<button class="ref" onClick=${() => lab.goToEvent(row.sinceStep)}>${short(row.since, 5)} s</button>`}</td>
         <td class="number">${row.vertex === null ? '–' : row.until === Infinity || row.until >= info.end ? 'the end' : html`<button class="ref" onClick=${() => lab.seek(row.until)}>${short(row.until, 5)} s</button>`}</td>
       </tr>`)}</tbody></table></div>

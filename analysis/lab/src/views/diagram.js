@@ -2,7 +2,7 @@
  * The value-time diagram of one side of one node: every vertex below the node as a line, the envelope that the bound must
  * follow, the present certificate, and the events where lines cross. Wheel or + and - zoom, dragging moves.
  */
-import {html, Canvas, font, haloText, pointerAt, ticks, tickText, useMemo, useRef, useState} from './dom.js';
+import {html, Canvas, font, haloText, pointerAt, ticks, tickText, useMemo, usePinch, useRef, useState} from './dom.js';
 import {envelope} from '../math/envelope.js';
 import {axisNames, axisOf, isUpper, sideName, valueAt} from '../math/plans.js';
 import {linesBelow} from '../text/tenure.js';
@@ -16,12 +16,13 @@ const manyLines = 500;
 export function Diagram({lab, state}) {
   const {trees, selection, scene, info, at, history, precision} = state;
   const [zoom, setZoom] = useState(null);  // {t0, t1, v0, v1}
-  const hits = useRef([]), drag = useRef(null), frame = useRef(null), hover = useRef(null);
+  const pinch = usePinch((middle, factor) => zoomAt(middle, 1 / factor));
+  const hits = useRef([]), drag = useRef(null), frame = useRef({width: 400, height: 300}), hover = useRef(null);
   const tree = trees[selection.body], {node, side} = selection;
   const known = tree && node < tree.size;
   const total = known ? tree.verticesBelow(node).length : 0, few = total <= manyLines;
   const always = !known || few ? [] : specialVertices(tree, node, side, selection.vertex, at?.queue ?? []);
-  const lines = useMemo(() => known ? linesBelow(scene, tree, node, side, precision, manyLines / 2, always) : [], [scene, known && tree.childStart, node, side, precision, always.join()]);
+  const lines = useMemo(() => known ? linesBelow(scene, tree, node, side, precision, few ? Infinity : manyLines / 2, always) : [], [scene, known && tree.childStart, node, side, precision, always.join()]);
   const pieces = useMemo(() => few && info ? envelope(lines, isUpper(side), info.begin, info.end) : [], [lines, info]);
   const whole = useMemo(() => extent(lines, info), [lines, info]);
   if (!known || !at) return html`<div class="empty">Choose a node that has a box.</div>`;
@@ -64,6 +65,13 @@ export function Diagram({lab, state}) {
       else if (line.id === certificate?.loser) stroke(line, colours.challenger, 2.5, [7, 4]);
       else if (line.id === selection.vertex) stroke(line, colours.ink, 2, [2, 3]);
     }
+    if (state.view.edit && few)
+      for (const l of lines) {
+        c.fillStyle = colours.panel;
+        c.strokeStyle = l.id === selection.vertex ? colours.ink : colours.muted;
+        c.lineWidth = 1.5;
+        l.times.forEach((t, k) => { c.beginPath(); c.rect(X(t) - 3.5, Y(l.values[k]) - 3.5, 7, 7); c.fill(); c.stroke(); });
+      }
     drawEvents(c, {colours, X, Y, height});
     const now = X(at.time);
     c.strokeStyle = colours.ink; c.lineWidth = 1.25;
@@ -159,7 +167,7 @@ export function Diagram({lab, state}) {
       haloText(c, text, Math.max(left + 2, x), height - bottom - 8, colours.challenger, colours.panel);
     }
     if (fromBelow && X(fromBelow.time) > left && X(fromBelow.time) < width - right) {
-      const text = `before that, from below: v${fromBelow.loser} takes over in node ${fromBelow.node}`;
+      const text = `${certificate ? 'before that' : 'next'}, from below: v${fromBelow.loser} takes over in node ${fromBelow.node}`;
       const x = Math.min(X(fromBelow.time) + 6, width - right - c.measureText(text).width);
       haloText(c, text, Math.max(left + 2, x), height - bottom - 24, colours.ink, colours.panel);
     }
@@ -206,6 +214,26 @@ export function Diagram({lab, state}) {
     }
     return best?.id ?? null;
   };
+  /** The keyframe of a line under the pointer, while editing. */
+  const pickKnot = ([x, y]) => {
+    if (!state.view.edit || !few) return null;
+    const {width, height} = frame.current;
+    let best = null;
+    for (const l of lines)
+      l.times.forEach((t, keyframe) => {
+        const px = left + (t - view.t0) / (view.t1 - view.t0) * (width - left - right), py = top + (view.v1 - l.values[keyframe]) / (view.v1 - view.v0) * (height - top - bottom);
+        const d = Math.hypot(px - x, py - y) - (l.id === selection.vertex ? 4 : 0);
+        if (d < 10 && (!best || d < best.d)) best = {vertex: l.id, keyframe, d};
+      });
+    return best;
+  };
+  /** Moves a knot of a flight plan to the height of the pointer. */
+  const dragKnot = ({vertex, keyframe}, [, y]) => {
+    const {height} = frame.current, value = view.v1 - (y - top) / (height - top - bottom) * (view.v1 - view.v0);
+    const p = lab.state.scene.bodies[selection.body].positions[keyframe], which = axisOf(side);
+    const position = [0, 1, 2].map((a) => a === which ? Math.round(value * 256) / 256 : p[3 * vertex + a]);
+    lab.editing.apply('setKeyframe', {body: selection.body, vertex, keyframe, position}, {remember: false});
+  };
   const onKeyDown = (event) => {
     const {width, height} = frame.current;
     const middle = certificate && event.altKey ? null : [(left + width - right) / 2, (top + height - bottom) / 2];
@@ -227,10 +255,13 @@ export function Diagram({lab, state}) {
       (realiser === null ? '' : `Vertex ${realiser} leads. `) + (certificate ? `Vertex ${certificate.loser} overtakes at ${when(certificate).text}.` : 'No overtaking is scheduled.');
   return html`<${Canvas} draw=${draw} role="img" tabIndex="0" data-view="diagram" aria-label=${`${label} Plus and minus zoom, 0 shows all, c shows the crossing.`}
       onKeyDown=${onKeyDown} onWheel=${(event) => { event.preventDefault(); zoomAt(pointerAt(event), event.deltaY > 0 ? 1.2 : 1 / 1.2, !event.shiftKey); }}
-      onPointerDown=${(event) => { const p = pointerAt(event), hit = pickEvent(p); if (hit) { chooseEvent(lab, hit.place); return; } drag.current = {p, from: p}; event.currentTarget.setPointerCapture(event.pointerId); }}
-      onPointerMove=${(event) => { const p = pointerAt(event); if (drag.current) { shift(p[0] - drag.current.p[0], p[1] - drag.current.p[1]); drag.current.p = p; return; }
-        const id = pickLine(p); if (id !== hover.current) { hover.current = id; event.currentTarget.title = id === null ? '' : `vertex ${id}`; } event.currentTarget.style.cursor = pickEvent(p) ? 'pointer' : id !== null ? 'pointer' : 'grab'; }}
-      onPointerUp=${(event) => { const p = pointerAt(event), d = drag.current; drag.current = null; if (d && Math.hypot(p[0] - d.from[0], p[1] - d.from[1]) < 4) { setZoom(zoom); const id = pickLine(p); if (id !== null) lab.select({vertex: id}); } }}
+      onPointerDown=${(event) => { if (pinch.down(event)) { drag.current = null; return; } const p = pointerAt(event), hit = pickEvent(p); const knot = pickKnot(p);
+        if (knot) { setZoom(view); lab.pause(); lab.editing.remember(); lab.select({vertex: knot.vertex}); drag.current = {knot, p, from: p}; event.currentTarget.setPointerCapture(event.pointerId); return; }
+        if (hit) { chooseEvent(lab, hit.place); return; } drag.current = {p, from: p}; event.currentTarget.setPointerCapture(event.pointerId); }}
+      onPointerMove=${(event) => { if (pinch.move(event)) return; const p = pointerAt(event); if (drag.current?.knot) { dragKnot(drag.current.knot, p); return; } if (drag.current) { shift(p[0] - drag.current.p[0], p[1] - drag.current.p[1]); drag.current.p = p; return; }
+        const id = pickLine(p); if (id !== hover.current) { hover.current = id; event.currentTarget.title = id === null ? '' : `vertex ${id}`; } event.currentTarget.style.cursor = pickKnot(p) ? 'ns-resize' : pickEvent(p) ? 'pointer' : id !== null ? 'pointer' : 'grab'; }}
+      onPointerCancel=${(event) => { pinch.up(event); drag.current = null; }}
+      onPointerUp=${(event) => { pinch.up(event); const p = pointerAt(event), d = drag.current; drag.current = null; if (d && !d.knot && Math.hypot(p[0] - d.from[0], p[1] - d.from[1]) < 4) { setZoom(zoom); const id = pickLine(p); if (id !== null) lab.select({vertex: id}); } }}
       onDblClick=${() => setZoom(null)} />
     <div class="diagram-tools"><button onClick=${toEvent} disabled=${!certificate} title="Zoom on the crossing (c)">crossing</button>
       <button onClick=${() => setZoom(null)} disabled=${!zoom} title="Show all (0)">all</button></div>`;

@@ -23,7 +23,7 @@ export function coloursOf(element) {
   const colours = {};
   for (const name of names) colours[name.replace(/-(.)/g, (_, c) => c.toUpperCase())] = style.getPropertyValue(`--${name}`).trim();
   colours.body = (b) => [colours.body0, colours.body1, colours.body2][b % 3];
-  colours.level = (depth) => [colours.level0, colours.level1, colours.level2, colours.level3, colours.level4, colours.level5][depth % 6];
+  colours.level = (depth) => [colours.level0, colours.level1, colours.level2, colours.level3, colours.level4, colours.level5][Math.min(depth, 5)];
   return colours;
 }
 
@@ -72,6 +72,33 @@ export function Canvas({draw, ...properties}) {
 export function pointerAt(event) {
   const box = event.currentTarget.getBoundingClientRect();
   return [event.clientX - box.left, event.clientY - box.top];
+}
+
+/**
+ * Two fingers zoom. Returns handlers that see pointers first: `down`, `move` and `up` return true while two fingers are on
+ * the canvas; `zoomAt([x, y], factor)` is called with the middle and the change of the distance.
+ */
+export function usePinch(zoomAt) {
+  const fingers = useRef(new Map()), last = useRef(0), call = useRef(zoomAt);
+  call.current = zoomAt;
+  const distance = ([[x0, y0], [x1, y1]]) => Math.max(1, Math.hypot(x0 - x1, y0 - y1));
+  return {
+    down(event) {
+      fingers.current.set(event.pointerId, pointerAt(event));
+      if (fingers.current.size === 2) last.current = distance([...fingers.current.values()]);
+      return fingers.current.size === 2;
+    },
+    move(event) {
+      if (!fingers.current.has(event.pointerId)) return false;
+      fingers.current.set(event.pointerId, pointerAt(event));
+      if (fingers.current.size !== 2) return false;
+      const [a, b] = [...fingers.current.values()], now = distance([a, b]);
+      call.current([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], now / last.current);
+      last.current = now;
+      return true;
+    },
+    up(event) { fingers.current.delete(event.pointerId); return false; },
+  };
 }
 
 /** Sets the font of a canvas: size in pixels. */

@@ -2,7 +2,7 @@
 import {html, useRef, useState} from './dom.js';
 import {builtIn} from '../state/scenes.js';
 import {encodeState} from '../state/permalink.js';
-import {openFiles} from '../state/files.js';
+import {openFiles, openStudyScene} from '../state/files.js';
 
 /** Strategies named first in the menus, in the order of the course. */
 const first = ['bottom_up', 'kinetic_aabb', 'kinetic_boxtree', 'kinetic_separation_list', 'linear_bounds', 'interval_join', 'kinetic_envelope'];
@@ -20,15 +20,17 @@ export function Header({lab, state, compact, onHelp}) {
   const load = (choice) => lab.load(choice, choice.scene ? {} : {time: state.at?.time});
   return html`<header class="lab-head">
     ${!compact && html`<h1>kbvh <span>lab</span></h1>
-    <label>Scene <select value=${sceneId ?? ''} onChange=${(event) => { const id = event.currentTarget.value; if (builtIn[id]) { lab.editing.forget(); load({scene: builtIn[id], sceneId: id, topology: lab.defaultTopology(strategy, builtIn[id])}); } }}>
+    <label>Scene <select value=${sceneId ?? ''} onChange=${(event) => { const id = event.currentTarget.value; if (id.startsWith('study ')) openStudyScene(lab, state.study[Number(id.slice(6))]); else if (builtIn[id]) { lab.editing.forget(); lab.view({up: 'z'}); load({scene: builtIn[id], sceneId: id, topology: lab.defaultTopology(strategy, builtIn[id])}); } }}>
       ${!sceneId && html`<option value="">${scene?.name ?? '…'} (changed or own)</option>`}
-      ${Object.entries(builtIn).map(([id, each]) => html`<option value=${id}>${each.name}</option>`)}</select></label>`}
+      ${Object.entries(builtIn).map(([id, each]) => html`<option value=${id}>${each.name}</option>`)}
+      ${state.study.length > 0 && html`<optgroup label="Scenes of the study">${state.study.map((each, i) => html`<option value=${`study ${i}`}>${each.name}</option>`)}</optgroup>`}</select></label>`}
     <label>Strategy <select value=${strategy} onChange=${(event) => lab.choose(event.currentTarget.value)}>
       ${ordered(strategies).map((s) => html`<option value=${s.id}>${s.title}${s.events ? ' (events)' : ''}</option>`)}</select></label>
     <label>Compare with <select value=${compare?.strategy ?? ''} onChange=${(event) => { const id = event.currentTarget.value; lab.comparison.set(id ? {strategy: id} : null); if (id) lab.view({panel: 'work'}); }}>
       <option value="">nothing</option>${ordered(strategies).map((s) => html`<option value=${s.id}>${s.title}</option>`)}</select></label>
     <button aria-expanded=${open} onClick=${() => setOpen(!open)} title="Parameters of the strategy, precision">Settings</button>
     <span class="spring"></span>
+    ${!compact && html`<a href="lessons/index.html">Course</a>`}
     ${!compact && html`<button onClick=${() => file.current.click()} title="Open OBJ, OBJ with PC2, glTF, or a scene or state of the lab">Open…</button>
     <input ref=${file} type="file" class="sr" tabIndex="-1" multiple aria-label="Open files" onChange=${(event) => { openFiles(lab, event.currentTarget.files); event.currentTarget.value = ''; }} />`}
     <button onClick=${() => save(lab)} title="Save the whole state as a file">Save</button>

@@ -7,7 +7,7 @@ export const keys = [
   ['Home and End', 'start and end of the clip'], ['v and Shift V', 'next, previous vertex'],
   ['[ and ]', 'previous, next node'], ['s and Shift S', 'next, previous side'],
   ['1 to 6', 'panel: event, box, pairs, counters, edit, compare'], ['e', 'dragging vertices on or off'],
-  ['Shift and arrows', 'on the stage, while dragging is on: move the chosen vertex'], ['Ctrl Z, Ctrl Y', 'undo, redo an edit'],
+  ['drag', 'stage and diagram, while dragging is on: move a vertex, or one of its keyframes in the diagram'], ['Shift and arrows', 'on the stage, while dragging is on: move the chosen vertex'], ['Ctrl Z, Ctrl Y', 'undo, redo an edit'],
   ['Arrows', 'tree: move the selection; timeline: choose an event; stage and diagram: move or turn'],
   ['+ − 0', 'stage and diagram: zoom, show all'], ['c', 'diagram: zoom on the crossing'], ['?', 'this help'],
 ];

@@ -25,8 +25,8 @@ function Pairs({lab, at, info}) {
   const word = (b) => primitiveWord(info.bodies[b]);
   return html`<p class="lead"><b>${count(n, 'pair')}</b> of primitives ${n === 1 ? 'intersects' : 'intersect'}${at.betweenFrames ? ' (as of the last frame)' : ''}${begun.size ? `; ${begun.size} began` : ''}${ended.length ? `; ${ended.length} ended` : ''}.</p>
     <ul class="pair-list" tabIndex="0" aria-label="Intersecting pairs">${rows(pairs).slice(0, most).map((row) => html`<li class=${begun.has(String(row)) ? 'begun' : ''}>
-      <button class="pair" onClick=${() => toPrimitive(lab, row[0], row[1])}>${word(row[0])} ${row[1]} of ${info.bodies[row[0]].name}</button> ×
-      <button class="pair" onClick=${() => toPrimitive(lab, row[2], row[3])}>${word(row[2])} ${row[3]} of ${info.bodies[row[2]].name}</button>${begun.has(String(row)) ? html` <b>began</b>` : ''}</li>`)}
+      <button class="pair-ref" onClick=${() => toPrimitive(lab, row[0], row[1])}>${word(row[0])} ${row[1]} of ${info.bodies[row[0]].name}</button> × ${' '}
+      <button class="pair-ref" onClick=${() => toPrimitive(lab, row[2], row[3])}>${word(row[2])} ${row[3]} of ${info.bodies[row[2]].name}</button>${begun.has(String(row)) ? html` <b>began</b>` : ''}</li>`)}
     ${ended.slice(0, 20).map((row) => html`<li class="ended">${word(row[0])} ${row[1]} × ${word(row[2])} ${row[3]} <b>ended</b></li>`)}</ul>
     ${n > most && html`<p class="hint">The first ${most} are listed.</p>`}`;
 }
@@ -40,8 +40,8 @@ function Separation({lab, state, watched}) {
     <ul class="pair-list" tabIndex="0" aria-label="Separation list">${ordered.slice(0, most).map((pair) => {
       const due = at.queue.find((e) => e.kind !== 'bound' && e.body === pair.body && e.node === pair.node && e.otherBody === pair.otherBody && e.otherNode === pair.otherNode);
       return html`<li class=${mine(pair) ? 'begun' : ''}><span class=${`pair-state ${pair.overlapping ? 'over' : 'apart'}`}>${pair.listed ? pair.overlapping ? 'overlap' : 'apart' : 'above'}</span>
-        <button class="pair" onClick=${() => lab.select({body: pair.body, node: pair.node})}>${info.bodies[pair.body].name} ${pair.node}</button> ×
-        <button class="pair" onClick=${() => lab.select({body: pair.otherBody, node: pair.otherNode})}>${info.bodies[pair.otherBody].name} ${pair.otherNode}</button>
+        <button class="pair-ref" onClick=${() => lab.select({body: pair.body, node: pair.node})}>${info.bodies[pair.body].name} ${pair.node}</button> × ${' '}
+        <button class="pair-ref" onClick=${() => lab.select({body: pair.otherBody, node: pair.otherNode})}>${info.bodies[pair.otherBody].name} ${pair.otherNode}</button>
         ${due && html` <button class="ref" onClick=${() => lab.seek(due.time)}>until ${due.time.toFixed(3)} s</button>`}</li>`; })}</ul>`;
 }
 

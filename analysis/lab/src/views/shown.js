@@ -3,9 +3,12 @@ import {isLit} from '../state/lit.js';
 
 /** The choices of the menu "boxes". */
 export const boxChoices = [
-  {id: 'level', title: 'by level'}, {id: 'changed', title: 'changed'}, {id: 'path', title: 'chosen, up to the root'},
+  {id: 'level', title: 'by level'}, {id: 'side', title: 'chosen side, by level'}, {id: 'changed', title: 'changed'}, {id: 'path', title: 'chosen, up to the root'},
   {id: 'one', title: 'chosen only'}, {id: 'none', title: 'none'},
 ];
+
+/** Whether a choice of boxes goes with a choice of level. */
+export const hasLevel = (boxes) => boxes === 'level' || boxes === 'side';
 
 /** @returns the nodes of a tree to draw, parents first; the chosen node is always among them (except for 'none') */
 export function shownNodes(tree, body, view, selection, lit) {

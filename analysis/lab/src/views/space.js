@@ -29,8 +29,10 @@ export class Space {
     sun.position.set(3, -4, 6);
     this.scene.add(sun);
     this.bodies = [];
+    this.root = new THREE.Group();  // turned if y points up in the scene
+    this.scene.add(this.root);
     this.extras = new THREE.Group();
-    this.scene.add(this.extras);
+    this.root.add(this.extras);
     this.materials = sharedMaterials();
     this.pending = 0;
     this.afterRender = null;
@@ -79,7 +81,10 @@ export class Space {
 
   /** Shows a state of the lab; `source` is the lab's state or its comparison. */
   update(state, source, colours) {
+    const turned = this.up !== state.view.up;
+    if (turned) this.turnRoot(state.view.up);
     if (this.info !== source.info) this.rebuild(state, source.info, colours);
+    if (turned) this.fit();
     const {at} = source;
     this.bodies.forEach(({geometry}, b) => {
       const attribute = geometry.getAttribute('position');
@@ -93,8 +98,15 @@ export class Space {
     this.soon();
   }
 
+  /** Turns the scene so that its axis `up` ('y' or 'z') points up on the screen. */
+  turnRoot(up) {
+    this.up = up;
+    this.root.rotation.x = up === 'y' ? Math.PI / 2 : 0;
+    this.root.updateMatrixWorld(true);
+  }
+
   rebuild(state, info, colours) {
-    for (const {object, wire} of this.bodies) { this.scene.remove(object); if (wire) this.scene.remove(wire); }
+    for (const {object, wire} of this.bodies) { this.root.remove(object); if (wire) this.root.remove(wire); }
     const sameSpace = this.info && this.name === state.scene.name;
     this.info = info;
     this.name = state.scene.name;
@@ -111,16 +123,17 @@ export class Space {
           lines.setIndex(edgeList(body));
           wire = new THREE.LineSegments(lines, this.materials.wire.clone());
           wire.frustumCulled = false;
-          this.scene.add(wire);
+          this.root.add(wire);
         }
       } else {
         object = new THREE.Points(geometry, this.materials.points.clone());
       }
       object.frustumCulled = false;
-      this.scene.add(object);
+      this.root.add(object);
       return {object, geometry, wire};
     });
     this.box = boxOf(state.scene);
+    this.sample = sampleOf(state.scene);
     if (!sameSpace) this.fit();
   }
 
@@ -140,15 +153,15 @@ export class Space {
 
   /** Looks at the whole clip. */
   fit() {
-    const centre = this.box.getCenter(new THREE.Vector3()), toCamera = new THREE.Vector3(0.55, -0.95, 0.55).normalize();
+    const centre = this.box.getCenter(new THREE.Vector3()).applyMatrix4(this.root.matrixWorld), toCamera = new THREE.Vector3(0.55, -0.95, 0.55).normalize();
     const across = new THREE.Vector3(0, 0, 1).cross(toCamera).normalize(), up = toCamera.clone().cross(across);
     const tall = Math.tan(this.camera.fov * Math.PI / 360) * 0.92, wide = tall * this.camera.aspect;
     let distance = 1e-3;
-    for (let k = 0; k < 8; ++k) {  // far enough for every corner
-      const d = new THREE.Vector3(...[0, 1, 2].map((axis) => (k >> axis & 1 ? this.box.max : this.box.min).getComponent(axis))).sub(centre);
+    for (let i = 0; i < this.sample.length; i += 3) {  // far enough for every vertex, sampled over the clip
+      const d = new THREE.Vector3(this.sample[i], this.sample[i + 1], this.sample[i + 2]).applyMatrix4(this.root.matrixWorld).sub(centre);
       distance = Math.max(distance, d.dot(toCamera) + Math.max(Math.abs(d.dot(across)) / wide, Math.abs(d.dot(up)) / tall));
     }
-    this.camera.position.copy(centre).addScaledVector(toCamera, distance);
+    this.camera.position.copy(centre).addScaledVector(toCamera, distance *= 1.06);
     this.camera.near = distance / 100;
     this.camera.far = distance * 10;
     this.camera.updateProjectionMatrix();
@@ -181,8 +194,9 @@ export class Space {
         const corners = cornersOf(tree, node), on = isLit(lit, b, node);
         if (b === selection.body && node === selection.node) { chosen = {tree, node, corners}; }
         colour.set(on ? colours.lit : colours.level(tree.depth[node]));
-        for (const corner of edges) { lines.push(...corners[corner]); lineColours.push(colour.r, colour.g, colour.b); }
-        if (on && lit.count <= 24) for (let side = 0; side < 6; ++side) if (isLit(lit, b, node, side)) quads.push(...quad(corners, side));
+        const drawn = view.boxes === 'side' ? sideEdges(selection.side) : edges;
+        for (const corner of drawn) { lines.push(...corners[corner]); lineColours.push(colour.r, colour.g, colour.b); }
+        if (on && lit.count <= 24) for (let side = 0; side < 6; ++side) if (isLit(lit, b, node, side) && (view.boxes !== 'side' || side === selection.side)) quads.push(...quad(corners, side));
       }
     });
     if (lines.length) {
@@ -235,22 +249,23 @@ export class Space {
     for (const object of [...this.extras.children]) { object.geometry.dispose(); this.extras.remove(object); }
   }
 
-  /** A position in CSS pixels of the holder, and its depth; z > 1 is behind the camera. */
+  /** A position of the scene in CSS pixels of the holder, and its depth; z > 1 is behind the camera. */
   project(x, y, z) {
-    const v = new THREE.Vector3(x, y, z).project(this.camera), {clientWidth, clientHeight} = this.renderer.domElement;
+    const v = new THREE.Vector3(x, y, z).applyMatrix4(this.root.matrixWorld).project(this.camera), {clientWidth, clientHeight} = this.renderer.domElement;
     return [(v.x + 1) / 2 * clientWidth, (1 - v.y) / 2 * clientHeight, v.z];
   }
 
+  /** The ray under a pixel, in the scene's coordinates. */
   ray([px, py]) {
     const {clientWidth, clientHeight} = this.renderer.domElement;
     const caster = new THREE.Raycaster();
     caster.setFromCamera(new THREE.Vector2(px / clientWidth * 2 - 1, 1 - py / clientHeight * 2), this.camera);
-    return caster.ray;
+    return caster.ray.applyMatrix4(this.root.matrixWorld.clone().invert());
   }
 
   /** The point under the pointer on the plane through `through` that faces the camera. */
   onPlane(pixel, through) {
-    const normal = this.camera.getWorldDirection(new THREE.Vector3());
+    const normal = this.camera.getWorldDirection(new THREE.Vector3()).transformDirection(this.root.matrixWorld.clone().invert());
     const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, new THREE.Vector3(...through));
     return this.ray(pixel).intersectPlane(plane, new THREE.Vector3())?.toArray() ?? null;
   }
@@ -266,6 +281,12 @@ export class Space {
 }
 
 const cornersOf = (tree, node) => Array.from({length: 8}, (_, k) => [0, 1, 2].map((axis) => tree.bounds[6 * node + (k >> axis & 1 ? 3 : 0) + axis]));
+
+/** The edges of one side of a box, as pairs of corners. */
+function sideEdges(side) {
+  const on = (corner) => (corner >> (side >> 1) & 1) === (side & 1);
+  return edges.filter((_, i) => on(edges[i - i % 2]) && on(edges[i - i % 2 + 1]));
+}
 
 /** Two triangles that cover a side of a box. */
 function quad(corners, side) {
@@ -316,6 +337,14 @@ function boxOf(scene) {
   const p = new THREE.Vector3();
   for (const body of scene.bodies) for (const frame of body.positions) for (let i = 0; i < frame.length; i += 3) box.expandByPoint(p.set(frame[i], frame[i + 1], frame[i + 2]));
   return box;
+}
+
+/** Some thousand positions of the clip, evenly chosen. */
+function sampleOf(scene) {
+  const total = scene.bodies.reduce((sum, body) => sum + body.vertices * body.positions.length, 0), step = Math.ceil(total / 6000), sample = [];
+  let k = 0;
+  for (const body of scene.bodies) for (const frame of body.positions) for (let i = 0; i < frame.length; i += 3) if (k++ % step === 0) sample.push(frame[i], frame[i + 1], frame[i + 2]);
+  return sample;
 }
 
 let discTexture = null;

@@ -2,7 +2,7 @@
 import {html} from './dom.js';
 import {Stage2d} from './stage2d.js';
 import {Stage3d} from './stage3d.js';
-import {boxChoices} from './shown.js';
+import {boxChoices, hasLevel} from './shown.js';
 
 export function StageView({lab, state}) {
   const {info, at, scene, compare} = state;
@@ -18,13 +18,14 @@ export function StageView({lab, state}) {
 const title = (state, id) => state.strategies.find((s) => s.id === id)?.title ?? id;
 
 export function StageTools({lab, state}) {
-  const {view, trees, selection} = state;
+  const {view, trees, selection, scene} = state;
   const levels = trees[selection.body]?.levels ?? 1;
   return html`
     <label>Boxes <select value=${view.boxes} onChange=${(event) => lab.view({boxes: event.currentTarget.value})}>
       ${boxChoices.map(({id, title: text}) => html`<option value=${id}>${text}</option>`)}</select></label>
-    ${view.boxes === 'level' && html`<label class="level-choice"><span class="sr">Level</span><select aria-label="Level" value=${String(view.level)} onChange=${(event) => lab.view({level: event.currentTarget.value})}>
+    ${hasLevel(view.boxes) && html`<label class="level-choice"><span class="sr">Level</span><select aria-label="Level" value=${String(view.level)} onChange=${(event) => lab.view({level: event.currentTarget.value})}>
       <option value="all">all levels</option>${Array.from({length: levels}, (_, d) => html`<option value=${String(d)}>level ${d}</option>`)}<option value="leaves">leaves</option></select></label>`}
+    ${scene && scene.dimension !== 2 && html`<label title="The axis that points up">up <select value=${view.up} onChange=${(event) => lab.view({up: event.currentTarget.value})}><option value="z">z</option><option value="y">y</option></select></label>`}
     <label class="check"><input type="checkbox" checked=${view.paths} onChange=${() => lab.view({paths: !view.paths})} /> paths</label>
     <label class="check"><input type="checkbox" checked=${view.labels} onChange=${() => lab.view({labels: !view.labels})} /> names</label>`;
 }

@@ -1,5 +1,5 @@
 /** The scene in the plane: primitives, boxes, flight plans; points can be picked, and dragged while editing. */
-import {html, Canvas, font, haloText, pointerAt, ticks, tickText, useRef, useState} from './dom.js';
+import {html, Canvas, font, haloText, pointerAt, ticks, tickText, usePinch, useRef, useState} from './dom.js';
 import {isLit} from '../state/lit.js';
 import {shownNodes} from './shown.js';
 import {positionAt} from '../math/plans.js';
@@ -18,6 +18,7 @@ export function Stage2d({lab, state, source, which}) {
     return {...z, X: (x) => width / 2 + 14 + (x - z.x) * z.scale, Y: (y) => height / 2 - 8 - (y - z.y) * z.scale,
             backX: (px) => z.x + (px - width / 2 - 14) / z.scale, backY: (py) => z.y - (py - height / 2 + 8) / z.scale};
   };
+  frame.current ??= {width: 300, height: 200, ...place({width: 300, height: 200})};  // until the first drawing
   const vertices = scene.bodies.reduce((sum, body) => sum + body.vertices, 0);
   const points = scene.bodies.every((body) => body.shape === 'points');
   const labels = view.labels && vertices <= (points ? 80 : 24);
@@ -76,18 +77,20 @@ export function Stage2d({lab, state, source, which}) {
       const nodes = shownNodes(tree, b, view, selection, lit), fill = nodes.filter((node) => isLit(lit, b, node)).length <= 5;
       for (const node of nodes) {
         const [x0, y0, x1, y1] = rect(node), chosen = b === selection.body && node === selection.node;
-        if (fill && isLit(lit, b, node)) { c.fillStyle = colours.litSoft; c.globalAlpha = 0.45; c.fillRect(x0, y0, x1 - x0, y1 - y0); c.globalAlpha = 1; }
+        if (fill && view.boxes !== 'side' && isLit(lit, b, node)) { c.fillStyle = colours.litSoft; c.globalAlpha = 0.45; c.fillRect(x0, y0, x1 - x0, y1 - y0); c.globalAlpha = 1; }
         c.strokeStyle = chosen ? colours.ink : colours.level(tree.depth[node]);
         c.lineWidth = chosen ? 3 : Math.max(1, 2.4 - 0.4 * tree.depth[node]);
-        c.strokeRect(x0, y0, x1 - x0, y1 - y0);
+        if (view.boxes !== 'side') c.strokeRect(x0, y0, x1 - x0, y1 - y0);
       }
       for (const node of nodes) {
         const [x0, y0, x1, y1] = rect(node), ends = [[x0, y0, x0, y1], [x1, y0, x1, y1], [x0, y1, x1, y1], [x0, y0, x1, y0]];
         for (let side = 0; side < 4; ++side) {
           const chosen = b === selection.body && node === selection.node && side === selection.side;
-          if (!chosen && !isLit(lit, b, node, side)) continue;
-          c.strokeStyle = chosen ? colours.realiser : colours.lit;
-          c.lineWidth = chosen ? 5 : 4;
+          const lone = view.boxes === 'side' && side === selection.side;
+          if (view.boxes === 'side' && !lone) continue;
+          if (!chosen && !lone && !isLit(lit, b, node, side)) continue;
+          c.strokeStyle = chosen ? colours.realiser : isLit(lit, b, node, side) ? colours.lit : colours.level(tree.depth[node]);
+          c.lineWidth = chosen ? 5 : lone ? Math.max(2, 5 - tree.depth[node]) : 4;
           stroke(c, ...ends[side]);
         }
       }
@@ -137,6 +140,7 @@ export function Stage2d({lab, state, source, which}) {
     });
   };
 
+  const pinch = usePinch((middle, factor) => zoomAt(middle, factor));
   const pickVertex = ([px, py]) => {
     const {X, Y} = frame.current;
     let best = null;
@@ -164,6 +168,7 @@ export function Stage2d({lab, state, source, which}) {
     return best;
   };
   const onPointerDown = (event) => {
+    if (pinch.down(event)) { drag.current = null; return; }
     const p = pointerAt(event), hit = pickVertex(p);
     event.currentTarget.setPointerCapture(event.pointerId);
     if (hit) lab.select({body: hit.body, vertex: hit.vertex});
@@ -174,6 +179,7 @@ export function Stage2d({lab, state, source, which}) {
     } else drag.current = {kind: 'pan', p, from: p, hit, z: {x: frame.current.x, y: frame.current.y, scale: frame.current.scale}};
   };
   const onPointerMove = (event) => {
+    if (pinch.move(event)) return;
     const p = pointerAt(event), d = drag.current;
     if (!d) { event.currentTarget.style.cursor = pickVertex(p) ? (view.edit ? 'move' : 'pointer') : 'grab'; return; }
     const f = frame.current;
@@ -181,6 +187,7 @@ export function Stage2d({lab, state, source, which}) {
     else if (Math.hypot(p[0] - d.from[0], p[1] - d.from[1]) > 3) setZoom({scale: d.z.scale, x: d.z.x - (p[0] - d.from[0]) / d.z.scale, y: d.z.y + (p[1] - d.from[1]) / d.z.scale});
   };
   const onPointerUp = (event) => {
+    pinch.up(event);
     const d = drag.current, p = pointerAt(event);
     drag.current = null;
     if (d?.kind === 'pan' && !d.hit && Math.hypot(p[0] - d.from[0], p[1] - d.from[1]) <= 3) { const box = pickBox(p); if (box) lab.select({body: box.body, node: box.node, side: box.side}); }
@@ -201,7 +208,7 @@ export function Stage2d({lab, state, source, which}) {
     act();
   };
   return html`<${Canvas} draw=${draw} role="img" tabIndex="0" data-view="stage" aria-label=${`${scene.name} in the plane at ${at.time.toFixed(4)} seconds. Plus and minus zoom, arrows move, 0 shows all, v and Shift v choose a vertex.`}
-    onPointerDown=${onPointerDown} onPointerMove=${onPointerMove} onPointerUp=${onPointerUp} onKeyDown=${onKeyDown}
+    onPointerDown=${onPointerDown} onPointerMove=${onPointerMove} onPointerUp=${onPointerUp} onPointerCancel=${onPointerUp} onKeyDown=${onKeyDown}
     onWheel=${(event) => { event.preventDefault(); zoomAt(pointerAt(event), event.deltaY > 0 ? 1 / 1.15 : 1.15); }} onDblClick=${() => setZoom(null)} />`;
 }
 
@@ -214,9 +221,16 @@ export function dragVertex(lab, {body, vertex}, position, precision) {
   else {
     const keyframe = nearestKeyframe(scene.bodies[body], at.time), p = scene.bodies[body].positions[keyframe];
     const tidy = (x) => Math.round(x * 1024) / 1024;
-    const target = scene.bodies[body].times[keyframe] === at.time ? position : [0, 1, 2].map((axis) => p[3 * vertex + axis] + by[axis]);
+    const share = shareOf(scene.bodies[body].times, keyframe, at.time);
+    const target = share === 1 ? position : [0, 1, 2].map((axis) => p[3 * vertex + axis] + by[axis] / share);
     lab.editing.apply('setKeyframe', {body, vertex, keyframe, position: target.map(tidy)}, {remember: false});
   }
+}
+
+/** How much of a keyframe's move a vertex makes at time t: 1 at the keyframe, 1/2 half-way to the next one. */
+function shareOf(times, keyframe, t) {
+  const next = times[keyframe + Math.sign(t - times[keyframe])];
+  return t === times[keyframe] || next === undefined ? 1 : 1 - Math.abs(t - times[keyframe]) / Math.abs(next - times[keyframe]);
 }
 
 /** Moves the chosen vertex by a small step: Shift and an arrow key (Page keys for z). */

@@ -1,5 +1,5 @@
 /** The event queue as a timeline: performed events left of now, scheduled ones right of it, a row for each side. */
-import {html, Canvas, font, pointerAt, ticks, tickText, useRef} from './dom.js';
+import {html, Canvas, font, pointerAt, ticks, tickText, useRef, useState} from './dom.js';
 import {sideName} from '../math/plans.js';
 import {isSame, title, when} from '../text/why.js';
 import {short} from '../math/exact.js';
@@ -16,10 +16,18 @@ export function rowsOf(scene, events) {
 export function Timeline({lab, state}) {
   const {info, at, frames, history, scene, selection, phase} = state;
   const hits = useRef([]), dragging = useRef(false), size = useRef([1, 1]);
+  const [zoom, setZoom] = useState(null);  // {t0, t1}; null: the whole clip
   if (!info || !at) return html`<div class="empty">…</div>`;
-  const span = Math.max(1e-12, info.end - info.begin);
-  const x = (t) => left + (t - info.begin) / span * (size.current[0] - left - right);
-  const timeAt = (px) => info.begin + (px - left) / (size.current[0] - left - right) * span;
+  const shown = zoom && zoom.t1 <= info.end + 1e-9 && zoom.t0 >= info.begin - 1e-9 ? follow(zoom, at.time, info) : {t0: info.begin, t1: info.end};
+  const span = Math.max(1e-300, shown.t1 - shown.t0);
+  const x = (t) => left + (t - shown.t0) / span * (size.current[0] - left - right);
+  const timeAt = (px) => shown.t0 + (px - left) / (size.current[0] - left - right) * span;
+  const zoomAt = (t, factor) => {
+    const wide = Math.min(info.end - info.begin, span * factor);
+    if (wide >= info.end - info.begin) { setZoom(null); return; }
+    const t0 = Math.min(info.end - wide, Math.max(info.begin, t - (t - shown.t0) * wide / span));
+    setZoom({t0, t1: t0 + wide});
+  };
   const all = history.map((step) => step.event).concat(at.queue);
   const rows = rowsOf(scene, all);
 
@@ -29,7 +37,7 @@ export function Timeline({lab, state}) {
     const top = 6, bottom = 20, rowHeight = (height - top - bottom) / rows.length;
     const rowOf = (event) => rows.findIndex((row) => row.side === (event.kind !== 'bound' ? null : event.side > 5 ? 'slanted' : event.side));
     c.fillStyle = colours.bg;
-    c.fillRect(left, top, Math.max(0, x(at.time) - left), height - top - bottom);
+    c.fillRect(left, top, Math.max(0, Math.min(x(at.time), width - right) - left), height - top - bottom);
     font(c, 11);
     rows.forEach((row, i) => {
       const y = top + i * rowHeight;
@@ -42,7 +50,12 @@ export function Timeline({lab, state}) {
       line(c, left, y + rowHeight / 2, width - right, y + rowHeight / 2);
     });
     drawAxis(c, {width, height, colours, bottom});
+    c.save();
+    c.beginPath();
+    c.rect(left - 6, 0, width - left - right + 12, height);
+    c.clip();
     const mark = (event, when, y, past, chosen) => {
+      if (event.time < shown.t0 - span / 50 || event.time > shown.t1 + span / 50) return;
       const px = x(event.time), r = Math.max(2.2, Math.min(5, rowHeight / 3));
       c.fillStyle = past ? colours.muted : event.kind === 'bound' ? colours.challenger : colours.pair;
       c.strokeStyle = c.fillStyle;
@@ -71,6 +84,7 @@ export function Timeline({lab, state}) {
     c.beginPath();
     c.moveTo(now - 6, 0); c.lineTo(now + 6, 0); c.lineTo(now, 8);
     c.fill();
+    c.restore();
   };
 
   const drawAxis = (c, {width, height, colours, bottom}) => {
@@ -78,14 +92,15 @@ export function Timeline({lab, state}) {
     c.strokeStyle = colours.muted;
     line(c, left, y, width - right, y);
     c.strokeStyle = colours.line;
-    if (frames.length < (width - left) / 3) for (const t of frames) line(c, x(t), y, x(t), y + 3);
+    const inside = (t) => t >= shown.t0 && t <= shown.t1, some = frames.filter(inside);
+    if (some.length < (width - left) / 3) for (const t of some) line(c, x(t), y, x(t), y + 3);
     c.strokeStyle = colours.ink;
-    for (const t of info.keyframes) line(c, x(t), y - 3, x(t), y + 5);
+    for (const t of info.keyframes) if (inside(t)) line(c, x(t), y - 3, x(t), y + 5);
     font(c, 11);
     c.textAlign = 'center';
     c.textBaseline = 'top';
     c.fillStyle = colours.muted;
-    const marks = ticks(info.begin, info.end, (width - left) / 90);
+    const marks = ticks(shown.t0, shown.t1, (width - left) / 90);
     const step = marks.length > 1 ? marks[1] - marks[0] : span;
     for (const t of marks) c.fillText(`${tickText(t, step)} s`, Math.min(width - 20, x(t)), y + 6);
   };
@@ -113,7 +128,8 @@ export function Timeline({lab, state}) {
     event.currentTarget.style.cursor = pick(pointerAt(event)) ? 'pointer' : 'ew-resize';
   };
   const onKeyDown = (event) => {
-    const moves = {ArrowRight: 1, ArrowLeft: -1};
+    const moves = {ArrowRight: 1, ArrowLeft: -1}, zooms = {'+': 0.6, '=': 0.6, '-': 1 / 0.6, 0: Infinity};
+    if (zooms[event.key] && !event.ctrlKey && !event.altKey) { event.preventDefault(); event.stopPropagation(); zoomAt(at.time, zooms[event.key]); return; }
     if (!moves[event.key] || event.shiftKey || event.ctrlKey || event.altKey) return;
     event.preventDefault();
     event.stopPropagation();
@@ -122,10 +138,18 @@ export function Timeline({lab, state}) {
   const summary = `${history.length} events performed, ${at.queueLength ?? at.queue.length} scheduled` +
       (at.queue.length ? `; next: ${title(at.queue[0], info.bodies)} at ${when(at.queue[0]).text}` : '');
   return html`<${Canvas} draw=${draw} role="slider" tabIndex="0" data-view="timeline"
-    aria-label="Event queue. Left and right arrow keys choose an event." aria-valuemin=${info.begin} aria-valuemax=${info.end}
+    aria-label="Event queue. Left and right arrow keys choose an event; plus and minus zoom, 0 shows the whole clip." aria-valuemin=${info.begin} aria-valuemax=${info.end}
     aria-valuenow=${at.time} aria-valuetext=${`${short(at.time)} s. ${summary}`} title=${summary} aria-busy=${phase === 'working'}
     onPointerDown=${onPointerDown} onPointerMove=${onPointerMove} onPointerUp=${() => { dragging.current = false; }}
-    onDblClick=${(event) => { const hit = pick(pointerAt(event)); if (hit?.when.done !== undefined) lab.goToEvent(hit.when.done); }} onKeyDown=${onKeyDown} />`;
+    onDblClick=${(event) => { const hit = pick(pointerAt(event)); if (hit?.when.done !== undefined) lab.goToEvent(hit.when.done); }} onKeyDown=${onKeyDown}
+    onWheel=${(event) => { event.preventDefault(); zoomAt(timeAt(pointerAt(event)[0]), event.deltaY > 0 ? 1.25 : 0.8); }} />`;
+}
+
+/** A zoomed window moves with the present time when that leaves it. */
+function follow({t0, t1}, time, info) {
+  if (time >= t0 && time <= t1) return {t0, t1};
+  const wide = t1 - t0, from = Math.min(info.end - wide, Math.max(info.begin, time - wide / 4));
+  return {t0: from, t1: from + wide};
 }
 
 /** Selects an event of the history ({done: index}) or of the queue ({due: index}), with its node and side. */

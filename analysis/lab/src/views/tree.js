@@ -48,7 +48,7 @@ export function TreeView({lab, state, which = 'main'}) {
   };
 
   const drawBoxes = (c, {unit, rowHeight, place, onPath, colours}) => {
-    const w = Math.min(54, unit - 5), h = Math.min(34, rowHeight - 9), two = h >= 27 && tree.realisers;
+    const widthOf = (node) => Math.min(54, plan.width[node] * unit - 5), h = Math.min(34, rowHeight - 9), two = h >= 27 && tree.realisers;
     for (let node = 1; node < tree.size; ++node) {
       const a = place(tree.parent[node]), b = place(node);
       c.strokeStyle = onPath.has(node) ? colours.ink : colours.line;
@@ -56,7 +56,7 @@ export function TreeView({lab, state, which = 'main'}) {
       c.beginPath(); c.moveTo(a.x, a.y + h / 2); c.lineTo(b.x, b.y - h / 2); c.stroke();
     }
     for (let node = 0; node < tree.size; ++node) {
-      const {x, y} = place(node), chosen = node === selection.node, on = isLit(lit, tree.body, node);
+      const {x, y} = place(node), w = widthOf(node), chosen = node === selection.node, on = isLit(lit, tree.body, node);
       c.beginPath();
       c.roundRect(x - w / 2, y - h / 2, w, h, tree.isLeaf(node) ? 3 : 8);
       c.fillStyle = on ? colours.litSoft : colours.panel;
@@ -73,7 +73,7 @@ export function TreeView({lab, state, which = 'main'}) {
       if (two) {
         font(c, 11, 600);
         c.fillStyle = v !== null && v === selection.vertex ? colours.challenger : colours.realiser;
-        c.fillText(v === null ? 'inherits' : `v${v}`, x, y + 8);
+        c.fillText(v === null ? '·' : `v${v}`, x, y + 8);
       }
       hits.current.push({node, x0: x - w / 2, x1: x + w / 2, y0: y - h / 2, y1: y + h / 2});
     }

@@ -40,15 +40,16 @@ function EventList({lab, state}) {
   useEffect(() => {
     const row = now.current, list = row?.closest('.event-list');
     if (list) list.scrollTop = row.offsetTop - list.clientHeight / 2;
-  }, [at.eventsDone]);
-  return html`<h3 class="list-head">${count(history.length, 'event')} performed, ${scheduled} scheduled</h3>
+  }, [at.eventsDone, history.length]);
+  return html`<h3 class="list-head">${count(at.eventsDone, 'event')} performed, ${scheduled} scheduled</h3>
     <ol class="event-list" aria-label="Events around now" tabIndex="0">
+    ${at.eventsDone > history.length && html`<li class="more">The first ${at.eventsDone} events are not listed: too many.</li>`}
     ${history.length > past.length && html`<li class="more">… ${history.length - past.length} earlier</li>`}
     ${past.map((step) => html`<li><button class=${`event past ${selection.event?.done === step.index ? 'chosen' : ''}`} onClick=${() => chooseEvent(lab, {done: step.index})}>
-      <span class="event-time">${clock(step.event)}</span> ${title(step.event, info.bodies)}</button></li>`)}
+      <span class="event-time">${clock(step.event, info.end - info.begin)}</span> ${title(step.event, info.bodies)}</button></li>`)}
     <li class="now" ref=${now} aria-label="now"><span>now</span></li>
     ${future.map((event, i) => html`<li><button class=${`event ${selection.event?.due && isSame(selection.event.due, event) ? 'chosen' : ''}`} onClick=${() => chooseEvent(lab, {due: i})}>
-      <span class="event-time">${clock(event)}</span> ${title(event, info.bodies)}</button></li>`)}
+      <span class="event-time">${clock(event, info.end - info.begin)}</span> ${title(event, info.bodies)}</button></li>`)}
     ${scheduled > future.length && html`<li class="more">… ${scheduled - future.length} later</li>`}
     ${!scheduled && html`<li class="more">Nothing is scheduled: no certificate fails any more.</li>`}
   </ol>`;

@@ -29,7 +29,8 @@ function Multiple({lab, state, metric, a, b}) {
   let verdict = '';
   if (ready && totals[0] !== totals[1]) {
     const less = totals[0] < totals[1] ? 'first' : 'second', low = Math.min(...totals), high = Math.max(...totals);
-    verdict = low === 0 ? `only the ${less === 'first' ? 'second' : 'first'} has any` : `the ${less} needs ${(high / low).toFixed(high / low < 10 ? 1 : 0)} times less`;
+    const frames = framesBelow(a.counters[metric.id], b.counters[metric.id], less === 'first');
+    verdict = low === 0 ? `only the ${less === 'first' ? 'second' : 'first'} has any` : `${(high / low).toFixed(high / low < 10 ? 1 : 0)} times less in the ${less}, which is lower in ${frames} of ${a.done} frames`;
   }
   const draw = (c, {width, height, colours}) => {
     const bottom = 3, top = 3, most = Math.max(1e-9, ...[a, b].map((s) => max(s.counters[metric.id], s.done)));
@@ -55,6 +56,16 @@ function Multiple({lab, state, metric, a, b}) {
     <${Canvas} draw=${draw} role="img" aria-label=${`${metric.title} per frame. Totals: ${text(totals[0])} and ${text(totals[1])}. ${verdict}`}
       onPointerDown=${(event) => { const [px] = pointerAt(event), w = event.currentTarget.clientWidth; lab.seek(frames[Math.max(0, Math.min(frames.length - 1, Math.round(px / w * (frames.length - 1))))]); }} />
     <div class="verdict">${verdict || (ready ? 'equal' : '…')}</div></figure>`;
+}
+
+/** The number of frames in which the first (or the second) series is the lower one. */
+function framesBelow(first, second, firstIsLower) {
+  let n = 0;
+  for (let f = 0; f < Math.max(first?.length ?? 0, second?.length ?? 0); ++f) {
+    const d = (first?.[f] ?? 0) - (second?.[f] ?? 0);
+    if (firstIsLower ? d < 0 : d > 0) ++n;
+  }
+  return n;
 }
 
 const sum = (values, n) => { let s = 0; for (let i = 0; values && i < n; ++i) s += values[i]; return s; };
