@@ -41,16 +41,20 @@ def require(holds: bool, what: str, run: subprocess.CompletedProcess[str] | None
         raise SystemExit(f"FAILED: {what}" + (f"\ncode {run.returncode}\n{run.stdout}\n{run.stderr}" if run else ""))
 
 
-def lines_of(file: Path) -> list[dict[str, Any]]:
-    """Returns the records of a file. Every line but the last must be whole."""
-    *whole, _ = file.read_bytes().split(b"\n") if file.exists() else [b""]
-    return [json.loads(line) for line in whole if line]
+def lines_of(file: Path, torn: bool) -> Iterator[dict[str, Any]]:
+    """Yields the records of a file. Lines are whole, but for the beginnings that a full disk leaves (`torn`)."""
+    for line in file.read_bytes().split(b"\n"):
+        try:
+            if line:
+                yield json.loads(line)
+        except ValueError:
+            require(torn and line.startswith(b"{"), f"{file} has a line that is no record: {line[:100]!r}")
 
 
-def without_times(file: Path) -> dict[str, Any]:
+def without_times(file: Path, torn: bool = False) -> dict[str, Any]:
     """Returns by key what each record says but times, and what depends on when and by whom it was made."""
     found = {}
-    for record in lines_of(file):
+    for record in lines_of(file, torn):
         times = record.pop("times")
         for name in ("run", "when"):
             record.pop(name)
@@ -95,8 +99,8 @@ class Study:
         file.chmod(file.stat().st_mode | stat.S_IXUSR)
         return str(file)
 
-    def check(self, out: Path) -> None:
-        require(without_times(out / "results.jsonl") == self.truth, "the records differ from those of kbvh run")
+    def check(self, out: Path, torn: bool = False) -> None:
+        require(without_times(out / "results.jsonl", torn) == self.truth, "the records differ from those of kbvh run")
 
 
 def attempts(out: Path) -> Iterator[dict[str, Any]]:
@@ -218,10 +222,22 @@ def broken_and_busy(study: Study) -> None:
     study.check(out)
 
 
+def elsewhere(study: Study) -> None:
+    """By a command that passes on no environment, as ssh does to another machine."""
+    out = study.folder / "elsewhere"
+    run = study.run("--jobs", "2", "--study", "again", "--", "--cluster-sync", "env -i PATH=/usr/bin:/bin sh", out=out)
+    require(run.returncode == 0 and "2 of 2 jobs are done; 4 new records" in run.stdout, "by --cluster-sync", run)
+    found = without_times(out / "results.jsonl")
+    for record in found.values():
+        record["study"] = study.truth[record["key"]]["study"]  # bottom_up is in both studies
+    require(all(study.truth[key] == record for key, record in found.items()), "the records of the second study", run)
+    check_cores(out)
+
+
 def killed(study: Study, times: int, seed: int) -> None:
     """Kills kbvh, its worker, or Snakemake at random moments; nothing but the job in progress is lost."""
     chance = random.Random(seed)
-    out, kills = study.folder / "killed", 0
+    out, kills, sweeps = study.folder / "killed", 0, 0
     kept: dict[Path, bytes] = {}
     while True:
         sweep = subprocess.Popen(
@@ -238,6 +254,7 @@ def killed(study: Study, times: int, seed: int) -> None:
             except ProcessLookupError:
                 continue
             kills += 1
+        sweeps += 1
         text = sweep.communicate()[0]
         for file, content in kept.items():
             require(file.read_bytes().startswith(content), f"{file} has lost lines")
@@ -250,7 +267,8 @@ def killed(study: Study, times: int, seed: int) -> None:
             shutil.rmtree(out)
             kept = {}
     study.check(out)
-    print(f"{kills} processes killed; the records are those of kbvh run")
+    lost = sum("end" not in about for about in attempts(out))
+    print(f"{kills} processes killed in {sweeps} sweeps; the records are those of kbvh run (in the last: {lost} lost attempts)")
 
 
 #: Parts of the command lines of processes that are killed.
@@ -285,7 +303,7 @@ def disk(study: Study) -> int:
         return SKIPPED
     try:
         ended = []
-        for free in (16, 120, 600, 3000):
+        for free in (16, 200, 400):
             out = mount / f"out-{free}"
             filler = mount / "filler"
             usage = os.statvfs(mount)
@@ -297,11 +315,12 @@ def disk(study: Study) -> int:
             filler.unlink()
             run = study.run("--cores", "1", out=out)
             require(run.returncode == 0, f"room again, after {free} KB", run)
-            study.check(out)
+            study.check(out, torn=True)
             for file, content in before.items():
                 require(file.read_bytes().startswith(content), f"{file} has lost lines")
             shutil.rmtree(out)
         require(3 in ended, f"the disk should have been full: {ended}")
+        print(f"full disks: ended with {ended}; with room again, the records are those of kbvh run")
     finally:
         subprocess.run(["umount", str(mount)], check=True)
     return 0
@@ -315,13 +334,6 @@ def on_slurm(study: Study) -> int:
     slots = min(2, len(os.sched_getaffinity(0)))
     with slurm.Cluster(study.folder / "cluster", slots) as cluster:
         study.environment |= {name: cluster.environment[name] for name in ("SLURM_CONF", "PATH")}
-        out = study.folder / "slurm"
-        run = study.run("--slurm", out=out)
-        require(run.returncode == 0 and "34 new records" in run.stdout, f"by Slurm\n{cluster.logs()}", run)
-        study.check(out)
-        check_cores(out)
-        require(all("SLURM_JOB_ID" in about["scheduler"] for about in attempts(out)), "Slurm has run the jobs")
-
         out = study.folder / "vanished"
         slow = study.program("slow", '[[ $* == *--job* ]] && sleep 1; exec "$KBVH" "$@"')
         sweep = subprocess.Popen(
@@ -338,6 +350,8 @@ def on_slurm(study: Study) -> int:
         text = sweep.communicate(timeout=600)[0]
         require(sweep.returncode == 0, f"after the node was lost:\n{text}\n{cluster.logs()}")
         study.check(out)
+        check_cores(out)
+        require(all("SLURM_JOB_ID" in about["scheduler"] for about in attempts(out)), "Slurm has run the jobs")
         for file, content in kept.items():
             require(file.read_bytes().startswith(content), f"{file} has lost lines")
         lost = [about for about in attempts(out) if "end" not in about]
@@ -347,7 +361,8 @@ def on_slurm(study: Study) -> int:
 
 
 def main() -> int:
-    kbvh, sweep, part = sys.argv[1:4]
+    kbvh, sweep = (str(Path(word).resolve()) for word in sys.argv[1:3])
+    part = sys.argv[3]
     if shutil.which("snakemake") is None:
         print("skipped: snakemake is not installed (experiments/setup --sweep)")
         return SKIPPED
@@ -357,6 +372,8 @@ def main() -> int:
             local(study)
             wrong_use(study)
             broken_and_busy(study)
+            elsewhere(study)
+            print("swept on this machine; the records are those of kbvh run")
         elif part == "killed":
             killed(study, int(sys.argv[4]) if len(sys.argv) > 4 else 5, int(sys.argv[5]) if len(sys.argv) > 5 else 1)
         elif part == "disk":
