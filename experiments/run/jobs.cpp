@@ -107,9 +107,10 @@ std::vector<Job> jobs_of(const Plan& plan, std::vector<std::string>& notes) {
           job.configurations = contestants.size();
           job.threads = threads_of(contestants);
           job.id = id_of(
-              name_of(spec) + "-" + scalar + (study.continuous ? "-contacts" : "-l" + std::to_string(l)),
+              name_of(spec) + "-" + scalar + (study.continuous ? "-contacts" : "-l" + std::to_string(l)) +
+                  (study.changes ? "-changes" : ""),
               {job.scene, scalar, l, study.repetitions, study.frames_limit, study.oracle_every,
-               study.continuous, content_of(contestants)});
+               study.continuous, study.changes ? word(*study.changes) : "", content_of(contestants)});
           if (known.insert(job.id).second) jobs.push_back(std::move(job));
         }
     }
