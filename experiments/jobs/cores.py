@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import fcntl
 import os
+import re
 import sys
 import time
 from pathlib import Path
 
 #: Seconds between two looks for a free core.
 PAUSE = 0.2
+#: Where Linux lists the processors that share a core with one: "0,8" or "0-1".
+SIBLINGS = "/sys/devices/system/cpu/cpu{}/topology/thread_siblings_list"
 
 
 def lock_folder() -> Path:
@@ -24,25 +27,20 @@ def lock_folder() -> Path:
     return folder
 
 
-def cores_of_siblings(cpus: set[int]) -> list[int]:
-    """Returns one processor of each physical core among the given ones: the lowest. Hyperthreads share a core."""
-    seen: set[str] = set()
-    chosen = []
+def cores_of(cpus: set[int]) -> dict[int, int]:
+    """Returns one processor of each physical core among the given ones, the lowest, with the number of the core: its lowest
+    processor, whether given or not. Hyperthreads share a core."""
+    chosen: dict[int, int] = {}
     for cpu in sorted(cpus):
-        file = Path(f"/sys/devices/system/cpu/cpu{cpu}/topology/thread_siblings_list")
-        try:
-            core = file.read_text().strip()
-        except OSError:
-            core = str(cpu)
-        if core not in seen:
-            seen.add(core)
-            chosen.append(cpu)
-    return chosen
+        file = Path(SIBLINGS.format(cpu))
+        listed = re.match(r"\d+", file.read_text()) if file.exists() else None
+        chosen.setdefault(int(listed.group()) if listed else cpu, cpu)
+    return {cpu: core for core, cpu in chosen.items()}
 
 
-def usable_cores() -> list[int]:
-    """Returns the physical cores on which this process may run, each by one of its processors."""
-    return cores_of_siblings(os.sched_getaffinity(0))
+def usable_cores() -> dict[int, int]:
+    """Returns the physical cores on which this process may run, as `cores_of` does."""
+    return cores_of(os.sched_getaffinity(0))
 
 
 def try_lock(folder: Path, core: int) -> int | None:
@@ -75,10 +73,10 @@ def hold_cores(count: int) -> list[int]:
     said = False
     while True:
         held: dict[int, int] = {}
-        for core in usable:
+        for cpu, core in usable.items():
             descriptor = try_lock(folder, core)
             if descriptor is not None:
-                held[core] = descriptor
+                held[cpu] = descriptor
             if len(held) == count:
                 os.sched_setaffinity(0, held)
                 return sorted(held)

@@ -94,4 +94,8 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except OSError as problem:  # a full disk, above all
+        print(f"sweep: {problem}", file=sys.stderr)
+        sys.exit(3)

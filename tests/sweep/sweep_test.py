@@ -162,11 +162,13 @@ exec "$KBVH" "$@" """,
     whole = (over / "results.jsonl").read_bytes()
     first = whole[: whole.index(b"\n") + 30]  # one record, and half of the next
     (over / "results.jsonl").write_bytes(first)
-    run = study.run("--cores", cores, out=over)
-    require(run.returncode == 0 and "33 new records" in run.stdout, "over results", run)
+    broken = study.program("broken", '"$KBVH" "$@"; code=$?; [[ $* == *--job*200-float-l1-* ]] && exit 1; exit $code')
+    run = study.run("--cores", cores, out=over, kbvh=broken)
+    require(run.returncode == 1 and "33 new records" in run.stdout, "over results; a broken guarantee is code 1", run)
     require((over / "results.jsonl").read_bytes().startswith(first), "lines of the results stay", run)
     listed = study.run("--list", out=over)
-    require(listed.stdout.count(" done\n") == JOBS, "the list says what is done", listed)
+    require(listed.stdout.count(" done\n") == JOBS - 1, "the list says what is done", listed)
+    require(listed.stdout.count(" guarantee broken\n") == 1, "the list says what is broken", listed)
 
 
 def time_of(text: str) -> float:
