@@ -106,7 +106,10 @@ class Study:
 def attempts(out: Path) -> Iterator[dict[str, Any]]:
     """Yields the provenance of every attempt."""
     for file in sorted([*(out / "jobs").glob("*/*.json"), *(out / "jobs" / "scenes").glob("*/*.json")]):
-        yield json.loads(file.read_text())
+        try:
+            yield json.loads(file.read_text())
+        except FileNotFoundError:
+            continue  # replaced meanwhile
 
 
 def check_cores(out: Path, threads: int = 1) -> None:
@@ -162,7 +165,7 @@ exec "$KBVH" "$@" """,
     whole = (over / "results.jsonl").read_bytes()
     first = whole[: whole.index(b"\n") + 30]  # one record, and half of the next
     (over / "results.jsonl").write_bytes(first)
-    broken = study.program("broken", '"$KBVH" "$@"; code=$?; [[ $* == *--job*200-float-l1-* ]] && exit 1; exit $code')
+    broken = study.program("breaks", '"$KBVH" "$@"; code=$?; [[ $* == *--job*200-float-l1-* ]] && exit 1; exit $code')
     run = study.run("--cores", cores, out=over, kbvh=broken)
     require(run.returncode == 1 and "33 new records" in run.stdout, "over results; a broken guarantee is code 1", run)
     require((over / "results.jsonl").read_bytes().startswith(first), "lines of the results stay", run)
@@ -337,12 +340,15 @@ def on_slurm(study: Study) -> int:
     with slurm.Cluster(study.folder / "cluster", slots) as cluster:
         study.environment |= {name: cluster.environment[name] for name in ("SLURM_CONF", "PATH")}
         out = study.folder / "vanished"
-        slow = study.program("slow", '[[ $* == *--job* ]] && sleep 1; exec "$KBVH" "$@"')
+        slow = study.program("slow", '[[ $* == *--job* ]] && sleep 2; exec "$KBVH" "$@"')
         sweep = subprocess.Popen(
             study.call("--slurm", out=out, kbvh=slow), env=study.environment, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
-        while len(list((out / "jobs").glob("*/done"))) < 3 and sweep.poll() is None:
+        while sweep.poll() is None:
+            running = any("end" not in about and about["kind"] == "job" for about in attempts(out))
+            if running and len(list((out / "jobs").glob("*/done"))) >= 3:
+                break
             time.sleep(0.1)
         require(sweep.poll() is None, "the sweep has ended too early")
         kept = {file: file.read_bytes() for file in out.rglob("*.jsonl")}
