@@ -6,6 +6,7 @@
 
 #include "experiments/common/machine.hpp"
 #include "experiments/common/text.hpp"
+#include "experiments/study/ray_measurement.hpp"
 
 namespace kbvh::experiments {
 
@@ -106,11 +107,15 @@ std::vector<Job> jobs_of(const Plan& plan, std::vector<std::string>& notes) {
           job.per_keyframe = l;
           job.configurations = contestants.size();
           job.threads = threads_of(contestants);
-          job.id = id_of(
-              name_of(spec) + "-" + scalar + (study.continuous ? "-contacts" : "-l" + std::to_string(l)) +
-                  (study.changes ? "-changes" : ""),
-              {job.scene, scalar, l, study.repetitions, study.frames_limit, study.oracle_every,
-               study.continuous, study.changes ? word(*study.changes) : "", content_of(contestants)});
+          const std::string asked = study.changes ? word(*study.changes) : "";
+          const std::string rays = study.rays ? text_of(*study.rays) : "";
+          job.id = id_of(name_of(spec) + "-" + scalar +
+                             (study.continuous ? "-contacts" : "-l" + std::to_string(l)) +
+                             (study.changes ? "-changes"
+                              : study.rays  ? "-rays"
+                                            : ""),
+                         {job.scene, scalar, l, study.repetitions, study.frames_limit, study.oracle_every,
+                          study.continuous, asked, rays, content_of(contestants)});
           if (known.insert(job.id).second) jobs.push_back(std::move(job));
         }
     }

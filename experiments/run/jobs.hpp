@@ -36,8 +36,8 @@ Plan plan_of_job(const Plan& plan, const std::string& id);
 nlohmann::json jobs_json(const Plan& plan, const std::vector<Job>& jobs);
 
 /// Makes what the jobs of one scene share, given by its id: the scene and its true pairs at all frames that
-/// any study compares, in the cache folder, and its pictures in `out`. True contacts (`continuous`) are not
-/// cached. Throws io::InputError.
+/// any study compares, in the cache folder, and its pictures in `out`. The truth of contacts and rays is
+/// not cached. Throws io::InputError.
 void prepare_scene(const Plan& plan, const std::string& id, const std::filesystem::path& out);
 
 }  // namespace kbvh::experiments

@@ -66,6 +66,7 @@ TEST(Jobs, IdsChangeWithWhatIsMeasuredAndWithNothingElse) {
   EXPECT_EQ(common(with(small, "oracle_every", 3)), 0u);
   EXPECT_EQ(common(with(small, "frames_limit", 3)), 0u);
   EXPECT_EQ(common(with(small, "changes", "pairs")), 0u);
+  EXPECT_EQ(common(with(small, "rays", "coherent")), 0u);
   EXPECT_EQ(common(with(small, "strategies", "bottom_up")), 0u);
   EXPECT_EQ(common(with(small, "builder", {{"leaf_size", 2}})), 0u);
   EXPECT_EQ(common(with(small, "params", {{"bottom_up.threads", 1}})), 8u) << "the default, said aloud";
