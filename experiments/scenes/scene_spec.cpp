@@ -172,6 +172,11 @@ const char* word(VertexOrder order) {
   return "given";
 }
 
+bool has_own_frames(const SceneSpec& spec) {
+  return (spec.script && spec.script->frames > 0) ||
+         (!spec.builtin.empty() && find_builtin_scene(spec.builtin).reversal != nullptr);
+}
+
 std::string given_name(const SceneSpec& spec) {
   return spec.name.empty() ? "" : spec.name + suffix(spec.order);
 }

@@ -63,6 +63,9 @@ struct SceneSpec {
 /// "".
 std::string given_name(const SceneSpec& spec);
 
+/// Returns whether the scene defines its own frames, so that l does not apply. It need not be loaded.
+bool has_own_frames(const SceneSpec& spec);
+
 /// Returns "given", "shuffled" or "renumbered".
 const char* word(VertexOrder order);
 
