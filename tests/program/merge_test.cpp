@@ -177,6 +177,7 @@ TEST_F(Merge, AFullDiskLeavesTheResultsAsTheyWere) {
 // --- the plan of a single configuration -----------------------------------------------------------------
 
 TEST_F(Binary, ARecordLeadsBackToItsConfiguration) {
+  std::filesystem::create_directories(folder_ / "plans");
   write_text(folder_ / "plans/plan.json", R"({"name": "my question", "description": "Is it so?",
     "scenes": [{"builtin": "waving_sheet", "triangles": [100, 200], "keyframes": 3, "order": "shuffled", "seed": 7},
       {"name": "two", "bodies": ["tri.obj,name=flat", {"shape": "sphere", "triangles": 30}], "optional": true}],

@@ -78,3 +78,12 @@ export async function copy(text, button) {
   button.setAttribute("aria-live", "polite");
   setTimeout(() => (button.textContent = said), 1500);
 }
+
+/** Fades the right edge of what can be scrolled there, so that nothing looks as if it ended. */
+export function hintScrolling(root) {
+  for (const one of root.querySelectorAll(".scroll, .plot-scroll")) {
+    const mark = () => one.classList.toggle("more", one.scrollLeft + one.clientWidth < one.scrollWidth - 2);
+    one.addEventListener("scroll", mark, { passive: true });
+    new ResizeObserver(mark).observe(one);
+  }
+}

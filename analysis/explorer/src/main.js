@@ -3,7 +3,7 @@ import "./style.css";
 import { forget } from "./chart.js";
 import { command } from "./command.js";
 import { details } from "./details.js";
-import { choice, copy, make, paints, symbol } from "./dom.js";
+import { choice, copy, hintScrolling, make, paints, symbol } from "./dom.js";
 import { filters } from "./filters.js";
 import { MEASURES, compare, entrants, model as modelOf, reference, seriesOfName, selected } from "./model.js";
 import { FACETS, decode, encode, initial } from "./state.js";
@@ -160,6 +160,7 @@ function drawView() {
       ? [make("p", { class: "lead", text: "No run passes these filters." })]
       : view.draw(context).filter(Boolean)),
   );
+  hintScrolling(host.view);
   host.said.textContent = `${view.name}: ${plural(count, "run")}`;
   forget();
 }
