@@ -28,7 +28,8 @@ LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
 def staged_pages() -> list[str]:
-    return TREE + sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / "core" / "adr").glob("*.md"))
+    folders = (ROOT / "core" / "adr", ROOT / "analysis" / "guides")
+    return TREE + sorted(path.relative_to(ROOT).as_posix() for folder in folders for path in folder.glob("*.md"))
 
 
 def rewritten(page: str, text: str, staged: set[str], pages: Path) -> str:
