@@ -54,14 +54,13 @@ class JoinChanges {
         if (answer == Answer::candidates) return is_candidate(parts[i], pair);
         return parts[i].filter->intersects(pair) || marks.is_hit(pair);
       };
-      if (one.follows)
-        marks.report(is_in, [&](std::uint32_t pair, bool began) {
-          (began ? begun : ended).push_back(parts[i].join->primitives_of(pair));
-        });
-      else
-        // In the order of the join, which is similar in the next segment: answers in a similar order are
-        // compared faster.
+      // In the order of the join, which is similar in the next segment: answers in a similar order are
+      // compared faster.
+      if (!one.follows)
         append(parts[i], after_, [&](std::uint32_t pair) { return is_in(pair) && marks.set_reported(pair); });
+      marks.report(is_in, [&](std::uint32_t pair, bool began) {
+        (began ? begun : ended).push_back(parts[i].join->primitives_of(pair));
+      });
     }
     if (one.follows) return;
     one.follows = true;
