@@ -117,7 +117,7 @@ std::string configuration_key(Harness harness, const std::string& program, const
             {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
              machine.at("kernels")}}};
   if (study.continuous) all["continuous"] = true;
-  if (study.changes) all["changes"] = word(*study.changes);
+  if (study.changes) all["changes"] = answer_word(*study.changes);
   if (study.rays) all["rays"] = text_of(*study.rays);
   if (scene.contains("script")) all["script"] = scene.at("script").at("hash");
   return hexadecimal(hash_of(all.dump()));

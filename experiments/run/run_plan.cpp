@@ -174,8 +174,8 @@ class Runner {
              const std::vector<double>& frames) {
     json about_scene = scene_record(scene, loaded, l, frames, script);
     if (study.changes) {
-      about_scene["changes"] = word(*study.changes);
-      about_scene["name"] = name_with_changes(scene.name, word(*study.changes));
+      about_scene["changes"] = answer_word(*study.changes);
+      about_scene["name"] = name_with_changes(scene.name, answer_word(*study.changes));
     }
     const std::string title = about_scene["name"].get<std::string>() + ", l = " + std::to_string(l);
     if (l > 1 && study.oracle_every % l == 0)
