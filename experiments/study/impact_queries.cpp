@@ -32,7 +32,7 @@ std::optional<Contact::Kind> kind_named(const std::string& name) {
   return {};
 }
 
-const char* word(Contact::Kind kind) {
+const char* kind_word(Contact::Kind kind) {
   return kind == Contact::Kind::vertex_face ? "vertex-face" : "edge-edge";
 }
 
@@ -183,7 +183,7 @@ FramePair read_frame_pair(const fs::path& folder) {
       const std::uint64_t offset_a = faces ? 0 : vertices, offset_b = faces ? vertices + edges : vertices;
       const std::uint64_t count_a = faces ? vertices : edges, count_b = faces ? pair.faces.size() : edges;
       if (a < offset_a || a - offset_a >= count_a || b < offset_b || b - offset_b >= count_b)
-        io::fail(boxes, place, std::string("has an id that is none of a ") + word(kind) + " pair");
+        io::fail(boxes, place, std::string("has an id that is none of a ") + kind_word(kind) + " pair");
       pair.listed.push_back(
           {kind, std::uint32_t(a - offset_a), std::uint32_t(b - offset_b), touch[i].get<bool>()});
     }
@@ -222,7 +222,7 @@ std::vector<ImpactQueries> find_below(const fs::path& path, std::vector<fs::path
   if (fs::is_directory(status) && is_frame_pair(path)) {
     const FramePair pair = read_frame_pair(path);
     for (const Contact::Kind kind : {Contact::Kind::vertex_face, Contact::Kind::edge_edge}) {
-      found.push_back({pair.name + "/" + word(kind), {}});
+      found.push_back({pair.name + "/" + kind_word(kind), {}});
       for (const auto& listed : pair.listed)
         if (listed.kind == kind) found.back().queries.push_back(pair.query(listed));
     }
