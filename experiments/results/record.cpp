@@ -92,7 +92,7 @@ json again_record(const json& scene_object, const json& scene, const json& strat
             {"oracle_every", study.oracle_every}};
   if (study.frames_limit > 0) plan["frames_limit"] = study.frames_limit;
   if (study.continuous) plan["continuous"] = true;
-  if (study.changes) plan["changes"] = word(*study.changes);
+  if (study.changes) plan["changes"] = answer_word(*study.changes);
   return plan;
 }
 

@@ -107,7 +107,7 @@ std::vector<Job> jobs_of(const Plan& plan, std::vector<std::string>& notes) {
           job.per_keyframe = l;
           job.configurations = contestants.size();
           job.threads = threads_of(contestants);
-          const std::string asked = study.changes ? word(*study.changes) : "";
+          const std::string asked = study.changes ? answer_word(*study.changes) : "";
           const std::string rays = study.rays ? text_of(*study.rays) : "";
           job.id = id_of(name_of(spec) + "-" + scalar +
                              (study.continuous ? "-contacts" : "-l" + std::to_string(l)) +
