@@ -63,7 +63,7 @@ class SameAsTheProgram(unittest.TestCase):
         description = {"builtin": "waving_sheet", "triangles": 200, "keyframes": 3}
         for name, precision in (("float", "float32"), ("double", "float64")):
             with tempfile.TemporaryDirectory() as folder:
-                plan = {"scenes": [description], "strategies": ["bottom_up"], "l": 3, "scalar": name, "repetitions": 1}
+                plan = {"scenes": [description], "strategies": ["bottom_up"], "l": 3, "scalars": [name], "repetitions": 1}
                 (run,) = kbvh.run(plan, folder).results.runs.to_dict("records")
             world = kbvh.World(kbvh.scene(description), "bottom_up", precision=precision)
             counts = [len(world.pairs()) for _ in world.play(l=3)]

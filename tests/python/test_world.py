@@ -59,7 +59,7 @@ class Answers(unittest.TestCase):
     def test_watched_pairs_and_realisers(self):
         world = kbvh.World(kbvh.small_scenes()[0], "kinetic_separation_list")
         watched = world.watched_pairs()
-        self.assertGreater(len(watched), 10)
+        self.assertGreater(len(watched), 3)
         self.assertEqual({0, 1}, set(watched["body"]) | set(watched["other_body"]))
         tree, realisers = world.hierarchy(0), world.realisers(0)
         self.assertEqual(realisers.shape, (len(tree.nodes), 6))
