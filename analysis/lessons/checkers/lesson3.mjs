@@ -1,6 +1,6 @@
 import { points, scene } from "../scenes/build.mjs";
 import { scenes } from "../scenes/scenes.mjs";
-import { count, no, play, state, yes } from "./parts.mjs";
+import { bySide, count, no, play, state, when, yes } from "./parts.mjs";
 
 /// Eight runners from `from` to `to` along x.
 function runners(from, to) {
@@ -13,7 +13,8 @@ export const twelveEvents = {
   start: () => state(scenes.race()),
   async check(lab, api) {
     const { steps } = await api.trace(play(lab.getState()));
-    return steps.length === 12 ? yes("Exactly twelve events.") : no(`This scene has ${count(steps.length, "event")}.`);
+    const sides = steps.length > 0 ? `: ${bySide(steps)}` : "";
+    return steps.length === 12 ? yes(`Exactly twelve events${sides}.`) : no(`This scene has ${count(steps.length, "event")}${sides}.`);
   },
   solution: () => runners(eight, [6, 5, 4, 3, 10, 8, 9, 7]),
   wrong: () => [state(scenes.race()), runners(eight, eight)],
@@ -26,9 +27,10 @@ export const sevenLeaders = {
     const given = lab.getState(), body = given.scene.bodies[0];
     if (body.vertices !== 8 || body.times.length !== 2) return no("Use eight points and two keyframes.");
     const { steps } = await api.trace(play(given));
-    const changes = steps.flatMap((step) => step.touched).filter((change) => change.body === 0 && change.node === 0 && change.side === 1);
+    const leads = (change) => change.body === 0 && change.node === 0 && change.side === 1;
+    const changes = steps.filter((step) => step.touched.some(leads)), times = changes.map((step) => step.event.time);
     return changes.length === 7 ? yes("The root's upper side in x changes hands seven times: once less than there are runners.")
-      : no(`The lead in x changes ${count(changes.length, "time")}.`);
+      : no(`The lead in x changes ${count(changes.length, "time")}${times.length > 0 ? ", " + when(times) : ""}.`);
   },
   solution: () => state(scenes.relay(8)),
   wrong: () => [state(scenes.race()), runners(eight, [...eight].reverse())],
@@ -40,7 +42,7 @@ export const hiddenEvents = {
   async check(lab, api) {
     const { steps } = await api.trace(play(lab.getState()));
     const upper = steps.filter((step) => step.event.side === 1);
-    const lead = steps.flatMap((step) => step.touched).filter((change) => change.node === 0 && change.side === 1).length;
+    const lead = steps.flatMap((step) => step.touched).filter((change) => change.body === 0 && change.node === 0 && change.side === 1).length;
     if (lead > 0) return no(`The lead in x changes ${count(lead, "time")}; it should never change.`);
     return upper.length >= 3 ? yes(`${count(upper.length, "event")} of upper x sides, and none of them changes the lead.`)
       : no(`Only ${count(upper.length, "event")} of upper x sides; at least three are wanted.`);

@@ -1,6 +1,6 @@
 import { triangles } from "../scenes/build.mjs";
 import { scenes } from "../scenes/scenes.mjs";
-import { count, no, perFrame, play, state, yes } from "./parts.mjs";
+import { bySide, count, no, perFrame, play, state, yes } from "./parts.mjs";
 
 export const breakT9 = {
   title: "break the claim T9",
@@ -12,17 +12,18 @@ export const breakT9 = {
     const at = kinetic.findIndex((value, frame) => value > refit[frame]);
     if (at >= 0) return yes(`On the way to frame ${at + 1} the kinetic tree writes ${kinetic[at]} values, the refit ${refit[at]}.`);
     const close = kinetic.reduce((best, value, frame) => (value / refit[frame] > kinetic[best] / refit[best] ? frame : best), 0);
-    return no(`In every frame the kinetic tree writes at most as many values as the refit; the closest is frame ${close + 1} with ${kinetic[close]} against ${refit[close]}. Fewer frames put more events into each.`);
+    return no(`In every frame the kinetic tree writes at most as many values as the refit; the closest is frame ${close + 1} with ${kinetic[close]} against ${refit[close]}. ${given.scene.frames.l > 1 ? "Fewer frames put more events into each."
+      : "There is one frame per segment already: fewer nodes make the refit cheaper, more vertices per polygon make more changes possible."}`);
   },
   solution: () => state(scenes.tangents(16)),
   wrong: () => [state(scenes.shoal()), state(scenes.tangents(6))],
 };
 
-/// Four triangles in a row, the first the tallest. Its second vertex moves by (dx, dy).
-function row(dx, dy) {
-  const from = [0, 1, 2, 3].flatMap((i) => [[3 * i, 0.125 * i], [3 * i + 1, 0.5], [3 * i + 0.25, i === 0 ? 1 : 0.75]]);
-  const to = from.map(([x, y], v) => (v === 1 ? [x + dx, y + dy] : [x, y]));
-  const faces = [0, 1, 2, 3].map((i) => [3 * i, 3 * i + 1, 3 * i + 2]);
+/// Triangles in a row, the first the tallest. One vertex moves by (dx, dy): the second of the first triangle, if not told.
+function row(dx, dy, { triangles: m = 4, vertex = 1 } = {}) {
+  const all = Array.from({ length: m }, (_, i) => i), from = all.flatMap((i) => [[3 * i, 0.125 * i], [3 * i + 1, 0.5], [3 * i + 0.25, i === 0 ? 1 : 0.75]]);
+  const to = from.map(([x, y], v) => (v === vertex ? [x + dx, y + dy] : [x, y]));
+  const faces = all.map((i) => [3 * i, 3 * i + 1, 3 * i + 2]);
   return state({ ...scenes.shoal(), name: "row", bodies: [triangles("row", [0, 1], [from, to], faces)] });
 }
 
@@ -31,13 +32,14 @@ export const climber = {
   start: () => row(0, 0),
   async check(lab, api) {
     const { steps, start } = await api.trace(play(lab.getState()));
-    if (steps.length !== 1) return no(`This scene has ${count(steps.length, "event")}; exactly one is wanted.`);
+    if (steps.length !== 1) return no(`This scene has ${count(steps.length, "event")}${steps.length > 0 ? ` (${bySide(steps)})` : ""}; exactly one is wanted.`);
     const [{ touched, event }] = steps;
     const top = touched.some((change) => change.node === 0);
     if (start[event.body].nodes.length < 7) return no("The tree is too small: use four triangles or more.");
-    return top && touched.length >= 3 ? yes(`The only event begins at node ${event.node} and changes ${touched.length} nodes, up to the root.`)
-      : no(`The event changes ${count(touched.length, "node")}; it should begin at a leaf and end at the root.`);
+    if (!start[event.body].nodes[event.node].leaf) return no(`The event begins at the inner node ${event.node}; it should begin at a leaf.`);
+    return top ? yes(`The only event begins at node ${event.node} and changes ${touched.length} nodes, up to the root.`)
+      : no(`The event changes ${count(touched.length, "node")}; it begins at a leaf, as it should, but does not reach the root.`);
   },
   solution: () => row(0, 1),
-  wrong: () => [row(-2, 0), state(scenes.flag())],
+  wrong: () => [row(-2, 0), row(0, 1, { triangles: 8, vertex: 5 }), state(scenes.flag())],
 };

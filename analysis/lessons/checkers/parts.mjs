@@ -37,3 +37,15 @@ export function velocities(body, vertex) {
 export const moves = (body, vertex) => velocities(body, vertex).some((v) => v.some((x) => x !== 0));
 export const count = (n, noun) => `${n} ${noun}${n === 1 ? "" : "s"}`;
 export const sideNames = ["lower x", "upper x", "lower y", "upper y", "lower z", "upper z"];
+
+/// Events by side, in words: "5 at upper x, 4 at lower x".
+export function bySide(steps) {
+  const of = sideNames.map((name, side) => [steps.filter((step) => step.event.side === side).length, name]);
+  return of.filter(([n]) => n > 0).map(([n, name]) => `${n} at ${name}`).join(", ");
+}
+
+/// When things happen, in words: "at 0.5 s and 0.75 s"; three decimals are enough to find them in the lab.
+export function when(times) {
+  const words = times.map((time) => `${Number(time.toFixed(3))} s`);
+  return words.length < 2 ? `at ${words.join("")}` : `at ${words.slice(0, -1).join(", ")} and ${words.at(-1)}`;
+}

@@ -92,8 +92,8 @@ export function tournament({ race4: { request, trace } }) {
     return [text(frame.x + 150, 60, caption, "bold", "middle"),
       drawTree(nodes, frame, { label: (n) => winner(n, t), css: (n) => (changed.includes(n) ? "b thick" : "a"), size: 22,
         edge: (n) => (winner(n, t) === winner(nodes[n].parent, t) ? "a thick" : "soft") }),
-      i > 0 ? text(frame.x + 150, 470, `node ${changed[0]}: ${winner(changed[0], moments[i - 1][0])} loses to ${winner(changed[0], t)}`, "b", "middle")
-        : text(frame.x + 150, 470, "each node holds its best runner", "quiet", "middle"), text(places[0][0], 118, "root", "small quiet", "middle")];
+      i > 0 ? text(frame.x + 150, 470, `${changed[0] === 0 ? "root" : "left pair"}: ${winner(changed[0], moments[i - 1][0])} loses to ${winner(changed[0], t)}`, "b", "middle")
+        : text(frame.x + 150, 470, "each node holds its winner", "quiet", "middle"), text(places[0][0], 118, "root", "small quiet", "middle")];
   }));
 }
 
