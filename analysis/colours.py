@@ -165,3 +165,39 @@ def symbol(look: Look) -> str:
     points = _POLYGONS.get(look.marker)
     shape = f'<polygon points="{points}" {paint}/>' if points else f'<circle r="4.2" {paint}/>'
     return f'<svg class="symbol" viewBox="-6.5 -6.5 13 13" width="13" height="13" aria-hidden="true">{shape}</svg>'
+
+
+#: The dark page of the explorer, and the least contrast of a mark on it (WCAG 2.1, 1.4.11: 3 for graphics).
+DARK_PAGE = "#15181D"
+DARK_CONTRAST = 4.0
+
+
+def _luminance(colour: str) -> float:
+    """Returns the relative luminance of WCAG."""
+    channels = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: str, other: str) -> float:
+    """Returns the contrast ratio of two colours, from 1 to 21."""
+    light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def on_dark(colour: str) -> str:
+    """Mixes a colour with as much white as it needs to be seen on the dark page."""
+    shades = (mix(colour, share / 20) for share in range(21))
+    return next(shade for shade in shades if contrast(shade, DARK_PAGE) >= DARK_CONTRAST)
+
+
+def for_page(look: Look) -> dict[str, object]:
+    """Returns a look as data for a page: colours for both schemes, the marker's corners (none: a circle) and dashes."""
+    corners = [[float(c) for c in corner.split(",")] for corner in _POLYGONS.get(look.marker, "").split()]
+    return {
+        "light": look.colour,
+        "dark": on_dark(look.colour),
+        "corners": corners,
+        "dashes": [] if isinstance(look.line, str) else list(look.line[1]),  # type: ignore[index]
+        "filled": look.filled,
+    }

@@ -120,8 +120,13 @@ class _Record:
         return value
 
 
-def load(folder: Path) -> Study:
-    """Reads `folder`/results.jsonl. Raises ResultError."""
+#: Of the runs with equal values in these columns, a report shows the newest.
+ONE_OF_ALL_COMMITS = ("group", "contestant")
+ONE_OF_EACH_COMMIT = (*ONE_OF_ALL_COMMITS, "commit", "dirty")
+
+
+def load(folder: Path, newest_of: tuple[str, ...] = ONE_OF_ALL_COMMITS) -> Study:
+    """Reads `folder`/results.jsonl; of runs that agree in the columns `newest_of`, the newest. Raises ResultError."""
     path = folder / FILE_NAME
     try:
         lines = path.read_bytes().decode("utf-8", errors="replace").split("\n")
@@ -169,7 +174,7 @@ def load(folder: Path) -> Study:
     runs["scene"], told_apart = scene_names.told_apart(runs)
     notes += told_apart
     runs["label"] = _labels(runs)
-    runs, dropped = _newest(runs)
+    runs, dropped = _newest(runs, newest_of)
     if dropped:
         notes.append(
             f"{dropped} older measurement{'s' if dropped > 1 else ''} of the same configuration"
@@ -234,6 +239,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "moving": _moving(bodies) or record.number("scene.primitives"),
         "bodies": bodies if isinstance(bodies, list) else [],
         "id": record.text("strategy.id"),
+        "tag": record.text("strategy.label", ""),
         "title": record.text("strategy.title", record.text("strategy.id")),
         "family": record.text("strategy.family", "unknown"),
         # Records from before baselines were declared are classified by family.
@@ -243,6 +249,10 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "foresight": record.text("strategy.foresight", ""),
         "citation": record.text("strategy.citation", ""),
         "about": record.text("strategy.about", ""),
+        "plan": _object(record, "plan"),
+        "again": _object(record, "again"),
+        "order": record.text("scene.order", ""),
+        "continuous": record.flag("scene.continuous", False),
         "choice": record.text("choice", ""),
         "own_scalar": record.text("strategy.own_scalar", ""),
         "params": params,
@@ -278,6 +288,13 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         [row["scene_name"], row["hash"], row["primitives"], row["scalar"], row["l"], str(row["frames"]), row["machine"]]
     )
     return row
+
+
+def _object(record: _Record, path: str) -> dict[str, Any]:
+    found = record.get(path, {})
+    if not isinstance(found, dict):
+        raise ResultError(f"{record.place}: {path} should be an object.")
+    return found
 
 
 def _list(record: _Record, path: str) -> list[Any]:
@@ -380,9 +397,9 @@ def _facts(params: dict[str, Any], builder: Optional[dict[str, Any]]) -> dict[st
     return facts
 
 
-def _newest(runs: pd.DataFrame) -> tuple[pd.DataFrame, int]:
+def _newest(runs: pd.DataFrame, columns: tuple[str, ...]) -> tuple[pd.DataFrame, int]:
     """Keeps one run per configuration, the newest: an older time must not hide a newer failure."""
-    newest = runs.drop_duplicates(["group", "contestant"], keep="last")
+    newest = runs.drop_duplicates(list(columns), keep="last")
     return newest.reset_index(drop=True), len(runs) - len(newest)
 
 

@@ -21,8 +21,10 @@ import claim_pictures
 import claim_tables
 import claims as paper_claims
 import exactness
+import explore
 import files
 import guide
+import overview_figures
 import paper_figures
 import robustness
 import sections
@@ -34,7 +36,7 @@ from canvas import Picture, picture
 from claim_points import ClaimError, Table
 from colours import Look, looks, symbol
 from limits import limits
-from load import ResultError, Study, load
+from load import ONE_OF_EACH_COMMIT, ResultError, Study, load
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 
@@ -47,7 +49,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
         epilog="example: report.py results --title 'My cloth'",
     )
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
-    parser.add_argument("--title", default="BVH update strategies, measured", help="heading of the report")
+    parser.add_argument("--title", default=explore.TITLE, help="heading of the report")
     parser.add_argument(
         "--figures", choices=("main", "all", "paper", "none"), default="main",
         help="figures of one group per scene (default), of every group, only those of the paper and its claims, or none",
@@ -55,12 +57,20 @@ def main(arguments: Optional[list[str]] = None) -> int:
     parser.add_argument("--print", dest="printed", action="store_true", help="also print the tables as text")
     options = parser.parse_args(arguments)
     try:
+        explorer = explore.PAGE if explore.program() else ""
+    except explore.NotBuilt as reason:
+        explorer = ""
+        print(f"report: {explore.PAGE} is not written: {reason}", file=sys.stderr)
+    try:
         study = load(options.folder)
         file = options.folder / targets_table.FILE_NAME
         targets = targets_table.load_targets(file) if file.exists() else []
         claims = paper_claims.evaluate(study, options.folder)
         paper_claims.write(claims, options.folder)
-        page = write(study, options.folder, options.title, options.figures, targets, claims)
+        page = write(study, options.folder, options.title, options.figures, targets, claims, explorer)
+        if explorer:
+            title = "" if options.title == explore.TITLE else options.title  # else the plan's question
+            explore.write(load(options.folder, ONE_OF_EACH_COMMIT), options.folder, title, claims)
     except (ResultError, ClaimError) as error:
         print(f"report: {error}", file=sys.stderr)
         return 2
@@ -87,9 +97,10 @@ def plain_groups(study: Study) -> list[tuple[str, tables.Group]]:
 
 
 def write(
-    study: Study, folder: Path, title: str, which: str, targets: Sequence[targets_table.Target], claims: paper_claims.Claims
+    study: Study, folder: Path, title: str, which: str, targets: Sequence[targets_table.Target], claims: paper_claims.Claims,
+    explorer: str = "",
 ) -> Path:
-    """Writes the report and its figures; returns the page's path."""
+    """Writes the report and its figures, with a link to the explorer if there is one; returns the page's path."""
     all_ratios = tables.Ratios(study)
     groups = tables.groups(study, all_ratios)
     unique = study.runs.drop_duplicates("contestant")
@@ -99,12 +110,16 @@ def write(
     paper = _paper(study, claims, all_looks, folder / "figures", which)
     exactness_rows = exactness.comparisons(study)
     drawn = {one.name for one in theory} | {paper_figures.anchor(figure.number) for figure, *_ in paper}
+    glance = tables.glance(study, all_ratios, groups)
     page = render(
+        explorer=explorer,
+        questions=_questions(study),
+        overview=overview_figures.pictures(study, glance, all_looks, folder / "figures") if which in ("main", "all") else [],
         title=title,
         study=study,
         machine=_machine(study),
         made=_made(study),
-        glance=tables.glance(study, all_ratios, groups),
+        glance=glance,
         targets=targets,
         targets_facts=targets_table.facts(list(targets)) if targets else "",
         verdicts=targets_table.VERDICTS,
@@ -115,6 +130,7 @@ def write(
         size=text.size,
         claims=claims,
         tally=_tally(claims),
+        claims_decided=any(row.verdict != paper_claims.OPEN for row in claims.rows),
         claim_links=_claim_links(claims, study, groups, drawn),
         **_claim_parts(claims),
         **_break_even(study, claims, all_looks, folder / "figures", which),
@@ -139,6 +155,12 @@ def write(
     path = folder / "report.html"
     files.write_whole(path, page)
     return path
+
+
+def _questions(study: Study) -> list[tuple[str, str]]:
+    """Returns the names and descriptions of the plans, each once."""
+    plans = [(str(plan.get("name", "")), str(plan.get("description", ""))) for plan in study.runs["plan"]]
+    return [plan for plan in dict.fromkeys(plans) if plan[1]]
 
 
 def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:

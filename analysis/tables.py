@@ -81,6 +81,8 @@ class Glance:
     approximate: str
     approximate_contestant: str
     approximate_ratio: Shown
+    refit_run: int
+    exact_run: Optional[int]
 
 
 class Ratios:
@@ -231,6 +233,8 @@ def glance(study: Study, all_ratios: Ratios, shown: list[Group]) -> list[Glance]
                 approximate="" if loose is None else loose["label"],
                 approximate_contestant="" if loose is None else loose["contestant"],
                 approximate_ratio=shown_ratio(loose_ratio),
+                refit_run=int(reference["run"]),
+                exact_run=None if exact is None else int(exact["run"]),
             )
         )
     return result

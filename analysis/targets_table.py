@@ -1,6 +1,6 @@
 """The targets of a plan and the measurements, from targets.json, as Markdown tables.
 
-usage: targets_table.py DIR/targets.json [--write README.md]
+usage: targets_table.py DIR/targets.json [--write analysis/guides/results.md]
 """
 
 from __future__ import annotations
@@ -214,7 +214,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
     parser = argparse.ArgumentParser(
         prog="targets_table.py",
         description="Prints the targets of a plan and their measurements as Markdown.",
-        epilog="example: targets_table.py results/targets.json --write README.md",
+        epilog="example: targets_table.py results/targets.json --write analysis/guides/results.md",
     )
     parser.add_argument("file", metavar="targets.json", type=Path, help="written by `kbvh bench --plan PLAN --out DIR`")
     parser.add_argument("--write", metavar="PAGE", type=Path, help=f"write the tables between {BEGIN} and {END} of this file")

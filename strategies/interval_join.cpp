@@ -77,6 +77,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     else
       for (std::size_t i = 0; i < scene.pairs().size(); ++i) by_spans_[i] = is_decidable(scene.pairs()[i]);
     any_by_spans_ = std::find(by_spans_.begin(), by_spans_.end(), true) != by_spans_.end();
+    all_by_spans_ = std::find(by_spans_.begin(), by_spans_.end(), false) == by_spans_.end();
   }
 
   void reset_to(double t) override {
@@ -118,7 +119,10 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     return {};
   }
 
+  /// Without span tests the triangles of all candidates are tested at every frame, and a comparison costs
+  /// little beside the tests.
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
+    if (answer == Answer::pairs && !all_by_spans_) return this->compare_answers(t, answer, begun, ended);
     if (!joined_) join();
     const float fraction = float(bounds_.fraction(t));
     for (std::size_t i = 0; i < now_.joins.size(); ++i) {
@@ -341,7 +345,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   std::vector<bool> by_spans_;   ///< by join
   std::vector<bool> decidable_;  ///< by body: triangles only, and the parameter asks for spans
   std::vector<BodyPair> joined_bodies_;
-  bool any_by_spans_ = false, joined_ = false;
+  bool any_by_spans_ = false, all_by_spans_ = false, joined_ = false;
   /// The range of pairs read from one join.
   struct Block {
     std::size_t certain, open;

@@ -1,9 +1,9 @@
 """Serves a built lab to browsers on this machine, and the scenes of a study beside it.
 
-    serve.py FOLDER [--port P] [--study DIR]
+    serve.py FOLDER [--port P] [--study DIR] [--open]
 
 The lab is at http://127.0.0.1:P/. Of a study (a folder of `kbvh run`), study/scenes.json lists the scenes as
-[{"name", "framesPerSecond", "files": [addresses]}], and the files are served below study/. The server answers only requests
+[{"name", "framesPerSecond", "files": [addresses]}] (without a study: none), and the files are served below study/. The server answers only requests
 that name it as 127.0.0.1 or localhost, so that no page of another site can read from it.
 """
 
@@ -11,8 +11,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
+import threading
 import urllib.parse
+import webbrowser
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -48,8 +51,8 @@ class Handler(SimpleHTTPRequestHandler):
         return super().send_head()
 
     def do_GET(self) -> None:
-        if self.study is not None and self.path.split("?")[0] == "/study/scenes.json" and self.allowed():
-            text = json.dumps(scenes_of(self.study)).encode()
+        if self.path.split("?")[0] == "/study/scenes.json" and self.allowed():
+            text = json.dumps([] if self.study is None else scenes_of(self.study)).encode()
             self.send_response(200)
             self.send_header("Content-Type", "application/json")
             self.send_header("Content-Length", str(len(text)))
@@ -82,11 +85,18 @@ class Handler(SimpleHTTPRequestHandler):
         pass
 
 
+def open_browser(address: str) -> None:
+    """Shows the page in the user's browser, if there is a screen for it."""
+    if sys.platform == "darwin" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+        threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()  # it may wait for the page
+
+
 def main(words: list[str]) -> int:
     parser = argparse.ArgumentParser(description="serves a built lab on this machine")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--port", type=int, default=8017)
     parser.add_argument("--study", type=Path)
+    parser.add_argument("--open", action="store_true", help="open the page in the browser")
     given = parser.parse_args(words)
     if not (given.folder / "index.html").is_file():
         print(f"there is no built lab in {given.folder} (experiments/lab makes it)", file=sys.stderr)
@@ -100,7 +110,10 @@ def main(words: list[str]) -> int:
     except OSError as problem:
         print(f"port {given.port} cannot be used: {problem.strerror} (--port names another, 0 a free one)", file=sys.stderr)
         return 2
-    print(f"http://127.0.0.1:{server.server_address[1]}/ (until Ctrl+C)", flush=True)
+    address = f"http://127.0.0.1:{server.server_address[1]}/"
+    print(f"{address} (until Ctrl+C)", flush=True)
+    if given.open:
+        open_browser(address)
     try:
         server.serve_forever()
     except KeyboardInterrupt:

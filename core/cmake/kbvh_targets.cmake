@@ -22,10 +22,16 @@ function(kbvh_add_about name source target)
   target_sources(${target} PRIVATE ${file})
 endfunction()
 
-# kbvh_write_manifest(FILE [NAME...]): writes the source that lists these strategies; without names, all of this
-# build. A strategy that is listed but not registered fails to link.
+# kbvh_write_manifest(FILE [NAME...] [NAMESPACE namespace]): writes the source that lists these strategies; without
+# names, all of this build. A strategy that is listed but not registered fails to link. NAMESPACE is for programs that
+# define kbvh::registry and kbvh::about themselves, from those of this namespace.
 function(kbvh_write_manifest file)
-  set(names ${ARGN})
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "NAMESPACE" "")
+  set(names ${arg_UNPARSED_ARGUMENTS})
+  set(namespace kbvh)
+  if(arg_NAMESPACE)
+    set(namespace ${arg_NAMESPACE})
+  endif()
   if(NOT names)
     get_property(names GLOBAL PROPERTY KBVH_STRATEGY_NAMES)
   endif()
@@ -45,7 +51,7 @@ function(kbvh_write_manifest file)
 #include \"core/contract/registry.hpp\"
 
 @declarations@
-namespace kbvh {
+namespace @namespace@ {
 static std::vector<StrategyEntry> manifest_entries() {
   std::vector<StrategyEntry> entries;
 @calls@  return with_unique_ids(std::move(entries));
@@ -63,7 +69,7 @@ std::string_view about(std::string_view id) {
   const auto text = texts.find(id);
   return text == texts.end() ? std::string_view() : text->second;
 }
-}  // namespace kbvh
+}  // namespace @namespace@
 ")
 endfunction()
 

@@ -44,6 +44,13 @@ class detail::WorldImplementation {
   virtual double next_event_time() const = 0;
   virtual void scheduled_events(std::vector<WorldEvent>& out) const = 0;
   virtual bool step_event(double until, WorldStep& out) = 0;
+  virtual WorldPositions current_positions(std::uint32_t body) = 0;
+  virtual std::vector<double> frame_times(std::uint32_t per_keyframe) const = 0;
+  virtual void true_pairs(std::vector<WorldPair>& out) = 0;
+  virtual bool audit(std::uint32_t body, WorldAudit& out) = 0;
+  virtual WorldVerdict verify(const std::string& strategy, std::span<const double> frames,
+                              const std::map<std::string, std::string>& params,
+                              const std::map<std::string, std::string>& topology) const = 0;
 };
 
 /// Makes a world in the given precision.

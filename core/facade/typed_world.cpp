@@ -3,108 +3,15 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/facade/conversions.hpp"
 #include "core/facade/implementation.hpp"
-#include "core/judge/session.hpp"
+#include "core/facade/judgement.hpp"
 #include "core/motion/admissible.hpp"
 
 namespace kbvh {
 namespace {
 
-template <class S>
-std::vector<S> converted(std::span<const float> numbers) {
-  return {numbers.begin(), numbers.end()};
-}
-template <class S>
-std::vector<S> converted(std::span<const double> numbers) {
-  std::vector<S> out;
-  out.reserve(numbers.size());
-  for (const double number : numbers) out.push_back(S(number));
-  return out;
-}
-
-Primitives primitives_of(const Connectivity& connectivity) {
-  Primitives primitives;
-  primitives.kind = connectivity.shape == Shape::points         ? PrimitiveKind::points
-                    : connectivity.shape == Shape::control_nets ? PrimitiveKind::control_nets
-                                                                : PrimitiveKind::polygons;
-  const auto indices = connectivity.indices;
-  if (connectivity.offsets.empty()) {
-    if (indices.size() % 3 != 0)
-      throw std::invalid_argument(std::to_string(indices.size()) +
-                                  " indices do not make triangles; other primitives need offsets");
-    for (std::size_t i = 0; i < indices.size(); i += 3) primitives.add(indices.subspan(i, 3));
-    return primitives;
-  }
-  const auto offsets = connectivity.offsets;
-  for (std::size_t p = 0; p + 1 < offsets.size(); ++p) {
-    if (offsets[p] > offsets[p + 1] || offsets[p + 1] > indices.size())
-      throw std::invalid_argument("primitive " + std::to_string(p) + " has indices " +
-                                  std::to_string(offsets[p]) + " to " + std::to_string(offsets[p + 1]) +
-                                  " of " + std::to_string(indices.size()));
-    primitives.add(indices.subspan(offsets[p], offsets[p + 1] - offsets[p]));
-  }
-  return primitives;
-}
-
-template <class S>
-WorldPiece plain(const Piece<S>& piece) {
-  return {piece.t0, piece.t1, double(piece.x0), double(piece.x1), piece.kind == PieceKind::ray};
-}
-template <class S>
-WorldEvent plain(const ScheduledEvent<S>& event) {
-  WorldEvent out;
-  out.kind = WorldEvent::Kind(event.kind);
-  out.body = event.body;
-  out.node = event.node;
-  out.side = event.side;
-  out.winner = event.winner;
-  out.loser = event.loser;
-  out.other_body = event.other_body;
-  out.other_node = event.other_node;
-  out.time = event.time.time;
-  out.error = event.time.error;
-  out.exact = event.has_crossing;
-  if (!out.exact) return out;
-  out.winner_piece = plain(event.crossing.winner);
-  out.loser_piece = plain(event.crossing.loser);
-  return out;
-}
-static_assert(int(WorldEvent::Kind::window) == int(EventKind::window) &&
-              int(WorldEvent::Kind::boxes_separate) == int(EventKind::boxes_separate));
-
-WorldPair plain(const PrimitivePair& pair) {
-  return {pair.body_a, pair.primitive_a, pair.body_b, pair.primitive_b};
-}
-void replace(std::vector<WorldPair>& out, const PairBuffer& pairs) {
-  out.clear();
-  for (const PrimitivePair& pair : pairs) out.push_back(plain(pair));
-}
-
-/// Rounds a ray to the world's precision.
-template <class S>
-Ray<S> typed(const WorldRay& ray) {
-  Ray<S> made{};
-  for (int axis = 0; axis < 3; ++axis) {
-    made.origin[axis] = S(ray.origin[axis]);
-    made.direction[axis] = S(ray.direction[axis]);
-  }
-  made.length = S(ray.length);
-  return made;
-}
-static_assert(WorldHit::none == RayHit::none && int(WorldRayQuery::any) == int(RayQuery::any));
-
-std::optional<std::uint32_t> number_of(const std::map<std::string, std::string>& words,
-                                       const std::string& key) {
-  const auto found = words.find(key);
-  if (found == words.end()) return {};
-  try {
-    std::size_t read = 0;
-    const unsigned long number = std::stoul(found->second, &read);
-    if (read == found->second.size() && number <= 64) return std::uint32_t(number);
-  } catch (const std::exception&) {
-  }
-  throw std::invalid_argument("the topology's " + key + " cannot be '" + found->second + "'");
-}
+using namespace facade;
 
 template <class S>
 class TypedWorld final : public detail::WorldImplementation {
@@ -141,20 +48,9 @@ class TypedWorld final : public detail::WorldImplementation {
   void start(const std::string& strategy, const std::map<std::string, std::string>& params, double t,
              const std::map<std::string, std::string>& topology) override {
     check_not_started();
-    const StrategyEntry& entry = find_strategy(strategy);
-    for (const auto& [key, value] : topology)
-      if (key != "method" && key != "width" && key != "leaf_size")
-        throw std::invalid_argument("a topology has the keys method, width and leaf_size, not '" + key + "'");
-    const auto method = topology.find("method");
-    const BuilderConfig builder = suitable_builder(
-        entry.info, method == topology.end() ? std::nullopt : std::optional(build_method(method->second)),
-        number_of(topology, "width"), number_of(topology, "leaf_size"));
-    Scene<S> scene = scene_;  // the added bodies stay if the strategy does not suit them
-    if (scene.pairs.empty()) scene.pairs = all_pairs(scene.bodies);
-    validate(scene);
-    played_ = std::make_unique<Scene<S>>(std::move(scene));
-    auto session =
-        std::make_unique<Session<S>>(*played_, Contestant{&entry, params, builder}, CountingPolicy::counting);
+    const Contestant contestant = contestant_of(strategy, params, topology);
+    played_ = std::make_unique<Scene<S>>(whole_scene());
+    auto session = std::make_unique<Session<S>>(*played_, contestant, CountingPolicy::counting);
     session->reset(t);
     session_ = std::move(session);
     fetched_for_questions_ = 0;
@@ -357,7 +253,74 @@ class TypedWorld final : public detail::WorldImplementation {
     return true;
   }
 
+  WorldPositions current_positions(std::uint32_t body) override {
+    check_body(body);
+    const S* const numbers = fetched(body);
+    return {sizeof(S) == 4 ? Precision::float32 : Precision::float64,
+            session().playback().plans(body).vertex_count(), numbers};
+  }
+  std::vector<double> frame_times(std::uint32_t per_keyframe) const override {
+    if (per_keyframe == 0) throw std::invalid_argument("0 frames per keyframe interval");
+    return kbvh::frame_times(scene_, per_keyframe);
+  }
+  void true_pairs(std::vector<WorldPair>& out) override {
+    const std::vector<PrimitivePair> pairs = brute_force_pairs(session().scene(), session().playback());
+    replace(out, pairs);
+  }
+  bool audit(std::uint32_t body, WorldAudit& out) override {
+    check_body(body);
+    out = {};
+    const auto view = session().strategy().audit_view(body);
+    if (!view) return false;
+    out = plain(kbvh::audit(*view, session().scene().bodies[body].primitives, fetched(body)));
+    return true;
+  }
+  WorldVerdict verify(const std::string& strategy, std::span<const double> frames,
+                      const std::map<std::string, std::string>& params,
+                      const std::map<std::string, std::string>& topology) const override {
+    check_frames(frames);
+    for (const Body<S>& body : scene_.bodies)
+      if (body.plans.is_handed_in())
+        throw std::invalid_argument("body '" + body.name +
+                                    "' cannot be verified: its positions are set frame by frame");
+    const Contestant contestant = contestant_of(strategy, params, topology);
+    const Scene<S> scene = whole_scene();
+    Session<S> session(scene, contestant, CountingPolicy::counting);
+    Oracle<S> oracle(scene);
+    return plain(kbvh::verify(session, frames, oracle));
+  }
+
  private:
+  static Contestant contestant_of(const std::string& strategy,
+                                  const std::map<std::string, std::string>& params,
+                                  const std::map<std::string, std::string>& topology) {
+    const StrategyEntry& entry = find_strategy(strategy);
+    for (const auto& [key, value] : topology)
+      if (key != "method" && key != "width" && key != "leaf_size")
+        throw std::invalid_argument("a topology has the keys method, width and leaf_size, not '" + key + "'");
+    const auto method = topology.find("method");
+    return {
+        &entry, params,
+        suitable_builder(
+            entry.info, method == topology.end() ? std::nullopt : std::optional(build_method(method->second)),
+            number_of(topology, "width"), number_of(topology, "leaf_size"))};
+  }
+  /// Copies the scene as it is played: the added bodies stay if a strategy does not suit them.
+  Scene<S> whole_scene() const {
+    Scene<S> scene = scene_;
+    if (scene.pairs.empty()) scene.pairs = all_pairs(scene.bodies);
+    validate(scene);
+    return scene;
+  }
+  /// Returns the positions of a body, evaluated for a question.
+  const S* fetched(std::uint32_t body) {
+    Playback<S>& playback = session().playback();
+    const std::uint64_t before = playback.fetched();
+    playback.fetch_all(body);
+    fetched_for_questions_ += playback.fetched() - before;
+    return playback.positions(body);
+  }
+
   std::uint32_t add(const std::string& name, const Connectivity& connectivity, std::span<const double> times,
                     std::vector<S> positions) {
     const std::size_t frames = times.size();

@@ -103,5 +103,22 @@ void World::scheduled_events(std::vector<WorldEvent>& out) const {
 bool World::step_event(double until, WorldStep& out) {
   return implementation_->step_event(until, out);
 }
+WorldPositions World::current_positions(std::uint32_t body) {
+  return implementation_->current_positions(body);
+}
+std::vector<double> World::frame_times(std::uint32_t per_keyframe) const {
+  return implementation_->frame_times(per_keyframe);
+}
+void World::true_pairs(std::vector<WorldPair>& out) {
+  implementation_->true_pairs(out);
+}
+bool World::audit(std::uint32_t body, WorldAudit& out) {
+  return implementation_->audit(body, out);
+}
+WorldVerdict World::verify(const std::string& strategy, std::span<const double> frames,
+                           const std::map<std::string, std::string>& params,
+                           const std::map<std::string, std::string>& topology) const {
+  return implementation_->verify(strategy, frames, params, topology);
+}
 
 }  // namespace kbvh

@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace kbvh {
@@ -164,6 +165,8 @@ inline constexpr std::uint32_t world_no_vertex = 0xffffffff;
 struct WorldParameter {
   std::string name, default_value, admissible, meaning;
   std::vector<std::string> allowed;  ///< the words that it takes; empty for numbers
+  double least = 0, most = 0;        ///< of numbers, both included; `most` may be infinite
+  bool whole = false;                ///< only whole numbers
 };
 /// What a strategy is and can do.
 struct WorldStrategy {
@@ -174,12 +177,49 @@ struct WorldStrategy {
   bool has_float32 = false, has_float64 = false;
   std::vector<std::uint32_t> widths;  ///< of the nodes of the trees that it takes; empty if it builds its own
   std::vector<WorldParameter> parameters;
+  bool baseline = false;                ///< ratios are against the fastest baseline
+  std::string guarantee, tightness;     ///< exact, candidate_superset, approximate; tight, conservative, none
+  std::vector<std::string> abilities;   ///< events, plan_changes, geometry_changes, spans, self_pairs, ...
+  std::vector<std::string> primitives;  ///< polygons, points, control_nets
+  std::string method;  ///< of its best tree, with width and leaf size; empty if it builds its own
+  std::uint32_t width = 0, leaf_size = 0;
+  std::uint64_t max_primitive_pairs = 0;  ///< of two bodies; 0: any number
 };
 
 /// A counter of a strategy since the last `reset`.
 struct WorldCounter {
   std::string name;
   std::uint64_t value;
+};
+
+/// The positions of a body where they lie: [vertex][3] in the world's precision.
+struct WorldPositions {
+  Precision precision;
+  std::uint32_t vertices;
+  const void* data;
+};
+
+/// What an audit finds in one body's hierarchy, or in all. Nodes that no query read are stale: they are
+/// counted and not examined.
+struct WorldAudit {
+  std::uint64_t nodes = 0, stale = 0;
+  std::uint64_t invalid = 0;    ///< nodes whose bound does not contain a vertex below it
+  std::uint64_t not_tight = 0;  ///< nodes whose bound is not as small as possible
+  double protrusion = 0;        ///< largest distance of a vertex from a bound above it, in units of length
+  double looseness = 0;         ///< summed surface area over that of tight bounds, minus one
+  std::string first_fault{};    ///< of the tree or of a bound; or empty
+};
+
+/// The result of a run of one strategy that was compared with the truth in every frame; sums over frames.
+struct WorldVerdict {
+  bool holds = false;             ///< the declared guarantee and tightness held
+  std::string first_violation{};  ///< frame, kind and value; or empty
+  std::uint64_t frames = 0, pairs = 0, candidates = 0;
+  std::uint64_t missed_candidates = 0;  ///< true pairs that were not candidates
+  std::uint64_t missed = 0, extra = 0;  ///< confirmed pairs against the truth
+  std::uint64_t repeated = 0, malformed = 0;
+  bool audited = false;  ///< false for hierarchies that are not visible
+  WorldAudit audit{};
 };
 
 /// A scene and one strategy that keeps its bounds valid, behind plain arrays. Bodies and their motion are
@@ -281,6 +321,28 @@ class World {
   /// strategy's own counters come last.
   std::vector<WorldCounter> counters() const;
 
+  /// Returns the positions of a body at the current time without copying them. Valid until the next call that
+  /// moves or changes the world.
+  WorldPositions current_positions(std::uint32_t body);
+
+  // ---- Judgement
+
+  /// Returns the times of a clip with `per_keyframe` (l >= 1) frames per interval between the keyframes of
+  /// all bodies, and the last keyframe. Possible before `start`.
+  std::vector<double> frame_times(std::uint32_t per_keyframe) const;
+  /// Replaces `out` by the pairs of primitives that intersect at the current time, sorted, found by testing
+  /// every pair exactly. O(primitives^2).
+  void true_pairs(std::vector<WorldPair>& out);
+  /// Audits the hierarchy of a body at the current time, after a query; returns false if the strategy's
+  /// hierarchy is not visible.
+  bool audit(std::uint32_t body, WorldAudit& out);
+  /// Plays the added bodies with a strategy from the first frame to the last, and compares its answers and
+  /// bounds with the truth in each. This world keeps its own strategy and time. Throws std::invalid_argument
+  /// for bodies with unknown motion and for times that decrease.
+  WorldVerdict verify(const std::string& strategy, std::span<const double> frames,
+                      const std::map<std::string, std::string>& params = {},
+                      const std::map<std::string, std::string>& topology = {}) const;
+
   // ---- Single events, for event-driven strategies
 
   bool has_events() const;
@@ -297,6 +359,8 @@ class World {
   static std::vector<std::string> strategies();
   /// Describes all strategies, in the same order.
   static std::vector<WorldStrategy> strategy_descriptions();
+  /// Returns the names of the counters that all strategies share, and what each counts.
+  static std::vector<std::pair<std::string, std::string>> counter_meanings();
 
  private:
   std::unique_ptr<detail::WorldImplementation> implementation_;

@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "core/contract/about.hpp"
 #include "core/contract/registry.hpp"
 #include "core/facade/world.hpp"
@@ -19,12 +21,48 @@ const char* words(Foresight foresight) {
   return "";
 }
 
+const char* words(Guarantee guarantee) {
+  return guarantee == Guarantee::exact                ? "exact"
+         : guarantee == Guarantee::candidate_superset ? "candidate_superset"
+                                                      : "approximate";
+}
+const char* words(Tightness tightness) {
+  return tightness == Tightness::tight          ? "tight"
+         : tightness == Tightness::conservative ? "conservative"
+                                                : "none";
+}
+
+std::vector<std::string> words(const Capabilities& can) {
+  const std::pair<bool, const char*> all[] = {{can.event_driven, "event_driven"},
+                                              {can.events, "events"},
+                                              {can.continuous, "continuous"},
+                                              {can.restructures, "restructures"},
+                                              {can.plan_changes, "plan_changes"},
+                                              {can.geometry_changes, "geometry_changes"},
+                                              {can.spans, "spans"},
+                                              {can.self_pairs, "self_pairs"},
+                                              {can.time_budget, "time_budget"},
+                                              {can.contacts, "contacts"},
+                                              {can.rays, "rays"},
+                                              {can.changes, "changes"}};
+  std::vector<std::string> out;
+  for (const auto& [has, word] : all)
+    if (has) out.push_back(word);
+  return out;
+}
+
 }  // namespace
 
 std::vector<std::string> World::strategies() {
   std::vector<std::string> ids;
   for (const StrategyEntry& entry : registry()) ids.push_back(entry.info.id);
   return ids;
+}
+std::vector<std::pair<std::string, std::string>> World::counter_meanings() {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (std::size_t c = 0; c < std::size_t(Counter::count); ++c)
+    all.emplace_back(name(Counter(c)), meaning(Counter(c)));
+  return all;
 }
 std::vector<WorldStrategy> World::strategy_descriptions() {
   std::vector<WorldStrategy> all;
@@ -45,7 +83,18 @@ std::vector<WorldStrategy> World::strategy_descriptions() {
     if (!info.topology.own) made.widths = info.topology.widths;
     for (const Parameter& parameter : info.parameters)
       made.parameters.push_back({parameter.name, parameter.default_value, admissible(parameter),
-                                 parameter.meaning, parameter.allowed});
+                                 parameter.meaning, parameter.allowed, parameter.least, parameter.most,
+                                 parameter.numbers == Numbers::whole});
+    made.baseline = info.baseline;
+    made.guarantee = words(info.guarantee);
+    made.tightness = words(info.tightness);
+    made.abilities = words(info.can);
+    for (const PrimitiveKind kind : info.primitives) made.primitives.push_back(name(kind));
+    made.max_primitive_pairs = info.max_primitive_pairs;
+    if (info.topology.own) continue;
+    made.method = name(info.topology.preferred.method);
+    made.width = info.topology.preferred.width;
+    made.leaf_size = info.topology.preferred.leaf_size;
   }
   return all;
 }

@@ -31,32 +31,32 @@ std::uint64_t hash_of(const PrimitivePair& pair) {
 
 }  // namespace
 
+/// The pairs of two answers that have no partner at their place.
+struct PairDifference::Left {
+  std::span<const PrimitivePair> before, after;
+};
+
 void PairDifference::find(std::span<const PrimitivePair> before, std::span<const PrimitivePair> after,
                           PairBuffer& begun, PairBuffer& ended) {
-  left_before_.clear();
-  left_after_.clear();
-  walk(before, after);
-  if (left_before_.empty() || left_after_.empty()) {
-    begun.insert(begun.end(), left_after_.begin(), left_after_.end());
-    ended.insert(ended.end(), left_before_.begin(), left_before_.end());
-    return;
-  }
-  look_up(begun, ended);
+  if (room_before_.size() < before.size()) room_before_.resize(before.size());
+  if (room_after_.size() < after.size()) room_after_.resize(after.size());
+  const Left left = walk(before, after);
+  if (!left.before.empty() && !left.after.empty()) return look_up(left, begun, ended);
+  begun.insert(begun.end(), left.after.begin(), left.after.end());
+  ended.insert(ended.end(), left.before.begin(), left.before.end());
 }
 
-/// Drops pairs that both answers have at corresponding places; keeps all others in `left_before_` and
-/// `left_after_`.
-void PairDifference::walk(std::span<const PrimitivePair> before, std::span<const PrimitivePair> after) {
+/// Passes over the pairs that both answers have at corresponding places, and returns all others.
+PairDifference::Left PairDifference::walk(std::span<const PrimitivePair> before,
+                                          std::span<const PrimitivePair> after) {
   const PrimitivePair* a = before.data();
   const PrimitivePair* b = after.data();
   const PrimitivePair *const a_end = a + before.size(), *const b_end = b + after.size();
-  const auto keep = [](PairBuffer& to, const PrimitivePair* from, const PrimitivePair* end) {
-    to.insert(to.end(), from, end);
-  };
+  PrimitivePair *left_a = room_before_.data(), *left_b = room_after_.data();
   while (a != a_end && b != b_end) {
-    const PrimitivePair *const a_window = a, *const a_stop = a + std::min<std::size_t>(window, a_end - a);
-    const std::size_t left = left_before_.size() + left_after_.size();
-    while (a != a_stop && b != b_end) {
+    const PrimitivePair *const begin = a, *const stop = a + std::min<std::size_t>(window, a_end - a);
+    const std::size_t left = (left_a - room_before_.data()) + (left_b - room_after_.data());
+    while (a < stop && b != b_end) {
       if (*a == *b) {
         ++a;
         ++b;
@@ -67,26 +67,44 @@ void PairDifference::walk(std::span<const PrimitivePair> before, std::span<const
       std::size_t k = 1;
       while (k < ahead && !(a[k] == *b) && !(*a == b[k])) ++k;
       if (k < ahead && a[k] == *b) {
-        keep(left_before_, a, a + k);
+        left_a = std::copy_n(a, k, left_a);
         a += k;
       } else if (k < ahead) {
-        keep(left_after_, b, b + k);
+        left_b = std::copy_n(b, k, left_b);
         b += k;
       } else {
-        left_before_.push_back(*a++);
-        left_after_.push_back(*b++);
+        *left_a++ = *a++;
+        *left_b++ = *b++;
       }
-      if (a > a_stop) break;
     }
-    const std::size_t differing = left_before_.size() + left_after_.size() - left;
-    if (2 * differing > std::size_t(a - a_window)) break;  // no common order
+    const std::size_t differing = (left_a - room_before_.data()) + (left_b - room_after_.data()) - left;
+    if (2 * differing > std::size_t(a - begin)) break;  // no common order
   }
-  keep(left_before_, a, a_end);
-  keep(left_after_, b, b_end);
+  left_a = std::copy(a, a_end, left_a);
+  left_b = std::copy(b, b_end, left_b);
+  return {{room_before_.data(), left_a}, {room_after_.data(), left_b}};
 }
 
-void PairDifference::look_up(PairBuffer& begun, PairBuffer& ended) {
-  const std::size_t slots = slots_for(left_before_.size());
+/// Calls use(index, first slot) for all pairs; slots are fetched ahead, so that their cache misses overlap.
+template <class Use>
+void PairDifference::for_slots(std::span<const PrimitivePair> pairs, std::size_t mask, const Use& use) const {
+  constexpr std::size_t ahead = 16;
+  std::size_t slots[ahead];
+  const auto fetch = [&](std::size_t i) {
+    const std::size_t slot = hash_of(pairs[i]) & mask;
+    __builtin_prefetch(&table_[slot]);
+    slots[i % ahead] = slot;
+  };
+  for (std::size_t i = 0; i < std::min(ahead, pairs.size()); ++i) fetch(i);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const std::size_t slot = slots[i % ahead];
+    if (i + ahead < pairs.size()) fetch(i + ahead);
+    use(i, slot);
+  }
+}
+
+void PairDifference::look_up(const Left& left, PairBuffer& begun, PairBuffer& ended) {
+  const std::size_t slots = slots_for(left.before.size());
   if (slots > table_.size()) {
     table_.assign(slots, 0);
     stamp_ = 0;
@@ -98,28 +116,27 @@ void PairDifference::look_up(PairBuffer& begun, PairBuffer& ended) {
   // Only as much of the table as needed: the rest stays out of the cache.
   const std::size_t mask = slots - 1;
   const std::uint64_t stamp = std::uint64_t(stamp_) << 32;
-  for (std::size_t i = 0; i < left_before_.size(); ++i) {
-    std::size_t slot = hash_of(left_before_[i]) & mask;
+  for_slots(left.before, mask, [&](std::size_t i, std::size_t slot) {
     while ((table_[slot] >> 32) == stamp_) slot = (slot + 1) & mask;
     table_[slot] = stamp | i;
-  }
-  met_.assign(left_before_.size(), 0);
-  for (const PrimitivePair& pair : left_after_) {
-    std::size_t slot = hash_of(pair) & mask;
+  });
+  met_.assign(left.before.size(), 0);
+  for_slots(left.after, mask, [&](std::size_t k, std::size_t slot) {
+    const PrimitivePair& pair = left.after[k];
     bool known = false;
     for (; !known && (table_[slot] >> 32) == stamp_; slot = (slot + 1) & mask) {
       const auto i = std::uint32_t(table_[slot]);
-      known = left_before_[i] == pair;
+      known = left.before[i] == pair;
       if (known) met_[i] = 1;
     }
     if (!known) begun.push_back(pair);
-  }
-  for (std::size_t i = 0; i < left_before_.size(); ++i)
-    if (met_[i] == 0) ended.push_back(left_before_[i]);
+  });
+  for (std::size_t i = 0; i < left.before.size(); ++i)
+    if (met_[i] == 0) ended.push_back(left.before[i]);
 }
 
 std::size_t PairDifference::bytes() const {
-  return (left_before_.capacity() + left_after_.capacity()) * sizeof(PrimitivePair) +
+  return (room_before_.capacity() + room_after_.capacity()) * sizeof(PrimitivePair) +
          table_.capacity() * sizeof(table_[0]) + met_.capacity();
 }
 

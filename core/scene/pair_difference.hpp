@@ -19,12 +19,15 @@ class PairDifference {
   std::size_t bytes() const;
 
  private:
-  void walk(std::span<const PrimitivePair> before, std::span<const PrimitivePair> after);
-  void look_up(PairBuffer& begun, PairBuffer& ended);
+  struct Left;
+  Left walk(std::span<const PrimitivePair> before, std::span<const PrimitivePair> after);
+  template <class Use>
+  void for_slots(std::span<const PrimitivePair> pairs, std::size_t mask, const Use& use) const;
+  void look_up(const Left& left, PairBuffer& begun, PairBuffer& ended);
 
-  PairBuffer left_before_, left_after_;  ///< pairs without a partner at their place
-  std::vector<std::uint64_t> table_;     ///< stamp of the call, and index into left_before_
-  std::vector<std::uint8_t> met_;        ///< [left_before_]
+  PairBuffer room_before_, room_after_;  ///< for pairs without a partner
+  std::vector<std::uint64_t> table_;     ///< stamp of the call, and index into room_before_
+  std::vector<std::uint8_t> met_;        ///< [room_before_]
   std::uint32_t stamp_ = 0;
 };
 

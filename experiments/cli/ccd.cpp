@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <memory>
@@ -18,6 +19,7 @@
 #include "experiments/io/bytes.hpp"
 #include "experiments/results/result_file.hpp"
 #include "experiments/results/table.hpp"
+#include "experiments/study/box_candidates.hpp"
 #include "experiments/study/impact_queries.hpp"
 
 namespace kbvh::experiments {
@@ -33,7 +35,8 @@ Decides queries of continuous collision detection (a vertex and a face, or two e
 compares with the given verdicts. Input: files with 8 rows per query in exact rationals, folders of such files, and
 pairs of frames with lists of pairs, as in the NYU CCD benchmark (Wang et al. 2021). The table also has the peers' own
 continuous tests of the same two features, in floating point, if they are built in. DIR/ccd.json has the table; if DIR
-is the folder of a study, the study's report includes it.
+is the folder of a study, the study's report includes it. With --candidates, counts the pairs of features whose swept
+boxes meet between the two frames of each pair, beside published counts.
 Exit codes: 0 all verdicts are right, 1 one is wrong, 2 wrong use or input, 3 other error.)";
 
 /// The verdicts and the speed of one test on the queries of one file.
@@ -121,7 +124,49 @@ struct Arguments {
   std::vector<std::string> paths;
   std::string out;
   double seconds = 0.05;
+  bool candidates = false;
 };
+
+/// Returns the frame pairs among the paths, and in folders of such pairs.
+std::vector<std::filesystem::path> frame_pairs(std::vector<std::string> paths) {
+  if (paths.empty()) paths.push_back((data_folder() / "ccd" / "frames").string());
+  std::vector<std::filesystem::path> found;
+  for (const std::string& path : paths) {
+    std::error_code error;
+    if (is_frame_pair(path)) {
+      found.emplace_back(std::filesystem::path(path).lexically_normal());
+      continue;
+    }
+    const std::size_t before = found.size();
+    for (const auto& entry : std::filesystem::directory_iterator(path, error))
+      if (is_frame_pair(entry.path())) found.push_back(entry.path());
+    if (found.size() == before)
+      throw io::InputError(path + ": there is no frame pair (folders frames, boxes and mma_bool)");
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+int count_candidates(const Arguments& arguments) {
+  std::vector<std::vector<std::string>> table{{"frames", "boxes", "vertex-face", "published", "edge-edge",
+                                               "published", "touch (listed)", "of these no candidate"}};
+  std::uint64_t missed = 0;
+  for (const std::filesystem::path& path : frame_pairs(arguments.paths)) {
+    const FramePair frames = read_frame_pair(path);
+    const PublishedCandidates published = published_candidates(frames.name);
+    const auto known = [](std::uint64_t count) { return count == 0 ? "-" : std::to_string(count); };
+    for (const BoxMargin margin : {BoxMargin::none, BoxMargin::one_ulp}) {
+      const BoxCandidates found = box_candidates(frames, margin);
+      table.push_back({frames.name, margin == BoxMargin::none ? "closed" : "one ulp wider",
+                       std::to_string(found.vertex_face), known(published.vertex_face),
+                       std::to_string(found.edge_edge), known(published.edge_edge),
+                       std::to_string(found.touching), std::to_string(found.missed)});
+      missed += found.missed;
+    }
+  }
+  print(columns(table));
+  return missed == 0 ? success : guarantee_broken;
+}
 
 int run(const Arguments& arguments) {
   std::vector<ImpactQueries> files;
@@ -206,8 +251,13 @@ void add_ccd(CLI::App& program, Action& action) {
   auto a = std::make_shared<Arguments>();
   add_texts(*command, "paths", a->paths, "files, folders, frame pairs (the data folder's ccd)");
   add_number(*command, "--seconds", a->seconds, 0, 3600, "minimum time of each test on each file (0.05)");
-  add_text(*command, "--out", a->out, "folder for ccd.json (none: the table only)");
-  command->callback([&action, a] { action = [a] { return run(*a); }; });
+  CLI::Option* out = add_text(*command, "--out", a->out, "folder for ccd.json (none: the table only)");
+  command
+      ->add_flag("--candidates", a->candidates,
+                 "count box candidates between frames instead (the data folder's ccd/frames)")
+      ->excludes(out);
+  command->callback(
+      [&action, a] { action = [a] { return a->candidates ? count_candidates(*a) : run(*a); }; });
 }
 
 }  // namespace kbvh::experiments

@@ -17,11 +17,14 @@ void add_list(CLI::App& program, Action& action);
 void add_run(CLI::App& program, Action& action);
 void add_bench(CLI::App& program, Action& action);
 void add_report(CLI::App& program, Action& action);
+void add_explore(CLI::App& program, Action& action);
+void add_merge(CLI::App& program, Action& action);
 void add_scene(CLI::App& program, Action& action);
 void add_theory(CLI::App& program, Action& action);
 void add_stress(CLI::App& program, Action& action);
 void add_ccd(CLI::App& program, Action& action);
 void add_lab(CLI::App& program, Action& action);
+void add_data(CLI::App& program, Action& action);
 
 /// Runs a program of PATH, passes on its output, waits for it and returns its exit code. Throws
 /// io::InputError if it cannot be started.
@@ -30,11 +33,11 @@ int run_and_wait(std::vector<std::string> words);
 /// The options of `run` and `bench` on the command line. Strings stay as given until `plan_of` turns them
 /// into the equivalent plan.
 struct StudyOptions {
-  std::string plan_file, out, scene, name, clip, script, changes, rays;
+  std::string plan_file, out, scene, name, clip, script, changes, rays, job, prepare;
   std::vector<std::string> bodies, strategies, scalars, params, studies, orders, builders;
   std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
   std::uint64_t obstacle = 0, keyframes = 0, repetitions = 0, frames_limit = 0, oracle_every = 0;
-  bool print_plan = false, self = false, continuous = false;
+  bool print_plan = false, list_jobs = false, self = false, continuous = false;
 };
 
 /// Keeps only the studies of a plan file whose name is among `names` (a study without a name has the plan's),

@@ -1,3 +1,7 @@
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <system_error>
@@ -8,6 +12,7 @@
 #include "experiments/common/environment.hpp"
 #include "experiments/common/output.hpp"
 #include "experiments/io/animated_mesh.hpp"
+#include "experiments/io/bytes.hpp"
 
 namespace kbvh::experiments {
 
@@ -16,27 +21,46 @@ namespace {
 constexpr const char* lab_examples = R"(Examples:
   kbvh lab
   kbvh lab --study results --port 8080
-shows the lab, which `experiments/lab` builds, to browsers on this machine, until Ctrl+C; with a study, its scenes are in
-the lab's menu. The lab also works without this server: open index.html or lab.html of its folder.)";
+shows the lab, which `experiments/lab` builds, to browsers on this machine, until Ctrl+C, and opens it in one if there is a
+screen; with a study, its scenes are in the lab's menu. The lab also works without this server: open index.html or lab.html of its folder.)";
 
 struct LabOptions {
   std::string folder, study;
   std::uint64_t port = 8017;
 };
 
-int serve(const LabOptions& options) {
-  const std::filesystem::path analysis = analysis_folder();
-  const std::filesystem::path folder = options.folder.empty() ? analysis.parent_path() / "build" / "lab"
-                                                              : std::filesystem::path(options.folder);
+bool is_lab(const std::filesystem::path& folder) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(folder / "index.html", error))
+  return std::filesystem::is_regular_file(folder / "index.html", error);
+}
+
+int serve(const LabOptions& options) {
+  std::error_code error;
+  if (!options.study.empty() &&
+      !std::filesystem::is_directory(std::filesystem::path(options.study) / "scenes", error))
+    throw io::InputError("--study: there is no folder scenes in " + io::printable(options.study) +
+                         " (`kbvh run --out FOLDER` makes one)");
+  const std::filesystem::path analysis = analysis_folder();
+  std::filesystem::path folder = options.folder;
+  if (!folder.empty() && !is_lab(folder))
+    throw io::InputError("--folder: there is no built lab in " + io::printable(options.folder));
+  if (folder.empty()) folder = analysis.parent_path() / "build" / "lab";
+  if (!is_lab(folder))
     throw io::InputError("there is no built lab in " + folder.string() +
                          " (`experiments/lab` makes it; --folder names another)");
-  std::vector<std::string> words{python(), (analysis / "lab" / "serve.py").string(), folder.string(),
-                                 "--port", std::to_string(options.port)};
+  std::vector<std::string> words{python(),
+                                 (analysis / "lab" / "serve.py").string(),
+                                 folder.string(),
+                                 "--port",
+                                 std::to_string(options.port),
+                                 "--open"};
   if (!options.study.empty()) words.insert(words.end(), {"--study", options.study});
-  const int code = run_and_wait(words);
-  return code == success || code == wrong_use ? code : internal_error;
+  // The server takes this process's place, and with it the signals that end it.
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  ::execvp(arguments[0], arguments.data());
+  throw io::InputError("cannot start " + words[0] + ": " + std::strerror(errno));
 }
 
 }  // namespace

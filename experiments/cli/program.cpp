@@ -128,11 +128,14 @@ int run_program(int argc, const char* const* argv) {
   add_run(program, action);
   add_bench(program, action);
   add_report(program, action);
+  add_explore(program, action);
+  add_merge(program, action);
   add_scene(program, action);
   add_theory(program, action);
   add_stress(program, action);
   add_ccd(program, action);
   add_lab(program, action);
+  add_data(program, action);
   // CLI11 would only say that a command is missing.
   std::vector<std::string> commands;
   for (const CLI::App* command : program.get_subcommands({})) commands.push_back(command->get_name());

@@ -24,20 +24,27 @@ namespace {
 
 constexpr const char* report_examples = R"(Example:
   kbvh report --out results
-writes results/report.html, self-contained, its figures and results/claims.json, from results/results.jsonl and the
-files next to it: targets.json (bench), theory.json, stress.json, ccd.json. The commands that write those take the
+writes results/report.html and results/explorer.html, each self-contained, the report's figures and
+results/claims.json, from results/results.jsonl and the files next to it: targets.json (bench), theory.json, stress.json, ccd.json. The commands that write those take the
 same --out.)";
 
-int report(const std::string& out, const std::string& title) {
+constexpr const char* explore_examples = R"(Example:
+  kbvh merge laptop server --out both && kbvh explore --out both
+writes both/explorer.html, a page of all results in both/results.jsonl: filters, performance profiles, ratios to any
+contestant, two commits or machines beside each other. It needs no network. `kbvh report` writes it, too, beside
+the static report.)";
+
+/// Runs a script of the analysis folder on a results folder.
+int report(const std::string& script, const std::string& out, const std::string& title) {
   const std::filesystem::path results = std::filesystem::path(out) / "results.jsonl";
   std::error_code error;
   if (!std::filesystem::is_regular_file(results, error))
     throw io::InputError("there is no " + results.string() + " (`kbvh run --out " + out + "` makes it)");
-  std::vector<std::string> words{python(), (analysis_folder() / "report.py").string(), out};
+  std::vector<std::string> words{python(), (analysis_folder() / script).string(), out};
   if (!title.empty()) words.insert(words.end(), {"--title", title});
   const int code = run_and_wait(words);
   if (code == 0) return success;
-  say("the report was not made: " + words[1] + " ended with " + std::to_string(code));
+  say("the page was not made: " + words[1] + " ended with " + std::to_string(code));
   return code == wrong_use ? wrong_use : internal_error;
 }
 
@@ -77,13 +84,28 @@ int run_and_wait(std::vector<std::string> words) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : internal_error;
 }
 
+namespace {
+void add_page(CLI::App& command, Action& action, const std::string& script) {
+  auto out = std::make_shared<std::string>(), title = std::make_shared<std::string>();
+  add_text(command, "--out", *out, "folder with results.jsonl")->required();
+  add_text(command, "--title", *title, "title of the page");
+  command.callback([&action, out, title, script] {
+    action = [out, title, script] { return report(script, *out, *title); };
+  });
+}
+}  // namespace
+
 void add_report(CLI::App& program, Action& action) {
   CLI::App* command = program.add_subcommand("report", "write tables and figures of a result folder");
   command->footer(report_examples);
-  auto out = std::make_shared<std::string>(), title = std::make_shared<std::string>();
-  add_text(*command, "--out", *out, "folder with results.jsonl")->required();
-  add_text(*command, "--title", *title, "title of the report");
-  command->callback([&action, out, title] { action = [out, title] { return report(*out, *title); }; });
+  add_page(*command, action, "report.py");
+}
+
+void add_explore(CLI::App& program, Action& action) {
+  CLI::App* command =
+      program.add_subcommand("explore", "write the explorer of a result folder: a page with filters");
+  command->footer(explore_examples);
+  add_page(*command, action, "explore.py");
 }
 
 }  // namespace kbvh::experiments

@@ -9,6 +9,7 @@
 #include "experiments/common/progress.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/bytes.hpp"
+#include "experiments/run/jobs.hpp"
 #include "experiments/study/plan.hpp"
 
 namespace kbvh::experiments {
@@ -86,6 +87,14 @@ void set_common(json& plan, const StudyOptions& options) {
   if (options.oracle_every > 0) plan["oracle_every"] = options.oracle_every;
 }
 
+int list_jobs(const Plan& plan) {
+  std::vector<std::string> notes;
+  const std::vector<Job> jobs = jobs_of(plan, notes);
+  for (const std::string& text : notes) say("note: " + text);
+  print(jobs_json(plan, jobs).dump(2) + "\n");
+  return success;
+}
+
 int run_study(const StudyOptions& options, Harness harness) {
   Plan plan;
   if (options.plan_file.empty()) {
@@ -112,17 +121,38 @@ int run_study(const StudyOptions& options, Harness harness) {
     }
     plan = read_plan(said, options.plan_file, std::filesystem::path(options.plan_file).parent_path());
   }
-  const StudyOutcome outcome = run_plan(plan, harness, options.out);
+  if (options.list_jobs) return list_jobs(plan);
+  if (!options.prepare.empty()) {
+    prepare_scene(plan, options.prepare, options.out);
+    return success;
+  }
+  if (!options.job.empty()) plan = plan_of_job(plan, options.job);
+  const StudyOutcome outcome = run_plan(plan, harness, options.out, options.job);
   if (!options.out.empty())
     say(counted(outcome.measured, "configuration") + " measured, " + std::to_string(outcome.skipped) +
         (outcome.skipped == 1 ? " was in " : " were in ") +
-        (std::filesystem::path(options.out) / "results.jsonl").string() + " already");
+        (std::filesystem::path(options.out) / (options.job.empty() ? "results.jsonl" : "jobs")).string() +
+        " already");
   if (outcome.unfinished > 0)
     say(counted(outcome.unfinished, "configuration") +
         " without enough memory; the next run measures them again");
   if (outcome.refused == 0) return outcome.unfinished == 0 ? success : internal_error;
   say(counted(outcome.refused, "configuration") + " in which a strategy breaks its guarantee");
   return guarantee_broken;
+}
+
+/// Adds the options by which an engine for many machines runs a plan (experiments/sweep).
+void add_jobs(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
+  CLI::Option *plan = command.get_option("--plan"), *out = command.get_option("--out");
+  CLI::Option* list = command.add_flag("--list-jobs", o->list_jobs,
+                                       "print the jobs into which experiments/sweep cuts the plan, and stop");
+  list->needs(plan)->excludes(command.get_option("--print-plan"));
+  CLI::Option* prepare = add_text(command, "--prepare", o->prepare,
+                                  "only make the scene of this id and its true pairs, for its jobs");
+  CLI::Option* job =
+      add_text(command, "--job", o->job, "run only the job of this id; records go to DIR/jobs");
+  for (CLI::Option* option : {prepare, job}) option->needs(plan)->needs(out)->excludes(list);
+  prepare->excludes(job);
 }
 
 void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
@@ -183,6 +213,7 @@ void add_command(CLI::App& program, Action& action, const char* name, const char
   command->footer(footer);
   auto options = std::make_shared<StudyOptions>();
   add_study(*command, options);
+  if (harness == Harness::rounds) add_jobs(*command, options);
   command->callback(
       [&action, options, harness] { action = [options, harness] { return run_study(*options, harness); }; });
 }

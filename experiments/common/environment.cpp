@@ -62,6 +62,15 @@ fs::path analysis_folder() {
                        "' (KBVH_ANALYSIS names another folder)");
 }
 
+fs::path data_program() {
+  std::error_code error;
+  const fs::path source = fs::path(KBVH_SOURCE_DIR) / "experiments" / "data" / "data.py";
+  const fs::path installed = fs::path(KBVH_INSTALLED_SHARE) / "data" / "data.py";
+  for (const fs::path& file : {source, installed})
+    if (fs::is_regular_file(file, error)) return file;
+  throw io::InputError("data.py is neither '" + source.string() + "' nor '" + installed.string() + "'");
+}
+
 std::string python() {
   return ::access("/usr/bin/python3", X_OK) == 0 ? "/usr/bin/python3" : "python3";
 }

@@ -17,6 +17,10 @@ std::filesystem::path data_folder();
 /// its installation. Throws io::InputError that names the places tried.
 std::filesystem::path analysis_folder();
 
+/// Returns data.py, which knows the data sets of the field: of the source tree, else of its installation.
+/// Throws io::InputError that names the places tried.
+std::filesystem::path data_program();
+
 /// Returns /usr/bin/python3 if it exists (Debian's, with its matplotlib), else the python3 of PATH.
 std::string python();
 

@@ -5,6 +5,8 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
 #include <ctime>
 #include <fstream>
 #include <iterator>
@@ -72,6 +74,20 @@ std::string compiler() {
 #endif
 }
 
+/// Returns the file that holds this code: the program, or a module that another program has loaded.
+std::string own_file() {
+  const auto here = reinterpret_cast<std::uintptr_t>(&own_file);
+  std::ifstream maps("/proc/self/maps");
+  for (std::string line; std::getline(maps, line);) {
+    unsigned long begin = 0, end = 0;
+    int path = 0;
+    if (std::sscanf(line.c_str(), "%lx-%lx %*s %*s %*s %*s %n", &begin, &end, &path) == 2 && path > 0 &&
+        here >= begin && here < end && std::ifstream(line.substr(std::size_t(path))).good())
+      return line.substr(std::size_t(path));
+  }
+  return "/proc/self/exe";
+}
+
 /// Returns the kernels in use; a wrong name in the environment is wrong use of the program.
 std::string kernels() {
   try {
@@ -107,7 +123,7 @@ std::string program_identity() {
   static const std::string identity = [] {
     std::string text = built_commit;
     if (!built_dirty && text != "unknown") return text;
-    std::ifstream file("/proc/self/exe", std::ios::binary);
+    std::ifstream file(own_file(), std::ios::binary);
     const std::string bytes{std::istreambuf_iterator<char>(file), {}};
     return text + "+" + hexadecimal(hash_of(bytes));
   }();

@@ -15,7 +15,7 @@ std::string commit();
 bool dirty();
 
 /// Identifies the program's code in the keys of results: the commit; with changed files or without a
-/// repository also a hash of the running executable.
+/// repository also a hash of the running executable, or of the module that holds this code.
 std::string program_identity();
 
 /// Returns the current time in UTC, as 2025-01-31T12:00:00Z.

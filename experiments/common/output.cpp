@@ -15,6 +15,9 @@ namespace {
 /// The first error of standard output, which belongs to the process, as its stream does. 0: none.
 int first_error = 0;
 
+/// Where printed text goes instead of standard output; null: nowhere else.
+std::string* receiver = nullptr;
+
 }  // namespace
 
 void prepare_output() {
@@ -28,7 +31,18 @@ void prepare_output() {
     if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF) ::open("/dev/null", modes[stream]);
 }
 
+PrintedText::PrintedText() {
+  receiver = &text_;
+}
+PrintedText::~PrintedText() {
+  receiver = nullptr;
+}
+
 void print(std::string_view text) {
+  if (receiver != nullptr) {
+    receiver->append(text);
+    return;
+  }
   errno = 0;
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
   const bool arrived = std::fflush(stdout) == 0 && written;

@@ -12,6 +12,19 @@ void prepare_output();
 /// running measurements; `output_failure` reports the failure at the end.
 void print(std::string_view text);
 
+/// Receives what `print` prints during its lifetime, instead of standard output. There is one at a time.
+class PrintedText {
+ public:
+  PrintedText();
+  ~PrintedText();
+  PrintedText(const PrintedText&) = delete;
+  PrintedText& operator=(const PrintedText&) = delete;
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
 /// Returns why some output was not written, for example "No space left on device". Empty if everything was
 /// written, or if the reader closed the pipe deliberately.
 std::string output_failure();

@@ -10,8 +10,7 @@ namespace {
 
 std::uint64_t mixed(std::uint64_t hash, const double* p) {
   for (int axis = 0; axis < 3; ++axis) {
-    hash = (hash ^ bit_cast<std::uint64_t>(p[axis] + 0.0)) *
-           0x9E3779B97F4A7C15u;  // + 0.0: merges both zeros
+    hash = (hash ^ bit_cast<std::uint64_t>(p[axis] + 0.0)) * 0x9E3779B97F4A7C15u;  // + 0.0: merges both zeros
     hash ^= hash >> 29;
   }
   return hash;

@@ -81,6 +81,21 @@ json script_record(const PlanScript<S>& script, double end) {
 template json script_record(const PlanScript<float>&, double);
 template json script_record(const PlanScript<double>&, double);
 
+json again_record(const json& scene_object, const json& scene, const json& strategy, const Study& study) {
+  json request{{"id", strategy.at("id")}, {"params", strategy.at("params")}};
+  if (!strategy.at("builder").is_null()) request["builder"] = strategy.at("builder");
+  json plan{{"scenes", json::array({scene_object})},
+            {"strategies", json::array({request})},
+            {"scalars", json::array({scene.at("scalar")})},
+            {"l", json::array({scene.at("per_keyframe")})},
+            {"repetitions", study.repetitions},
+            {"oracle_every", study.oracle_every}};
+  if (study.frames_limit > 0) plan["frames_limit"] = study.frames_limit;
+  if (study.continuous) plan["continuous"] = true;
+  if (study.changes) plan["changes"] = answer_word(*study.changes);
+  return plan;
+}
+
 std::string configuration_key(Harness harness, const std::string& program, const json& scene,
                               const json& strategy, const Study& study, const json& machine) {
   // nlohmann's objects are sorted by key, so the text does not depend on the order of insertion.
@@ -102,7 +117,7 @@ std::string configuration_key(Harness harness, const std::string& program, const
             {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
              machine.at("kernels")}}};
   if (study.continuous) all["continuous"] = true;
-  if (study.changes) all["changes"] = word(*study.changes);
+  if (study.changes) all["changes"] = answer_word(*study.changes);
   if (study.rays) all["rays"] = text_of(*study.rays);
   if (scene.contains("script")) all["script"] = scene.at("script").at("hash");
   return hexadecimal(hash_of(all.dump()));

@@ -28,6 +28,11 @@ nlohmann::json scene_record(const Scene<S>& scene, const LoadedScene& loaded, st
 template <class S>
 nlohmann::json script_record(const PlanScript<S>& script, double end);
 
+/// Makes the "again" of a record: a plan that measures this configuration alone. `scene_object` is the scene
+/// as an object of a plan, `scene` and `strategy` are as above.
+nlohmann::json again_record(const nlohmann::json& scene_object, const nlohmann::json& scene,
+                            const nlohmann::json& strategy, const Study& study);
+
 /// Computes the key of a configuration: a hash of everything that affects the measurement. `scene` and
 /// `strategy` are as above; `program` is program_identity().
 std::string configuration_key(Harness harness, const std::string& program, const nlohmann::json& scene,

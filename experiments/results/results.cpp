@@ -82,8 +82,9 @@ void prepare_folder(const std::filesystem::path& folder) {
   remove_left_overs(folder);
 }
 
-ResultStore::ResultStore(const std::filesystem::path& folder)
-    : folder_(folder), file_(folder / "results.jsonl") {
+ResultStore::ResultStore(const std::filesystem::path& folder, const std::filesystem::path& file,
+                         const std::vector<std::filesystem::path>& others)
+    : folder_(folder), file_(folder / file) {
   prepare_folder(folder);
   std::error_code error;
   const bool leads_nowhere =
@@ -95,9 +96,14 @@ ResultStore::ResultStore(const std::filesystem::path& folder)
     ::close(descriptor);
   else if (errno != ENOENT)
     throw io::InputError(file_.string() + ": cannot be written: " + std::strerror(errno));
-  std::ifstream in(file_, std::ios::binary);
+  for (const std::filesystem::path& other : others)
+    if (other != file_) read(other);
+  broken_end_ = read(file_);
+}
+
+bool ResultStore::read(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
-  broken_end_ = !text.empty() && text.back() != '\n';
   std::size_t line = 0;
   for (std::size_t begin = 0; begin < text.size();) {
     ++line;
@@ -113,9 +119,10 @@ ResultStore::ResultStore(const std::filesystem::path& folder)
       continue;
     }
     known_.insert_or_assign(key->get<std::string>(), record);
-    line_of_.insert_or_assign(key->get<std::string>(), line);
+    place_of_.insert_or_assign(key->get<std::string>(), file.string() + " line " + std::to_string(line));
     ++records_;
   }
+  return !text.empty() && text.back() != '\n';
 }
 
 const json* ResultStore::find(const std::string& key) const {
@@ -124,8 +131,8 @@ const json* ResultStore::find(const std::string& key) const {
 }
 
 std::string ResultStore::place(const std::string& key) const {
-  const auto line = line_of_.find(key);
-  return file_.string() + (line == line_of_.end() ? "" : " line " + std::to_string(line->second));
+  const auto place = place_of_.find(key);
+  return place == place_of_.end() ? file_.string() : place->second;
 }
 
 void ResultStore::append(const json& record) {
@@ -147,7 +154,7 @@ void ResultStore::append(const json& record) {
   if (!complete) failed();
   broken_end_ = false;
   known_.insert_or_assign(record.at("key").get<std::string>(), record);
-  line_of_.erase(record.at("key").get<std::string>());
+  place_of_.erase(record.at("key").get<std::string>());
   ++records_;
 }
 

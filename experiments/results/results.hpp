@@ -21,14 +21,18 @@ void prepare_folder(const std::filesystem::path& folder);
 /// repaired.
 class ResultStore {
  public:
-  /// Creates the folder and reads existing records. Throws io::InputError if the folder cannot be written.
-  explicit ResultStore(const std::filesystem::path& folder);
+  /// Creates the folder and reads existing records. `file` is where records are appended, relative to the
+  /// folder; those of `others` are known as well (they need not exist; `file` counts after them). Throws
+  /// io::InputError if the folder or the file cannot be written.
+  explicit ResultStore(const std::filesystem::path& folder,
+                       const std::filesystem::path& file = "results.jsonl",
+                       const std::vector<std::filesystem::path>& others = {});
   ResultStore(const ResultStore&) = delete;
   ResultStore& operator=(const ResultStore&) = delete;
 
   /// Returns the newest record with this key, or nullptr.
   const nlohmann::json* find(const std::string& key) const;
-  /// Returns "FILE line N", the place of a record that was read from the file; else the file.
+  /// Returns "FILE line N", the place of a record that was read; else the file.
   std::string place(const std::string& key) const;
   /// Writes the record as one line, flushed to disk. Throws io::InputError if that fails.
   void append(const nlohmann::json& record);
@@ -38,9 +42,12 @@ class ResultStore {
   std::size_t unreadable_lines() const { return unreadable_; }
 
  private:
+  /// Returns whether the file ends in the middle of a line.
+  bool read(const std::filesystem::path& file);
+
   std::filesystem::path folder_, file_;
   std::map<std::string, nlohmann::json> known_;
-  std::map<std::string, std::size_t> line_of_;
+  std::map<std::string, std::string> place_of_;
   std::size_t records_ = 0, unreadable_ = 0;
   bool broken_end_ = false;
 };

@@ -19,7 +19,7 @@
 #include "experiments/results/table.hpp"
 #include "experiments/results/target_rows.hpp"
 #include "experiments/run/bench_harness.hpp"
-#include "experiments/scenes/scene_card.hpp"
+#include "experiments/run/scene_pictures.hpp"
 #include "experiments/study/contact_measurement.hpp"
 #include "experiments/study/ray_measurement.hpp"
 #include "experiments/study/targets.hpp"
@@ -30,25 +30,52 @@ using nlohmann::json;
 
 namespace {
 
-/// The largest scene whose keyframes are written for its picture, in primitives and in bodies (each is a
-/// file), and the number of keyframes.
-constexpr std::uint64_t largest_shown = 150'000;
-constexpr std::size_t most_bodies_shown = 1000;
-constexpr std::size_t keyframes_shown = 4;
+/// Returns the name of this machine as a part of a file name.
+std::string host() {
+  char name[256] = {};
+  if (::gethostname(name, sizeof name - 1) != 0) return "unknown";
+  return file_name(name);
+}
+
+/// Returns what identifies this invocation. Jobs run on several machines at the same time.
+std::string invocation(const std::string& job) {
+  return now_utc() + "-" + (job.empty() ? "" : host() + "-") + std::to_string(::getpid());
+}
+
+/// Opens the results: those of a job are appended to a file of this process alone, because appending from
+/// several machines to one file of a network file system can lose lines.
+std::unique_ptr<ResultStore> opened(const std::filesystem::path& out, const std::string& job,
+                                    const std::string& run) {
+  if (job.empty()) return std::make_unique<ResultStore>(out);
+  const std::filesystem::path folder = out / "jobs" / job;
+  prepare_folder(folder);
+  std::vector<std::filesystem::path> others{out / "results.jsonl"};
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+    if (entry.path().extension() == ".jsonl") others.push_back(entry.path());
+  std::sort(others.begin() + 1, others.end());
+  std::string name = run + ".jsonl";
+  std::erase(name, ':');
+  return std::make_unique<ResultStore>(out, std::filesystem::path("jobs") / job / name, others);
+}
 
 /// One run of a plan: the state shared by all its groups.
 class Runner {
  public:
-  Runner(Harness harness, const std::filesystem::path& out)
-      : harness_(harness), machine_(machine()), run_(now_utc() + "-" + std::to_string(::getpid())) {
+  Runner(Harness harness, const Plan& plan, const std::filesystem::path& out, const std::string& job)
+      : harness_(harness),
+        plan_{{"name", plan.name}, {"description", plan.description}},
+        machine_(machine()),
+        run_(invocation(job)) {
     if (out.empty()) return;
-    store_ = std::make_unique<ResultStore>(out);
+    store_ = opened(out, job, run_);
     std::error_code error;
     for (const char* name : {"benchmark.json", "targets.json"})
       if (const auto file = out / name; std::filesystem::is_directory(file, error))
         throw io::InputError(file.string() + ": is a folder, but a file must be written there");
     if (store_->unreadable_lines() > 0)
-      say("note: " + (out / "results.jsonl").string() + " has " + std::to_string(store_->unreadable_lines()) +
+      say("note: " + (job.empty() ? out / "results.jsonl" : out / "jobs" / job).string() + " has " +
+          std::to_string(store_->unreadable_lines()) +
           " unreadable lines (of an interrupted run?); they stay unchanged");
   }
 
@@ -62,7 +89,11 @@ class Runner {
       }
       const LoadedScene loaded = load(spec, making_);
       for (const std::string& text : loaded.notes) note("note: " + text);
-      card_ = store_ ? show_scene(loaded) : "";
+      card_ = store_ ? write_pictures(loaded, store_->folder(), making_,
+                                      [this](const std::string& text) { note(text); })
+                     : "";
+      progress_.clear();
+      scene_object_ = spec.object;
       for (const std::string& scalar : study.scalars) {
         if (scalar == "float")
           scene<float>(study, contestants, loaded);
@@ -86,34 +117,6 @@ class Runner {
   void note(const std::string& text) {
     progress_.clear();
     if (said_.insert(text).second) say(text);
-  }
-
-  /// Writes the report's data on a scene: its card, and a few keyframes if the scene is not too large for a
-  /// picture. Returns the card's hash; "" without a card.
-  std::string show_scene(const LoadedScene& loaded) {
-    std::uint64_t primitives = 0;
-    for (const io::AnimatedMesh& mesh : loaded.meshes) primitives += mesh.primitive_count();
-    if (primitives > largest_shown || loaded.meshes.size() > most_bodies_shown) return {};
-    const std::string hash = hexadecimal(card_hash(loaded));
-    const std::filesystem::path folder = store_->folder() / "scenes" / folder_name(loaded);
-    if (is_card(folder / "card.json", hash)) return hash;
-    making_("looking at " + loaded.name, 0);
-    try {
-      export_scene(loaded, folder, keyframes_shown);
-    } catch (const io::InputError& problem) {
-      // No measurement depends on it.
-      note("warning: the report will have no picture of " + loaded.name + ": " + problem.what());
-    }
-    progress_.clear();
-    return hash;
-  }
-
-  static bool is_card(const std::filesystem::path& file, const std::string& hash) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(file, error) || std::filesystem::file_size(file, error) == 0)
-      return false;
-    const json card = json_or_nothing(io::read_file(file));
-    return card.is_object() && card.contains("bodies") && card.contains("hash") && card.at("hash") == hash;
   }
 
   /// Warns of a scene of one body: it has times, but its query has nothing to find, which is seldom intended.
@@ -171,8 +174,8 @@ class Runner {
              const std::vector<double>& frames) {
     json about_scene = scene_record(scene, loaded, l, frames, script);
     if (study.changes) {
-      about_scene["changes"] = word(*study.changes);
-      about_scene["name"] = name_with_changes(scene.name, word(*study.changes));
+      about_scene["changes"] = answer_word(*study.changes);
+      about_scene["name"] = name_with_changes(scene.name, answer_word(*study.changes));
     }
     const std::string title = about_scene["name"].get<std::string>() + ", l = " + std::to_string(l);
     if (l > 1 && study.oracle_every % l == 0)
@@ -251,6 +254,7 @@ class Runner {
       json record{{"schema", results_schema},
                   {"kind", word(harness_)},
                   {"run", run_},
+                  {"plan", plan_},
                   {"study", study.name},
                   {"commit", commit()},
                   {"dirty", dirty()},
@@ -258,6 +262,7 @@ class Runner {
                   {"seed", loaded.seed},
                   {"scene", about_scene},
                   {"strategy", strategy_record(spec)}};
+      record["again"] = again_record(scene_object_, about_scene, record["strategy"], study);
       record["key"] =
           configuration_key(harness_, program_identity(), about_scene, record["strategy"], study, machine_);
       if (const json* known = known_record(record["key"], title + ": " + spec.label)) {
@@ -379,11 +384,13 @@ class Runner {
   }
 
   Harness harness_;
+  json plan_;  // its name and description
   json machine_;
   std::string run_;
   std::unique_ptr<ResultStore> store_;
   std::map<std::string, json> of_this_run_;  // by key, where there is no store
   std::string card_;                         // of the current scene
+  json scene_object_;                        // the current scene in a plan
   Progress progress_;
   const MakeProgress making_ = [this](const std::string& what, double fraction) {
     progress_.show(what + (fraction > 0 ? ": " + std::to_string(int(100 * fraction)) + " %" : ""));
@@ -395,7 +402,8 @@ class Runner {
 
 }  // namespace
 
-StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::path& out) {
+StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::path& out,
+                      const std::string& job) {
   // All errors of the contestants are found before the first measurement.
   std::vector<std::vector<ContestantSpec>> contestants;
   std::vector<std::string> notes;
@@ -404,7 +412,7 @@ StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::
   for (const auto& list : contestants) try_parameters(list);
   check_target_contestants(plan, contestants);
   for (const std::string& text : std::set<std::string>(notes.begin(), notes.end())) say("note: " + text);
-  Runner runner(harness, out);
+  Runner runner(harness, plan, out, job);
   for (std::size_t i = 0; i < plan.studies.size(); ++i) runner.study(plan.studies[i], contestants[i]);
   runner.targets(plan);
   return runner.outcome();

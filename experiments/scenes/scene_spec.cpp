@@ -120,6 +120,23 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
   return body;
 }
 
+/// Returns the scene of a plan as an object whose files are found from the working folder. Files in the data
+/// folder keep their prefix.
+json located(json scene, const fs::path& folder) {
+  const auto locate = [&](json& text) {
+    const std::string& file = text.get_ref<const std::string&>();
+    if (!file.starts_with("data:")) text = resolved(file, folder).lexically_normal().string();
+  };
+  if (scene.contains("script") && scene["script"].is_string()) locate(scene["script"]);
+  if (!scene.contains("bodies")) return scene;
+  for (json& body : scene["bodies"]) {
+    if (body.is_string()) body = body_from_text(body.get<std::string>());
+    for (const char* key : {"file", "motion"})
+      if (body.contains(key) && body[key].is_string()) locate(body[key]);
+  }
+  return scene;
+}
+
 /// Rejects a word that is neither a file nor the beginning of a file name: it was meant as a shape.
 void check_is_a_file(const BodySpec& body) {
   std::error_code error;
@@ -153,6 +170,11 @@ const char* word(VertexOrder order) {
       break;
   }
   return "given";
+}
+
+bool has_own_frames(const SceneSpec& spec) {
+  return (spec.script && spec.script->frames > 0) ||
+         (!spec.builtin.empty() && find_builtin_scene(spec.builtin).reversal != nullptr);
 }
 
 std::string given_name(const SceneSpec& spec) {
@@ -261,6 +283,7 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
   if (triangles.empty()) triangles = {base.options.triangles};
   if (seeds.empty()) seeds = {base.options.seed};
   if (orders.empty()) orders = {"given"};
+  const json located_object = located(object, folder);
   std::vector<SceneSpec> scenes;
   for (const std::uint64_t count : triangles)
     for (const std::uint64_t seed : seeds)
@@ -272,6 +295,10 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
         if (spec.script && spec.order != VertexOrder::given)
           keys.fail("order", "a script names vertices in the given order");
         spec.said = text_of(json{object, count, seed, order}) + " in " + folder.string();
+        spec.object = located_object;
+        if (!spec.builtin.empty()) spec.object["triangles"] = count;
+        spec.object["seed"] = seed;
+        spec.object["order"] = order;
         scenes.push_back(std::move(spec));
       }
   return scenes;

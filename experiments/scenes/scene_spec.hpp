@@ -55,11 +55,16 @@ struct SceneSpec {
   bool self = false;      ///< pairs within every body are requested, too
   bool optional = false;  ///< skipped with a note if a file does not exist
   std::string said;       ///< everything that defines the scene, as text: equal texts are equal scenes
+  nlohmann::json
+      object;  ///< this scene alone as an object of a plan; files are relative to the working folder
 };
 
 /// Returns the name that results will show if the plan gives one ("cloth", shuffled: "cloth-shuffled"), else
 /// "".
 std::string given_name(const SceneSpec& spec);
+
+/// Returns whether the scene defines its own frames, so that l does not apply. It need not be loaded.
+bool has_own_frames(const SceneSpec& spec);
 
 /// Returns "given", "shuffled" or "renumbered".
 const char* word(VertexOrder order);

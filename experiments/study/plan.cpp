@@ -79,7 +79,7 @@ StrategyRequest read_strategy(const json& value, const std::string& place) {
 std::optional<Answer> read_answer(const JsonReader& keys, const std::string& text) {
   if (text == "none") return {};
   for (const Answer answer : {Answer::candidates, Answer::pairs})
-    if (text == word(answer)) return answer;
+    if (text == answer_word(answer)) return answer;
   keys.fail("changes", "expected candidates, pairs or none, got '" + text + "'");
 }
 
@@ -133,7 +133,7 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
 
 }  // namespace
 
-const char* word(Answer answer) {
+const char* answer_word(Answer answer) {
   return answer == Answer::candidates ? "candidates" : "pairs";
 }
 

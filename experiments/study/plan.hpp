@@ -38,7 +38,7 @@ struct Study {
 };
 
 /// Names an answer in plans and results.
-const char* word(Answer answer);
+const char* answer_word(Answer answer);
 /// Returns the name of a scene in the tables of a study with `changes`.
 std::string name_with_changes(const std::string& scene, const std::string& changes);
 

@@ -78,8 +78,8 @@ Target read_target(const json& value, const std::string& place) {
   if (target.scalar != "float" && target.scalar != "double")
     keys.fail("scalar", "expected float or double, got '" + target.scalar + "'");
   target.changes = keys.word("changes").value_or("");
-  if (!target.changes.empty() && target.changes != word(Answer::candidates) &&
-      target.changes != word(Answer::pairs))
+  if (!target.changes.empty() && target.changes != answer_word(Answer::candidates) &&
+      target.changes != answer_word(Answer::pairs))
     keys.fail("changes", "expected candidates or pairs, got '" + target.changes + "'");
   target.per_keyframe = std::uint32_t(needed(keys, "l", keys.whole("l", ranges::frames_per_keyframe)));
   target.at_least = needed(keys, "at_least", keys.number("at_least"));
@@ -95,7 +95,7 @@ Target read_target(const json& value, const std::string& place) {
 /// Returns whether the study measures in this scalar and l, and the same kind of answer.
 bool measures(const Study& study, const Target& target) {
   return has(study.scalars, target.scalar) && has(study.per_keyframe, target.per_keyframe) &&
-         target.changes == (study.changes ? word(*study.changes) : "");
+         target.changes == (study.changes ? answer_word(*study.changes) : "");
 }
 
 std::string conditions(const Target& target) {

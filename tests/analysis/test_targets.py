@@ -115,9 +115,9 @@ class TestWrite(TargetsCase):
             self.assertIn("should be there once", err)
             self.assertEqual(page.read_text(encoding="utf-8"), content)
 
-    def test_the_readme_has_the_markers(self) -> None:
-        readme = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
-        self.assertIn("| refit over FCL |", targets_table.rewrite(readme, self.run_main(rows())[1]))
+    def test_the_page_of_results_has_the_markers(self) -> None:
+        page = (Path(__file__).resolve().parents[2] / "analysis" / "guides" / "results.md").read_text(encoding="utf-8")
+        self.assertIn("| refit over FCL |", targets_table.rewrite(page, self.run_main(rows())[1]))
 
 
 class TestRefusals(TargetsCase):

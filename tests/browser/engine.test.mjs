@@ -40,6 +40,14 @@ test('strategies are described', () => {
   assert.ok(title.length > 0 && family === 'kinetic' && about.length > 50 && parameters.some(({ name }) => name === 'queue'));
 });
 
+test('counters have meanings', async () => {
+  const { host } = await loaded({ scene: soups(), strategy: 'kinetic_aabb' });
+  const meanings = await host.counters();
+  assert.ok(meanings.every(({ name, meaning }) => /^[a-z_]+$/.test(name) && meaning.length > 5));
+  const { counters } = host.state();
+  for (const { name } of meanings) assert.ok(name in counters, name);
+});
+
 test('every strategy shows the bits of the program, in both precisions', async () => {
   let compared = 0;
   for (const scene of [soups(), ties()])
@@ -55,7 +63,7 @@ test('every strategy shows the bits of the program, in both precisions', async (
         }
         const events = host.history().flatMap(steps);
         assert.deepEqual(plain(events), expected.events, `${scene.name}, ${id}, ${precision}: events`);
-        assert.ok(!info.hasEvents || events.length > 10, `${id} has ${events.length} events`);
+        assert.ok(!info.hasEvents || events.length > 4, `${id} has ${events.length} events`);
       }
   assert.ok(compared > 500);
 });
@@ -187,7 +195,11 @@ test('pairs begin and end against the state shown last', async () => {
 });
 
 test('edits are part of the time line', async () => {
-  const { host, info } = await loaded({ scene: soups(), strategy: 'kinetic_aabb' });
+  for (const snapshotBytes of [undefined, 0]) await edits(snapshotBytes);
+});
+/** Without room for copies, everything is replayed from the start. */
+async function edits(snapshotBytes) {
+  const { host, info } = await loaded({ scene: soups(), strategy: 'kinetic_aabb', snapshotBytes });
   const plan = [{ body: 0, vertex: 4, times: [2], positions: [9, 9, 9], velocity: [1, 0, 0] }];
   const { frames } = info;
   host.frame(frames[3]);
@@ -208,7 +220,7 @@ test('edits are part of the time line', async () => {
   });
   assert.notEqual(later[0], untouched[0]);
   assert.deepEqual([...host.frame(2).positions[0].slice(12, 15)], [9, 9, 9]);
-  host.frame(frames[1]);
+  host.frame((frames[1] + frames[2]) / 2); // the detour takes a copy, for which that of the edit has to go
   [frames[4], frames[6], frames[8]].forEach((t, i) => {
     host.frame(t);
     assert.equal(host.checkpoint(), later[i], `replay after edits, t = ${t}`);
@@ -223,12 +235,15 @@ test('edits are part of the time line', async () => {
   assert.match(await refusal(() => host.changePlans([{ body: 0, vertex: 999, velocity: [0, 0, 0] }])), /999/);
   assert.match(await refusal(() => host.edit({ removedPrimitives: [{ body: 0, id: 77 }] })), /77/);
   assert.equal(host.checkpoint(), stands, 'a refused edit changes nothing');
-});
+}
 
 test('an edit after single events happens at the time of the last one', async () => {
-  const { host, info } = await loaded({ scene: soups(), strategy: 'kinetic_aabb' });
+  const { host, info } = await loaded({ scene: soups(), strategy: 'kinetic_aabb', snapshotBytes: 0 });
   for (let i = 0; i < 9; ++i) host.event(info.end, { counters: true });
   const { time } = host.state();
+  const between = host.checkpoint();
+  assert.match(await refusal(() => host.changePlans([{ body: 0, vertex: 1, times: [0], positions: [0, 0, 0] }])), /0/);
+  assert.equal(host.checkpoint(), between, 'a refused edit changes nothing');
   const state = host.changePlans([{ body: 0, vertex: 1, velocity: [0, 2, 0] }]);
   assert.equal(state.time, time);
   assert.ok(!state.betweenFrames);
@@ -238,7 +253,7 @@ test('an edit after single events happens at the time of the last one', async ()
   assert.equal(host.history().flatMap(steps).length, count);
   host.history().flatMap(steps).forEach(({ index }, i) => assert.equal(index, i));
   assert.equal(host.history(count - 3).flatMap(steps).filter(({ index }) => index >= count - 3).length, 3);
-  host.frame(info.begin);
+  host.frame((info.frames[0] + info.frames[1]) / 2);
   host.frame(info.end);
   assert.equal(host.checkpoint(), end);
 });

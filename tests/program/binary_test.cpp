@@ -6,7 +6,7 @@ namespace kbvh::experiments {
 namespace {
 
 TEST_F(Binary, HelpHasExamples) {
-  for (const char* command : {"list", "run", "bench", "report", "scene", "theory", "ccd"}) {
+  for (const char* command : {"list", "run", "bench", "report", "scene", "theory", "lab", "ccd", "data"}) {
     const Outcome help = kbvh(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find("Example"), std::string::npos) << command;

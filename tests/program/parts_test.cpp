@@ -5,6 +5,8 @@
 
 #include "complaint.hpp"
 #include "experiments/common/json_reader.hpp"
+#include "experiments/common/machine.hpp"
+#include "experiments/common/output.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/scenes/scene_spec.hpp"
 #include "experiments/study/contestants.hpp"
@@ -46,6 +48,25 @@ TEST(Text, Counts) {
                                                                         {2, "box", "2 boxes"},
                                                                         {2, "control net", "2 control nets"}})
     EXPECT_EQ(counted(count, noun), text);
+}
+
+TEST(Output, IsReceivedInsteadOfPrinted) {
+  testing::internal::CaptureStdout();
+  print("before ");
+  {
+    const PrintedText received;
+    print("one ");
+    print("two");
+    EXPECT_EQ(received.text(), "one two");
+  }
+  print("after");
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "before after");
+}
+
+// The identity of changed code is that of the file that holds it: this program, whatever runs it.
+TEST(Machine, IdentityNamesTheCommit) {
+  EXPECT_EQ(program_identity().rfind(commit(), 0), 0u);
+  EXPECT_EQ(program_identity() == commit(), !dirty() && commit() != "unknown");
 }
 
 TEST(Text, UnknownNames) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/topology/builders.hpp"
+#include "experiments/scenes/lab_scene.hpp"
 #include "experiments/scenes/scene_card.hpp"
 #include "experiments/scenes/shapes.hpp"
 
@@ -79,6 +80,32 @@ TEST(SceneCard, SharesEqualAPlainSearch) {
   EXPECT_GT(card.sides_changed, 0);
   EXPECT_DOUBLE_EQ(card.sides_changed, mean);
   EXPECT_DOUBLE_EQ(card.most_sides_changed, most);
+}
+
+TEST(LabScene, HoldsWhatTheSceneIs) {
+  io::AnimatedMesh square;
+  square.name = "square";
+  square.vertex_count = 4;
+  square.primitive_offsets = {0, 4};
+  square.primitive_vertices = {0, 1, 2, 3};
+  square.keyframe_times = {0.1};
+  square.positions = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 1.0 / 3};
+  LoadedScene scene = scene_of({scenes::random_soup(4, 3, 6), square});
+  scene.self = {false, true};
+  const nlohmann::json written = nlohmann::json::parse(lab_scene(scene, 7).dump());
+  EXPECT_EQ(written.at("format"), "kbvh-scene");
+  EXPECT_EQ(written.at("pairs"), nlohmann::json::parse("[[0, 1], [1, 1]]"));
+  EXPECT_EQ(written.at("frames").at("l"), 7);
+  const nlohmann::json &soup = written.at("bodies").at(0), &flat = written.at("bodies").at(1);
+  EXPECT_EQ(soup.at("vertices"), 12);
+  EXPECT_FALSE(soup.contains("offsets")) << "triangles need none";
+  EXPECT_EQ(soup.at("times").size(), 6u);
+  std::vector<double> positions;
+  for (const auto& keyframe : soup.at("positions"))
+    for (const auto& number : keyframe) positions.push_back(number);
+  EXPECT_EQ(positions, scene.meshes[0].positions);
+  EXPECT_EQ(flat.at("offsets"), nlohmann::json::parse("[0, 4]"));
+  EXPECT_EQ(flat.at("positions").at(0).at(11), 1.0 / 3);
 }
 
 }  // namespace

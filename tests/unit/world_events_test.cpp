@@ -183,6 +183,9 @@ TEST(WorldEvents, WatchedPairsAreThoseOfASeparationList) {
 }
 
 TEST(WorldEvents, DescribesEveryStrategy) {
+  const auto meanings = World::counter_meanings();
+  ASSERT_EQ(meanings.size(), std::size_t(Counter::count));
+  EXPECT_EQ(meanings[0].second, meaning(Counter(0)));
   const std::vector<WorldStrategy> all = World::strategy_descriptions();
   ASSERT_EQ(all.size(), World::strategies().size());
   for (std::size_t i = 0; i < all.size(); ++i) {

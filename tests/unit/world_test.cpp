@@ -15,24 +15,10 @@
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/ray_sets.hpp"
 #include "tests/support/synthetic_scenes.hpp"
+#include "tests/support/world_of.hpp"
 
 namespace kbvh::test {
 namespace {
-
-template <class S>
-World world_of(const Scene<S>& scene) {
-  World world(sizeof(S) == 4 ? Precision::float32 : Precision::float64);
-  for (const Body<S>& body : scene.bodies) {
-    const FlightPlans<S>& plans = body.plans;
-    const std::vector<S> positions(
-        plans.keyframe(0),
-        plans.keyframe(0) + std::size_t(3) * plans.keyframed_count() * plans.keyframe_count());
-    world.add_body(body.name, {body.primitives.vertices, body.primitives.offsets}, plans.keyframe_times(),
-                   std::span<const S>(positions));
-  }
-  for (const BodyPair& pair : scene.pairs) world.add_pair(pair.first, pair.second);
-  return world;
-}
 
 template <class S>
 void expect_the_same(const StrategyEntry& entry, const char* name,

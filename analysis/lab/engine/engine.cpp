@@ -23,6 +23,7 @@ class Engine {
  public:
   json call(const std::string& name, const json& request, Answer& answer) {
     if (name == "strategies") return strategies_json();
+    if (name == "counters") return counters_json();
     if (name == "open") return open(request);
     if (name == "body") return add_body(request);
     if (name == "start") return start(request);

@@ -60,6 +60,13 @@ json strategies_json() {
   return all;
 }
 
+json counters_json() {
+  json all = json::array();
+  for (const auto& [name, meaning] : World::counter_meanings())
+    all.push_back({{"name", name}, {"meaning", meaning}});
+  return all;
+}
+
 namespace {
 
 /// Replaces the boxes by those of the realisers at the given positions. Parents come before their children.

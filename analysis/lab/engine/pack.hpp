@@ -39,6 +39,9 @@ class PackedSteps {
 /// Describes all strategies as JSON.
 nlohmann::json strategies_json();
 
+/// Describes the counters that all strategies share.
+nlohmann::json counters_json();
+
 /// The state of a world that the page asks for.
 struct Wanted {
   bool positions = true, nodes = true, pairs = true, queue = true, counters = true;

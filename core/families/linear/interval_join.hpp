@@ -69,12 +69,6 @@ class IntervalJoin {
     const std::uint32_t place = place_[pair];
     return place >= throughout_ && place < alive_count_ && alive_places_[place] == pair;
   }
-  /// Calls use(pair) for every overlapping pair.
-  template <class Use>
-  void for_overlapping(const Use& use) const {
-    for (std::uint32_t place = 0; place < alive_count_; ++place)
-      use(place < throughout_ ? place : alive_places_[place]);
-  }
   /// Touches these marks whenever a pair begins or ends to overlap, until the next join.
   void follow(const FollowingMarks& marks) { following_ = marks; }
 

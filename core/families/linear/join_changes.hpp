@@ -36,23 +36,33 @@ class JoinChanges {
       if (!one.follows) continue;
       one.follows = false;
       for (std::size_t i = 0; i < parts.size(); ++i)
-        one.marks[i].for_reported(
-            [&](std::uint32_t pair) { one.before.push_back(parts[i].join->primitives_of(pair)); });
+        append(parts[i], one.before, [&](std::uint32_t pair) { return one.marks[i].is_reported(pair); });
     }
   }
-  /// Appends the changes since the last call for the same answer. `confirm(pairs)` keeps those of the pairs
-  /// that intersect, in their order.
+  /// Appends the changes since the last call for the same answer. Pairs need span tests in every part.
+  /// `confirm(pairs)` keeps those that intersect, in their order.
   template <class Confirm>
   void find(Answer answer, std::span<const Part> parts, const Confirm& confirm, PairBuffer& begun,
             PairBuffer& ended) {
     One& one = of_[std::size_t(answer)];
-    const bool follows = one.follows;
-    if (!follows) after_.clear();
+    if (!one.follows) after_.clear();
     for (std::size_t i = 0; i < parts.size(); ++i) {
-      if (!follows) touch_members(parts[i], one.marks[i]);
-      report(answer, parts[i], one.marks[i], confirm, follows ? begun : after_, ended);
+      PairMarks& marks = one.marks[i];
+      if (!one.follows) marks.start(parts[i].join->pairs().size());
+      if (answer == Answer::pairs) test(parts[i], marks, confirm);
+      const auto is_in = [&](std::uint32_t pair) {
+        if (answer == Answer::candidates) return is_candidate(parts[i], pair);
+        return parts[i].filter->intersects(pair) || marks.is_hit(pair);
+      };
+      // In the order of the join, which is similar in the next segment: answers in a similar order are
+      // compared faster.
+      if (!one.follows)
+        append(parts[i], after_, [&](std::uint32_t pair) { return is_in(pair) && marks.set_reported(pair); });
+      marks.report(is_in, [&](std::uint32_t pair, bool began) {
+        (began ? begun : ended).push_back(parts[i].join->primitives_of(pair));
+      });
     }
-    if (follows) return;
+    if (one.follows) return;
     one.follows = true;
     for (std::size_t i = 0; i < parts.size(); ++i) follow(parts[i], i);
     difference_.find(one.before, after_, begun, ended);
@@ -80,13 +90,15 @@ class JoinChanges {
   static bool is_candidate(const Part& part, std::uint32_t pair) {
     return part.filter == nullptr ? part.join->overlaps(pair) : part.filter->may_intersect(pair);
   }
-  /// In the order of the join, which is similar in the next segment: answers in a similar order are compared
-  /// faster.
-  static void touch_members(const Part& part, PairMarks& marks) {
+  /// Appends the pairs that `is_in` selects.
+  template <class IsIn>
+  static void append(const Part& part, PairBuffer& out, const IsIn& is_in) {
     const auto count = std::uint32_t(part.join->pairs().size());
-    marks.start(count);
+    std::size_t size = out.size();
+    out.resize(size + count);
     for (std::uint32_t pair = 0; pair < count; ++pair)
-      if (is_candidate(part, pair)) marks.touch(pair);
+      if (is_in(pair)) out[size++] = part.join->primitives_of(pair);
+    out.resize(size);
   }
   void follow(const Part& part, std::size_t i) {
     FollowingMarks marks;
@@ -94,39 +106,21 @@ class JoinChanges {
       if (of_[answer].follows) marks.of[answer] = &of_[answer].marks[i];
     part.filter == nullptr ? part.join->follow(marks) : part.filter->follow(marks);
   }
-  template <class Confirm>
-  void report(Answer answer, const Part& part, PairMarks& marks, const Confirm& confirm, PairBuffer& begun,
-              PairBuffer& ended) {
-    const auto tell = [&](std::uint32_t pair, bool began) {
-      (began ? begun : ended).push_back(part.join->primitives_of(pair));
-    };
-    const auto is_in = [&](std::uint32_t pair) { return is_candidate(part, pair); };
-    if (answer == Answer::candidates) return marks.report(is_in, tell);
-    test(part, marks, confirm);
-    marks.report(
-        [&](std::uint32_t pair) {
-          return (part.filter != nullptr && part.filter->intersects(pair)) ||
-                 (is_in(pair) && marks.is_hit(pair));
-        },
-        tell);
-  }
   /// Tests the triangles of all pairs that are not decided.
   template <class Confirm>
   void test(const Part& part, PairMarks& marks, const Confirm& confirm) {
     to_test_.clear();
-    const auto add = [&](std::uint32_t pair) {
+    part.filter->for_open([&](std::uint32_t pair) {
       marks.touch(pair);
       to_test_.push_back(part.join->primitives_of(pair));
-    };
-    part.filter == nullptr ? part.join->for_overlapping(add) : part.filter->for_open(add);
+    });
     confirm(to_test_);
     std::size_t next = 0;
-    const auto take = [&](std::uint32_t pair) {
+    part.filter->for_open([&](std::uint32_t pair) {
       if (next == to_test_.size() || !(to_test_[next] == part.join->primitives_of(pair))) return;
       marks.set_hit(pair);
       ++next;
-    };
-    part.filter == nullptr ? part.join->for_overlapping(take) : part.filter->for_open(take);
+    });
   }
 
   One of_[2];  ///< [Answer]

@@ -19,6 +19,12 @@ class PairMarks {
     marks_[pair] |= touched;
     touched_.push_back(pair);
   }
+  bool is_reported(std::uint32_t pair) const { return (marks_[pair] & reported) != 0; }
+  /// Returns true.
+  bool set_reported(std::uint32_t pair) {
+    marks_[pair] |= reported;
+    return true;
+  }
   /// Keeps the outcome of a test of the pair until the next report.
   void set_hit(std::uint32_t pair) { marks_[pair] |= hit; }
   bool is_hit(std::uint32_t pair) const { return (marks_[pair] & hit) != 0; }
@@ -28,16 +34,10 @@ class PairMarks {
   void report(const IsIn& is_in, const Tell& tell) {
     for (const std::uint32_t pair : touched_) {
       const bool now = is_in(pair), before = (marks_[pair] & reported) != 0;
-      marks_[pair] = now ? reported : 0;
+      marks_[pair] = now ? reported : 0;  // no longer touched
       if (now != before) tell(pair, now);
     }
     touched_.clear();
-  }
-  /// Calls use(pair) for every reported pair. O(pairs).
-  template <class Use>
-  void for_reported(const Use& use) const {
-    for (std::uint32_t pair = 0; pair < marks_.size(); ++pair)
-      if ((marks_[pair] & reported) != 0) use(pair);
   }
   std::size_t bytes() const { return marks_.capacity() + touched_.capacity() * sizeof(std::uint32_t); }
 

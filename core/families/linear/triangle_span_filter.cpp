@@ -174,13 +174,24 @@ void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const Scene
   due_.resize(left);
 }
 
-/// When a proof expires, retries the remaining span, then its first quarter.
+/// When a proof expires, retries the remaining span, then its first quarter, and that quarter's first quarter
+/// as long as several frames lie in it.
 template <class S>
 void TriangleSpanFilter<S>::attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene,
                                         const IntervalJoin<S>& join, float fraction) {
   attempt(segment, scene, join, fraction, 1);
-  attempt(segment, scene, join, fraction, 0.25F);
-  for (const std::uint32_t pair : due_) leave_open(pair, fraction + (join.pairs()[pair].end - fraction) / 4);
+  for (float share = 0.25F; !due_.empty(); share /= 4) {
+    attempt(segment, scene, join, fraction, share);
+    std::size_t left = 0;
+    for (const std::uint32_t pair : due_) {
+      const float rest = share * (join.pairs()[pair].end - fraction);
+      if (step_ > 0 && rest >= 8 * step_)
+        due_[left++] = pair;
+      else
+        leave_open(pair, fraction + rest);
+    }
+    due_.resize(left);
+  }
 }
 
 template <class S>

@@ -9,9 +9,10 @@
 namespace kbvh {
 
 /// Decides the triangle tests of an interval join for spans of time where a proof exists. When a pair begins,
-/// or when a proof expires, it retries the remaining span, then its first quarter. A pair proved apart is not
-/// examined again before its span ends; a pair proved intersecting is only reported; any other pair is a
-/// candidate at each frame for the length of that quarter.
+/// or when a proof expires, it retries the remaining span, then its first quarter, and so on while several
+/// frames lie in the next quarter. A pair proved apart is not examined again before its span ends; a pair
+/// proved intersecting is only reported; any other pair is a candidate at each frame for the length of the
+/// last quarter.
 ///
 /// All bodies of the join must consist of triangles only, with the corners of primitive p at 3 p, 3 p + 1 and
 /// 3 p + 2 of `Primitives::vertices` (`all_triangles`).

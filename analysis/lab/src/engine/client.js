@@ -44,6 +44,7 @@ export function engineOver(call, close) {
   const stepOrNull = (packed) => (packed === null ? null : steps(packed)[0]);
   return {
     strategies: () => call('strategies', []),
+    counters: () => call('counters', []),
     load: (config) => call('load', [config]),
     readScene: (files, options) => call('readScene', [files, options]),
     frame: async (t, want) => decodedState(await call('frame', [t, want])),

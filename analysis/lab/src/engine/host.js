@@ -17,6 +17,9 @@ export class Host {
     this.#strategies ??= (await this.#newModule()).call('strategies');
     return this.#strategies;
   }
+  async counters() {
+    return (await this.#newModule()).call('counters');
+  }
   async load(config) {
     const timeline = new Timeline(await this.#newModule(), config);
     this.#timeline = timeline; // the old one stays if the new one fails

@@ -4,11 +4,12 @@
 // The line has stops: the frames, and the times of edits. The canonical way to a stop is to advance and query at every
 // stop before it. A place is a stop, a time between this stop and the next one, or some single events after either.
 
+import { difference, hashOf, merged } from './packed.js';
 import { checkedScene, frameTimes, overlaidKeyframes } from './scene.js';
 
 const SNAPSHOT_AFTER = 25; // milliseconds of replay
 const SNAPSHOT_PER_MIB = 2; // and as many for each MiB to copy
-const SNAPSHOT_BUDGET = 192 << 20; // bytes
+const SNAPSHOT_BYTES = 192 << 20; // of all of them
 const NOTHING = { positions: false, nodes: false, pairs: false, queue: false, counters: false };
 
 export class Timeline {
@@ -24,16 +25,18 @@ export class Timeline {
   #eventsSinceStop = 0;
   #snapshots = new Map(); // stop -> memory
   #seconds = 0;
+  #snapshotBytes;
   #shownPairs = new Uint32Array(0);
 
   /** Loads a scene into a fresh module and starts a strategy. */
-  constructor(module, { scene, strategy, params = {}, topology = {}, precision = 'float64', t0 }) {
+  constructor(module, { scene, strategy, params = {}, topology = {}, precision = 'float64', t0, snapshotBytes = SNAPSHOT_BYTES }) {
     const { bodies, pairs, l } = checkedScene(scene);
     if (precision !== 'float64' && precision !== 'float32')
       throw new Error(`the precision is "${precision}", not float64 or float32`);
     const texts = (map) => Object.fromEntries(Object.entries(map).map(([key, value]) => [key, String(value)]));
     const keyframes = overlaidKeyframes(bodies);
     this.#module = module;
+    this.#snapshotBytes = snapshotBytes;
     this.#bodies = bodies.length;
     this.#end = keyframes[keyframes.length - 1];
     const begin = t0 ?? keyframes[0];
@@ -146,9 +149,15 @@ export class Timeline {
   /** Applies an edit, {plans: [...]} or {edit: {...}}, at the current time. Edits at later times are taken back. */
   change(edit) {
     const request = normalEdit(edit);
+    const place = [this.#stop, this.#time, this.#steps];
     if (this.#steps > 0) this.frame(this.#now); // single events end at the time of the last one
     this.#leaveStop();
-    this.#module.call(...request);
+    try {
+      this.#module.call(...request);
+    } catch (error) {
+      this.#go(...place);
+      throw error;
+    }
     if (this.#time !== null) {
       const stop = { t: this.#time, frame: null, edits: [], log: merged(this.#logs), events: this.eventsDone, cost: this.#stops[this.#stop].cost + 1 };
       this.#stops.splice(++this.#stop, 0, stop);
@@ -274,7 +283,7 @@ export class Timeline {
     this.#snapshots.set(this.#stop, this.#module.snapshot());
     let bytes = 0;
     for (const memory of this.#snapshots.values()) bytes += memory.byteLength;
-    while (bytes > SNAPSHOT_BUDGET && this.#snapshots.size > 2) {
+    while (bytes > this.#snapshotBytes) {
       // Drops the one whose absence costs least: the replay between its neighbours.
       const places = [...this.#snapshots.keys()].sort((a, b) => a - b);
       let cheapest = null;
@@ -319,78 +328,4 @@ function normalEdit({ plans, edit }) {
     removedPrimitives: removedPrimitives.map(({ body = 0, id }) => ({ body, id })),
     removedVertices: removedVertices.map(({ body = 0, id }) => ({ body, id })),
   }];
-}
-
-/** The pairs of the sorted list `a` that are not in the sorted list `b`. */
-function difference(a, b) {
-  const order = [0, 2, 1, 3]; // bodies first
-  const compare = (i, j) => {
-    for (const k of order) if (a[i + k] !== b[j + k]) return a[i + k] - b[j + k];
-    return 0;
-  };
-  const out = [];
-  let j = 0;
-  for (let i = 0; i < a.length; i += 4) {
-    while (j < b.length && compare(i, j) > 0) j += 4;
-    if (j >= b.length || compare(i, j) !== 0) out.push(a[i], a[i + 1], a[i + 2], a[i + 3]);
-  }
-  return Uint32Array.from(out);
-}
-
-/** One log of several. */
-function merged(logs) {
-  if (logs.length === 0) return null;
-  const joined = (parts) => {
-    const out = new parts[0].constructor(parts.reduce((sum, part) => sum + part.length, 0));
-    let at = 0;
-    for (const part of parts) {
-      out.set(part, at);
-      at += part.length;
-    }
-    return out;
-  };
-  const ends = (of) => {
-    let before = 0;
-    return joined(of.map((part) => {
-      const moved = part.map((end) => end + before);
-      before += part.length === 0 ? 0 : part[part.length - 1];
-      return moved;
-    }));
-  };
-  const events = (of) => ({ words: joined(of.map((part) => part.words)), numbers: joined(of.map((part) => part.numbers)) });
-  return {
-    events: events(logs.map((log) => log.events)),
-    touchedEnds: ends(logs.map((log) => log.touchedEnds)),
-    touched: joined(logs.map((log) => log.touched)),
-    rescheduledEnds: ends(logs.map((log) => log.rescheduledEnds)),
-    rescheduled: events(logs.map((log) => log.rescheduled)),
-  };
-}
-
-/** FNV-1a over the bits of every number and the text of everything else, in two lanes of 32 bits. */
-function hashOf(value) {
-  let a = 0x811c9dc5, b = 0xcbf29ce4;
-  const mix = (word) => {
-    a = Math.imul(a ^ word, 0x01000193);
-    b = Math.imul(b ^ word ^ (a >>> 15), 0x85ebca6b);
-  };
-  const text = (string) => {
-    for (let i = 0; i < string.length; ++i) mix(string.charCodeAt(i));
-  };
-  const visit = (part) => {
-    if (ArrayBuffer.isView(part)) {
-      const words = new Uint32Array(part.buffer, part.byteOffset, part.byteLength >> 2);
-      mix(words.length);
-      for (let i = 0; i < words.length; ++i) mix(words[i]);
-    } else if (part !== null && typeof part === 'object') {
-      for (const key of Object.keys(part).sort()) {
-        text(key);
-        visit(part[key]);
-      }
-    } else {
-      text(`${typeof part}:${String(part)};`);
-    }
-  };
-  visit(value);
-  return (a >>> 0).toString(16).padStart(8, '0') + (b >>> 0).toString(16).padStart(8, '0');
 }

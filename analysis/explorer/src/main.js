@@ -1,0 +1,385 @@
+// The page: header, filters, views, the panel of a point; redrawn from the state, which the link holds.
+import "./style.css";
+import { forget } from "./chart.js";
+import { command } from "./command.js";
+import { details } from "./details.js";
+import { choice, copy, hintScrolling, make, paints, symbol } from "./dom.js";
+import { filters } from "./filters.js";
+import { MEASURES, compare, entrants, model as modelOf, reference, seriesOfName, selected } from "./model.js";
+import { FACETS, decode, encode, initial } from "./state.js";
+import * as statistics from "./statistics.js";
+import { claims } from "./views/claims.js";
+import { errors } from "./views/errors.js";
+import { frames } from "./views/frames.js";
+import { overview, profiled } from "./views/overview.js";
+import { pairwise } from "./views/pairwise.js";
+import { runs } from "./views/runs.js";
+import { scaling } from "./views/scaling.js";
+import { pairs, sources, versus } from "./views/versus.js";
+import { plural } from "./words.js";
+
+const begun = performance.now();
+const model = modelOf(JSON.parse(document.getElementById("data").textContent));
+let state = decode(location.hash);
+
+const VIEWS = {
+  overview: { name: "Overview", draw: overview, uses: ["measure", "against", "per", "contestants", "cells"] },
+  pairwise: { name: "Ratios", draw: pairwise, uses: ["measure", "against", "per", "contestants"] },
+  errors: { name: "Time and error", draw: errors, uses: ["measure", "cell"] },
+  scaling: { name: "Over l and n", draw: scaling, uses: ["measure", "per", "contestants"] },
+  frames: { name: "Frames over time", draw: frames, uses: ["cell", "per", "contestants"] },
+  versus: { name: "A against B", draw: versus, uses: ["measure", "contestants"], shown: () => sources(model).size > 1 },
+  claims: { name: "The paper's claims", draw: claims, uses: [], shown: () => model.data.claims.length > 0 },
+  runs: { name: "All runs", draw: runs, uses: ["measure", "against", "contestants"] },
+};
+const views = Object.entries(VIEWS).filter(([, { shown }]) => !shown || shown());
+
+const host = {
+  filters: make("aside", { id: "filters", "aria-label": "Filters" }),
+  tabs: make("div", { role: "tablist", "aria-label": "Views" }),
+  tools: make("div", { class: "toolbar", "aria-label": "What is shown" }),
+  view: make("div", { id: "view", role: "tabpanel", tabindex: -1 }),
+  panel: make("aside", { id: "details", "aria-labelledby": "details-name", tabindex: -1, hidden: true }),
+  said: make("p", { class: "hidden", role: "status" }),
+};
+
+/** Changes the state, the link and the page. */
+function set(patch) {
+  const before = state;
+  state = { ...state, ...patch };
+  const link = `#${encode(state)}`;
+  const jumps = state.view !== before.view;
+  history[jumps ? "pushState" : "replaceState"](null, "", link === "#" ? location.pathname + location.search : link);
+  draw(Object.keys(patch));
+}
+
+function choose(run, from) {
+  host.back = from;
+  set({ point: run.key });
+  host.panel.focus({ preventScroll: true });
+}
+
+function close() {
+  set({ point: "" });
+  host.back?.focus?.({ preventScroll: true });
+}
+
+/** The cell of views that show one: the chosen one, or the one with most entrants. */
+function currentCell() {
+  const cells = entrants(model, { ...state, contestants: state.view === "errors" ? "all" : state.contestants });
+  const wanted = [...cells.keys()].find((cell) => cell.key === state.cell);
+  if (wanted) return { cells, cell: wanted };
+  const most = [...cells].sort((a, b) => b[1].size - a[1].size || b[0].primitives - a[0].primitives)[0];
+  return { cells, cell: most?.[0] };
+}
+
+function tools(uses, current) {
+  const strategies = Object.fromEntries(
+    [...new Map(model.contestants.map((one) => [one.id, one.title]))].sort((a, b) => a[1].localeCompare(b[1])),
+  );
+  const settings = Object.fromEntries(
+    model.contestants
+      .filter((one) => model.contestants.filter((other) => other.id === one.id).length > 1)
+      .map((one) => [one.key, one.label])
+      .sort((a, b) => a[1].localeCompare(b[1])),
+  );
+  const against = {
+    usual: undefined,
+    "In each cell": { baseline: "the best refit", tree: "the refit of the same tree", fastest: "the fastest" },
+    "A strategy, at its fastest": strategies,
+    "One setting": settings,
+  };
+  delete against.usual;
+  if (!Object.keys(settings).length) delete against["One setting"];
+  const words = Object.fromEntries(Object.entries(MEASURES).map(([name, measure]) => [name, measure.name]));
+  const all = {
+    cell: () =>
+      current &&
+      choice(
+        "Cell",
+        Object.fromEntries([...current.cells.keys()].map((cell) => [cell.key, cell.title])),
+        current.cell?.key,
+        (cell) => set({ cell }),
+      ),
+    measure: () => choice("Measure", words, state.measure, (measure) => set({ measure })),
+    against: () => choice("Compared with", against, state.against, (name) => set({ against: name })),
+    per: () =>
+      choice("Settings", { best: "each strategy's fastest", each: "every setting" }, state.per, (per) => set({ per })),
+    contestants: () =>
+      choice("Contestants", { usual: "guaranteed, one thread", all: "all" }, state.contestants, (contestants) =>
+        set({ contestants }),
+      ),
+    cells: () =>
+      choice(
+        "Cells",
+        { own: "those of each strategy", all: "all; absent is never", common: "common to all" },
+        state.cells,
+        (cells) => set({ cells }),
+      ),
+  };
+  host.tools.replaceChildren(...uses.map((name) => all[name]()).filter(Boolean));
+}
+
+/** A legend of series or strategies, or of runs. */
+function legend(names) {
+  const named = (name) =>
+    seriesOfName(model, { per: model.contestants.some((one) => one.id === name) ? "best" : "each" }, name);
+  return legendList(names.map(named).map(({ contestant, label }) => [contestant, label]));
+}
+function legendOf(list) {
+  return legendList([
+    ...new Map(list.map((run) => [run.contestant.key, [run.contestant, run.contestant.label]])).values(),
+  ]);
+}
+function legendList(entries) {
+  return (
+    entries.length > 0 &&
+    make(
+      "ul",
+      { class: "legend", "aria-label": "Legend" },
+      entries.map(([contestant, label]) => make("li", {}, symbol(contestant), label)),
+    )
+  );
+}
+
+function drawView() {
+  const [name, view] = views.find(([key]) => key === state.view) ?? views[0];
+  const current = view.uses.includes("cell") ? currentCell() : null;
+  for (const tab of host.tabs.children) {
+    const mine = tab.dataset.view === name;
+    tab.setAttribute("aria-selected", mine);
+    tab.tabIndex = mine ? 0 : -1;
+  }
+  tools(view.uses, current);
+  host.view.setAttribute("aria-label", view.name);
+  const context = { model, state, set, choose, legend, legendOf, cell: current?.cell };
+  const count = selected(model, state).length;
+  const nothing = count === 0 && name !== "claims";
+  host.view.replaceChildren(
+    ...(nothing
+      ? [make("p", { class: "lead", text: "No run passes these filters." })]
+      : view.draw(context).filter(Boolean)),
+  );
+  hintScrolling(host.view);
+  host.said.textContent = `${view.name}: ${plural(count, "run")}`;
+  forget();
+}
+
+function drawPanel() {
+  const run = state.point && model.runs.find((one) => one.key === state.point);
+  host.panel.hidden = !run;
+  document.body.classList.toggle("has-details", Boolean(run));
+  if (run) host.panel.replaceChildren(...details(model, state, run, close));
+}
+
+function drawFilters() {
+  const open = new Map([...host.filters.querySelectorAll("details")].map((one) => [one.dataset.facet, one.open]));
+  const focused = document.activeElement?.closest?.("#filters input");
+  host.filters.replaceChildren(...filters({ model, state, set, close: () => showFilters(false) }));
+  for (const one of host.filters.querySelectorAll("details"))
+    if (open.has(one.dataset.facet)) one.open = open.get(one.dataset.facet);
+  if (focused)
+    host.filters.querySelector(`input[name="${focused.name}"][value="${CSS.escape(focused.value)}"]`)?.focus();
+  const active = FACETS.filter((facet) => state[facet].length).length;
+  host.open.textContent = active ? `Filters (${active})` : "Filters";
+}
+
+/** Opens or closes the filters, where the window is too narrow for them to stay. */
+function showFilters(open) {
+  document.body.classList.toggle("filters-open", open);
+  host.open.setAttribute("aria-expanded", open);
+  (open ? host.filters.querySelector("input, summary") : host.open)?.focus({ preventScroll: true });
+}
+
+/** Redraws what depends on the changed parts of the state. */
+function draw(changed) {
+  const only = (...names) => changed?.length && changed.every((name) => names.includes(name));
+  if (!only("point", "sort", "view", "a", "b", "cell", "against", "measure")) drawFilters();
+  drawPanel();
+  if (only("point")) markChosen();
+  else {
+    const top = changed?.includes("view");
+    const focus = host.tools.contains(document.activeElement)
+      ? [...host.tools.querySelectorAll("select")].indexOf(document.activeElement)
+      : -1;
+    drawView();
+    if (focus >= 0) host.tools.querySelectorAll("select")[focus]?.focus();
+    if (top && scrollY > host.tabs.offsetTop) scrollTo({ top: host.tabs.offsetTop - 8 });
+  }
+}
+
+function markChosen() {
+  for (const cell of host.view.querySelectorAll("[data-run]"))
+    cell.classList.toggle("chosen", model.runs[cell.dataset.run].key === state.point);
+}
+
+function header() {
+  const { data } = model;
+  const named = data.plans.filter((plan) => plan.name);
+  // A study's question is the title; of several, a list that the filter of studies chooses from.
+  const names = named.map((plan) => plan.name);
+  const title =
+    data.title ||
+    (names.length > 3 ? plural(names.length, "study").replace("studys", "studies") : names.join(" · ")) ||
+    document.title;
+  const about =
+    named.length === 1
+      ? [make("p", { class: "question", text: named[0].description })]
+      : named.map((plan) =>
+          make("p", { class: "question" }, make("strong", { text: `${plan.name}.` }), ` ${plan.description}`),
+        );
+  const facts = [
+    plural(model.runs.length, "run"),
+    plural(model.cells.length, "cell"),
+    plural(new Set(model.cells.map((cell) => cell.scene)).size, "scene"),
+    plural(new Set(model.contestants.map((one) => one.id)).size, "strategy").replace("strategys", "strategies"),
+    model.commits.length === 1 ? `commit ${model.commits[0].label}` : plural(model.commits.length, "commit"),
+    model.machines.length === 1 ? model.machines[0].label : plural(model.machines.length, "machine"),
+  ];
+  const share = make("button", {
+    type: "button",
+    text: "Copy the link",
+    title: "The link has the filters, the view and the chosen point",
+    click: () => copy(location.href, share),
+  });
+  const theme = make("button", {
+    type: "button",
+    id: "theme",
+    click: () => scheme(document.documentElement.dataset.scheme === "dark" ? "light" : "dark"),
+  });
+  host.theme = theme;
+  return make(
+    "header",
+    { class: "page" },
+    make(
+      "div",
+      { class: "title" },
+      make("h1", { text: title }),
+      make(
+        "div",
+        { class: "actions" },
+        data.report && make("a", { href: data.report, text: "Report for print" }),
+        share,
+        theme,
+      ),
+    ),
+    about.length > 3 ? make("details", { class: "notes" }, make("summary", { text: "What they ask" }), about) : about,
+    make("p", { class: "facts", text: facts.join(" · ") }),
+    data.notes.length > 0 &&
+      make(
+        "details",
+        { class: "notes" },
+        make("summary", { text: plural(data.notes.length, "note") + " on the input" }),
+        make(
+          "ul",
+          {},
+          data.notes.map((text) => make("li", { text })),
+        ),
+      ),
+  );
+}
+
+/** Chooses a colour scheme; by default, the system's. */
+function scheme(name) {
+  document.documentElement.dataset.scheme = name;
+  host.theme.textContent = name === "dark" ? "Light" : "Dark";
+  host.theme.setAttribute("aria-label", `switch to the ${name === "dark" ? "light" : "dark"} scheme`);
+}
+
+function build() {
+  document.head.append(
+    make("style", {
+      text: `:root{${paints(model.contestants, "light")}}:root[data-scheme=dark]{${paints(model.contestants, "dark")}}`,
+    }),
+  );
+  host.open = make("button", {
+    type: "button",
+    id: "open-filters",
+    "aria-controls": "filters",
+    "aria-expanded": "false",
+    click: () => showFilters(!document.body.classList.contains("filters-open")),
+  });
+  host.filters.addEventListener("keydown", (event) => event.key === "Escape" && showFilters(false));
+  host.tabs.append(
+    ...views.map(([key, { name }]) =>
+      make("button", {
+        type: "button",
+        role: "tab",
+        "data-view": key,
+        "aria-controls": "view",
+        text: name,
+        click: () => set({ view: key }),
+      }),
+    ),
+  );
+  host.tabs.addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step) return;
+    const at = views.findIndex(([key]) => key === document.activeElement.dataset.view);
+    const next = host.tabs.children[(at + step + views.length) % views.length];
+    next.focus();
+    next.click();
+  });
+  host.panel.addEventListener("keydown", (event) => event.key === "Escape" && close());
+  document.body.prepend(
+    make("a", {
+      class: "skip",
+      href: "#view",
+      text: "Skip to the figures",
+      click: (event) => {
+        event.preventDefault();
+        host.view.focus();
+      },
+    }),
+    header(),
+    make(
+      "div",
+      { class: "layout" },
+      host.filters,
+      make("main", {}, make("nav", { class: "views" }, host.open, host.tabs), host.tools, host.view),
+      host.panel,
+    ),
+    make(
+      "footer",
+      {},
+      make("p", {
+        text: `From ${model.data.source}. Ratios compare repetition with repetition where both ran in one session; intervals are bootstraps over repetitions.`,
+      }),
+    ),
+    host.said,
+  );
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  scheme(dark.matches ? "dark" : "light");
+  dark.addEventListener("change", () => scheme(dark.matches ? "dark" : "light"));
+}
+
+build();
+draw();
+addEventListener("hashchange", () => {
+  state = decode(location.hash);
+  draw();
+});
+addEventListener("popstate", () => {
+  state = decode(location.hash);
+  draw();
+});
+
+// For the console, and for tests: what the page computes.
+window.explorer = {
+  model,
+  set,
+  statistics,
+  sources: () => sources(model),
+  pairs: (a, b) => pairs(model, state, a, b),
+  initial,
+  encode,
+  decode,
+  state: () => state,
+  command,
+  profiles: () => profiled({ model, state }),
+  ratio: (run, base, measure) => compare(model, run, base, measure),
+  reference: (run) => reference(model, state, run.cell, run),
+  selected: () => selected(model, state),
+  ready: performance.now() - begun,
+};
+requestAnimationFrame(() => requestAnimationFrame(() => (window.explorer.shown = performance.now())));

@@ -1,0 +1,140 @@
+// Time against error.
+import * as Plot from "@observablehq/plot";
+import { clippedMarks, dotLook, figure, logAxis, logScale } from "../chart.js";
+import { make, paintOf } from "../dom.js";
+import { MEASURES, selected, value } from "../model.js";
+import { percent, plural, sentence, significant, tick } from "../words.js";
+import { empty } from "./overview.js";
+
+const ERRORS = {
+  looseness: {
+    name: "looseness of the boxes",
+    of: (run) => run.looseness,
+    format: (v) => percent(v),
+    reading: "Summed surface area of the boxes over that of tight ones, minus one: loose boxes cost query time.",
+  },
+  false: {
+    name: "false candidates per pair",
+    of: (run) =>
+      run.pairs === null || run.candidates === null
+        ? null
+        : (run.candidates - run.pairs + (run.missed_candidates ?? 0)) / Math.max(run.pairs, 1),
+    format: (v) => significant(v, 3),
+    reading: "Candidates that are no pairs, for each pair.",
+  },
+  missed: {
+    name: "missed pairs",
+    of: (run) => (run.missed === null ? null : run.missed / Math.max(run.pairs ?? 1, 1)),
+    format: (v) => percent(v),
+    reading: "Pairs of the oracle that were not reported, as a share of all.",
+  },
+  extra: {
+    name: "extra pairs",
+    of: (run) => (run.extra === null ? null : run.extra / Math.max(run.pairs ?? 1, 1)),
+    format: (v) => percent(v),
+    reading: "Reported pairs that the oracle does not have, as a share of all.",
+  },
+  protrusion: {
+    name: "protrusion",
+    of: (run) => run.protrusion,
+    format: (v) => significant(v, 2),
+    reading: "How far a vertex leaves a box that a query has read, in units of the scene: a valid box has exactly 0.",
+  },
+};
+
+export function errors(context) {
+  const { model, state } = context;
+  const cell = context.cell;
+  if (!cell) return [empty("Time against error", "No cell of this selection has a time.")];
+  const runs = selected(model, { ...state, contestants: "all" }).filter(
+    (run) => run.cell === cell && value(model, run, state.measure) > 0,
+  );
+  const figures = Object.values(ERRORS)
+    .map((error) => one(context, error, runs))
+    .filter(Boolean);
+  if (!figures.length)
+    return [
+      empty(
+        `Time against error: ${cell.title}`,
+        "All contestants of this cell have the same errors; the numbers of a point tell them.",
+      ),
+    ];
+  return [
+    make("p", {
+      class: "lead",
+      text: `Every contestant and setting of one cell, those without a guarantee included: ${cell.title}. Down and to the left is better; the line joins those that no other beats in both.`,
+    }),
+    make("div", { class: "pair" }, figures),
+    context.legend([...new Set(runs.map((run) => run.contestant.id))]),
+  ];
+}
+
+function one({ model, state, choose }, error, runs) {
+  const usable = runs
+    .map((run) => ({ run, time: value(model, run, state.measure), error: error.of(run) }))
+    .filter((p) => p.error !== null && p.error >= 0);
+  if (new Set(usable.map((p) => p.error)).size < 2) return null;
+  const times = logAxis(usable.map((p) => p.time));
+  // Errors are not clipped: the few that differ are the finding. An error of exactly 0 has its own place, left of all others.
+  const errors = usable.map((p) => p.error).filter((v) => v > 0);
+  const axis = logAxis([], { include: [] });
+  if (errors.length) axis.domain = [Math.min(...errors) / 1.1, Math.max(...errors) * 1.1];
+  const zero = axis.domain[0] / Math.max((axis.domain[1] / axis.domain[0]) ** 0.12, 1.08);
+  const beside = Math.sqrt(zero * axis.domain[0]);
+  const points = usable.map((p) => {
+    const [y, side] = times.clip(p.time);
+    return { ...p, x: p.error === 0 ? zero : p.error, y, side, paint: paintOf(p.run.contestant) };
+  });
+  const front = pareto(points);
+  const measure = MEASURES[state.measure];
+  return figure({
+    title: sentence(error.name),
+    reading: error.reading,
+    notes: times.outside ? [`${plural(times.outside, "point")} beyond the axis of time: arrows at its edge.`] : [],
+    plot: (width) => ({
+      height: 330,
+      marginLeft: 56,
+      marginBottom: 44,
+      marginRight: 24,
+      x: {
+        ...logScale({ domain: [zero ** 1.25 / axis.domain[0] ** 0.25, axis.domain[1]] }, width - 90, `${error.name} →`),
+        ticks: [zero, ...logScale(axis, (width - 120) * 0.85, "").ticks.filter((t) => t > beside)],
+        tickFormat: (v) => (v === zero ? "0" : error.format(1) === "100\u202f%" ? `${tick(v * 100)}%` : tick(v)),
+      },
+      y: logScale(times, 220, `↑ ${measure.name}${measure.unit === "ms" ? ", ms per frame" : ""}`, { grid: true }),
+      marks: [
+        Plot.ruleX([beside], { stroke: "var(--line)", strokeDasharray: "2 3" }),
+        Plot.line(front, { x: "x", y: "y", stroke: "var(--soft)", strokeWidth: 1, curve: "step-after" }),
+        ...points.map((p) => Plot.dot([p], { x: "x", y: "y", ...dotLook(p.run.contestant, 4.5) })),
+        clippedMarks(points, "y"),
+      ],
+    }),
+    points: points.map((p) => ({
+      x: p.x,
+      y: p.y,
+      run: p.run,
+      current: p.run.key === state.point,
+      lines: [
+        p.run.contestant.label,
+        `${measure.format(p.time)}${measure.unit === "ms" ? " ms" : ""}`,
+        `${error.name}: ${error.format(p.error)}`,
+        p.run.contestant.guarantee.replace("_", " "),
+      ],
+    })),
+    choose,
+    table: {
+      head: ["contestant", measure.name, error.name],
+      rows: usable
+        .toSorted((a, b) => a.time - b.time)
+        .map((p) => [p.run.contestant.label, measure.format(p.time), error.format(p.error)]),
+    },
+  });
+}
+
+/** Returns the points that no other beats in both coordinates, from left to right. */
+function pareto(points) {
+  const front = [];
+  for (const point of points.toSorted((a, b) => a.x - b.x || a.time - b.time))
+    if (!front.length || point.time < front.at(-1).time) front.push(point);
+  return front;
+}

@@ -1,0 +1,425 @@
+#include "core/facade/world.hpp"
+
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+
+#include "arrays.hpp"
+
+namespace kbvh::python {
+
+namespace {
+
+using Words = std::map<std::string, std::string>;
+
+Shape shape_of(const std::string& word) {
+  if (word == "polygons") return Shape::polygons;
+  if (word == "points") return Shape::points;
+  if (word == "control_nets") return Shape::control_nets;
+  throw std::invalid_argument("a shape is polygons, points or control_nets, not '" + word + "'");
+}
+
+Precision precision_of(const std::string& word) {
+  if (word == "float32") return Precision::float32;
+  if (word == "float64") return Precision::float64;
+  throw std::invalid_argument("a precision is float32 or float64, not '" + word + "'");
+}
+
+py::dict plain(const WorldAudit& audit) {
+  py::dict out;
+  out["nodes"] = audit.nodes;
+  out["stale"] = audit.stale;
+  out["invalid"] = audit.invalid;
+  out["not_tight"] = audit.not_tight;
+  out["protrusion"] = audit.protrusion;
+  out["looseness"] = audit.looseness;
+  out["first_fault"] = audit.first_fault;
+  return out;
+}
+
+py::dict plain(const WorldVerdict& verdict) {
+  py::dict out;
+  out["holds"] = verdict.holds;
+  out["first_violation"] = verdict.first_violation;
+  out["frames"] = verdict.frames;
+  out["pairs"] = verdict.pairs;
+  out["candidates"] = verdict.candidates;
+  out["missed_candidates"] = verdict.missed_candidates;
+  out["missed"] = verdict.missed;
+  out["extra"] = verdict.extra;
+  out["repeated"] = verdict.repeated;
+  out["malformed"] = verdict.malformed;
+  out["audit"] = verdict.audited ? py::object(plain(verdict.audit)) : py::object(py::none());
+  return out;
+}
+
+/// The façade for Python: keeps the arrays alive whose memory the world reads, and lets other threads run
+/// while it works.
+class PythonWorld {
+ public:
+  explicit PythonWorld(const std::string& precision)
+      : precision_(precision), world_(precision_of(precision)) {}
+
+  std::uint32_t add_body(const std::string& name, const py::object& indices, const py::object& offsets,
+                         const std::string& shape, const py::object& times, const py::object& positions) {
+    const std::string what = "body '" + name + "'";
+    const Ids vertices(indices, what + ", its indices");
+    std::unique_ptr<Ids> starts;
+    if (!offsets.is_none()) starts = std::make_unique<Ids>(offsets, what + ", its offsets");
+    const Numbers numbers(positions, what + ", its positions");
+    numbers.check_points(what + ", its positions");
+    const Connectivity connectivity{
+        vertices.span(), starts ? starts->span() : std::span<const std::uint32_t>(), shape_of(shape)};
+    const auto add = [&](auto span) {
+      if (times.is_none()) return world_.add_body(name, connectivity, span);
+      const std::vector<double> keyframes = doubles_of(times, what + ", its times");
+      return world_.add_body(name, connectivity, std::span<const double>(keyframes), span);
+    };
+    const std::uint32_t body = numbers.single() ? add(numbers.floats()) : add(numbers.doubles());
+    given_.emplace_back();
+    return body;
+  }
+  void add_pair(std::uint32_t a, std::uint32_t b) { world_.add_pair(a, b); }
+
+  void start(const std::string& strategy, const Words& params, double t, const Words& topology) {
+    alone([&] { world_.start(strategy, params, t, topology); });
+  }
+  void reset(double t) {
+    move([&] { world_.reset(t); });
+  }
+  void advance(double t) {
+    move([&] { world_.advance(t); });
+  }
+  double time() const { return world_.time(); }
+  /// `rays` is [ray][7]: origin, direction, length.
+  py::array hits(const py::object& rays, bool any) {
+    const std::vector<double> numbers = doubles_of(rays, "rays");
+    if (numbers.size() % 7 != 0)
+      throw std::invalid_argument(std::to_string(numbers.size()) + " numbers are no rays of 7 each");
+    std::vector<WorldRay> asked(numbers.size() / 7);
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      std::copy_n(&numbers[7 * i], 3, asked[i].origin);
+      std::copy_n(&numbers[7 * i + 3], 3, asked[i].direction);
+      asked[i].length = numbers[7 * i + 6];
+    }
+    std::vector<WorldHit> out;
+    alone([&] { world_.hits(any ? WorldRayQuery::any : WorldRayQuery::closest, asked, out); });
+    return records_of(std::move(out), hit_type());
+  }
+  double next_knot() const { return world_.next_knot(); }
+
+  /// Returns whether the array is used where it lies: one of 3n + 1 numbers in the world's precision.
+  bool set_positions(std::uint32_t body, const py::object& positions) {
+    const std::string what = "the positions of body " + std::to_string(body);
+    const Numbers numbers(positions, what);
+    if (numbers.array().ndim() > 1) numbers.check_points(what);
+    const bool in_place = set(body, numbers) && numbers.array().is(positions);
+    given_[body].pending.push_back(numbers.array());
+    return in_place;
+  }
+
+  void change_plans(std::uint32_t body, const py::object& vertices, const py::object& velocities,
+                    const py::object& times, const py::object& positions) {
+    const Ids ids(vertices, "the vertices of new plans");
+    const std::size_t count = ids.span().size();
+    const std::vector<double> velocity = doubles_of(velocities, "the velocities of new plans");
+    std::vector<double> knots, points;
+    if (!times.is_none()) knots = doubles_of(times, "the times of new plans");
+    if (!positions.is_none()) points = doubles_of(positions, "the positions of new plans");
+    if (velocity.size() != 3 * count)
+      throw std::invalid_argument(std::to_string(velocity.size()) + " numbers are no velocities of " +
+                                  std::to_string(count) + " vertices");
+    if (points.size() != 3 * count * knots.size())
+      throw std::invalid_argument(std::to_string(points.size()) + " numbers are no positions of " +
+                                  std::to_string(count) + " vertices at " + std::to_string(knots.size()) +
+                                  " times");
+    std::vector<WorldPlan> plans(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      plans[i].body = body;
+      plans[i].vertex = ids.span()[i];
+      plans[i].times = knots;
+      plans[i].positions.assign(points.begin() + std::ptrdiff_t(3 * knots.size() * i),
+                                points.begin() + std::ptrdiff_t(3 * knots.size() * (i + 1)));
+      for (std::size_t axis = 0; axis < 3; ++axis) plans[i].velocity[axis] = velocity[3 * i + axis];
+    }
+    alone([&] { world_.change_plans(plans); });
+  }
+
+  /// Each dictionary is by body: (positions, velocities); lists of vertices; ids; ids.
+  void change_geometry(const py::dict& vertices, const py::dict& primitives,
+                       const py::dict& removed_primitives, const py::dict& removed_vertices) {
+    WorldEdit edit;
+    for (const auto& [key, value] : vertices) {
+      const auto body = key.cast<std::uint32_t>();
+      const auto pair = value.cast<std::pair<py::object, py::object>>();
+      const std::vector<double> positions = doubles_of(pair.first, "the positions of new vertices");
+      const std::vector<double> velocities = doubles_of(pair.second, "the velocities of new vertices");
+      if (positions.size() % 3 != 0 || positions.size() != velocities.size())
+        throw std::invalid_argument(std::to_string(positions.size()) + " coordinates and " +
+                                    std::to_string(velocities.size()) + " velocities are no vertices");
+      for (std::size_t i = 0; i < positions.size(); i += 3)
+        edit.vertices.push_back({body,
+                                 {positions[i], positions[i + 1], positions[i + 2]},
+                                 {velocities[i], velocities[i + 1], velocities[i + 2]}});
+    }
+    for (const auto& [key, value] : primitives)
+      for (const py::handle list : value) {
+        const Ids ids(py::reinterpret_borrow<py::object>(list), "the vertices of a new primitive");
+        edit.primitives.push_back({key.cast<std::uint32_t>(), {ids.span().begin(), ids.span().end()}});
+      }
+    const auto collect = [](const py::dict& from, std::vector<WorldEdit::Id>& to, const char* what) {
+      for (const auto& [key, value] : from) {
+        const Ids ids(py::reinterpret_borrow<py::object>(value), what);
+        for (const std::uint32_t id : ids.span()) to.push_back({key.cast<std::uint32_t>(), id});
+      }
+    };
+    collect(removed_primitives, edit.removed_primitives, "removed primitives");
+    collect(removed_vertices, edit.removed_vertices, "removed vertices");
+    alone([&] { world_.change_geometry(edit); });
+  }
+
+  py::array pairs() {
+    std::vector<WorldPair> out;
+    alone([&] { world_.pairs(out); });
+    return records_of(std::move(out), pair_type());
+  }
+  py::array true_pairs() {
+    std::vector<WorldPair> out;
+    alone([&] { world_.true_pairs(out); });
+    return records_of(std::move(out), pair_type());
+  }
+  py::tuple changes() {
+    std::vector<WorldPair> begun, ended;
+    alone([&] { world_.changes(begun, ended); });
+    return py::make_tuple(records_of(std::move(begun), pair_type()),
+                          records_of(std::move(ended), pair_type()));
+  }
+  py::array spans(double t) {
+    std::vector<WorldSpan> out;
+    move([&] { world_.spans(t, out); });
+    return records_of(std::move(out), span_type());
+  }
+  py::array contacts(double t) {
+    for (std::size_t body = 0; body < given_.size(); ++body)
+      if (const Given& given = given_[body]; !given.pending.empty() && !given.current.empty() &&
+                                             given.pending.back().data() == given.current.back().data())
+        throw std::invalid_argument("contacts need the positions at both ends: body " + std::to_string(body) +
+                                    " got the same array twice");
+    std::vector<WorldContact> out;
+    move([&] { world_.contacts(t, out); });
+    return records_of(std::move(out), contact_type());
+  }
+
+  py::array positions(std::uint32_t body) {
+    const WorldPositions found = alone([&] { return world_.current_positions(body); });
+    const std::vector<py::ssize_t> shape{py::ssize_t(found.vertices), 3};
+    py::array out(found.precision == Precision::float32 ? py::dtype::of<float>() : py::dtype::of<double>(),
+                  shape);
+    if (found.vertices > 0) std::memcpy(out.mutable_data(), found.data, std::size_t(out.nbytes()));
+    return out;
+  }
+  std::uintptr_t positions_address(std::uint32_t body) {
+    return reinterpret_cast<std::uintptr_t>(alone([&] { return world_.current_positions(body); }).data);
+  }
+  py::object hierarchy(std::uint32_t body) {
+    WorldHierarchy out;
+    if (!alone([&] { return world_.hierarchy(body, out); })) return py::none();
+    const auto primitives = py::ssize_t(out.primitives.size());
+    return py::make_tuple(records_of(std::move(out.nodes), node_type()),
+                          numbers_of(std::move(out.primitives), {primitives}));
+  }
+  py::object realisers(std::uint32_t body) {
+    std::vector<std::uint32_t> out;
+    if (!alone([&] { return world_.realisers(body, out); })) return py::none();
+    const auto nodes = py::ssize_t(out.size() / 6);
+    return numbers_of(std::move(out), {nodes, 6});
+  }
+  py::array watched_pairs() {
+    std::vector<WorldWatch> out;
+    alone([&] { world_.watched_pairs(out); });
+    return records_of(std::move(out), watch_type());
+  }
+  py::object audit(std::uint32_t body) {
+    WorldAudit out;
+    if (!alone([&] { return world_.audit(body, out); })) return py::none();
+    return plain(out);
+  }
+  py::dict counters() const {
+    py::dict out;
+    for (const WorldCounter& counter : world_.counters()) out[py::str(counter.name)] = counter.value;
+    return out;
+  }
+
+  std::vector<double> frame_times(std::uint32_t per_keyframe) const {
+    return world_.frame_times(per_keyframe);
+  }
+  py::dict verify(const std::string& strategy, const py::object& frames, const Words& params,
+                  const Words& topology) {
+    const std::vector<double> times = doubles_of(frames, "frames");
+    return plain(alone([&] { return world_.verify(strategy, times, params, topology); }));
+  }
+
+  bool has_events() const { return world_.has_events(); }
+  double next_event_time() const { return world_.next_event_time(); }
+  py::array scheduled_events() {
+    std::vector<WorldEvent> out;
+    alone([&] { world_.scheduled_events(out); });
+    return records_of(std::move(out), event_type());
+  }
+  py::object step_event(double until) {
+    WorldStep out;
+    if (!alone([&] { return world_.step_event(until, out); })) return py::none();
+    std::vector<WorldEvent> event{out.event};
+    return py::make_tuple(records_of(std::move(event), event_type()),
+                          records_of(std::move(out.touched), bound_change_type()),
+                          records_of(std::move(out.rescheduled), event_type()));
+  }
+
+  const std::string& precision() const { return precision_; }
+
+ private:
+  /// The arrays of a body that the world may read: since the last move, and for the next one.
+  struct Given {
+    std::vector<py::array> current, pending;
+  };
+
+  /// Returns whether the world reads these numbers where they lie.
+  bool set(std::uint32_t body, const Numbers& numbers) {
+    if (numbers.single())
+      world_.set_positions(body, numbers.floats());
+    else
+      world_.set_positions(body, numbers.doubles());
+    return numbers.size() % 3 == 1 && numbers.single() == (precision_ == "float32");
+  }
+
+  template <class Work>
+  auto alone(Work&& work) -> decltype(work()) {
+    if (busy_)
+      throw std::logic_error("this world is at work, in another thread or in a strategy that asks it");
+    busy_ = true;
+    struct Done {
+      bool& busy;
+      ~Done() { busy = false; }
+    } done{busy_};
+    Unlocked unlocked;
+    return work();
+  }
+  /// Works on the way to another time: afterwards the pending positions are the current ones.
+  template <class Work>
+  void move(Work&& work) {
+    alone(work);
+    for (Given& given : given_)
+      if (!given.pending.empty()) {
+        given.current = {given.pending.back()};
+        given.pending.clear();
+      }
+  }
+
+  std::string precision_;
+  World world_;
+  std::vector<Given> given_;
+  bool busy_ = false;  ///< guarded by the interpreter's lock
+};
+
+py::list listed() {
+  py::list out;
+  for (const WorldStrategy& strategy : World::strategy_descriptions()) {
+    py::list parameters;
+    for (const WorldParameter& parameter : strategy.parameters) {
+      py::dict one;
+      one["name"] = parameter.name;
+      one["default"] = parameter.default_value;
+      one["meaning"] = parameter.meaning;
+      one["admissible"] = parameter.admissible;
+      one["allowed"] = py::tuple(py::cast(parameter.allowed));
+      one["least"] = parameter.least;
+      one["most"] = parameter.most;
+      one["whole"] = parameter.whole;
+      parameters.append(one);
+    }
+    py::list precisions;
+    if (strategy.has_float32) precisions.append("float32");
+    if (strategy.has_float64) precisions.append("float64");
+    std::string foresight = strategy.foresight;
+    std::replace(foresight.begin(), foresight.end(), ' ', '_');
+    py::dict one;
+    one["id"] = strategy.id;
+    one["title"] = strategy.title;
+    one["family"] = strategy.family;
+    one["citation"] = strategy.citation;
+    one["about"] = strategy.about;
+    one["baseline"] = strategy.baseline;
+    one["guarantee"] = strategy.guarantee;
+    one["tightness"] = strategy.tightness;
+    one["foresight"] = foresight;
+    one["precisions"] = py::tuple(precisions);
+    one["primitives"] = py::tuple(py::cast(strategy.primitives));
+    one["abilities"] = py::tuple(py::cast(strategy.abilities));
+    one["method"] = strategy.method;
+    one["width"] = strategy.width;
+    one["leaf_size"] = strategy.leaf_size;
+    one["max_primitive_pairs"] = strategy.max_primitive_pairs;
+    one["parameters"] = parameters;
+    out.append(one);
+  }
+  return out;
+}
+
+}  // namespace
+
+void bind_world(py::module_& module) {
+  using py::arg;
+  py::class_<PythonWorld>(module, "World")
+      .def(py::init<const std::string&>(), arg("precision"))
+      .def_property_readonly("precision", &PythonWorld::precision)
+      .def_property_readonly("time", &PythonWorld::time)
+      .def("add_body", &PythonWorld::add_body, arg("name"), arg("indices"), arg("offsets"), arg("shape"),
+           arg("times"), arg("positions"))
+      .def("add_pair", &PythonWorld::add_pair, arg("body_a"), arg("body_b"))
+      .def("start", &PythonWorld::start, arg("strategy"), arg("params"), arg("t"), arg("topology"))
+      .def("reset", &PythonWorld::reset, arg("t"))
+      .def("advance", &PythonWorld::advance, arg("t"))
+      .def("next_knot", &PythonWorld::next_knot)
+      .def("set_positions", &PythonWorld::set_positions, arg("body"), arg("positions"))
+      .def("change_plans", &PythonWorld::change_plans, arg("body"), arg("vertices"), arg("velocities"),
+           arg("times"), arg("positions"))
+      .def("change_geometry", &PythonWorld::change_geometry, arg("vertices"), arg("primitives"),
+           arg("removed_primitives"), arg("removed_vertices"))
+      .def("pairs", &PythonWorld::pairs)
+      .def("true_pairs", &PythonWorld::true_pairs)
+      .def("changes", &PythonWorld::changes)
+      .def("spans", &PythonWorld::spans, arg("t"))
+      .def("contacts", &PythonWorld::contacts, arg("t"))
+      .def("hits", &PythonWorld::hits, arg("rays"), arg("any"))
+      .def("positions", &PythonWorld::positions, arg("body"))
+      .def("positions_address", &PythonWorld::positions_address, arg("body"))
+      .def("hierarchy", &PythonWorld::hierarchy, arg("body"))
+      .def("realisers", &PythonWorld::realisers, arg("body"))
+      .def("watched_pairs", &PythonWorld::watched_pairs)
+      .def("audit", &PythonWorld::audit, arg("body"))
+      .def("counters", &PythonWorld::counters)
+      .def("frame_times", &PythonWorld::frame_times, arg("per_keyframe"))
+      .def("verify", &PythonWorld::verify, arg("strategy"), arg("frames"), arg("params"), arg("topology"))
+      .def("has_events", &PythonWorld::has_events)
+      .def("next_event_time", &PythonWorld::next_event_time)
+      .def("scheduled_events", &PythonWorld::scheduled_events)
+      .def("step_event", &PythonWorld::step_event, arg("until"));
+  module.def("list_strategies", &listed);
+  module.def("counter_meanings", [] {
+    py::dict out;
+    for (const auto& [name, meaning] : World::counter_meanings()) out[py::str(name)] = meaning;
+    return out;
+  });
+  module.attr("pair_type") = pair_type();
+  module.attr("span_type") = span_type();
+  module.attr("contact_type") = contact_type();
+  module.attr("hit_type") = hit_type();
+  module.attr("node_type") = node_type();
+  module.attr("watch_type") = watch_type();
+  module.attr("event_type") = event_type();
+  module.attr("bound_change_type") = bound_change_type();
+}
+
+}  // namespace kbvh::python

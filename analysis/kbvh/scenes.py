@@ -1,0 +1,172 @@
+"""Scenes: from arrays, from files, by formula and built in."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from typing import Any, Mapping, Optional, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+
+SHAPES = ("polygons", "points", "control_nets")
+#: A path of a file.
+PathLike = Union[str, "os.PathLike[str]"]
+
+
+@dataclass
+class Body:
+    """A mesh and its motion.
+
+    `positions` is [keyframe][vertex][3] with keyframes at `times` (seconds, increasing), between which vertices move on straight
+    lines; or [vertex][3] for a body at rest, or for one whose motion is unknown (`known` is False): its positions are then set
+    frame by frame. `indices` is [triangle][3], or a flat list of vertices that `offsets` cuts into primitives: primitive p has
+    indices[offsets[p]:offsets[p + 1]]. Arrays are used as they are: nothing is copied before a world is made.
+
+    >>> import numpy as np
+    >>> kbvh.Body([[0, 1, 2]], np.zeros((2, 3, 3)), times=[0, 1]).keyframes
+    2
+    """
+
+    indices: npt.ArrayLike
+    positions: npt.ArrayLike
+    times: Optional[npt.ArrayLike] = None
+    offsets: Optional[npt.ArrayLike] = None
+    shape: str = "polygons"
+    name: str = "body"
+    known: bool = True
+    #: Whether pairs within the body are requested, too.
+    self_pairs: bool = False
+
+    def __post_init__(self) -> None:
+        self.positions = np.asarray(self.positions)
+        if self.positions.ndim not in (2, 3) or self.positions.shape[-1] != 3:
+            raise ValueError(
+                f"body '{self.name}': positions are [vertex][3] or [keyframe][vertex][3], not {list(self.positions.shape)}"
+            )
+        if self.times is None and self.positions.ndim == 3:
+            raise ValueError(f"body '{self.name}': {self.positions.shape[0]} keyframes need times")
+        if not self.known and self.positions.ndim == 3:
+            raise ValueError(f"body '{self.name}': an unknown motion has no keyframes")
+
+    @property
+    def keyframes(self) -> int:
+        """The number of keyframes."""
+        return 1 if np.ndim(self.positions) == 2 else int(np.shape(self.positions)[0])
+
+    @property
+    def vertices(self) -> int:
+        """The number of vertices."""
+        return int(np.shape(self.positions)[-2])
+
+    @property
+    def primitives(self) -> int:
+        """The number of primitives."""
+        return int(np.size(self.indices)) // 3 if self.offsets is None else int(np.size(self.offsets)) - 1
+
+
+@dataclass
+class PlanChange:
+    """New plans of some vertices of a body: from their position at `time` on straight lines through `positions`
+    ([vertex][knot][3]) at `times` ([knot], seconds), then with `velocities` ([vertex][3], units per second) for ever."""
+
+    time: float
+    body: int
+    vertices: npt.NDArray[np.uint32]
+    velocities: npt.NDArray[np.float64]
+    times: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    positions: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0, 3)))
+
+
+@dataclass
+class Scene:
+    """Bodies, and the pairs of bodies that are asked about: all pairs with a moving body, unless `pairs` lists them."""
+
+    bodies: Sequence[Body]
+    pairs: Optional[Sequence[tuple[int, int]]] = None
+    name: str = "scene"
+    notes: Sequence[str] = ()
+    #: Whether plans change at run time (see `script`).
+    changes: bool = False
+    _source: Optional[tuple[str, str]] = field(default=None, repr=False)
+
+    @property
+    def primitives(self) -> int:
+        """The number of primitives of all bodies."""
+        return sum(body.primitives for body in self.bodies)
+
+    def pairs_asked(self) -> Optional[list[tuple[int, int]]]:
+        """Returns the pairs of bodies for a world; None for the default."""
+        own = [(i, i) for i, body in enumerate(self.bodies) if body.self_pairs]
+        if self.pairs is not None:
+            return [*self.pairs, *(pair for pair in own if pair not in self.pairs)]
+        if not own:
+            return None
+        moving = [body.keyframes > 1 or not body.known for body in self.bodies]
+        count = len(self.bodies)
+        between = [(a, b) for a in range(count) for b in range(a + 1, count)]
+        return ([pair for pair in between if moving[pair[0]] or moving[pair[1]]] or between) + own
+
+    def script(self, precision: str = "float32", l: int = 1) -> tuple[npt.NDArray[np.float64], list[PlanChange]]:
+        """Returns the frames of a described scene, l per interval between keyframes, and its changes of plans in order of time,
+        each to be made after the query of the frame at its time.
+
+        >>> frames, changes = kbvh.scene("reversing_spheres", triangles=80, keyframes=30).script()
+        >>> len(frames), changes[0].velocities.shape[1]
+        (30, 3)
+        """
+        if self._source is None:
+            raise ValueError(f"'{self.name}' is made of arrays and has no script")
+        if precision not in ("float32", "float64"):
+            raise ValueError(f"a precision is float32 or float64, not '{precision}'")
+        frames, changes = _core.make_scene(*self._source, precision, l)["played"]
+        return frames, [PlanChange(t, body, ids, velocities, times, knots) for t, body, ids, times, knots, velocities in changes]
+
+
+def scene(description: Union[str, Mapping[str, Any]], folder: PathLike = ".", **keys: Any) -> Scene:
+    """Makes a scene from the description that a plan has (experiments/RESULTS.md): the name of a built-in scene with its keys
+    (triangles, keyframes, seed, obstacle, order, self), or bodies from files and by formula. Relative files are relative to
+    `folder`. Raises InputError.
+
+    >>> kbvh.scene("tablecloth", triangles=200, keyframes=2).bodies[0].positions.shape
+    (2, 121, 3)
+    >>> [body.name for body in kbvh.scene({"bodies": [{"shape": "sphere", "triangles": 80}]}).bodies]
+    ['icosphere-80']
+    """
+    if isinstance(description, str):
+        description = {"builtin": description}
+    source = (json.dumps({**description, **keys}, default=os.fspath), os.fspath(folder))
+    made = _core.make_scene(*source, "", 0)
+    bodies = [Body(**body) for body in made["bodies"]]
+    return Scene(bodies, name=made["name"], notes=made["notes"], changes=made["changes"], _source=source)
+
+
+def load(file: PathLike, motion: Optional[PathLike] = None, **keys: Any) -> Body:
+    """Reads a body from a file (.obj .ply .gltf .glb, or a folder of numbered frames), moved by a point cache (.pc2) if `motion`
+    names one. `keys` are those of a plan's body: clip, fps, name, scale, rotate, translate, as, self. Raises InputError.
+    """
+    description = {"file": os.path.abspath(os.fspath(file)), **keys}
+    if motion is not None:
+        description["motion"] = os.path.abspath(os.fspath(motion))
+    return scene({"bodies": [description]}).bodies[0]
+
+
+def builtin_scenes() -> dict[str, str]:
+    """Returns the names of the built-in scenes, with what they show.
+
+    >>> "tablecloth" in kbvh.builtin_scenes()
+    True
+    """
+    return _core.builtin_scenes()
+
+
+def shapes() -> dict[str, str]:
+    """Returns the names of the bodies that are made by formula, with their keys.
+
+    >>> "sphere" in kbvh.shapes()
+    True
+    """
+    return _core.shapes()

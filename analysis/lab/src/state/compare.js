@@ -1,0 +1,107 @@
+import {createEngine} from '../engine/client.js';
+import {Tree} from '../math/hierarchy.js';
+import {difference, nothingLit} from './lit.js';
+
+/** The counters that the comparison draws, with their meaning, in the order of the menu. */
+export const workMetrics = [
+  {id: 'values_written', title: 'Bound values written', about: 'six per box written; one per realiser changed'},
+  {id: 'nodes_visited', title: 'Nodes visited', about: 'nodes whose bounds an update visited'},
+  {id: 'box_tests', title: 'Box tests', about: 'box against box tests of the query'},
+  {id: 'triangle_tests', title: 'Primitive tests', about: 'exact tests of primitives'},
+  {id: 'certificates_failed', title: 'Events', about: 'certificates that failed'},
+  {id: 'queue_operations', title: 'Queue operations', about: 'insert, erase, pop and re-key on the event queue'},
+  {id: 'milliseconds', title: 'Time in the engine', about: 'milliseconds in WebAssembly; depends on this machine and its load'},
+];
+
+/**
+ * A second strategy on the same clock, with an engine of its own, and the work of both strategies frame by frame, measured
+ * by a third engine in the background.
+ */
+export class Comparison {
+  constructor(lab) {
+    this.lab = lab;
+    this.engine = null;
+    this.meter = null;
+    this.measuring = 0;  // number of the newest measurement; an older one stops
+  }
+
+  /** Chooses the second strategy: {strategy, params?, topology?}, or null for none. */
+  async set(choice) {
+    if (!choice) {
+      this.lab.store.set({compare: null, work: null});
+      ++this.measuring;
+      return;
+    }
+    const topology = this.lab.defaultTopology(choice.strategy, this.lab.state.scene);
+    this.lab.store.set({compare: {params: {}, topology, ...choice, info: null, at: null, trees: [], lit: nothingLit}});
+    await this.reload();
+  }
+
+  /** Loads the current scene again, after the scene or a strategy changed. */
+  async reload({quiet = false} = {}) {
+    const {compare, scene, precision, at} = this.lab.state;
+    ++this.measuring;
+    if (!compare) return;
+    await this.lab.enqueue(quiet ? null : 'loading', `Loading the second strategy, ${compare.strategy}`, async () => {
+      this.engine ??= await createEngine();
+      const info = await this.engine.load({scene: this.lab.sceneFor(scene, compare.strategy), strategy: compare.strategy, params: compare.params, topology: compare.topology, precision});
+      this.lab.store.set({compare: {...this.lab.state.compare, info, at: null, trees: [], lit: nothingLit}});
+      if (at) await this.frame(at.time);
+    });
+    this.measure();
+  }
+
+  /** Brings the second strategy to the lab's time. */
+  async frame(t) {
+    const {compare, phase} = this.lab.state;
+    if (!compare?.info || !this.engine) return;
+    const at = await this.engine.frame(t, {positions: true, nodes: true, flat: true, pairs: true, queue: phase !== 'playing', counters: true, queueLimit: 4000, pairsLimit: 20000});
+    const now = this.lab.state.compare;
+    if (!now) return;
+    const flats = at.hierarchies?.map((hierarchy) => hierarchy?.flat ?? null);
+    const trees = flats ? flats.map((flat, b) => !flat ? null
+        : now.trees[b] ? now.trees[b].next(flat, now.info.bodies[b]) : new Tree(flat, b, now.info.bodies[b])) : now.trees;
+    this.lab.store.set({compare: {...now, at: {...at, queue: at.queue ?? now.at?.queue ?? []}, trees, lit: now.at && flats ? difference(now.trees, trees) : nothingLit}});
+  }
+
+  /** Plays the clip once with each strategy in the background and keeps the counters of every frame. */
+  async measure() {
+    const {compare, scene, precision, strategy, params, topology, frames} = this.lab.state;
+    if (!compare || frames.length < 2) return;
+    const number = ++this.measuring;
+    const chosen = [{strategy, params, topology}, compare].map(({strategy, params, topology}) => ({strategy, params, topology}));
+    const series = chosen.map(({strategy}) => ({strategy, frames, done: 0, counters: {}}));
+    const show = () => { if (number === this.measuring) this.lab.store.set({work: {series: series.map((s) => ({...s}))}}); };
+    show();
+    try {
+      this.meter ??= await createEngine();
+      for (const [k, choice] of chosen.entries()) {
+        await this.meter.load({scene: this.lab.sceneFor(scene, choice.strategy), precision, ...choice});
+        let before = {}, shown = performance.now();
+        for (let f = 0; f < frames.length; ++f) {
+          if (number !== this.measuring) return;
+          const began = performance.now();
+          const at = await this.meter.frame(frames[f], {positions: false, nodes: false, flat: false, pairs: true, queue: false, counters: true, pairsLimit: 0});
+          const counters = {...at.counters, milliseconds: 1000 * (at.seconds ?? (performance.now() - began) / 1000)};
+          for (const {id} of workMetrics) {
+            const values = series[k].counters[id] ??= new Float64Array(frames.length);
+            values[f] = id === 'milliseconds' ? counters[id] : (counters[id] ?? 0) - (before[id] ?? 0);
+          }
+          before = at.counters;
+          series[k].done = f + 1;
+          if (performance.now() - shown > 120) { shown = performance.now(); show(); }
+        }
+        show();
+      }
+    } catch (error) {
+      console.error(error);
+      if (number === this.measuring) this.lab.store.set({error: `Work per frame could not be measured: ${error.message}`});
+    }
+  }
+
+  close() {
+    ++this.measuring;
+    this.engine?.close();
+    this.meter?.close();
+  }
+}

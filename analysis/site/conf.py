@@ -1,0 +1,18 @@
+"""Sphinx configuration of the site."""
+
+project = "kbvh"
+copyright = "the kbvh authors, MIT licence"  # noqa: A001
+extensions = ["myst_parser"]
+source_suffix = {".md": "markdown"}
+master_doc = "index"
+html_theme = "furo"
+html_title = "kbvh"
+html_show_sphinx = False
+html_copy_source = False
+myst_heading_anchors = 3
+myst_enable_extensions = ["deflist", "colon_fence"]
+# GitHub-style pages begin parts where they like.
+suppress_warnings = ["myst.header"]
+nitpicky = True
+# Blocks without a language are commands and their output.
+highlight_language = "none"

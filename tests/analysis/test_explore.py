@@ -1,0 +1,186 @@
+"""The data of the explorer, its statistics against values worked out by hand or drawn, and its page without a program."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import paths  # noqa: F401  (finds the modules under test)
+import synthetic
+
+import colours
+import explore
+import explorer_data
+import load
+import numpy as np
+import profiles
+import ratios
+import report
+
+
+def line(id: str, times: list[float], scene: str = "s", **strategy: Any) -> dict[str, Any]:
+    """A result with these update times and nothing else that takes time."""
+    result = synthetic.record(dict(id=id, title=id, family=strategy.pop("family", "kinetic"), query=1.0), scene, 2000, "float", 10)
+    result["times"]["repetitions"] = [
+        {"motion": 0.0, "update": time, "traversal": 0.0, "triangle_tests": 0.0, "plan_changes": 0.0} for time in times
+    ]
+    result["strategy"].update(strategy)
+    return result
+
+
+class Folder(unittest.TestCase):
+    def setUp(self) -> None:
+        place = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
+        self.addCleanup(place.cleanup)
+        self.folder = Path(place.name)
+
+    def study(self, lines: list[dict[str, Any]], newest_of: tuple[str, ...] = load.ONE_OF_EACH_COMMIT) -> load.Study:
+        return load.load(synthetic.write(self.folder, lines), newest_of)
+
+
+class TestInterval(unittest.TestCase):
+    def test_is_the_limit_of_many_draws(self) -> None:
+        chance = np.random.default_rng(1)
+        for n in (2, 3, 5, 8, 9):
+            own, other = chance.lognormal(0, 0.1, n), chance.lognormal(0.2, 0.1, n)
+            picks = chance.integers(0, n, (2, 100_000, n))
+            drawn = {
+                True: np.median((other / own)[picks[0]], axis=1),
+                False: np.median(other[picks[0]], axis=1) / np.median(own[picks[1]], axis=1),
+            }
+            for paired, values in drawn.items():
+                low, high = ratios.interval(own, other, paired) or (0, 0)
+                # Each end has the share of the distribution beyond it that it should have, itself included.
+                self.assertLessEqual(np.mean(values < low - 1e-12), 0.027, (n, paired))
+                self.assertGreaterEqual(np.mean(values <= low + 1e-12), 0.023, (n, paired))
+                self.assertLessEqual(np.mean(values > high + 1e-12), 0.027, (n, paired))
+                self.assertGreaterEqual(np.mean(values >= high - 1e-12), 0.023, (n, paired))
+
+    def test_single_repetitions_have_none(self) -> None:
+        self.assertIsNone(ratios.interval(np.array([1.0]), np.array([2.0]), True))
+        self.assertIsNone(ratios.interval(np.array([0.0, 0.0]), np.array([2.0, 2.0]), False))
+
+    def test_few_repetitions_have_their_range(self) -> None:
+        self.assertEqual(ratios.interval(np.array([1.0, 1.0, 1.0]), np.array([2.0, 4.0, 3.0]), True), (2.0, 4.0))
+
+
+class TestProfiles(Folder):
+    def test_by_hand(self) -> None:
+        lines = [
+            line("a", [1.0], "one"), line("b", [2.0], "one"), line("c", [3.0], "one"),
+            line("a", [4.0], "two"), line("b", [2.0], "two"),
+            line("a", [5.0], "three"),  # alone: no cell
+            line("bad", [0.1], "one", guarantee="approximate"),
+            line("many", [0.1], "one", params={"threads": "4"}),
+            line("oracle", [0.1], "one", family="oracle"),
+        ]  # fmt: skip
+        found = {one.id: one for one in profiles.profiles(self.study(lines))}
+        self.assertEqual({id: one.factors for id, one in found.items()}, {"a": [1.0, 2.0], "b": [1.0, 2.0], "c": [3.0]})
+        self.assertEqual({one.cells for one in found.values()}, {2})
+        self.assertEqual([found["a"].within(factor) for factor in (1, 1.9, 2)], [0.5, 0.5, 1.0])
+
+    def test_of_several_settings_the_fastest_counts(self) -> None:
+        lines = [line("a", [4.0], params={"x": "1"}), line("a", [2.0], params={"x": "2"}), line("b", [1.0])]
+        self.assertEqual([(one.id, one.factors) for one in profiles.profiles(self.study(lines))], [("b", [1.0]), ("a", [2.0])])
+
+
+class TestData(Folder):
+    def data(self, lines: list[dict[str, Any]]) -> dict[str, Any]:
+        return explorer_data.data(self.study(lines), "", None, self.folder)
+
+    def test_every_commit_and_machine_is_a_cell_of_its_own(self) -> None:
+        lines = []
+        for commit, cpu in (("a", "x"), ("b", "x"), ("b", "y")):
+            one = line("bottom_up", [1.0, 2.0])
+            one.update(commit=commit, machine={**synthetic.MACHINE, "cpu": cpu})
+            lines.append(one)
+        data = self.data(lines)
+        self.assertEqual([(cell["commit"], cell["machine"]) for cell in data["cells"]], [(0, 0), (1, 0), (1, 1)])
+        self.assertEqual([machine["label"] for machine in data["machines"]], ["x", "y"])
+        self.assertEqual(len(load.load(self.folder).runs), 2, "the report shows the newest commit of each machine")
+
+    def test_machines_of_one_processor_have_labels_of_their_own(self) -> None:
+        lines = []
+        for kernels in ("avx2", "portable"):
+            one = line("bottom_up", [1.0])
+            one["machine"] = {**synthetic.MACHINE, "kernels": kernels}
+            lines.append(one)
+        labels = [machine["label"] for machine in self.data(lines)["machines"]]
+        self.assertEqual([label.split(" · ")[1] for label in labels], ["avx2", "portable"])
+
+    def test_commands(self) -> None:
+        built_in, shapes, old = (line("bottom_up", [1.0], scene) for scene in ("x", "y", "waving_sheet"))
+        built_in["again"] = {"scenes": [{"builtin": "tablecloth", "triangles": 512, "seed": 3, "order": "shuffled"}], "frames_limit": 7}
+        shapes["again"] = {"scenes": [{"bodies": [{"shape": "sphere"}]}]}
+        old["scene"]["origin"] = "built_in"
+        unknown = line("bottom_up", [1.0], "file")
+        unknown["scene"]["origin"] = "files"
+        data = self.data([built_in, shapes, old, unknown])
+        again = [cell["again"] for cell in data["cells"]]
+        self.assertEqual(again[0], {"options": "--scene tablecloth --triangles 512 --order shuffled --seed 3"})
+        self.assertEqual(again[1], {"scene": {"bodies": [{"shape": "sphere"}]}})
+        self.assertEqual(again[2], {"options": "--scene waving_sheet --triangles 1600 --obstacle 400"})
+        self.assertIn("why", again[3])
+        self.assertEqual(data["runs"]["limit"], [7, 0, 0, 0])
+
+    def test_is_json_without_nan(self) -> None:
+        hidden = line("bottom_up", [1.0])
+        hidden["verified"]["audited"] = False
+        data = self.data([hidden, synthetic.refused(line("k", [1.0]), "too slow")])
+        json.dumps(data, allow_nan=False)
+        self.assertEqual(data["runs"]["looseness"], [None, 0])
+        self.assertEqual(data["runs"]["refused"], ["", "too slow"])
+        self.assertEqual(data["runs"]["times"][1], [])
+
+
+class TestPage(Folder):
+    def test_text_of_results_cannot_end_the_data(self) -> None:
+        data = {"plans": [{"name": "</script><b>", "description": ""}], "title": ""}
+        page = explore.page(data, "var a = '</script>';", "")
+        self.assertEqual(page.count("</script>"), 2)
+        self.assertIn("<title>&lt;/script&gt;&lt;b&gt;</title>", page)
+
+    def test_without_a_program_the_report_is_written_and_says_so(self) -> None:
+        synthetic.write(self.folder, [line("bottom_up", [1.0], family="refit"), line("k", [2.0])])
+        with mock.patch.object(explore, "PROGRAM", self.folder / "nowhere"):
+            said = io.StringIO()
+            with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+                self.assertEqual(report.main([str(self.folder), "--figures", "none"]), 0)
+            self.assertIn("report: explorer.html is not written: the explorer's program is not built", said.getvalue())
+            self.assertNotIn("explorer.html", (self.folder / "report.html").read_text())
+            said = io.StringIO()
+            with contextlib.redirect_stderr(said):
+                self.assertEqual(explore.main([str(self.folder)]), 2)
+            self.assertIn("build builds it, with Node.js and npm", said.getvalue())
+        self.assertFalse((self.folder / "explorer.html").exists())
+
+    def test_damaged_results_are_refused(self) -> None:
+        program = self.folder / "dist"
+        program.mkdir()
+        for name in ("explorer.js", "explorer.css"):
+            (program / name).write_text("")
+        (self.folder / "results.jsonl").write_text('{"schema": 7}\n')
+        said = io.StringIO()
+        with mock.patch.object(explore, "PROGRAM", program), contextlib.redirect_stderr(said):
+            self.assertEqual(explore.main([str(self.folder)]), 2)
+        self.assertIn("results.jsonl line 1: schema 7 is not known", said.getvalue())
+        self.assertFalse((self.folder / "explorer.html").exists())
+
+
+class TestColours(unittest.TestCase):
+    def test_every_family_is_seen_on_both_pages(self) -> None:
+        for colour, _ in [*colours.FAMILIES.values(), *colours.FREE]:
+            for shade in colours.SHADES:
+                own = colours.mix(colour, shade)
+                self.assertGreaterEqual(colours.contrast(colours.on_dark(own), colours.DARK_PAGE), colours.DARK_CONTRAST)
+        self.assertAlmostEqual(colours.contrast("#000000", "#FFFFFF"), 21)
+
+
+if __name__ == "__main__":
+    unittest.main()

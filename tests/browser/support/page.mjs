@@ -1,0 +1,47 @@
+// Opens the built page of the lab in Chromium, without a network, and gives tests handles to it.
+
+import { existsSync } from 'node:fs';
+import { join } from 'node:path';
+import { fileURLToPath, pathToFileURL } from 'node:url';
+
+import { startBrowser as startChromium } from './chromium.mjs';
+
+const root = fileURLToPath(new URL('../../..', import.meta.url));
+
+/** The page as built by experiments/lab. */
+export const built = join(root, 'build/lab/index.html');
+if (!existsSync(built)) throw new Error(`${built} is missing: run experiments/lab`);
+
+/** Starts a browser that draws WebGL in software; `open` gives pages, `close` ends it. */
+export async function startBrowser() {
+  const { browser, close } = await startChromium(['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader']);
+  return { open: (options) => open(browser, options), close };
+}
+
+/**
+ * Opens the page with a hash and waits until the lab shows a state. `problems` collects errors of the console, exceptions
+ * and requests that leave the machine.
+ */
+async function open(browser, { hash = '', width = 1440, height = 900, scheme = 'light', file = built } = {}) {
+  const page = await browser.newPage();
+  const problems = [];
+  page.on('console', (message) => { if (message.type() === 'error') problems.push(message.text()); });
+  page.on('pageerror', (error) => problems.push(String(error.stack ?? error)));
+  page.on('request', (request) => { if (/^(https?|wss?):/.test(request.url())) problems.push(`request of ${request.url()}`); });
+  await page.setOfflineMode(true);
+  await page.setViewport({ width, height });
+  await page.emulateMediaFeatures([{ name: 'prefers-color-scheme', value: scheme }]);
+  await page.goto(pathToFileURL(file).href + hash);
+  await page.waitForFunction(() => document.querySelector('[data-kbvh-lab-page]')?.lab?.state.at, { timeout: 60000 });
+  return {
+    page, problems,
+    /** Runs a function in the page with the lab and arguments. */
+    lab: (body, ...args) => page.evaluate(`(${body})(document.querySelector('[data-kbvh-lab-page]').lab, ...${JSON.stringify(args)})`),
+    /** Waits until the engine has answered everything that was asked, and the views have been drawn. */
+    settle: () => page.evaluate(async () => {
+      const { lab } = document.querySelector('[data-kbvh-lab-page]');
+      for (let chain = null; chain !== lab.chain;) { chain = lab.chain; await chain; await new Promise((resolve) => setTimeout(resolve, 20)); }
+      await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+    }),
+  };
+}

@@ -1,0 +1,86 @@
+"""Scenes from files, by formula and built in are those that the program plays."""
+
+import pathlib
+import struct
+import tempfile
+import unittest
+
+import numpy as np
+
+import kbvh
+from scenes import pairs
+
+
+class Files(unittest.TestCase):
+    def setUp(self):
+        self.place = tempfile.TemporaryDirectory()
+        self.addCleanup(self.place.cleanup)
+        self.folder = pathlib.Path(self.place.name)
+        (self.folder / "quad.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
+        rest = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype="f4")
+        self.frames = np.stack([rest + np.float32([0, 0, k]) for k in range(3)])
+        head = b"POINTCACHE2\0" + struct.pack("<iiffi", 1, 4, 0.0, 1.0, 3)
+        (self.folder / "quad.pc2").write_bytes(head + self.frames.tobytes())
+
+    def test_a_mesh_and_its_point_cache(self):
+        still = kbvh.load(self.folder / "quad.obj")
+        self.assertEqual((still.keyframes, still.primitives, still.vertices), (1, 1, 4))
+        self.assertEqual(np.asarray(still.indices).tolist(), [0, 1, 2, 3])
+        moving = kbvh.load(self.folder / "quad.obj", self.folder / "quad.pc2", fps=10, name="quad", translate=[0, 0, 5])
+        self.assertEqual(moving.name, "quad")
+        self.assertTrue(np.allclose(moving.times, [0, 0.1, 0.2]))
+        self.assertTrue(np.array_equal(moving.positions, self.frames + [0, 0, 5]))
+
+    def test_a_described_scene_is_that_of_its_arrays(self):
+        described = kbvh.scene(
+            {"bodies": [{"file": "quad.obj", "motion": "quad.pc2", "translate": [0, 0, -1]}, {"shape": "sphere", "triangles": 80}]},
+            folder=self.folder,
+        )
+        copied = kbvh.Scene(
+            [kbvh.Body(b.indices, np.array(b.positions), times=b.times, offsets=b.offsets, name=b.name) for b in described.bodies]
+        )
+        seen = 0
+        for precision in ("float32", "float64"):
+            first, second = (kbvh.World(play, "bottom_up", precision=precision) for play in (described, copied))
+            for t, again in zip(first.play(l=4), second.play(l=4)):
+                self.assertEqual(t, again)
+                self.assertEqual(pairs(first.pairs()), pairs(second.pairs()))
+                seen += len(first.pairs())
+        self.assertGreater(seen, 0)
+
+    def test_wrong_files(self):
+        (self.folder / "bad.obj").write_text("v 0 0 0\nf 1 2 9\n")
+        with self.assertRaisesRegex(kbvh.InputError, "bad.obj"):
+            kbvh.load(self.folder / "bad.obj")
+        with self.assertRaisesRegex(kbvh.InputError, "no_such_key"):
+            kbvh.load(self.folder / "quad.obj", no_such_key=1)
+        with self.assertRaisesRegex(ValueError, "is made of arrays"):
+            kbvh.Scene([kbvh.load(self.folder / "quad.obj")]).script()
+
+
+class SameAsTheProgram(unittest.TestCase):
+    def test_worlds_count_what_studies_record(self):
+        description = {"builtin": "waving_sheet", "triangles": 200, "keyframes": 3}
+        for name, precision in (("float", "float32"), ("double", "float64")):
+            with tempfile.TemporaryDirectory() as folder:
+                plan = {"scenes": [description], "strategies": ["bottom_up"], "l": 3, "scalars": [name], "repetitions": 1}
+                (run,) = kbvh.run(plan, folder).results.runs.to_dict("records")
+            world = kbvh.World(kbvh.scene(description), "bottom_up", precision=precision)
+            counts = [len(world.pairs()) for _ in world.play(l=3)]
+            self.assertEqual((run["frames"], run["pairs"]), (len(counts), sum(counts)))
+            self.assertGreater(sum(counts), 0)
+            counters = world.counters()
+            for counter in ("values_written", "box_tests"):
+                self.assertEqual(round(run[f"{counter}_per_frame"] * run["frames"]), counters[counter], counter)
+
+    def test_every_built_in_scene_can_be_made(self):
+        for name in kbvh.builtin_scenes():
+            if name in ("shirt", "dress"):  # a simulation of seconds
+                continue
+            made = kbvh.scene(name, triangles=400, keyframes=3)
+            self.assertGreater(made.primitives, 0, name)
+            self.assertTrue(any(body.keyframes > 1 for body in made.bodies) or made.changes, name)
+
+
+if __name__ == "__main__":
+    unittest.main()
