@@ -199,7 +199,6 @@ TEST(World, RaysMeetWhatTheLibrarySays) {
   }
   World world;
   const std::vector<float> positions{0, 0, 0, 1, 0, 0, 0, 1, 0};
-  const std::vector<std::uint32_t> triangle{0, 1, 2};
   world.add_body("triangle", {triangle}, std::span<const float>(positions));
   std::vector<WorldHit> hits{{7, 7, 7}};
   EXPECT_THROW(world.hits(WorldRayQuery::any, {}, hits), std::logic_error);
