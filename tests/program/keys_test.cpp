@@ -134,7 +134,8 @@ TEST(Keys, SeeEveryFieldOfAPlan) {
        {"frames_limit", 3},
        {"oracle_every", 1},
        {"continuous", false}});
-  expect_every_field_counts({{"scenes", {"random_soups"}},
+  expect_every_field_counts({{"scenes", json::parse(R"([{"builtin": "random_soups", "triangles": 50,
+                                 "obstacle": 40, "keyframes": 3}])")},
                              {"strategies", strategies},
                              {"changes", "pairs"},
                              {"l", {3}},
