@@ -38,6 +38,7 @@
 // The hierarchy is not visible, so there is no audit. Float scenes only.
 #include <Eigen/Core>
 #include <atomic>
+#include <cmath>
 #include <cstring>
 #include <mutex>
 #include <span>
@@ -135,6 +136,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     for (BodyState& state : bodies_) bring_fans_up_to_date(state);
     for (std::size_t i = 0; i < rays.size(); ++i) {
       hits[i] = {};
+      if (!is_valid(rays[i])) continue;
       RTCRayHit found = ray_of(rays[i]);
       for (BodyState& state : bodies_) {
         if (!state.fans().scene) continue;
@@ -283,6 +285,14 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     state.positions = this->sampled_.positions(state.body);
     state.boxes.refit();
     state.boxes_are_old = false;
+  }
+
+  /// Embree asserts that rays are within its range of numbers; others count as misses.
+  static bool is_valid(const Ray<S>& ray) {
+    for (const S* const values : {ray.origin, ray.direction})
+      for (int axis = 0; axis < 3; ++axis)
+        if (!(std::abs(values[axis]) <= largest)) return false;
+    return true;
   }
 
   /// Makes or refits the triangles that rays meet.
