@@ -193,7 +193,7 @@ test("the buttons of an exercise load a solution and check it", needsLab, async 
   });
   assert.match(verdicts[0][0], /This scene has \d+ events/);
   assert.equal(verdicts[0][1], "verdict-line wrong");
-  assert.deepEqual(verdicts[1], ["Exactly twelve events.", "verdict-line right"]);
+  assert.deepEqual(verdicts[1], ["Exactly twelve events: 6 at lower x, 6 at upper x.", "verdict-line right"]);
   assert.deepEqual(wrong, []);
   await page.close();
 });
