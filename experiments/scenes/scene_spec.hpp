@@ -8,21 +8,10 @@
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/primitives.hpp"
 #include "experiments/scenes/builtin_scenes.hpp"
+#include "experiments/scenes/placement.hpp"
 #include "experiments/scenes/scripted.hpp"
 
 namespace kbvh::experiments {
-
-/// The placement of a body: scaled, then rotated by each rotation in turn, then translated.
-struct Placement {
-  struct Rotation {
-    double axis[3];  ///< need not be of unit length
-    double degrees;
-  };
-  double scale = 1;
-  std::vector<Rotation> rotations;
-  double translate[3] = {0, 0, 0};
-  bool identity() const;
-};
 
 /// One body of a scene from files, or by formula.
 struct BodySpec {
@@ -106,12 +95,6 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress = {});
 
 /// Returns the name of a missing file of an optional scene, else "".
 std::string missing_file(const SceneSpec& spec);
-
-/// Applies a placement to all keyframes, in double. Right angles are exact.
-void place(io::AnimatedMesh& mesh, const Placement& placement);
-
-/// Reorders the vertices at random by the seed; the geometry stays the same.
-void shuffle_vertices(io::AnimatedMesh& mesh, std::uint64_t seed);
 
 /// Makes the scene in one scalar: every coordinate is rounded once. Body pairs: all pairs with at least one
 /// moving body, then the requested pairs of bodies with themselves. Throws io::InputError that names the
