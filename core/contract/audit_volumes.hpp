@@ -21,8 +21,10 @@ class AuditVolumes {
   virtual double protrusion(std::uint32_t node, const double* point) const = 0;
   /// Returns the surface area of a node's volume.
   virtual double surface(std::uint32_t node) const = 0;
-  /// Returns the surface area of a volume of the same kind that is fitted directly to these points:
-  /// [point][3], exact in the strategy's scalar.
+  /// Returns whether a node's volume equals a volume of the same kind that is fitted directly to these
+  /// points: [point][3], exact in the strategy's scalar.
+  virtual bool tight(std::uint32_t node, std::span<const double> points) const = 0;
+  /// Returns the surface area of the volume that is fitted directly.
   virtual double tight_surface(std::span<const double> points) const = 0;
 };
 

@@ -28,15 +28,20 @@ class AuditedVolumes final : public AuditVolumes {
     return detail::protrusion_of(volumes_[node], point);
   }
   double surface(std::uint32_t node) const override { return surface_area(volumes_[node]); }
-  double tight_surface(std::span<const double> points) const override {
+  bool tight(std::uint32_t node, std::span<const double> points) const override {
+    return volumes_[node] == fitted(points);
+  }
+  double tight_surface(std::span<const double> points) const override { return surface_area(fitted(points)); }
+
+ private:
+  static V fitted(std::span<const double> points) {
     std::vector<VolumeScalar<V>> rounded(points.size());
     for (std::size_t i = 0; i < rounded.size(); ++i) rounded[i] = VolumeScalar<V>(points[i]);
     V volume;
     fit(volume, PointSet<VolumeScalar<V>>(rounded.data(), rounded.size() / 3));
-    return surface_area(volume);
+    return volume;
   }
 
- private:
   std::vector<V> volumes_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "core/base/assert.hpp"
 #include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
@@ -13,6 +14,18 @@ std::vector<StrategyEntry> with_unique_ids(std::vector<StrategyEntry> entries) {
       if (entries[i].info.id == entries[j].info.id)
         throw std::logic_error("two strategies are registered as '" + entries[i].info.id + "'");
   return entries;
+}
+
+std::vector<StrategyEntry> joined_scalars(std::vector<StrategyEntry> in_float,
+                                          const std::vector<StrategyEntry>& in_double) {
+  KBVH_ASSERT(in_float.size() == in_double.size());
+  for (std::size_t i = 0; i < in_float.size(); ++i) {
+    KBVH_ASSERT(in_float[i].info.id == in_double[i].info.id);
+    KBVH_ASSERT(in_float[i].make_float != nullptr && in_double[i].make_double != nullptr);
+    in_float[i].info.has_double = true;
+    in_float[i].make_double = in_double[i].make_double;
+  }
+  return in_float;
 }
 
 const StrategyEntry& find_strategy(const std::vector<StrategyEntry>& entries, std::string_view id) {

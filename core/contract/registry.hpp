@@ -73,13 +73,26 @@ std::unique_ptr<Strategy<S>> make(const SceneView<S>& scene, Playback<S>& playba
 /// The scene scalars for which a strategy exists.
 enum class Scalars : std::uint8_t { both, float_only, double_only };
 
+namespace detail {
+#ifdef KBVH_SCALARS_HERE
+constexpr Scalars scalars_here = Scalars::KBVH_SCALARS_HERE;
+#else
+constexpr Scalars scalars_here = Scalars::both;
+#endif
+}  // namespace detail
+
 /// Registers the class template T<Scalar, CountingPolicy>, which must
 ///   - derive from Strategy<Scalar>, and from the interfaces of its optional abilities,
 ///   - define `static constexpr Foresight foresight`,
 ///   - be constructible from (SceneView<S>, MotionView<foresight, S>, Topologies, const Params&).
 /// The abilities are derived from the class: a given `Info::can` is overwritten.
-template <template <class, class> class T, Scalars scalars = Scalars::both>
+/// `here` makes the instances of two parts of a source distinct functions (SCALARS_APART): the linker would
+/// merge them otherwise.
+template <template <class, class> class T, Scalars existing = Scalars::both,
+          Scalars here = detail::scalars_here>
 StrategyEntry make_entry(Info info) {
+  constexpr Scalars scalars = here == Scalars::both ? existing : here;
+  static_assert(existing == Scalars::both || scalars == existing, "SCALARS_APART needs both scalars");
   using Any = std::conditional_t<scalars == Scalars::double_only, double, float>;
   StrategyEntry entry;
   info.foresight = T<Any, Silent>::foresight;
@@ -92,9 +105,27 @@ StrategyEntry make_entry(Info info) {
   return entry;
 }
 
+/// Adds to each entry the factory of the other scalar. Both vectors hold the same ids in the same order.
+std::vector<StrategyEntry> joined_scalars(std::vector<StrategyEntry> in_float,
+                                          const std::vector<StrategyEntry>& in_double);
+
 /// Defines the function through which the generated manifest finds a source file. In strategies/NAME.cpp:
 ///   KBVH_STRATEGY(NAME) { return {make_entry<MyStrategy>({.id = ...})}; }
+/// A source that takes long to compile is compiled once a scalar (kbvh_add_strategy, SCALARS_APART). The part
+/// for float then joins both.
+#ifndef KBVH_SCALARS_HERE
 #define KBVH_STRATEGY(name) std::vector<kbvh::StrategyEntry> kbvh_strategy_##name()
+#elif defined(KBVH_JOINS_SCALARS)
+#define KBVH_STRATEGY(name)                                                                             \
+  std::vector<kbvh::StrategyEntry> kbvh_strategy_##name##_in_double();                                  \
+  static std::vector<kbvh::StrategyEntry> kbvh_strategy_##name##_in_float();                            \
+  std::vector<kbvh::StrategyEntry> kbvh_strategy_##name() {                                             \
+    return kbvh::joined_scalars(kbvh_strategy_##name##_in_float(), kbvh_strategy_##name##_in_double()); \
+  }                                                                                                     \
+  static std::vector<kbvh::StrategyEntry> kbvh_strategy_##name##_in_float()
+#else
+#define KBVH_STRATEGY(name) std::vector<kbvh::StrategyEntry> kbvh_strategy_##name##_in_double()
+#endif
 
 /// Returns all contestants linked into this program, in manifest order. Defined by the manifest, a source
 /// that the build generates from the list of strategies: a program that links no manifest has no registry.

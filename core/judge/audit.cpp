@@ -72,7 +72,8 @@ class PointsBelow {
 
 /// Queries every volume that is not stale about all vertices below its node.
 template <class S>
-void audit_volumes(const AuditView& view, const Primitives& primitives, const S* positions, Audit& result) {
+void audit_volumes(const AuditView& view, const Primitives& primitives, const S* positions, Areas areas,
+                   Audit& result) {
   const PointsBelow<S> below(view.topology, primitives, positions);
   for (std::uint32_t node = 0; node < view.topology.size(); ++node) {
     if (!view.stale.empty() && view.stale[node]) {
@@ -80,10 +81,13 @@ void audit_volumes(const AuditView& view, const Primitives& primitives, const S*
       continue;
     }
     const auto points = below.points(node);
-    const double surface = view.volumes->surface(node), tight = view.volumes->tight_surface(points);
-    result.area += surface;
-    result.tight_area += tight;
-    if (surface != tight) ++result.not_tight;
+    const bool tight = view.volumes->tight(node, points);
+    if (!tight) ++result.not_tight;
+    if (areas == Areas::summed) {
+      const double surface = view.volumes->surface(node);
+      result.area += surface;
+      result.tight_area += tight ? surface : view.volumes->tight_surface(points);
+    }
     double furthest = 0;
     std::uint32_t vertex = 0;
     for (std::size_t i = 0; i < points.size() / 3; ++i) {
@@ -134,7 +138,8 @@ std::vector<Box<double>> tight_boxes(const Topology& topology, const Primitives&
 }
 
 template <class S>
-Audit audit(const AuditView& view, const Primitives& primitives, const S* positions, const Topology* sound) {
+Audit audit(const AuditView& view, const Primitives& primitives, const S* positions, const Topology* sound,
+            Areas areas) {
   Audit result;
   result.nodes = view.topology.size();
   if (sound == nullptr || !(view.topology == *sound))
@@ -148,7 +153,7 @@ Audit audit(const AuditView& view, const Primitives& primitives, const S* positi
   if (!one_per_node(view.boxes.size(), " boxes for ")) return result;
   if (view.volumes && !one_per_node(view.volumes->size(), " volumes for ")) return result;
   if (view.volumes) {
-    audit_volumes(view, primitives, positions, result);
+    audit_volumes(view, primitives, positions, areas, result);
     return result;
   }
   const auto tight = tight_boxes(view.topology, primitives, positions);
@@ -192,7 +197,7 @@ double sah_cost(const Topology& topology, const std::vector<Box<double>>& boxes,
 
 template std::vector<Box<double>> tight_boxes(const Topology&, const Primitives&, const float*);
 template std::vector<Box<double>> tight_boxes(const Topology&, const Primitives&, const double*);
-template Audit audit(const AuditView&, const Primitives&, const float*, const Topology*);
-template Audit audit(const AuditView&, const Primitives&, const double*, const Topology*);
+template Audit audit(const AuditView&, const Primitives&, const float*, const Topology*, Areas);
+template Audit audit(const AuditView&, const Primitives&, const double*, const Topology*, Areas);
 
 }  // namespace kbvh

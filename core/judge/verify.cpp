@@ -67,8 +67,8 @@ PairBuffer difference(const PairBuffer& from, const PairBuffer& without) {
 template <class S>
 class FrameChecker {
  public:
-  FrameChecker(Session<S>& session, Verification& result)
-      : session_(session), result_(result), sound_(session.scene().bodies.size()) {}
+  FrameChecker(Session<S>& session, Verification& result, Areas areas)
+      : session_(session), result_(result), areas_(areas), sound_(session.scene().bodies.size()) {}
 
   /// Takes the answers by value: sorting must not disturb the warm buffers of strategies.
   void check_pairs(PairBuffer candidates, PairBuffer confirmed, const PairBuffer& truth) {
@@ -106,7 +106,7 @@ class FrameChecker {
       if (!view) continue;
       result_.audited = true;
       const Audit found = audit(*view, session_.scene().bodies[body].primitives,
-                                session_.playback().positions(body), &sound_[body]);
+                                session_.playback().positions(body), &sound_[body], areas_);
       frame.add(found);
       if (judged && found.topology_error.empty()) judge(body, *view, quality);
       if (found.topology_error.empty()) sound_[body] = std::move(view->topology);
@@ -148,6 +148,7 @@ class FrameChecker {
   }
   Session<S>& session_;
   Verification& result_;
+  Areas areas_;
   std::vector<Topology> sound_;  ///< the last topology of each body that passed the check: most never change
 };
 
@@ -157,7 +158,7 @@ template <class S>
 Verification verify(Session<S>& session, std::span<const double> frames, Oracle<S>& oracle,
                     const PlanScript<S>* script, const VerifyOptions& options) {
   Verification result;
-  FrameChecker<S> checker(session, result);
+  FrameChecker<S> checker(session, result, options.areas);
   PairBuffer pairs;
   PhaseTimes ignored;
   ScriptCursor<S> cursor(script);

@@ -39,6 +39,7 @@ struct VerifyOptions {
   std::uint64_t every_nth_frame =
       1;  ///< only these frames (and the last) are compared and audited; the strategy plays all
   std::uint64_t quality_samples = 0;  ///< maximum number of entries of `over_time`; each costs an SAH build
+  Areas areas = Areas::summed;        ///< left out: looseness is not measured
 };
 
 /// Names a pair in messages: "(body:primitive, body:primitive)".

@@ -37,7 +37,9 @@ TEST_P(Changes, AddUpToTheAnswers) {
   const auto& [scene_name, id] = GetParam();
   const StrategyEntry& entry = find_strategy(id);
   const BuilderConfig builder = entry.info.topology.preferred;
-  const std::uint32_t l = scene_name.find("geometry") != std::string::npos ? 3 : 7;
+  // Comparing full answers is one function for all strategies: few frames show what they can.
+  const bool compares = !entry.info.can.changes;
+  const std::uint32_t l = compares ? 2 : scene_name.find("geometry") != std::string::npos ? 3 : 7;
   const auto in_float = synthetic_scene<float>(scene_name, l);
   const auto in_double = synthetic_scene<double>(scene_name, l);
   EXPECT_EQ(check_changes(entry, in_float, l, {}, builder), "") << id << " on " << scene_name << ", float";

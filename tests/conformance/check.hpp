@@ -56,7 +56,7 @@ Oracle<S>& shared_oracle(const TestScene<S>& test) {
 template <class S>
 std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uint32_t frames_per_keyframe,
                   const std::map<std::string, std::string>& params, const BuilderConfig& builder,
-                  const VerifyOptions& options = {}) {
+                  const VerifyOptions& options = {.areas = Areas::left_out}) {
   if (const std::string why = skipped(entry, test); !why.empty()) return why;
   const std::vector<double> frames =
       test.frames.empty() ? frame_times(test.scene, frames_per_keyframe) : test.frames;

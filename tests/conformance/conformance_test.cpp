@@ -27,11 +27,12 @@ TEST_P(Conformance, KeepsItsGuaranteeOnEveryFrame) {
   const auto& [scene_name, id] = GetParam();
   const StrategyEntry& entry = find_strategy(id);
   const BuilderConfig builder = entry.info.topology.preferred;
-  // Scripts that change the geometry do so at most frames, which takes its time; so do sanitizers.
-  const bool changes = scene_name.find("geometry") != std::string::npos;
-  const std::uint32_t most = std::getenv("KBVH_FEW_FRAMES") != nullptr ? 7 : changes ? 20 : 100;
+  // The slow tests play every scene with many frames. Sanitizers take their time.
+  const std::uint32_t most = std::getenv("KBVH_FEW_FRAMES") != nullptr ? 7
+                             : std::getenv("KBVH_SLOW") != nullptr     ? 100
+                                                                       : 20;
   for (std::uint32_t l : {1u, 7u, 20u, 100u}) {
-    if (l > most || (l == 20 && !changes)) continue;
+    if (l > most) continue;
     const std::string where = id + " on " + scene_name + ", l = " + std::to_string(l);
     expect_conforms(check(entry, synthetic_scene<float>(scene_name, l), l, {}, builder), where + ", float");
     expect_conforms(check(entry, synthetic_scene<double>(scene_name, l), l, {}, builder), where + ", double");
@@ -72,23 +73,26 @@ class Configurations : public testing::TestWithParam<std::string> {};
 // Every admissible topology (method x width x leaf size) and every word of every parameter.
 TEST_P(Configurations, AllConform) {
   const StrategyEntry& entry = find_strategy(GetParam());
-  const auto sweep = [&](const std::string& scene_name, const auto& run) {
+  const auto sweep = [&](const std::string& scene_name, bool scripted, const auto& run) {
     if (entry.info.topology.own) return;
     for (BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
       for (std::uint32_t width : entry.info.topology.widths)
         for (std::uint32_t leaf = entry.info.topology.min_leaf_size;
-             leaf <= entry.info.topology.max_leaf_size; leaf += leaf < 4 ? 1 : 4)
+             leaf <= entry.info.topology.max_leaf_size; leaf += scripted   ? 5
+                                                                : leaf < 4 ? 1
+                                                                           : 4)
           run({.method = method, .width = width, .leaf_size = leaf}, scene_name + ", " + name(method) +
                                                                          ", width " + std::to_string(width) +
                                                                          ", leaf " + std::to_string(leaf));
   };
   for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes", "geometry_changes",
                                        "self_rolled_cloth", "self_plan_changes"}) {
-    // Scripts make every frame dear: fewer of them.
-    const std::uint32_t l = scene_name == "sheets" || scene_name == "integer_ties" ? 7 : 2;
+    // Scripts make every frame dear: fewer frames and leaf sizes.
+    const bool scripted = scene_name != "sheets" && scene_name != "integer_ties";
+    const std::uint32_t l = scripted ? 2 : 7;
     const auto in_float = synthetic_scene<float>(scene_name, l);
     const auto in_double = synthetic_scene<double>(scene_name, l);
-    sweep(scene_name, [&](const BuilderConfig& builder, const std::string& where) {
+    sweep(scene_name, scripted, [&](const BuilderConfig& builder, const std::string& where) {
       expect_conforms(check(entry, in_float, l, {}, builder), GetParam() + " on " + where + ", float");
       expect_conforms(check(entry, in_double, l, {}, builder), GetParam() + " on " + where + ", double");
     });
@@ -113,14 +117,14 @@ TEST_P(Kernels, Conform) {
   const KernelSet before = active_kernel_set();
   use_kernel_set(GetParam());
   for (const std::string& scene_name : all_scene_names()) {
-    const auto in_float = synthetic_scene<float>(scene_name, 10);
-    const auto in_double = synthetic_scene<double>(scene_name, 10);
+    const auto in_float = synthetic_scene<float>(scene_name, 3);
+    const auto in_double = synthetic_scene<double>(scene_name, 3);
     for (const StrategyEntry& entry : registry()) {
       if (entry.info.topology.own || entry.info.max_primitive_pairs != 0) continue;
       const std::string where = entry.info.id + " on " + scene_name + " with " + name(GetParam());
       const BuilderConfig builder = entry.info.topology.preferred;
-      expect_conforms(check(entry, in_float, 10, {}, builder), where + ", float");
-      expect_conforms(check(entry, in_double, 10, {}, builder), where + ", double");
+      expect_conforms(check(entry, in_float, 3, {}, builder), where + ", float");
+      expect_conforms(check(entry, in_double, 3, {}, builder), where + ", double");
     }
   }
   for (const std::string scene_name : {"sheets", "integer_ties"}) {
@@ -218,6 +222,8 @@ TEST(Registry, DescribesEveryStrategy) {
     EXPECT_FALSE(entry.info.family.empty()) << entry.info.id;
     EXPECT_FALSE(entry.info.citation.empty()) << entry.info.id;
     EXPECT_TRUE(entry.info.has_float || entry.info.has_double) << entry.info.id;
+    EXPECT_EQ(entry.info.has_float, entry.make_float != nullptr) << entry.info.id;
+    EXPECT_EQ(entry.info.has_double, entry.make_double != nullptr) << entry.info.id;
     for (const Parameter& parameter : entry.info.parameters) {
       EXPECT_FALSE(parameter.meaning.empty()) << entry.info.id << "." << parameter.name;
       EXPECT_NO_THROW(
