@@ -55,15 +55,15 @@ class LeafSlabs final : public StoredHierarchyStrategy<S, Count>,
       if (tests >= budget.box_tests) {
         ++status.pending;
       } else if (accepted_[pair.first] != 0 && accepted_[pair.second] != 0) {
-        status.pending += slabs_
-                              .run(slab_side(pair.first), slab_side(pair.second), reach, out, tests,
-                                   rest_of(budget, tests))
-                              .pending;
+        status.pending +=
+            slabs_
+                .run(slab_side(pair.first), slab_side(pair.second), reach, out, tests, rest_of(budget, tests))
+                .pending;
       } else {
-        status.pending += this->query_
-                              .run(this->side(pair.first), this->side(pair.second), out, tests,
-                                   rest_of(budget, tests))
-                              .pending;
+        status.pending +=
+            this->query_
+                .run(this->side(pair.first), this->side(pair.second), out, tests, rest_of(budget, tests))
+                .pending;
       }
     });
     this->count_.add(Counter::box_tests, tests);
@@ -90,8 +90,9 @@ class LeafSlabs final : public StoredHierarchyStrategy<S, Count>,
   void find_accepted() {
     accepted_.clear();
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body)
-      accepted_.push_back(SlabQuery<S>::accepts(this->scene_.primitives(body)) &&
-                          (this->hierarchies_[body].empty() || this->hierarchies_[body].padded_leaf_size() > 1));
+      accepted_.push_back(
+          SlabQuery<S>::accepts(this->scene_.primitives(body)) &&
+          (this->hierarchies_[body].empty() || this->hierarchies_[body].padded_leaf_size() > 1));
   }
   S largest_coordinate() const {
     S largest = 0;

@@ -66,8 +66,8 @@ struct Joined {
 
 enum class Fault : std::uint8_t { none, of_the_segment_before, of_another_leaf };
 
-/// Plays a scene and returns the pairs that joins with slabs have lost, and the shares of pairs that they have
-/// left.
+/// Plays a scene and returns the pairs that joins with slabs have lost, and the shares of pairs that they
+/// have left.
 struct Played {
   std::size_t lost = 0, hits = 0, joined = 0, left = 0;
 };
@@ -125,9 +125,9 @@ TYPED_TEST(SlabSpansTest, LosesNoContact) {
     for (const std::uint32_t leaf : {1U, 5U, 16U}) {
       std::size_t of_first_set = 0;
       for (const KernelSet set : supported_kernel_sets()) {
-        const Played one = played<S>(
-            name, {.method = BuildMethod::median, .width = leaf == 5 ? 4U : 8U, .leaf_size = leaf}, set,
-            Fault::none);
+        const Played one =
+            played<S>(name, {.method = BuildMethod::median, .width = leaf == 5 ? 4U : 8U, .leaf_size = leaf},
+                      set, Fault::none);
         EXPECT_EQ(one.lost, 0U) << name << ", leaves of " << leaf;
         if (set == KernelSet::portable) of_first_set = one.left;
         EXPECT_EQ(one.left, of_first_set) << name << ", leaves of " << leaf;

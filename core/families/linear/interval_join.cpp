@@ -311,9 +311,9 @@ void IntervalJoin<S>::move_to(float fraction) {
 template <class S>
 std::size_t IntervalJoin<S>::bytes() const {
   return stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
-         masks_.capacity() * sizeof(std::uint32_t) + found_throughout_.bytes() + found_partly_.bytes() + sorted_.capacity() * sizeof(JoinedPair) +
-         alive_.capacity() * sizeof(PrimitivePair) + bodies_.capacity() * sizeof(BodyPair) +
-         found_.capacity() * sizeof(Found) +
+         masks_.capacity() * sizeof(std::uint32_t) + found_throughout_.bytes() + found_partly_.bytes() +
+         sorted_.capacity() * sizeof(JoinedPair) + alive_.capacity() * sizeof(PrimitivePair) +
+         bodies_.capacity() * sizeof(BodyPair) + found_.capacity() * sizeof(Found) +
          (bodies_of_.capacity() + waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() +
           place_.capacity()) *
              sizeof(std::uint32_t);

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "core/families/slabs/kernels/slab_spans.hpp"
-#include "core/families/slabs/kernels/slabs.hpp"
 #include "core/families/wide/kernels/wide_linear.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 
@@ -56,7 +55,7 @@ struct LinearBody {
   SlabSpanLeaves<S> slab_leaves(const EndpointBounds<S>& first, const EndpointBounds<S>& last) {
     const std::size_t count = hierarchy.leaf_count();
     for (const std::uint32_t slot : {first.slot, last.slot}) {
-      blocks[slot].resize(count * SlabBlock::scalars(std::max(4u, hierarchy.padded_leaf_size())));
+      blocks[slot].resize(count * SpanBlock::scalars(std::max(4u, hierarchy.padded_leaf_size())));
       block_stamps[slot].resize(count, 0);
     }
     slabs.resize(count);
@@ -76,14 +75,13 @@ struct LinearBody {
             slab_stamp};
   }
   std::size_t bytes() const {
-    std::size_t total = hierarchy.bytes() + slabs.size() * sizeof(SpanSlab<S>) +
-                        slab_stamps.size() * sizeof(std::uint32_t);
+    std::size_t total =
+        hierarchy.bytes() + slabs.size() * sizeof(SpanSlab<S>) + slab_stamps.size() * sizeof(std::uint32_t);
     for (std::uint32_t slot = 0; slot < slots; ++slot)
-      total +=
-          (child_bounds[slot].size() + node_bounds[slot].size() + room[slot].capacity() + rows[slot].size() +
-           blocks[slot].size()) *
-              sizeof(S) +
-          (stamps[slot].size() + block_stamps[slot].size()) * sizeof(std::uint32_t);
+      total += (child_bounds[slot].size() + node_bounds[slot].size() + room[slot].capacity() +
+                rows[slot].size() + blocks[slot].size()) *
+                   sizeof(S) +
+               (stamps[slot].size() + block_stamps[slot].size()) * sizeof(std::uint32_t);
     return total;
   }
 };

@@ -72,15 +72,15 @@ QueryStatus SlabQuery<S>::run(const Side& a, const Side& b, S reach, PairBuffer&
       out.resize(size + leaves.found);
       for (std::size_t i = 0; i < leaves.found; ++i)
         out[size + i] = {a.body, column_a_[i], b.body, column_b_[i]};
-      if (self)
-        out.resize(size + keep_self_pairs(neighbours, from, out.data() + size, out.size() - size));
+      if (self) out.resize(size + keep_self_pairs(neighbours, from, out.data() + size, out.size() - size));
     }
   };
   while (state.depth > 0 && state.tests < state.test_limit) {
     traverse(leaves.a, leaves.b, state);
     leaf_pairs_seen_ += state.found;
     leaves.next = 0;
-    const std::size_t different = self ? different_leaves_first(leaf_pairs_.data(), state.found) : state.found;
+    const std::size_t different =
+        self ? different_leaves_first(leaf_pairs_.data(), state.found) : state.found;
     take(different, LeavesOf::two);
     take(state.found, LeavesOf::one);
     state.found = 0;

@@ -9,7 +9,9 @@ template <class S, std::size_t padded>
 [[gnu::noinline]] void make_span_block(const WideLeafLists& lists, std::uint32_t leaf, const S* positions,
                                        S* block) {
   load_corners<S, padded>(lists, leaf, positions, block);
-  find_direction<S, padded>(block);
+  alignas(64) S normals[3][padded];
+  find_normals<S, padded>(block, normals);
+  find_direction<S, padded>(normals, block + SpanBlock::rows * padded);
 }
 
 /// The corners of one leaf at both ends, and its slab.
@@ -23,8 +25,8 @@ template <class S, std::size_t padded>
 [[gnu::noinline]] void make_slab(const SpanLeaf<S>& leaf, SpanSlab<S>& slab) {
   // The mean direction of both ends; they are normalised, and opposite ones separate nothing.
   for (std::size_t axis = 0; axis < 3; ++axis)
-    slab.direction[axis] = S(0.5) * (leaf.blocks[0][SlabBlock::rows * padded + axis] +
-                                     leaf.blocks[1][SlabBlock::rows * padded + axis]);
+    slab.direction[axis] = S(0.5) * (leaf.blocks[0][SpanBlock::rows * padded + axis] +
+                                     leaf.blocks[1][SpanBlock::rows * padded + axis]);
   for (std::size_t end = 0; end < 2; ++end)
     find_extent<S, padded>(leaf.blocks[end], slab.direction, slab.low[end], slab.high[end]);
 }
@@ -32,7 +34,7 @@ template <class S, std::size_t padded>
 /// Computes what is not current of a leaf.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline SpanLeaf<S> span_leaf(const SlabSpanLeaves<S>& leaves, std::uint32_t leaf) {
-  const std::size_t place = std::size_t(leaf) * SlabBlock::scalars(padded);
+  const std::size_t place = std::size_t(leaf) * SpanBlock::scalars(padded);
   SpanLeaf<S> result{{leaves.blocks[0] + place, leaves.blocks[1] + place}, leaves.slabs + leaf};
   if (leaves.slab_stamps[leaf] == leaves.slab_stamp) return result;
   for (std::size_t end = 0; end < 2; ++end) {

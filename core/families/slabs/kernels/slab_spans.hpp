@@ -16,12 +16,19 @@ struct SpanSlab {
   S direction[3], low[2], high[2], unused;
 };
 
+/// A leaf of triangles at one end of a segment: nine rows of coordinates as in SlabBlock, and the direction
+/// of its slab at that time.
+struct SpanBlock {
+  static constexpr std::size_t rows = 9, tail = 16;
+  static constexpr std::size_t scalars(std::size_t padded) { return rows * padded + tail; }
+};
+
 /// The leaves of one body of triangles in linear motion over a segment.
 template <class S>
 struct SlabSpanLeaves {
   WideLeafLists lists;
   /// By end; both the same for a body at rest.
-  S* blocks[2];              ///< [leaf][SlabBlock::scalars]: only corners are used
+  S* blocks[2];              ///< [leaf][SpanBlock::scalars]
   std::uint32_t* stamps[2];  ///< [leaf]: stamp of the positions of its block
   std::uint32_t stamp[2];    ///< stamp of these positions
   const S* positions[2];

@@ -10,11 +10,14 @@ namespace kbvh {
 enum class KernelSet : std::uint8_t;
 
 /// A leaf of triangles as a block of rows of `padded` lanes, one triangle per lane: six rows of boxes like
-/// those of a node, then nine rows of coordinates (corner 0 x, y, z, corner 1 x, ...), then the slab: a
-/// direction whose absolute components add up to about 1, and the smallest and largest product of it with a
-/// corner. Lanes behind the last triangle have empty boxes and repeat its coordinates.
+/// those of a node; nine rows of coordinates (corner 0 x, y, z, corner 1 x, ...); three rows of normals, with
+/// the smallest and the largest product of a triangle's normal and its corners, and the sum of the normal's
+/// absolute components; and behind the rows the slab: a direction whose absolute components add up to about
+/// 1, and the smallest and the largest product of it and a corner. Lanes behind the last triangle have empty
+/// boxes and repeat its other numbers.
 struct SlabBlock {
-  static constexpr std::size_t corner_row = 6, rows = 15, tail = 16;
+  static constexpr std::size_t corner_row = 6, normal_row = 15, low_row = 18, high_row = 19, size_row = 20;
+  static constexpr std::size_t rows = 21, tail = 16;
   static constexpr std::size_t scalars(std::size_t padded) { return rows * padded + tail; }
 };
 
@@ -29,7 +32,7 @@ struct SlabLeaves {
 };
 
 /// Turns pairs of leaves into pairs of triangles whose boxes overlap, and of which each meets the slab of the
-/// other one's leaf.
+/// other one's leaf, and the second one the plane of the first one.
 template <class S>
 struct SlabLeafPairs {
   WideArrays<S> a, b;

@@ -324,7 +324,8 @@ struct PartlyBatch {
   }
 };
 
-/// Processes the pairs of the primitives of two leaves; only primitives with a bit are visited. Branches on the overlap would cost as much as the comparisons, so only the ends of loops branch.
+/// Processes the pairs of the primitives of two leaves; only primitives with a bit are visited. Branches on
+/// the overlap would cost as much as the comparisons, so only the ends of loops branch.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline void leaf_pairs(const LeafRows<S>& outer, unsigned bits,
                                               const LeafRows<S>& inner, unsigned inner_bits, S margin,
