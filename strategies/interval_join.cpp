@@ -76,6 +76,10 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
       by_spans_[0] = spans;
     else
       for (std::size_t i = 0; i < scene.pairs().size(); ++i) by_spans_[i] = is_decidable(scene.pairs()[i]);
+    if (params.word("slabs") == "on")
+      for (std::size_t i = 0; i < now_.joins.size(); ++i)
+        for (Joins<S>* one : {&now_, &next_})
+          if (by_spans_[i]) one->joins[i].use_slabs();
     any_by_spans_ = std::find(by_spans_.begin(), by_spans_.end(), true) != by_spans_.end();
     all_by_spans_ = std::find(by_spans_.begin(), by_spans_.end(), false) == by_spans_.end();
   }
@@ -368,6 +372,11 @@ std::vector<Parameter> join_parameters() {
                   "spans",
                   {"spans", "frames"},
                   "decide pairs of triangles for spans of time where a proof exists, or at every frame"});
+  list.push_back({"slabs",
+                  "on",
+                  {"on", "off"},
+                  "with triangle_tests=spans: leave out triangles that the slab of a leaf separates "
+                  "throughout the segment"});
   return list;
 }
 

@@ -1,6 +1,7 @@
 #include "core/families/linear/interval_join.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "core/families/wide/leaf_slots.hpp"
 #include "core/topology/traversal.hpp"
@@ -60,6 +61,7 @@ void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>&
   found_.clear();
   leaf_pairs_room_ = leaf_pairs;
   node_tests_ = 0;
+  leaf_pairs_seen_ = leaf_pairs_left_ = 0;
   reading_ = false;
   following_ = {};
   throughout_ = count_ = 0;
@@ -83,8 +85,8 @@ void IntervalJoin<S>::begin_bodies() {
   const std::uint32_t width = a.hierarchy().topology().width;
   const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(a.hierarchy().kernels());
   traverse_ = self_ ? kernels.self(width) : kernels.join(width);
-  join_leaves_ =
-      kernels.leaf_join(std::max({4u, a.hierarchy().padded_leaf_size(), b.hierarchy().padded_leaf_size()}));
+  padded_ = std::max({4u, a.hierarchy().padded_leaf_size(), b.hierarchy().padded_leaf_size()});
+  join_leaves_ = kernels.leaf_join(padded_);
   neighbours_ = self_ && !with_neighbours_ ? &scene_->primitives(bodies.first) : nullptr;
   stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
   leaf_pairs_.resize(std::max(leaf_pairs_.size(), 2 * leaf_pairs_room_));
@@ -105,6 +107,20 @@ void IntervalJoin<S>::begin_bodies() {
                 leaf_join_.throughout,
                 leaf_join_.partly,
                 leaf_join_.tests};
+  if (!with_slabs_) return;
+  masks_.resize(leaf_pairs_.size() / 2);
+  // Positions at frames and at ends differ from the lines by half an ulp each; the products of directions and
+  // corners, two sums of which are compared, by less than two ulps of the largest coordinate each. A body's
+  // margin is 8 ulps.
+  slabs_ = {a.hierarchy().arrays(),
+            b.hierarchy().arrays(),
+            a.slab_leaves(),
+            b.slab_leaves(),
+            2 * (a.margin + b.margin) + std::numeric_limits<S>::min(),
+            leaf_pairs_.data(),
+            0,
+            masks_.data(),
+            0};
 }
 
 template <class S>
@@ -130,7 +146,7 @@ bool IntervalJoin<S>::step(std::uint64_t box_tests) {
         take_self_leaves(different_leaves_first(leaf_pairs_.data(), traversal_.found), LeavesOf::two);
         take_self_leaves(traversal_.found, LeavesOf::one);
       } else {
-        take_leaves(traversal_.found);
+        take_leaves(traversal_.found, LeavesOf::two);
       }
       traversal_.found = 0;
       if (traversal_.depth + max_pairs_per_step >= traversal_.stack_room) {
@@ -148,20 +164,40 @@ bool IntervalJoin<S>::step(std::uint64_t box_tests) {
   return true;
 }
 
+/// Leaves out pairs of leaves that slabs separate; returns the number of the others.
 template <class S>
-void IntervalJoin<S>::take_leaves(std::size_t end) {
+std::size_t IntervalJoin<S>::filter_leaves(std::size_t count) {
+  slabs_.count = count;
+  slabs_.tests = 0;
+  slab_span_kernels<S>(segment_->sides[bodies_[found_.size()].first].hierarchy().kernels())
+      .filter(padded_)(slabs_);
+  leaf_join_.tests += slabs_.tests;
+  return slabs_.count;
+}
+
+/// Processes the pairs of leaves from `leaf_join_.next` on, up to `end`.
+template <class S>
+void IntervalJoin<S>::take_leaves(std::size_t end, LeavesOf leaves) {
   leaf_join_.count = end;
+  leaf_join_.masks = nullptr;
+  leaf_pairs_seen_ += end - leaf_join_.next;
+  if (with_slabs_ && leaves == LeavesOf::two) {
+    leaf_join_.count = filter_leaves(end);
+    leaf_join_.masks = masks_.data();
+  }
+  leaf_pairs_left_ += leaf_join_.count - leaf_join_.next;
   while (leaf_join_.next < leaf_join_.count) {
     leaf_join_.throughout = found_throughout_.view(leaf_join_.throughout.found, false);
     leaf_join_.partly = found_partly_.view(leaf_join_.partly.found, true);
     join_leaves_(leaf_join_);
   }
+  leaf_join_.next = end;
 }
 
 template <class S>
 void IntervalJoin<S>::take_self_leaves(std::size_t end, LeavesOf leaves) {
   const std::size_t old_throughout = leaf_join_.throughout.found, old_partly = leaf_join_.partly.found;
-  take_leaves(end);
+  take_leaves(end, leaves);
   keep_self_columns(neighbours_, leaves, leaf_join_.throughout, old_throughout);
   keep_self_columns(neighbours_, leaves, leaf_join_.partly, old_partly);
 }
@@ -275,9 +311,9 @@ void IntervalJoin<S>::move_to(float fraction) {
 template <class S>
 std::size_t IntervalJoin<S>::bytes() const {
   return stack_.size() * sizeof(WidePair) + leaf_pairs_.size() * sizeof(LeafSlot) +
-         found_throughout_.bytes() + found_partly_.bytes() + sorted_.capacity() * sizeof(JoinedPair) +
-         alive_.capacity() * sizeof(PrimitivePair) + bodies_.capacity() * sizeof(BodyPair) +
-         found_.capacity() * sizeof(Found) +
+         masks_.capacity() * sizeof(std::uint32_t) + found_throughout_.bytes() + found_partly_.bytes() +
+         sorted_.capacity() * sizeof(JoinedPair) + alive_.capacity() * sizeof(PrimitivePair) +
+         bodies_.capacity() * sizeof(BodyPair) + found_.capacity() * sizeof(Found) +
          (bodies_of_.capacity() + waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() +
           place_.capacity()) *
              sizeof(std::uint32_t);

@@ -55,6 +55,14 @@ class IntervalJoin {
   /// Keeps pairs within one body that share a vertex from now on.
   void keep_neighbours() { with_neighbours_ = true; }
 
+  /// From now on leaves out pairs of triangles that the slab of a leaf separates throughout the segment
+  /// (SlabSpanPairs); all bodies must consist of triangles only.
+  void use_slabs() { with_slabs_ = true; }
+  /// Return the pairs of leaves whose boxes overlap within the segment, and those of them of which slabs have
+  /// left something.
+  std::uint64_t leaf_pairs() const { return leaf_pairs_seen_; }
+  std::uint64_t leaf_pairs_left() const { return leaf_pairs_left_; }
+
   /// Appends the pairs whose boxes overlap at a fraction of the segment. Fractions must not decrease within a
   /// segment. O(pairs that begin or end since the last call), plus one copy of the overlapping pairs.
   void read(float fraction, PairBuffer& out) {
@@ -107,7 +115,8 @@ class IntervalJoin {
   };
   void begin_bodies();
   void end_bodies();
-  void take_leaves(std::size_t end);
+  void take_leaves(std::size_t end, LeavesOf leaves);
+  std::size_t filter_leaves(std::size_t count);
   void take_self_leaves(std::size_t end, LeavesOf leaves);
   void sort_by_begin();
   void start_reading();
@@ -120,8 +129,12 @@ class IntervalJoin {
   std::vector<Found> found_;      ///< [pair of bodies], completed ones
   std::size_t leaf_pairs_room_ = 0;
   std::uint64_t node_tests_ = 0;  ///< of completed pairs of bodies
+  std::uint32_t padded_ = 4;      ///< lanes of a leaf
   bool self_ = false;             ///< the current pair is one body with itself
-  bool with_neighbours_ = false, done_ = true;
+  bool with_neighbours_ = false, with_slabs_ = false, done_ = true;
+  SlabSpanPairs<S> slabs_{};          ///< of the current pair of bodies
+  std::vector<std::uint32_t> masks_;  ///< [pair of leaves]
+  std::uint64_t leaf_pairs_seen_ = 0, leaf_pairs_left_ = 0;
   WideTraversal traversal_{};
   WideLeafJoin<S> leaf_join_{};
   typename WideLinearKernels<S>::Join traverse_ = nullptr;

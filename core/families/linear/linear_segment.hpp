@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/families/slabs/kernels/slab_spans.hpp"
 #include "core/families/wide/kernels/wide_linear.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 
@@ -31,6 +32,12 @@ struct LinearBody {
   AlignedArray<S> rows[slots];
   std::vector<std::uint32_t> stamps[slots];
   std::uint32_t made = 0;  ///< number of ends made so far
+  /// Corners of the leaves that a join with slabs visited, with stamps of their positions.
+  AlignedArray<S> blocks[slots];
+  std::vector<std::uint32_t> block_stamps[slots];
+  AlignedArray<SpanSlab<S>> slabs;  ///< [leaf]
+  std::vector<std::uint32_t> slab_stamps;
+  std::uint32_t slab_stamp = 0, slab_ends[2] = {0, 0};  ///< of the last segment asked for, and its `made`
 
   WideLinearLeaves<S> leaves(const EndpointBounds<S>& first, const EndpointBounds<S>& last) {
     const std::size_t count = hierarchy.leaf_count();
@@ -44,13 +51,37 @@ struct LinearBody {
             {first.made, last.made},
             {first.positions, last.positions}};
   }
+  /// Returns the same for slabs, of a body of triangles.
+  SlabSpanLeaves<S> slab_leaves(const EndpointBounds<S>& first, const EndpointBounds<S>& last) {
+    const std::size_t count = hierarchy.leaf_count();
+    for (const std::uint32_t slot : {first.slot, last.slot}) {
+      blocks[slot].resize(count * SpanBlock::scalars(std::max(4u, hierarchy.padded_leaf_size())));
+      block_stamps[slot].resize(count, 0);
+    }
+    slabs.resize(count);
+    slab_stamps.resize(count, 0);
+    if (slab_ends[0] != first.made || slab_ends[1] != last.made) {
+      slab_ends[0] = first.made;
+      slab_ends[1] = last.made;
+      ++slab_stamp;
+    }
+    return {hierarchy.leaf_lists(),
+            {blocks[first.slot].data(), blocks[last.slot].data()},
+            {block_stamps[first.slot].data(), block_stamps[last.slot].data()},
+            {first.made, last.made},
+            {first.positions, last.positions},
+            slabs.data(),
+            slab_stamps.data(),
+            slab_stamp};
+  }
   std::size_t bytes() const {
-    std::size_t total = hierarchy.bytes();
+    std::size_t total =
+        hierarchy.bytes() + slabs.size() * sizeof(SpanSlab<S>) + slab_stamps.size() * sizeof(std::uint32_t);
     for (std::uint32_t slot = 0; slot < slots; ++slot)
-      total +=
-          (child_bounds[slot].size() + node_bounds[slot].size() + room[slot].capacity() + rows[slot].size()) *
-              sizeof(S) +
-          stamps[slot].size() * sizeof(std::uint32_t);
+      total += (child_bounds[slot].size() + node_bounds[slot].size() + room[slot].capacity() +
+                rows[slot].size() + blocks[slot].size()) *
+                   sizeof(S) +
+               (stamps[slot].size() + block_stamps[slot].size()) * sizeof(std::uint32_t);
     return total;
   }
 };
@@ -70,6 +101,7 @@ struct BodySegmentBounds {
     return {{at[0].child_bounds, at[1].child_bounds}, {at[0].node_bounds, at[1].node_bounds}, margin};
   }
   WideLinearLeaves<S> leaves() const { return body->leaves(at[0], at[1]); }
+  SlabSpanLeaves<S> slab_leaves() const { return body->slab_leaves(at[0], at[1]); }
   Box<S> box_at(std::uint32_t end, std::uint32_t node) const {
     return hierarchy().box_in(at[end].child_bounds, at[end].node_bounds, node);
   }

@@ -324,12 +324,12 @@ struct PartlyBatch {
   }
 };
 
-/// Processes the pairs of the primitives of two leaves; only primitives of `outer` with a bit are visited.
-/// Branches on the overlap would cost as much as the comparisons, so only the ends of loops branch.
+/// Processes the pairs of the primitives of two leaves; only primitives with a bit are visited. Branches on
+/// the overlap would cost as much as the comparisons, so only the ends of loops branch.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline void leaf_pairs(const LeafRows<S>& outer, unsigned bits,
-                                              const LeafRows<S>& inner, S margin, bool swapped,
-                                              WideLeafJoin<S>& state, PartlyBatch<S>& batch) {
+                                              const LeafRows<S>& inner, unsigned inner_bits, S margin,
+                                              bool swapped, WideLeafJoin<S>& state, PartlyBatch<S>& batch) {
   LeafReach<S, padded> reach;
   reach.make(outer, margin);
   JoinColumns& all = state.throughout;
@@ -344,7 +344,9 @@ template <class S, std::size_t padded>
   };
   for (; bits != 0; bits &= bits - 1) {
     const std::uint32_t i = lowest(bits);
-    const LaneBits found = compare<S, padded>(inner, reach, i);
+    LaneBits found = compare<S, padded>(inner, reach, i);
+    found.hit &= inner_bits;
+    found.throughout &= inner_bits;
     fill(column_outer + all.found, outer.primitives[i]);
     all.found += pack_lanes(found.throughout, inner.primitives, column_inner + all.found);
     fill(part_outer + parts, i);
@@ -396,17 +398,18 @@ void leaf_join(WideLeafJoin<S>& shared) {
     const LeafSlot slot_a = state.pairs[2 * state.next], slot_b = state.pairs[2 * state.next + 1];
     const LeafRows<S> a = rows_of(state.leaves_a, number(state.a, slot_a));
     const LeafRows<S> b = rows_of(state.leaves_b, number(state.b, slot_b));
-    const unsigned near_a = meeting<S, padded>(a.first, a.last, box_of(state.ends_b, slot_b));
-    const unsigned near_b = meeting<S, padded>(b.first, b.last, box_of(state.ends_a, slot_a));
+    const std::uint32_t mask = state.masks != nullptr ? state.masks[state.next] : ~std::uint32_t(0);
+    const unsigned near_a = meeting<S, padded>(a.first, a.last, box_of(state.ends_b, slot_b)) & mask;
+    const unsigned near_b = meeting<S, padded>(b.first, b.last, box_of(state.ends_a, slot_a)) & mask >> 16;
     const auto count_a = unsigned(__builtin_popcount(near_a)), count_b = unsigned(__builtin_popcount(near_b));
     state.tests += a.count + b.count;
     if (count_a == 0 || count_b == 0) continue;
     if (count_a <= count_b) {
       state.tests += std::uint64_t(count_a) * b.count;
-      leaf_pairs<S, padded>(a, near_a, b, margin, false, state, batch);
+      leaf_pairs<S, padded>(a, near_a, b, near_b, margin, false, state, batch);
     } else {
       state.tests += std::uint64_t(count_b) * a.count;
-      leaf_pairs<S, padded>(b, near_b, a, margin, true, state, batch);
+      leaf_pairs<S, padded>(b, near_b, a, near_a, margin, true, state, batch);
     }
   }
   if (batch.count > 0) batch.flush(state.partly);

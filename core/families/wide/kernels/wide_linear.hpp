@@ -68,6 +68,9 @@ struct WideLeafJoin {
   JoinColumns throughout;  ///< pairs that overlap from the start of the segment to its end
   JoinColumns partly;      ///< the others
   std::uint64_t tests;
+  /// [pair of leaves] bit i: primitive i of the first leaf counts; bit 16 + i: primitive i of the second.
+  /// Null: all count.
+  const std::uint32_t* masks = nullptr;
 };
 
 template <class S>

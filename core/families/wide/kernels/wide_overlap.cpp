@@ -28,6 +28,8 @@ void traverse(WideArrays<S> a, WideArrays<S> b, WideTraversal& state) {
   traverse_pairs(a, b, view, state);
 }
 
+constexpr std::size_t leaf_pairs_at_once = 4;
+
 /// Computes the rows of a leaf unless they are current.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline const S* leaf_rows(const WideLeaves<S>& leaves, std::uint32_t leaf) {
@@ -39,13 +41,27 @@ template <class S, std::size_t padded>
   return rows;
 }
 
+/// Appends the pairs of one primitive and those of a leaf whose bits are set. Writes four pairs in any case:
+/// how many bits are set changes from call to call, and a loop over them would be mispredicted each time.
+[[gnu::always_inline]] inline std::size_t emit_pairs(FoundPair pair, const std::uint32_t* primitives_b,
+                                                     unsigned bits, FoundPair* out) {
+  alignas(64) std::uint32_t packed[16] = {};
+  const unsigned count = pack_lanes(bits, primitives_b, packed);
+  for (std::size_t k = 0; k < leaf_pairs_at_once; ++k)
+    out[k] = {pair.body_a, pair.primitive_a, pair.body_b, packed[k]};
+  for (std::size_t k = leaf_pairs_at_once; k < count; ++k)
+    out[k] = {pair.body_a, pair.primitive_a, pair.body_b, packed[k]};
+  return count;
+}
+
 template <class S, std::uint32_t width, std::size_t padded>
 void leaf_pairs(WideLeafPairs<S>& shared) {
   WideLeafPairs<S> state = shared;
   const auto number = [](const WideArrays<S>& h, LeafSlot slot) {
     return h.nodes[slot.node()].first_leaf + slot.lane();
   };
-  for (; state.next < state.count && state.found + leaf_pair_step <= state.out_room; ++state.next) {
+  for (; state.next < state.count && state.found + leaf_pair_step + leaf_pairs_at_once <= state.out_room;
+       ++state.next) {
     const LeafSlot slot_a = state.pairs[2 * state.next], slot_b = state.pairs[2 * state.next + 1];
     const std::uint32_t leaf_a = number(state.a, slot_a), leaf_b = number(state.b, slot_b);
     const S* rows_a = leaf_rows<S, padded>(state.leaves_a, leaf_a);
@@ -60,11 +76,9 @@ void leaf_pairs(WideLeafPairs<S>& shared) {
     state.tests += count_a + std::uint64_t(unsigned(__builtin_popcount(first))) * count_b;
     for (; first != 0; first &= first - 1) {
       const std::uint32_t i = lowest(first), primitive_a = lists_a.primitives[begin_a + i];
-      unsigned second = overlapping<S, padded>(rows_b, lane_box(rows_a, padded, i));
-      for (; second != 0; second &= second - 1) {
-        state.out[state.found++] = {state.body_a, primitive_a, state.body_b,
-                                    lists_b.primitives[begin_b + lowest(second)]};
-      }
+      const unsigned second = overlapping<S, padded>(rows_b, lane_box(rows_a, padded, i));
+      state.found += emit_pairs({state.body_a, primitive_a, state.body_b, 0}, lists_b.primitives + begin_b,
+                                second, state.out + state.found);
     }
   }
   shared = state;

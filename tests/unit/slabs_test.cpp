@@ -1,0 +1,206 @@
+// Queries with slabs at the leaves lose no pair of triangles that share a point, for every width, leaf size
+// and set of kernels, also where surfaces touch in a tilted plane far from the origin, so that only the slack
+// for rounding keeps them; and slabs that are stale, or of another leaf, lose some.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/families/slabs/slab_query.hpp"
+#include "core/families/wide/wide_hierarchy.hpp"
+#include "core/topology/builders.hpp"
+#include "tests/support/play.hpp"
+#include "tests/support/synthetic_scenes.hpp"
+
+namespace kbvh::test {
+namespace {
+
+template <class S>
+struct SlabbedBodies {
+  SlabbedBodies(const Scene<S>& of, const BuilderConfig& builder, KernelSet set)
+      : scene(of), view(scene), playback(scene), motion(playback), boxes(view, motion), slabs(view) {
+    playback.evaluate_all();
+    hierarchies.resize(scene.bodies.size());
+    blocks.resize(scene.bodies.size());
+    for (std::uint32_t body = 0; body < scene.bodies.size(); ++body)
+      hierarchies[body].assign(build_topology(view.primitives(body), playback.positions(body), builder),
+                               view.primitives(body), set);
+  }
+  enum class Blocks : std::uint8_t { current, stale };
+  void seek(double t, Blocks what = Blocks::current) {
+    playback.seek(t);
+    playback.evaluate_all();
+    for (std::uint32_t body = 0; body < hierarchies.size(); ++body) {
+      hierarchies[body].positions_changed();
+      hierarchies[body].refit(playback.positions(body));
+      if (what == Blocks::current) blocks[body].positions_changed();
+    }
+  }
+  PairBuffer by_boxes() {
+    PairBuffer pairs;
+    std::uint64_t tests = 0;
+    for (const BodyPair& pair : scene.pairs)
+      boxes.run({&hierarchies[pair.first], pair.first}, {&hierarchies[pair.second], pair.second}, pairs,
+                tests);
+    std::sort(pairs.begin(), pairs.end());
+    return pairs;
+  }
+  typename SlabQuery<S>::Side side(std::uint32_t body) {
+    return {&hierarchies[body], body, &blocks[body], playback.positions(body)};
+  }
+  PairBuffer by_slabs(double share_of_reach = 1) {
+    S reach = 0;
+    for (const auto& hierarchy : hierarchies) {
+      const Box<S> box = hierarchy.root_box();
+      for (int axis = 0; axis < 3; ++axis)
+        reach = std::max({reach, std::abs(box.lower[axis]), std::abs(box.upper[axis])});
+    }
+    PairBuffer pairs;
+    std::uint64_t tests = 0;
+    for (const BodyPair& pair : scene.pairs)
+      slabs.run(side(pair.first), side(pair.second), S(share_of_reach) * reach, pairs, tests, {});
+    std::sort(pairs.begin(), pairs.end());
+    return pairs;
+  }
+  PairBuffer confirmed(PairBuffer pairs) {
+    TriangleTestStats stats;
+    confirm_pairs(view, motion, pairs, stats);
+    return pairs;
+  }
+
+  Scene<S> scene;
+  SceneView<S> view;
+  Playback<S> playback;
+  SampledMotion<S> motion;
+  WideQuery<S> boxes;
+  SlabQuery<S> slabs;
+  std::vector<WideHierarchy<S>> hierarchies;
+  std::vector<SlabBlocks<S>> blocks;
+};
+
+template <class S>
+bool all_triangular(const Scene<S>& scene) {
+  return std::all_of(scene.bodies.begin(), scene.bodies.end(),
+                     [](const Body<S>& body) { return SlabQuery<S>::accepts(body.primitives); });
+}
+
+template <class S>
+class SlabsTest : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(SlabsTest, Scalars);
+
+TYPED_TEST(SlabsTest, LosesNoContact) {
+  using S = TypeParam;
+  Random random(3);
+  std::size_t found = 0, candidates = 0, kept = 0;
+  std::vector<std::string> names = synthetic_scene_names();
+  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
+  for (const std::string& name : names) {
+    const auto test = synthetic_scene<S>(name);
+    if (test.script.changes_geometry() || !all_triangular(test.scene)) continue;
+    const BuilderConfig builders[] = {{.method = BuildMethod::median, .width = 2, .leaf_size = 3},
+                                      {.method = BuildMethod::sah, .width = 4, .leaf_size = 7},
+                                      {.method = BuildMethod::median, .width = 8, .leaf_size = 16}};
+    for (const BuilderConfig& builder : builders) {
+      PairBuffer of_first_set;
+      const double t = test.frames[random.below(std::uint32_t(test.frames.size()))];
+      for (const KernelSet set : supported_kernel_sets()) {
+        SlabbedBodies<S> bodies(test.scene, builder, set);
+        bodies.seek(test.frames[0]);
+        bodies.by_slabs();
+        bodies.seek(t);
+        const PairBuffer boxes = bodies.by_boxes(), slabs = bodies.by_slabs();
+        ASSERT_TRUE(std::includes(boxes.begin(), boxes.end(), slabs.begin(), slabs.end())) << name;
+        ASSERT_EQ(bodies.confirmed(slabs), bodies.confirmed(boxes)) << name << ", width " << builder.width;
+        if (set == KernelSet::portable)
+          of_first_set = slabs;
+        else
+          ASSERT_EQ(slabs, of_first_set) << name;
+        found += bodies.confirmed(slabs).size();
+        candidates += boxes.size();
+        kept += slabs.size();
+      }
+    }
+  }
+  EXPECT_GT(found, 100U);
+  EXPECT_LT(kept, candidates);
+}
+
+/// Two flat sheets in one tilted plane, far from the origin; those of the second one lie on vertices of the
+/// first one, so that triangles touch in vertices whose positions are rounded to the same numbers.
+template <class S>
+Scene<S> tilted_sheets(double far) {
+  Scene<S> scene;
+  constexpr std::uint32_t n = 24;
+  for (const int offset : {0, 12}) {
+    Body<S> body;
+    std::vector<S> positions;
+    for (std::uint32_t j = 0; j <= n; ++j)
+      for (std::uint32_t i = 0; i <= n; ++i) {
+        const double u = (double(i) + offset) / 7, v = double(j) / 9;
+        positions.push_back(S(far + 0.83 * u - 0.31 * v));
+        positions.push_back(S(-far + 0.29 * u + 0.93 * v));
+        // The second sheet lies below the plane but for every third vertex.
+        const double gap = offset != 0 && (i + j) % 3 != 0 ? 0.02 : 0;
+        positions.push_back(S(far + 0.47 * u - 0.21 * v - gap));
+      }
+    for (std::uint32_t j = 0; j < n; ++j)
+      for (std::uint32_t i = 0; i < n; ++i) {
+        const std::uint32_t a = j * (n + 1) + i, b = a + n + 1;
+        body.primitives.add(std::vector<std::uint32_t>{a, a + 1, b});
+        body.primitives.add(std::vector<std::uint32_t>{b, a + 1, b + 1});
+      }
+    body.plans = FlightPlans<S>((n + 1) * (n + 1), std::vector<double>{0}, std::move(positions));
+    scene.bodies.push_back(std::move(body));
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  return scene;
+}
+
+TYPED_TEST(SlabsTest, SlackKeepsWhatTouches) {
+  using S = TypeParam;
+  std::size_t lost_without = 0;
+  for (const double far : {0.0, 10.0, 1000.0})
+    for (const std::uint32_t leaf : {4U, 16U}) {
+      SlabbedBodies<S> bodies(tilted_sheets<S>(far),
+                              {.method = BuildMethod::median, .width = 8, .leaf_size = leaf},
+                              active_kernel_set());
+      bodies.seek(0);
+      const PairBuffer truth = bodies.confirmed(bodies.by_boxes());
+      EXPECT_GT(truth.size(), 100U);
+      EXPECT_EQ(bodies.confirmed(bodies.by_slabs()), truth) << far;
+      lost_without += truth.size() - bodies.confirmed(bodies.by_slabs(0)).size();
+    }
+  EXPECT_GT(lost_without, 0U) << "the fault without slack is not seen";
+}
+
+TYPED_TEST(SlabsTest, StaleSlabsAndThoseOfOtherLeavesLosePairs) {
+  using S = TypeParam;
+  const auto test = synthetic_scene<S>("sheets");
+  const BuilderConfig builder{.method = BuildMethod::median, .width = 8, .leaf_size = 8};
+  using Blocks = typename SlabbedBodies<S>::Blocks;
+  std::size_t stale = 0, exchanged = 0;
+  for (const double t : test.frames) {
+    SlabbedBodies<S> bodies(test.scene, builder, active_kernel_set());
+    bodies.seek(test.frames[0]);
+    bodies.by_slabs();
+    bodies.seek(t, Blocks::stale);
+    const PairBuffer truth = bodies.confirmed(bodies.by_boxes());
+    stale += truth.size() - bodies.confirmed(bodies.by_slabs()).size();
+    bodies.seek(t);
+    ASSERT_EQ(bodies.confirmed(bodies.by_slabs()), truth);
+    const SlabLeaves<S> leaves = bodies.blocks[0].of(bodies.hierarchies[0], bodies.playback.positions(0));
+    const std::uint32_t padded = bodies.hierarchies[0].padded_leaf_size();
+    const auto slab = [&](std::uint32_t leaf) {
+      return leaves.blocks + leaf * SlabBlock::scalars(padded) + SlabBlock::rows * padded;
+    };
+    for (std::uint32_t leaf = 0; leaf + 1 < bodies.hierarchies[0].leaf_count(); leaf += 2)
+      std::swap_ranges(slab(leaf), slab(leaf) + 5, slab(leaf + 1));
+    exchanged += truth.size() - bodies.confirmed(bodies.by_slabs()).size();
+  }
+  EXPECT_GT(stale, 0U);
+  EXPECT_GT(exchanged, 0U);
+}
+
+}  // namespace
+}  // namespace kbvh::test
