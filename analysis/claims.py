@@ -328,18 +328,14 @@ def main(arguments: Optional[list[str]] = None) -> int:
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl (and theory.json)")
     parser.add_argument("--claims", metavar="FILE", type=Path, default=FILE, help="claims other than the paper's")
     options = parser.parse_args(arguments)
-    try:
+
+    def work() -> int:
         claims = evaluate(load(options.folder), options.folder, options.claims)
         print(plain(claims))
         print(write(claims, options.folder))
-    except (ResultError, ClaimError) as error:
-        print(f"claims: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        text, code = files.complaint(error)
-        print(f"claims: {text}", file=sys.stderr)
-        return code
-    return 0
+        return 0
+
+    return files.run_command("claims", (ResultError, ClaimError), work)
 
 
 if __name__ == "__main__":

@@ -38,17 +38,14 @@ def main(arguments: Optional[list[str]] = None) -> int:
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
     parser.add_argument("--title", default="", help="heading of the page (default: the plan's name)")
     options = parser.parse_args(arguments)
-    try:
-        program()
-        study = load(options.folder, ONE_OF_EACH_COMMIT)
-        page = write(study, options.folder, options.title)
-    except (ResultError, ClaimError, NotBuilt) as error:
-        print(f"explore: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        text, code = files.complaint(error)
-        print(f"explore: {text}", file=sys.stderr)
-        return code
+    return files.run_command("explore", (ResultError, ClaimError, NotBuilt), lambda: run(options))
+
+
+def run(options: argparse.Namespace) -> int:
+    """Does what the options say; returns the exit code."""
+    program()
+    study = load(options.folder, ONE_OF_EACH_COMMIT)
+    page = write(study, options.folder, options.title)
     for note in study.notes:
         print(f"explore: {note}", file=sys.stderr)
     print(page)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import os
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Union
 
@@ -32,6 +34,20 @@ def complaint(error: OSError) -> tuple[str, int]:
     if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):
         return f"{error.strerror}: the limits of this process (ulimit) or machine are too low.", 3
     return f"{error.filename} cannot be written: {error.strerror}.", 2
+
+
+def run_command(name: str, expected: tuple[type[Exception], ...], work: Callable[[], int]) -> int:
+    """Runs the work of a command; returns its exit code. Expected errors and those of the system become one sentence on stderr,
+    and the codes 2 and 3 (`complaint`)."""
+    try:
+        return work()
+    except expected as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        text, code = complaint(error)
+        print(f"{name}: {text}", file=sys.stderr)
+        return code
 
 
 def write_whole(file: Path, content: Union[str, bytes]) -> None:

@@ -25,6 +25,8 @@ from profiles import Profile, profiles
 WIDTH = 10.5  #: of every figure, in inches
 #: Factors up to which a profile is drawn; the first that holds this share of all factors is taken.
 ENDS, SHARE = (2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0), 0.85
+#: Profiles that print can tell apart, beside those of the baselines. Up to EXTRA more are drawn rather than left out.
+MOST, EXTRA = 12, 4
 
 
 def pictures(study: Study, glance: Sequence[tables.Glance], all_looks: dict[str, Look], folder: Path) -> list[Picture]:
@@ -32,14 +34,16 @@ def pictures(study: Study, glance: Sequence[tables.Glance], all_looks: dict[str,
     found = profiles(study)
     first = study.runs.sort_values(["id", "contestant"]).drop_duplicates("id").set_index("id")
     looks = {id: all_looks[contestant] for id, contestant in first["contestant"].items()}
+    titles = dict(first["title"])
     cells = found[0].cells if found else 0
+    shown, left_out = selection(found, set(study.runs.loc[study.runs["baseline"], "id"]))
     made = [
         picture(
             folder, "profiles", "How often is who within a factor of the best?",
             f"Each line counts the tables in which a strategy was measured, of {text.plural(cells, 'table')} with two strategies or more. A line at "
             "60 % above 1.25 is a strategy that in 60 % of its tables takes at most 1.25 times as long as the fastest, motion evaluation "
-            "included. Of several settings of a strategy the fastest counts; in brackets: its tables.",
-            lambda: profile(found, looks, dict(first["title"])) if cells else None,
+            "included. Of several settings of a strategy the fastest counts; in brackets: its tables." + left_out_says(left_out, titles),
+            lambda: profile(shown, looks, titles) if cells else None,
         ),
         picture(
             folder, "glance", "The fastest contestant of another kind against the best refit of each table",
@@ -49,6 +53,25 @@ def pictures(study: Study, glance: Sequence[tables.Glance], all_looks: dict[str,
         ),
     ]  # fmt: skip
     return [one for one in made if one is not None]
+
+
+def selection(found: Sequence[Profile], baselines: set[str]) -> tuple[list[Profile], list[Profile]]:
+    """Splits profiles, which come best first, into those that are drawn and those that are left out."""
+    if len(found) <= MOST + EXTRA:
+        return list(found), []
+    drawn = [place < MOST or one.id in baselines for place, one in enumerate(found)]
+    return [one for one, yes in zip(found, drawn) if yes], [one for one, yes in zip(found, drawn) if not yes]
+
+
+def left_out_says(left_out: Sequence[Profile], titles: dict[str, str]) -> str:
+    """Returns a sentence on the profiles that are not drawn."""
+    if not left_out:
+        return ""
+    names = "; ".join(titles[one.id] for one in left_out)
+    return (
+        f" Drawn are the {MOST} strategies with the largest mean of (fastest time / own time), and the baselines. Left out, from the "
+        f"better to the worse: {names}. The explorer draws all of them."
+    )
 
 
 def profile(found: Sequence[Profile], looks: dict[str, Look], titles: dict[str, str]) -> Figure:

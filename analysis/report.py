@@ -56,28 +56,25 @@ def main(arguments: Optional[list[str]] = None) -> int:
     )  # fmt: skip
     parser.add_argument("--print", dest="printed", action="store_true", help="also print the tables as text")
     options = parser.parse_args(arguments)
+    return files.run_command("report", (ResultError, ClaimError), lambda: run(options))
+
+
+def run(options: argparse.Namespace) -> int:
+    """Does what the options say; returns the exit code."""
     try:
         explorer = explore.PAGE if explore.program() else ""
     except explore.NotBuilt as reason:
         explorer = ""
         print(f"report: {explore.PAGE} is not written: {reason}", file=sys.stderr)
-    try:
-        study = load(options.folder)
-        file = options.folder / targets_table.FILE_NAME
-        targets = targets_table.load_targets(file) if file.exists() else []
-        claims = paper_claims.evaluate(study, options.folder)
-        paper_claims.write(claims, options.folder)
-        page = write(study, options.folder, options.title, options.figures, targets, claims, explorer)
-        if explorer:
-            title = "" if options.title == explore.TITLE else options.title  # else the plan's question
-            explore.write(load(options.folder, ONE_OF_EACH_COMMIT), options.folder, title, claims)
-    except (ResultError, ClaimError) as error:
-        print(f"report: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        text, code = files.complaint(error)
-        print(f"report: {text}", file=sys.stderr)
-        return code
+    study = load(options.folder)
+    file = options.folder / targets_table.FILE_NAME
+    targets = targets_table.load_targets(file) if file.exists() else []
+    claims = paper_claims.evaluate(study, options.folder)
+    paper_claims.write(claims, options.folder)
+    page = write(study, options.folder, options.title, options.figures, targets, claims, explorer)
+    if explorer:
+        title = "" if options.title == explore.TITLE else options.title  # else the plan's question
+        explore.write(load(options.folder, ONE_OF_EACH_COMMIT), options.folder, title, claims)
     for note in study.notes:
         print(f"report: {note}", file=sys.stderr)
     if options.printed:

@@ -286,18 +286,12 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     parser = argparse.ArgumentParser(prog="theory_figures.py", description="Draws FOLDER/theory.json.")
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="folder with theory.json")
     options = parser.parse_args(arguments)
-    try:
-        theory = load(options.folder / "theory.json")
-    except TheoryError as problem:
-        print(f"theory_figures.py: {problem}", file=sys.stderr)
-        return 2
-    try:
-        draw_all(theory, options.folder / "figures")
-    except OSError as problem:
-        text, code = files.complaint(problem)
-        print(f"theory_figures.py: {text}", file=sys.stderr)
-        return code
-    return 0
+
+    def work() -> int:
+        draw_all(load(options.folder / "theory.json"), options.folder / "figures")
+        return 0
+
+    return files.run_command("theory_figures.py", (TheoryError,), work)
 
 
 if __name__ == "__main__":

@@ -24,6 +24,8 @@ TREE = [
     "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "core/README.md", "experiments/README.md", "experiments/RESULTS.md",
     "analysis/reference/README.md",
 ]  # fmt: skip
+#: The folder of the site's own pages, which stand at the root of the site.
+PAGES = "analysis/site/pages/"
 LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
@@ -49,6 +51,8 @@ def rewritten(page: str, text: str, staged: set[str], pages: Path) -> str:
             return match.group(0)
         if full in staged:
             return match.group(0)
+        if full.startswith(PAGES):
+            return f"[{words}]({os.path.relpath(full.removeprefix(PAGES), os.path.dirname(page) or '.')}{'#' * bool(anchor)}{anchor})"
         if full == "core/adr":
             return f"[{words}]({os.path.relpath('adr.md', os.path.dirname(page) or '.')})"
         return f"{words} (`{full}`)" if full not in words else f"`{full}`"
@@ -59,16 +63,6 @@ def rewritten(page: str, text: str, staged: set[str], pages: Path) -> str:
             code = not code
         lines.append(line if code or line.lstrip().startswith("```") else LINK.sub(link, line))
     return "\n".join(lines)
-
-
-def tutorial() -> str:
-    """Returns the tutorial, with the code of README.md, which the test of the installed package compiles."""
-    readme = (ROOT / "README.md").read_text()
-    code = re.search(r"\n## Adding a strategy\n.*?(```cpp\n.*?\n```)\n\n(```cmake\n.*?\n```)", readme, re.S)
-    if code is None:
-        raise SystemExit("README.md shows no strategy under 'Adding a strategy'")
-    page = (HERE / "pages" / "tutorial.md").read_text()
-    return page.replace("{{code}}", code.group(1)).replace("{{cmake}}", code.group(2))
 
 
 def decisions(staged: list[str]) -> str:
@@ -87,7 +81,8 @@ def main() -> int:
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(rewritten(page, (ROOT / page).read_text(), staged, pages))
     for file in (HERE / "pages").glob("*.md"):
-        text = tutorial() if file.name == "tutorial.md" else file.read_text()
+        # In the tree, links lead from this folder.
+        text = file.read_text().replace("](../../../", "](")
         (pages / file.name).write_text(text.replace("{{api}}", '<a href="api/index.html">C++ interfaces</a>'))
     (pages / "adr.md").write_text(decisions(pages_of_tree))
     strategy_pages.write(listed, results, ROOT, pages)

@@ -22,9 +22,16 @@ def read(file: Path) -> Iterator[tuple[bytes, dict[str, Any]]]:
             yield line, record
 
 
-def is_finished(record: dict[str, Any]) -> bool:
-    """Returns whether the configuration need not be measured again."""
-    return record.get("unfinished") is not True
+def rank(record: dict[str, Any]) -> tuple[bool, str]:
+    """Orders the records of one key: the largest counts, the newest finished one. Of equal ones, the one that stands later.
+    This is the rule of `kbvh merge` (experiments/results/merge.cpp), and a test compares the two."""
+    when = record.get("when")
+    return record.get("unfinished") is not True, when if isinstance(when, str) else ""
+
+
+def identity(line: bytes, record: dict[str, Any]) -> tuple[Any, ...]:
+    """Returns what two copies of one measurement share."""
+    return (record["key"], record.get("run") or line, record.get("when"))
 
 
 def append(file: Path, lines: list[bytes]) -> None:
@@ -45,17 +52,25 @@ def append(file: Path, lines: list[bytes]) -> None:
 
 
 def join(out: Path, jobs: list[str]) -> int:
-    """Appends the records of the jobs, in this order, to OUT/results.jsonl, those that it does not have. Of a configuration
-    that several jobs or attempts have measured, the first finished record counts. Returns the number of new records."""
-    known = {record["key"]: is_finished(record) for _, record in read(out / "results.jsonl")}
-    new: dict[str, tuple[bytes, bool]] = {}
+    """Appends records of the jobs, in this order, to OUT/results.jsonl: of each configuration the one that counts, unless it is
+    the last of its key there, which readers take. Returns the number of new records."""
+    best: dict[str, tuple[tuple[bool, str], bytes, tuple[Any, ...]]] = {}  # by key: rank, line and identity
+    last: dict[str, tuple[Any, ...]] = {}  # by key: identity of the last record in the results
+    order: dict[str, None] = {}  # keys of the jobs
+
+    def take(line: bytes, record: dict[str, Any]) -> None:
+        known = best.get(record["key"])
+        if known is None or rank(record) >= known[0]:
+            best[record["key"]] = rank(record), line, identity(line, record)
+
+    for line, record in read(out / "results.jsonl"):
+        take(line, record)
+        last[record["key"]] = identity(line, record)
     for job in jobs:
         for file in sorted((out / "jobs" / job).glob("*.jsonl")):
             for line, record in read(file):
-                key, finished = record["key"], is_finished(record)
-                if known.get(key) or (key in new and new[key][1]):
-                    continue
-                if finished or key not in known:
-                    new[key] = line, finished
-    append(out / "results.jsonl", [line for line, _ in new.values()])
+                take(line, record)
+                order[record["key"]] = None
+    new = [best[key][1] for key in order if best[key][2] != last.get(key)]
+    append(out / "results.jsonl", new)
     return len(new)

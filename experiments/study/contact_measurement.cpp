@@ -84,7 +84,7 @@ ContactMeasurement<S>::ContactMeasurement(const Scene<S>& scene, std::vector<dou
 
 template <class S>
 void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every) {
-  ContactEntrant entrant;
+  ContactEntrant<S> entrant;
   Measured& measured = entrant.measured;
   measured.spec = &spec;
   measured.sampled_every = oracle_every;
@@ -120,12 +120,12 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
       entrant.session->contacts(knots_[1], contacts_, ignored);
     }
   });
-  entrants_.push_back(std::move(entrant));
+  this->entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
 const ClipTimes* ContactMeasurement<S>::play(std::size_t i) {
-  ContactEntrant& entrant = entrants_[i];
+  ContactEntrant<S>& entrant = this->entrants_[i];
   const bool played = entrant.attempt([&] {
     ClipTimes clip;
     const auto begin = std::chrono::steady_clock::now();
@@ -145,7 +145,7 @@ const ClipTimes* ContactMeasurement<S>::play(std::size_t i) {
 
 template <class S>
 nlohmann::json ContactMeasurement<S>::extras(std::size_t i) const {
-  const ImpactStats& impacts = entrants_[i].impacts;
+  const ImpactStats& impacts = this->entrants_[i].impacts;
   return {{"impacts", {{"tests", impacts.tests}, {"filtered", impacts.filtered}, {"exact", impacts.exact}}}};
 }
 

@@ -13,9 +13,15 @@ template <class S>
 std::vector<double> contact_times(const Scene<S>& scene, std::vector<double> frames,
                                   const PlanScript<S>& script);
 
+/// A contestant, with what its record says of impacts.
+template <class S>
+struct ContactEntrant : Entrant<S> {
+  ImpactStats impacts;
+};
+
 /// Like Measurement, for the contacts of features while vertices move from one time of `knots` to the next.
 template <class S>
-class ContactMeasurement {
+class ContactMeasurement : public Entrants<ContactEntrant<S>> {
  public:
   /// Finds the true contacts by sort-and-sweep. The script changes plans at some of the knots, and nothing
   /// else; null: no script. Throws io::InputError unless all bodies in pairs consist of triangles.
@@ -23,21 +29,14 @@ class ContactMeasurement {
 
   /// Verifies a contestant, comparing every n-th interval and the last.
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
-  std::size_t size() const { return entrants_.size(); }
-  Measured& operator[](std::size_t i) { return entrants_[i].measured; }
-  bool timed(std::size_t i) const { return entrants_[i].session != nullptr; }
   const ClipTimes* play(std::size_t i);
   nlohmann::json extras(std::size_t i) const;
 
  private:
-  struct ContactEntrant : Entrant<S> {
-    ImpactStats impacts;
-  };
   const Scene<S>* scene_;
   std::vector<double> knots_;
   const PlanScript<S>* script_;
   std::vector<ContactBuffer> truth_;  ///< [interval], sorted
-  std::vector<ContactEntrant> entrants_;
   ContactBuffer contacts_;
 };
 

@@ -140,12 +140,12 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
       warm_up<S>(*entrant.session, frames_, script_, query_);
     }
   });
-  entrants_.push_back(std::move(entrant));
+  this->entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
 const ClipTimes* Measurement<S>::play(std::size_t i) {
-  Entrant<S>& entrant = entrants_[i];
+  Entrant<S>& entrant = this->entrants_[i];
   const bool played = entrant.attempt([&] {
     entrant.measured.repetitions.push_back(play_clip<S>(*entrant.session, frames_, script_, query_));
     entrant.measured.choice = entrant.session->strategy().choice();
@@ -156,7 +156,7 @@ const ClipTimes* Measurement<S>::play(std::size_t i) {
 template <class S>
 json Measurement<S>::extras(std::size_t i) const {
   if (!query_.changes) return json::object();
-  const ChangesVerification& changes = entrants_[i].measured.changes;
+  const ChangesVerification& changes = this->entrants_[i].measured.changes;
   return {{"changes", {{"begun", changes.begun}, {"ended", changes.ended}}}};
 }
 

@@ -63,6 +63,21 @@ struct Entrant {
   }
 };
 
+/// The contestants of a measurement by their places, as run/ and results/ see them in every kind of
+/// measurement. A kind adds `add` (verifies a contestant), `play` (plays the clip once) and `extras` (members
+/// of its record).
+template <class E>
+class Entrants {
+ public:
+  std::size_t size() const { return entrants_.size(); }
+  Measured& operator[](std::size_t i) { return entrants_[i].measured; }
+  /// Returns whether the contestant has an instance to be timed.
+  bool timed(std::size_t i) const { return entrants_[i].session != nullptr; }
+
+ protected:
+  std::vector<E> entrants_;
+};
+
 /// Receives progress messages; may be empty.
 using MeasureProgress = std::function<void(const std::string&)>;
 
@@ -82,7 +97,7 @@ struct FrameQuery {
 
 /// Measures contestants on one scene, in one scalar, at one l.
 template <class S>
-class Measurement {
+class Measurement : public Entrants<Entrant<S>> {
  public:
   /// The script, if given, is replayed to every contestant; its times must be frames, and the oracle must be
   /// made for it. With `changes`, frames ask for the changes of this answer instead of the pairs.
@@ -95,10 +110,6 @@ class Measurement {
   /// timed. Exceptions of the strategy count as a broken guarantee; ConfigError is passed on.
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
 
-  std::size_t size() const { return entrants_.size(); }
-  Measured& operator[](std::size_t i) { return entrants_[i].measured; }
-  /// Returns whether the contestant has an instance to be timed.
-  bool timed(std::size_t i) const { return entrants_[i].session != nullptr; }
   /// Plays the clip once, keeps its times and returns them. If the contestant throws, it is refused its
   /// times, is no longer `timed`, and nullptr is returned.
   const ClipTimes* play(std::size_t i);
@@ -111,7 +122,6 @@ class Measurement {
   std::vector<double> frames_;
   Oracle<S>* oracle_;
   const PlanScript<S>* script_;
-  std::vector<Entrant<S>> entrants_;
   FrameQuery query_;
 };
 

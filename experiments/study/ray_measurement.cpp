@@ -164,7 +164,7 @@ RayMeasurement<S>::RayMeasurement(const Scene<S>& scene, std::vector<double> fra
 
 template <class S>
 void RayMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every) {
-  RayEntrant entrant;
+  RayEntrant<S> entrant;
   Measured& measured = entrant.measured;
   measured.spec = &spec;
   measured.sampled_every = oracle_every;
@@ -225,12 +225,12 @@ void RayMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_eve
     entrant.session->reset(frames_[0]);
     entrant.session->hits(study_.query, rays_, std::span<RayHit>(hits_), ignored);
   });
-  entrants_.push_back(std::move(entrant));
+  this->entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
 const ClipTimes* RayMeasurement<S>::play(std::size_t i) {
-  RayEntrant& entrant = entrants_[i];
+  RayEntrant<S>& entrant = this->entrants_[i];
   const bool played = entrant.attempt([&] {
     Session<S>& session = *entrant.session;
     ClipTimes clip;
@@ -257,7 +257,7 @@ const ClipTimes* RayMeasurement<S>::play(std::size_t i) {
 
 template <class S>
 nlohmann::json RayMeasurement<S>::extras(std::size_t i) const {
-  const RayEntrant& entrant = entrants_[i];
+  const RayEntrant<S>& entrant = this->entrants_[i];
   return {{"rays",
            {{"per_frame", rays_.size()},
             {"hits", entrant.hits},

@@ -35,29 +35,29 @@ template <class S>
 std::vector<Ray<S>> make_rays(const RayStudy& study, const Scene<S>& scene,
                               const std::vector<double>& frames);
 
+/// A contestant, with what its record says of rays.
+template <class S>
+struct RayEntrant : Entrant<S> {
+  RayCheck check;
+  std::uint64_t hits = 0;  ///< of all rays at all frames
+  /// Bodies of polygons that no ray of a frame meets, summed over frames: what occlusion culling by these
+  /// rays skips.
+  std::uint64_t hidden_bodies = 0;
+};
+
 /// Like Measurement, for rays instead of pairs: every frame is one update, and one call with all rays.
 template <class S>
-class RayMeasurement {
+class RayMeasurement : public Entrants<RayEntrant<S>> {
  public:
   RayMeasurement(const Scene<S>& scene, std::vector<double> frames, const RayStudy& study,
                  const PlanScript<S>* script);
 
   /// Verifies a contestant, comparing some of the rays of every n-th frame and of the last with brute force.
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
-  std::size_t size() const { return entrants_.size(); }
-  Measured& operator[](std::size_t i) { return entrants_[i].measured; }
-  bool timed(std::size_t i) const { return entrants_[i].session != nullptr; }
   const ClipTimes* play(std::size_t i);
   nlohmann::json extras(std::size_t i) const;
 
  private:
-  struct RayEntrant : Entrant<S> {
-    RayCheck check;
-    std::uint64_t hits = 0;  ///< of all rays at all frames
-    /// Bodies of polygons that no ray of a frame meets, summed over frames: what occlusion culling by these
-    /// rays skips.
-    std::uint64_t hidden_bodies = 0;
-  };
   const Scene<S>* scene_;
   std::vector<double> frames_;
   RayStudy study_;
@@ -66,7 +66,6 @@ class RayMeasurement {
   std::vector<std::size_t> compared_;       ///< indices of the rays that are compared with brute force
   std::vector<std::vector<RayHit>> truth_;  ///< [frame], of these; empty until needed
   std::vector<RayHit> hits_;
-  std::vector<RayEntrant> entrants_;
 };
 
 extern template class RayMeasurement<float>;

@@ -69,14 +69,31 @@ class Records(Folder):
     def test_in_the_order_of_jobs_and_once(self):
         a, b, c = {"key": "a", "n": 1}, {"key": "b", "n": 1}, {"key": "c", "n": 1}
         self.file("jobs/one/1.jsonl", b)
-        self.file("jobs/two/1.jsonl", c, {"key": "b", "n": 2})
-        self.file("jobs/two/2.jsonl", {"key": "c", "n": 2})
+        self.file("jobs/two/1.jsonl", c)
         self.file("jobs/other/1.jsonl", {"key": "d"})  # of another plan
         self.file("results.jsonl", a)
         before = (self.path / "results.jsonl").read_bytes()
         self.assertEqual(self.joined("one", "two"), (2, [a, b, c]))
         self.assertTrue((self.path / "results.jsonl").read_bytes().startswith(before))
         self.assertEqual(self.joined("one", "two")[0], 0)
+
+    def test_the_newest_finished_record_of_a_key_counts(self):
+        """The cases of tests/program/merge_test.cpp: `kbvh merge` has the same rule."""
+
+        def record(run, day, **more):
+            return {"key": "k", "run": run, "when": f"2026-01-0{day}T00:00:00Z", **more}
+
+        first, second, failed = record("r1", 1), record("r2", 2), record("r3", 3, unfinished=True)
+        self.file("jobs/one/1.jsonl", failed, second)
+        self.file("jobs/two/1.jsonl", first)
+        self.assertEqual(self.joined("one", "two"), (1, [second]))
+        self.assertEqual(self.joined("two", "one")[0], 0)
+        self.file("jobs/three/1.jsonl", record("r4", 2))  # as new: the one that stands later
+        self.assertEqual(self.joined("three")[1][-1]["run"], "r4")
+        self.file("jobs/three/2.jsonl", record("r5", 4, unfinished=True))
+        self.assertEqual(self.joined("one", "two", "three")[0], 0)
+        self.assertEqual(self.joined("three", "two", "one")[0], 1)  # r2 and r4 have changed places
+        self.assertEqual(self.joined("three", "two", "one")[0], 0)
 
     def test_lines_stay_as_they_are(self):
         line = b'{"key": "a",   "t": 1.000, "n": 18446744073709551615}\n'

@@ -1,5 +1,6 @@
 """Parts of the site: dead links are seen, links of the tree's pages are rewritten, strategies have their files."""
 
+import re
 import sys
 import tempfile
 import unittest
@@ -48,6 +49,8 @@ class Stage(unittest.TestCase):
             ("core/README.md", "[all](adr/)", "[all](../adr.md)"),
             ("README.md", "[contract](core/contract/strategy.hpp)", "contract (`core/contract/strategy.hpp`)"),
             ("README.md", "[core/contract/strategy.hpp](core/contract/strategy.hpp)", "`core/contract/strategy.hpp`"),
+            ("README.md", "[try](analysis/site/pages/tutorial.md)", "[try](tutorial.md)"),
+            ("core/README.md", "[try](../analysis/site/pages/tutorial.md#here)", "[try](../tutorial.md#here)"),
             ("README.md", "[x](https://x.org) [y](#here)", "[x](https://x.org) [y](#here)"),
             ("README.md", "```\n[code](core/none.hpp)\n```", "```\n[code](core/none.hpp)\n```"),
         ):
@@ -57,11 +60,13 @@ class Stage(unittest.TestCase):
         with self.assertRaises(SystemExit):
             self.rewritten("README.md", "[x](core/none.md)")
 
-    def test_the_tutorial_has_the_code_of_the_readme(self):
-        page = stage.tutorial()
-        self.assertIn("KBVH_STRATEGY(my_refit)", page)
-        self.assertIn("kbvh_add_strategy(my_refit", page)
-        self.assertNotIn("{{", page)
+    def test_the_first_lesson_and_the_tutorial_show_one_refit(self):
+        """The test of the installed package compiles the tutorial's strategies and runs the conformance suite on them."""
+        pages = ("analysis/site/pages/tutorial.md", "analysis/lessons/text/1-boxes.md")
+        tutorial, lesson = (re.findall(r"\n```cpp\n(.*?)\n```\n", (ROOT / page).read_text(), re.S) for page in pages)
+        self.assertEqual(len(tutorial), 2)
+        self.assertEqual(lesson, tutorial[:1])
+        self.assertIn("KBVH_STRATEGY(my_refit)", tutorial[0])
 
 
 class Strategies(unittest.TestCase):

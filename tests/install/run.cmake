@@ -47,22 +47,33 @@ foreach(file IN LISTS package_files)
   endforeach()
 endforeach()
 
-# The strategy that README.md shows is one of the consumer's.
-file(READ ${SOURCE_DIR}/README.md readme)
-if(NOT readme MATCHES "\n## Adding a strategy\n.*")
-  message(FATAL_ERROR "README.md has no part 'Adding a strategy'")
+# The strategies that the tutorial shows are the consumer's, as they stand there.
+file(READ ${SOURCE_DIR}/analysis/site/pages/tutorial.md rest)
+set(shown)
+while(rest MATCHES "\n```cpp\n")
+  string(FIND "${rest}" "\n```cpp\n" begin)
+  math(EXPR begin "${begin} + 8")
+  string(SUBSTRING "${rest}" ${begin} -1 rest)
+  string(FIND "${rest}" "\n```\n" length)
+  string(SUBSTRING "${rest}" 0 ${length} code)
+  if(NOT code MATCHES "KBVH_STRATEGY\\(([a-z_]+)\\)")
+    message(FATAL_ERROR "the tutorial's code registers no strategy:\n${code}")
+  endif()
+  file(WRITE ${WORK_DIR}/${CMAKE_MATCH_1}.cpp "${code}\n")
+  list(APPEND shown ${CMAKE_MATCH_1})
+endwhile()
+if(NOT shown STREQUAL "my_refit;periodic_rebuild")
+  message(FATAL_ERROR "the tutorial shows these strategies: ${shown}")
 endif()
-if(NOT CMAKE_MATCH_0 MATCHES "\n```cpp\n(.*)\n```\n\n```cmake\n")
-  message(FATAL_ERROR "README.md shows no strategy under 'Adding a strategy'")
-endif()
-file(WRITE ${WORK_DIR}/my_refit.cpp "${CMAKE_MATCH_1}\n")
+list(TRANSFORM shown PREPEND ${WORK_DIR}/ OUTPUT_VARIABLE shown_files)
+list(TRANSFORM shown_files APPEND .cpp)
 
 # The compiler's flags as kbvh had them, because sanitizers must agree on both sides.
 string(TOUPPER "${BUILD_TYPE}" build_type)
 step("configure" ${CMAKE_COMMAND} -S ${CONSUMER_DIR} -B ${build} -G ${GENERATOR}
   -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_CXX_COMPILER=${COMPILER} "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}"
   -DCMAKE_BUILD_TYPE=${BUILD_TYPE} "-DCMAKE_CXX_FLAGS=${FLAGS}" "-DCMAKE_CXX_FLAGS_${build_type}=${TYPE_FLAGS}"
-  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DFROM_README=${WORK_DIR}/my_refit.cpp)
+  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON "-DFROM_TUTORIAL=${shown_files}")
 refuse("configure" "${errors}" "Warning")
 
 file(READ ${build}/compile_commands.json commands)
@@ -76,7 +87,7 @@ refuse("consumers see the installed tree only" "${commands}" "-(I|isystem )${SOU
 
 step("build" ${CMAKE_COMMAND} --build ${build} --parallel 2)
 step("conformance" ${CMAKE_CTEST_COMMAND} --test-dir ${build} -j 2 --output-on-failure --no-tests=error)
-foreach(id sparse_refit my_refit)
+foreach(id sparse_refit ${shown})
   expect("conformance covers the strategy" "${output}" "my_kbvh\\.Registry/Conformance[^\n]*${id}")
 endforeach()
 refuse("conformance covers nothing else" "${output}" "bottom_up")
@@ -102,13 +113,13 @@ if(NOT EXISTS ${prefix}/bin/kbvh)
 endif()
 
 step("list" ${build}/my_kbvh list --json)
-foreach(id sparse_refit my_refit bottom_up)
+foreach(id sparse_refit ${shown} bottom_up)
   expect("list" "${output}" "\"id\": \"${id}\"")
 endforeach()
 step("list of the installed program" ${prefix}/bin/kbvh list --json)
 refuse("list of the installed program" "${output}" "sparse_refit")
 
-set(scene --scene tablecloth --triangles 500 --keyframes 6 --l 3 --strategies sparse_refit,my_refit,bottom_up)
+set(scene --scene tablecloth --triangles 500 --keyframes 6 --l 3 --strategies sparse_refit,my_refit,periodic_rebuild,bottom_up)
 step("run" ${build}/my_kbvh run ${scene} --repetitions 2)
 expect("run" "${output}" "sparse_refit")
 step("bench" ${build}/my_kbvh bench ${scene} --repetitions 2 --out ${WORK_DIR}/results)

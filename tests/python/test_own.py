@@ -244,12 +244,39 @@ class Studies(unittest.TestCase):
             self.assertEqual(first.results.refused["id"].tolist(), ["py_wrong"])
             self.assertIn("not among the candidates", first.results.refused["refused"].iloc[0])
             self.assertEqual(len(first.results.repetitions), 4)
+            self.compare(first.results)
             again = kbvh.run(plan, folder)
             self.assertEqual((again.measured, again.skipped), (0, 3))
             # Other code is another contestant.
             variant("py_wrong", counters=lambda self: {"other": 1})
             other = kbvh.run(plan, folder)
             self.assertEqual((other.measured, other.skipped, other.refused), (1, 2, 0))
+
+    def compare(self, results):
+        """Ratios and profiles follow from the repetitions."""
+        runs = results.runs.set_index("id")["run"]
+        columns = ["update", "plan_changes", "traversal", "triangle_tests"]
+        times = results.repetitions.assign(total=results.repetitions[columns].sum(axis=1)).groupby("run")["total"].apply(list)
+        own, other = times[runs["py_boxes"]], times[runs["bottom_up"]]
+        quotients = [b / a for a, b in zip(own, other)]
+        found = results.ratios(measure="without_motion")
+        row = found.loc[runs["py_boxes"]]
+        self.assertAlmostEqual(row["ratio"], sum(quotients) / 2)
+        self.assertEqual((row["low"], row["high"]), (min(quotients), max(quotients)))  # of two repetitions
+        self.assertEqual((row["paired"], row["reference"]), (True, runs["bottom_up"]))
+        self.assertEqual(found.loc[runs["bottom_up"], "ratio"], 1)
+        self.assertEqual(len(found), 2)
+        turned = results.ratios("py_boxes", "without_motion")
+        self.assertAlmostEqual(turned.loc[runs["bottom_up"], "ratio"], sum(1 / q for q in quotients) / 2)
+        self.assertEqual(len(results.ratios("lbvh")), 0)
+        with self.assertRaisesRegex(ValueError, "measure is 'speed', but should be one of with_motion"):
+            results.ratios(measure="speed")
+        profiles = results.profiles(within=(1, 1e9))
+        self.assertEqual(sorted(profiles.index), ["bottom_up", "py_boxes"])
+        self.assertEqual(sorted(profiles["within 1"]), [0, 1])
+        self.assertEqual(profiles["within 1e+09"].tolist(), [1, 1])
+        self.assertEqual(profiles["factor"].iloc[0], 1)
+        self.assertEqual(profiles["cells"].tolist(), [1, 1])
 
     def test_wrong_plans_and_results(self):
         with self.assertRaisesRegex(kbvh.InputError, "plan: .*scenez"):
