@@ -95,7 +95,7 @@ def profile(found: Sequence[Profile], looks: dict[str, Look], titles: dict[str, 
     axes.set_xscale("log")
     axes.set_xlim(1, end)
     axes.set_ylim(0, 1.02)
-    axes.xaxis.set_major_locator(FixedLocator([value for value in (1, 1.25, 1.5, 2, 3, 5, 10, 20, 50, 100) if value <= end]))
+    axes.xaxis.set_major_locator(FixedLocator([value for value in ((1, 1.25, 1.5) if end <= 10 else (1,)) + (2, 3, 5, 10, 20, 50, 100) if value <= end]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}x"))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value * 100:.0f}\u2009%"))

@@ -1,6 +1,6 @@
 """Gathers the pages of the site: the tree's own Markdown, the pages of this folder, and pages made from registry and results.
 
-usage: stage.py LIST_JSON RESULTS_DIR PAGES_DIR
+usage: stage.py LIST_JSON RESULTS_DIR PAGES_DIR COURSE_DIR
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import claims_page  # noqa: E402
+import lessons_page  # noqa: E402
 import strategy_pages  # noqa: E402
 
 #: Pages of the tree that are part of the site, in their places.
@@ -87,6 +88,8 @@ def main() -> int:
     (pages / "adr.md").write_text(decisions(pages_of_tree))
     strategy_pages.write(listed, results, ROOT, pages)
     (pages / "claims.md").write_text(claims_page.page(results))
+    built = (Path(sys.argv[4]) / "index.html").exists()
+    (pages / "lessons.md").write_text(lessons_page.page(ROOT / "analysis" / "lessons" / "text", built))
     return 0
 
 

@@ -10,6 +10,7 @@ import paths
 
 ROOT = paths.HERE.parents[1]
 sys.path.insert(0, str(ROOT / "analysis" / "site"))
+import lessons_page  # noqa: E402
 import links  # noqa: E402
 import stage  # noqa: E402
 import strategy_pages  # noqa: E402
@@ -67,6 +68,19 @@ class Stage(unittest.TestCase):
         self.assertEqual(len(tutorial), 2)
         self.assertEqual(lesson, tutorial[:1])
         self.assertIn("KBVH_STRATEGY(my_refit)", tutorial[0])
+
+
+class Lessons(unittest.TestCase):
+    def test_every_lesson_is_listed_and_linked_if_built(self):
+        texts = ROOT / "analysis" / "lessons" / "text"
+        for built in (False, True):
+            page = lessons_page.page(texts, built)
+            rows = [line for line in page.split("\n") if line.startswith("| ")][1:]
+            self.assertEqual(len(rows), 9)
+            for number, (row, file) in enumerate(zip(rows, sorted(texts.glob("*.md"))), 1):
+                self.assertRegex(row, rf"\b{number}\. \w")
+                self.assertEqual(f'href="lab/lessons/{file.stem}.html"' in row, built)
+                self.assertEqual(row.count(" | "), 2, row)
 
 
 class Strategies(unittest.TestCase):

@@ -80,6 +80,26 @@ std::vector<BuilderConfig> configs() {
   return all;
 }
 
+// A strategy whose geometry vanishes at run time asks for this, too.
+TYPED_TEST(LeafContentsOf, ATreeWithoutNodesOrOfOneLeafIsSorted) {
+  using S = TypeParam;
+  const BuilderConfig config{.method = BuildMethod::median, .width = 8, .leaf_size = 16};
+  Soup<S> soup(3, config);
+  ASSERT_EQ(soup.hierarchy.topology().size(), 1U);
+  const std::vector<std::uint32_t> before = soup.hierarchy.topology().primitives;
+  EXPECT_TRUE(soup.contents.sort_in_parts(soup.hierarchy, soup.primitives(), soup.positions.data(),
+                                          MedianSort::unlimited));
+  EXPECT_EQ(soup.hierarchy.topology().primitives, before);
+  EXPECT_EQ(soup.fault(), "");
+
+  const Primitives none;
+  soup.hierarchy.assign(build_topology(none, soup.positions.data(), config), none, active_kernel_set());
+  soup.contents.prepare(soup.hierarchy);
+  EXPECT_TRUE(
+      soup.contents.sort_in_parts(soup.hierarchy, none, soup.positions.data(), MedianSort::unlimited));
+  EXPECT_FALSE(soup.contents.in_parts());
+}
+
 TYPED_TEST(LeafContentsOf, RefilledLayoutEqualsANewOne) {
   for (const BuilderConfig& config : configs()) {
     Soup<TypeParam> soup(700, config);

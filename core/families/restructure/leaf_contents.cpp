@@ -115,6 +115,7 @@ template <class S>
 bool LeafContents<S>::sort_in_parts(WideHierarchy<S>& hierarchy, const Primitives& primitives,
                                     const S* positions, std::uint64_t work) {
   const auto all = std::uint32_t(order_.size());
+  if (hierarchy.topology().size() < 2) return true;  // no tree, or one leaf
   if (!in_parts_) {
     put_primitives(hierarchy, primitives, positions, 0, all);
     entry_sort_.start(hierarchy.topology(), entries_, 0);

@@ -26,7 +26,8 @@ class LeafContents {
   void sort_primitives(WideHierarchy<S>& hierarchy, const Primitives& primitives, const S* positions,
                        std::span<const std::uint32_t> nodes);
   /// The same for the whole tree, in parts: takes the positions of the first call, and changes the hierarchy
-  /// in the call that ends the sort. `work` is that of MedianSort::run. Returns whether the sort has ended.
+  /// in the call that ends the sort. `work` is that of MedianSort::run. Returns whether the sort has ended;
+  /// in a tree of one node or none there is nothing to sort.
   bool sort_in_parts(WideHierarchy<S>& hierarchy, const Primitives& primitives, const S* positions,
                      std::uint64_t work);
   bool in_parts() const { return in_parts_; }
