@@ -1,6 +1,8 @@
 // A strategy that chooses among other strategies by observed properties of the scene: the number of frames
-// per segment of the flight plans, the vertex steps per frame, changes of plans, and the number of
-// candidates. The choice depends on counts and plans only, never on a clock, so that a run can be repeated.
+// per segment of the flight plans, the vertex steps per frame, changes of plans, the number of candidates,
+// and the triangle tests that the interval join had to make at frames, by which a join that decides little
+// for spans of time is left after some frames. The choice depends on counts and plans only, never on a clock,
+// so that a run can be repeated.
 //
 // Each candidate has one instance from the first frame on, with its own hierarchies. This costs the memory of
 // all candidates and saves creating an instance at a change. Inactive instances do not advance.
@@ -19,12 +21,16 @@ namespace {
 struct Seen {
   double frames_per_segment = 1;  // of the current segment; infinite if it has no end
   double changes_per_frame = 0;   // frames with changes of plans, as a share of the last frames
-  double candidates = 0;          // overlapping pairs of boxes in a frame
+  double candidates = 0;          // in a frame, of leaf_slabs
+  bool near = false;              // bodies are not known to be apart
   double reads = 0;               // vertices that a refit reads
   double step = 0;           // mean step of a vertex per frame relative to another body, in mean leaf sides
   double slide = 0;          // the same for primitives relative to their candidates
   bool many_bodies = false;  // more pairs of bodies than a choice examines
   double spread = 1;         // how different the steps are among a body's vertices; 0: all the same
+  /// Triangle tests of the join in a frame, over the candidates of leaf_slabs: pairs that it could not decide
+  /// for spans of time. Measured while it is active, and slowly forgotten at later choices.
+  double undecided = 0;
 };
 
 using Cost = costs::Choice;
@@ -37,7 +43,7 @@ double refit_cost(const Seen& seen) {
 /// come near in these frames than a query takes to find.
 double drift_cost(const Seen& seen) {
   const double watching = Cost::watch_read * seen.reads;
-  if (seen.candidates == 0) return seen.step < 0.2 ? 0.5 * watching : Cost::unfit * refit_cost(seen);
+  if (!seen.near) return seen.step < 0.2 ? 0.5 * watching : Cost::unfit * refit_cost(seen);
   if (seen.spread > 0.02) return Cost::unfit * refit_cost(seen);
   const double frames = seen.step > 0 ? std::min(0.4 / seen.step, 24.0) : 24;
   if (frames < 3) return Cost::unfit * refit_cost(seen);
@@ -45,21 +51,22 @@ double drift_cost(const Seen& seen) {
   return watching + search / frames + Cost::kept_candidate * seen.candidates;
 }
 
-/// One join serves a segment. Its cost grows with the distance that primitives move past each other within
-/// the segment. A translating body passes by others; the touching part of a deforming body stays in place.
+/// One join serves a segment. Its cost grows with the share of pairs that it cannot decide for spans of time,
+/// and with the distance that primitives move past each other within the segment. A translating body passes
+/// by others; the touching part of a deforming body stays in place.
 double join_cost(const Seen& seen) {
   const double l = seen.frames_per_segment, moves = seen.slide * l;
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
   // Bodies apart: one box at each end, unless they come to meet; over a long distance they may pass through
   // each other.
-  if (seen.candidates == 0) return Cost::join_apart / l * (1 + moves * moves) * refit_cost(seen);
+  if (!seen.near) return Cost::join_apart / l * (1 + moves * moves) * refit_cost(seen);
   const double alike = 1 - seen.spread;
   // Small bodies that move past each other meet further bodies on their way, in addition to their current
   // contacts.
-  const double others = seen.many_bodies ? 1 + moves : 1;
-  return refit_cost(seen) *
-         (Cost::join_frame + Cost::join_segment / (l + Cost::join_frames) * (1 + moves) * others +
-          Cost::join_slide * alike * alike * moves);
+  const double others = seen.many_bodies ? 1 + moves : 1 + Cost::join_moves * moves;
+  return refit_cost(seen) * ((Cost::join_frame + Cost::join_segment / (l + Cost::join_frames) * others) *
+                                 (1 + Cost::join_undecided * seen.undecided) +
+                             Cost::join_slide * alike * alike * moves);
 }
 
 /// A strategy to choose, its explicitly set parameters, and its predicted cost. To add a candidate, add a
@@ -72,7 +79,7 @@ struct Candidate {
 };
 const std::vector<Candidate>& candidates() {
   static const std::vector<Candidate> list{
-      {"bottom_up", {}, &refit_cost},  // first: it answers until observations exist
+      {"leaf_slabs", {}, &refit_cost},  // first: it answers until observations exist
       {"drift_boxes", {}, &drift_cost},
       {"interval_join", {}, &join_cost},
   };
@@ -116,7 +123,8 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
     step_ = 0;
     segment_end_ = t;
     changes_ = false;
-    chosen_candidates_ = 0;
+    chosen_candidates_ = tests_before_ = 0;
+    chosen_near_ = false;
     touching_.clear();
     for (Reported& one : reported_) one.start_over();
     switches_ = 0;
@@ -136,7 +144,8 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
     const int stayed = frame_ - chosen_at_;
     const bool due = frame_ == 1 || stayed >= (t >= segment_end_ ? stay_ : longest_stay) ||
                      (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
-                     seen_.candidates > 2 * chosen_candidates_ || 2 * seen_.candidates < chosen_candidates_;
+                     seen_.near != chosen_near_ || seen_.candidates > 2 * chosen_candidates_ ||
+                     2 * seen_.candidates < chosen_candidates_;
     if (step_ > 0 && due) choose(t);
     if (active_ != last) ++switches_;
     Runner& runner = runners_[active_];
@@ -158,9 +167,7 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
     const std::size_t before = out.size();
     // Not all candidates honour a budget.
     const QueryStatus status = runners_[active_].strategy->candidates_at(t, out, {});
-    // Other strategies drop pairs that are certainly apart: their candidates only show that bodies meet.
-    if (runners_[active_].all_positions || seen_.candidates == 0)
-      seen_.candidates = double(out.size() - before);
+    see_candidates(out.size() - before);
     const std::size_t count = out.size() - before, stride = std::max<std::size_t>(1, count / samples);
     touching_.clear();
     for (std::size_t i = 0; i < count && touching_.size() < samples; i += stride)
@@ -189,8 +196,7 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
     for (const PrimitivePair& pair : ended) reported.pairs.erase(pair);
     for (const PrimitivePair& pair : begun) reported.pairs.insert(pair);
     // Pairs that intersect stand for the candidates among which they are.
-    if (runners_[active_].all_positions || seen_.candidates == 0)
-      seen_.candidates = double(reported.pairs.size());
+    see_candidates(reported.pairs.size());
     touching_.clear();
     reported.pairs.sample(samples, touching_);
   }
@@ -223,9 +229,11 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
     char segments[48] = "one segment", last[160];
     if (std::isfinite(seen_.frames_per_segment))
       std::snprintf(segments, sizeof segments, "%.3g frames per segment", seen_.frames_per_segment);
-    std::snprintf(last, sizeof last,
-                  " (last seen: %s, steps of %.2g leaves, %.0f candidates, plans changed at %.2g of frames)",
-                  segments, seen_.step, seen_.candidates, seen_.changes_per_frame);
+    std::snprintf(
+        last, sizeof last,
+        " (last seen: %s, steps of %.2g leaves, %.2g between candidates, %.0f candidates, plans changed at "
+        "%.2g of frames)",
+        segments, seen_.step, seen_.slide, seen_.candidates, seen_.changes_per_frame);
     return text + last;
   }
 
@@ -297,6 +305,26 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
     reads_.push_back(this->scene_.moving(body) ? reads : 0);
   }
 
+  bool is_active(double (*cost)(const Seen&)) const { return runners_[active_].candidate->cost == cost; }
+  /// Strategies differ in the pairs that they leave out early: only drift_boxes reports all pairs of boxes,
+  /// and shows that bodies are apart.
+  void see_candidates(std::size_t count) {
+    if (count != 0 || is_active(&drift_cost)) seen_.near = count != 0;
+    if (active_ == 0 || !seen_.near) seen_.candidates = double(count);
+  }
+  /// Measures the work of the active strategy since the last choice.
+  void see_work() {
+    const double tests = double(runners_[active_].strategy->counters()[Counter::triangle_tests]);
+    const double frames = frame_ - chosen_at_;
+    // From time to time drift_boxes may look whether bodies have parted.
+    if (frames >= longest_stay && seen_.candidates == 0) seen_.near = false;
+    if (!is_active(&join_cost))
+      seen_.undecided *= 0.8;
+    else if (frames > 0 && seen_.candidates > 0)
+      seen_.undecided = (tests - tests_before_) / frames / seen_.candidates;
+    tests_before_ = tests;
+  }
+
   void fetch_all() {
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) this->sampled_.fetch_all(body);
   }
@@ -304,8 +332,10 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
   /// Reads the plans, and switches to a strategy that is predicted to be faster than the active one by at
   /// least `gain_`.
   void choose(double t) {
+    see_work();
     chosen_at_ = frame_;
     chosen_candidates_ = seen_.candidates;
+    chosen_near_ = seen_.near;
     double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
       if (seen_.changes_per_frame == 0) {  // otherwise the observation takes too long and is unreliable
@@ -341,6 +371,7 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
       }
     }
     stay_ = best == active_ ? std::min(2 * stay_, longest_stay) : shortest_stay;
+    if (best != active_) tests_before_ = 0;  // it starts over
     active_ = best;
   }
 
@@ -420,6 +451,8 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
   int frame_ = 0, chosen_at_ = 0, stay_ = shortest_stay;
   double step_ = 0, segment_end_ = 0;   ///< seconds
   double chosen_candidates_ = 0;        ///< number of candidates at the time of the choice
+  bool chosen_near_ = false;            ///< whether bodies met then
+  double tests_before_ = 0;             ///< triangle tests of the active strategy until then
   bool changes_ = false;                ///< plans changed since the last frame
   std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first change of each body
   std::vector<std::uint8_t> body_changed_;

@@ -34,16 +34,20 @@ struct JoinAhead {
   static constexpr double answer = 5;  ///< sorting in an answer
 };
 
-/// auto, in nanoseconds per frame on the scenes "tuned on" of experiments/plans/auto.json at l = 1 to 30 (Zen
-/// 5, float); only their order matters. Fitted in c6e0cf1 and 167e5b8, the join in ef3f1d8.
+/// auto, in nanoseconds per frame (Zen 5, float); only their order matters. leaf_slabs (`refit`) and the join
+/// are fitted on six captured or animated figures, a skirt and a tablecloth (experiments/plans/motion.json)
+/// at l = 1, 3, 7 and 30; drift_boxes, `join_slide` and `join_apart` on the scenes "tuned on" of
+/// experiments/plans/auto.json, in c6e0cf1, 167e5b8 and ef3f1d8, with counts of candidates that are larger
+/// than those of leaf_slabs.
 struct Choice {
-  static constexpr double refit_read = 0.27, refit_candidate = 28;    ///< per vertex read; per candidate
+  static constexpr double refit_read = 0.27, refit_candidate = 37;    ///< per vertex read; per candidate
   static constexpr double watch_read = 0.1;                           ///< per vertex whose drift is read
-  static constexpr double search_read = 0.35, search_candidate = 45;  ///< one search of drift_boxes
-  static constexpr double kept_candidate = 15;                        ///< a frame of drift_boxes
+  static constexpr double search_read = 0.35, search_candidate = 90;  ///< one search of drift_boxes
+  static constexpr double kept_candidate = 45;                        ///< a frame of drift_boxes
   static constexpr double unfit = 1.2;  ///< drift_boxes that fall back, over a refit
-  static constexpr double join_frame = 0.08, join_segment = 5.5, join_frames = 4.6;  ///< of a refit
-  static constexpr double join_slide = 0.2, join_apart = 1.5;                        ///< of a refit
+  static constexpr double join_frame = 0.12, join_segment = 4.2, join_frames = 1;  ///< of a refit
+  static constexpr double join_moves = 0.25, join_undecided = 2;                   ///< of a join
+  static constexpr double join_slide = 0.2, join_apart = 1.5;                      ///< of a refit
 };
 
 }  // namespace kbvh::costs

@@ -175,11 +175,21 @@ void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const Scene
 }
 
 /// When a proof expires, retries the remaining span, then its first quarter, and that quarter's first quarter
-/// as long as several frames lie in it.
+/// as long as several frames lie in it. An attempt costs as much as the tests of several frames, so a pair
+/// stays open to its end if no other frame lies in the quarter.
 template <class S>
 void TriangleSpanFilter<S>::attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene,
                                         const IntervalJoin<S>& join, float fraction) {
   attempt(segment, scene, join, fraction, 1);
+  std::size_t longer = 0;
+  for (const std::uint32_t pair : due_) {
+    const float end = join.pairs()[pair].end;
+    if (end - fraction < 4 * step_)
+      leave_open(pair, end);
+    else
+      due_[longer++] = pair;
+  }
+  due_.resize(longer);
   for (float share = 0.25F; !due_.empty(); share /= 4) {
     attempt(segment, scene, join, fraction, share);
     std::size_t left = 0;
