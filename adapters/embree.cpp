@@ -16,9 +16,11 @@
 //   Bodies with primitives other than triangles are given one triangle (lower, upper, lower) per primitive,
 //   which has the primitive's box; writing these triangles is part of their update.
 //
-// Threads. Every instance asks for one thread. In Embree 3 with TBB that limit is process-wide while a device
-// exists. rtcCollide therefore calls back from the caller's thread, which takes no lock; calls from other
-// threads would take one.
+// Threads. A device that is made with a number of threads limits TBB in the whole process while it exists:
+// with one thread, every other contestant of a run would have one, too. The device is therefore made without
+// a number (threads=0), and every call is made within as many threads as the parameter asks for
+// (LibraryThreads). With one, rtcCollide calls back from the caller's thread, which takes no lock; calls from
+// other threads take one, and the order of the pairs differs from call to call.
 //
 // Candidates. rtcCollide compares node boxes, and therefore the boxes of primitives with a leaf of their own.
 // For larger leaves it reports all pairs: these come several at a time, and are filtered by their boxes.
@@ -49,6 +51,7 @@
 #include "core/base/assert.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
+#include "core/parallel/library_threads.hpp"
 #include "embree.hpp"
 
 namespace kbvh {
@@ -67,96 +70,36 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
               const Params& params)
       : CountedStrategy<S, Count>(scene, motion),
         refits_(params.word("geometry") == "triangles" ? Refits::triangles : Refits::boxes),
+        threads_(threads_of(params)),
         bodies_(scene.body_count()),
         near_bodies_(scene.pairs(), scene.body_count()) {
-    const KeepFloatingPointState keep;
-    device_.reset(rtcNewDevice("threads=1,set_affinity=0"));
-    if (!device_) fail("Embree cannot make a device", rtcGetDeviceError(nullptr));
-    rtcSetDeviceMemoryMonitorFunction(device_.get(), &count_memory, &memory_);
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
-      for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
-      build(body);
-    }
-    check();
+    threads_.call([&] { make_device(scene, motion); });
   }
 
   void reset_to(double /*t*/) override {
-    for (BodyState& state : bodies_) {
-      state.moves = this->scene_.moving(state.body);
-      update(state);
-    }
+    threads_.call([&] {
+      for (BodyState& state : bodies_) {
+        state.moves = this->scene_.moving(state.body);
+        update(state);
+      }
+    });
   }
 
   void advance_to(double /*t*/) override {
-    for (BodyState& state : bodies_)
-      if (state.moves) update(state);
+    threads_.call([&] {
+      for (BodyState& state : bodies_)
+        if (state.moves) update(state);
+    });
   }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
-    const KeepFloatingPointState keep;
-    for (BodyState& state : bodies_)
-      if (state.boxes_are_old) {
-        refit_boxes(state);
-        KBVH_ASSERT(bounds_triangles(state));
-      }
-    collected_.out = &out;
-    collected_.thread = std::this_thread::get_id();
-    std::uint64_t tests = 0;
-    const auto box_of = [&](std::uint32_t body) {
-      Box<double> box;
-      if (!bodies_[body].boxes.scene) return box;
-      RTCBounds bounds;
-      rtcGetSceneBounds(bodies_[body].boxes.scene.get(), &bounds);
-      box.lower[0] = double(bounds.lower_x);
-      box.lower[1] = double(bounds.lower_y);
-      box.lower[2] = double(bounds.lower_z);
-      box.upper[0] = double(bounds.upper_x);
-      box.upper[1] = double(bounds.upper_y);
-      box.upper[2] = double(bounds.upper_z);
-      return box;
-    };
-    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
-      const BodyPair& pair = this->scene_.pairs()[i];
-      if (!bodies_[pair.first].boxes.scene || !bodies_[pair.second].boxes.scene) continue;
-      collected_.bodies = pair;
-      collected_.a = &bodies_[pair.first];
-      collected_.b = &bodies_[pair.second];
-      rtcCollide(collected_.a->boxes.scene.get(), collected_.b->boxes.scene.get(), &collect, &collected_);
-      append_overlapping(collected_, collected_.from_others);
-      collected_.from_others.clear();
-    }
-    this->count_.add(Counter::box_tests, tests + std::exchange(collected_.box_tests, 0));
-    check();
+    threads_.call([&] { collide(out); });
     return {};
   }
 
   void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
                  std::span<RayHit> hits) override {
-    const KeepFloatingPointState keep;
-    for (BodyState& state : bodies_) bring_fans_up_to_date(state);
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      hits[i] = {};
-      if (!is_valid(rays[i])) continue;
-      RTCRayHit found = ray_of(rays[i]);
-      for (BodyState& state : bodies_) {
-        if (!state.fans().scene) continue;
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        if (query == RayQuery::any) {
-          rtcOccluded1(state.fans().scene.get(), &context, &found.ray);
-          if (found.ray.tfar >= 0) continue;
-          hits[i] = {state.body, RayHit::none, std::numeric_limits<double>::quiet_NaN()};
-          break;
-        }
-        found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        rtcIntersect1(state.fans().scene.get(), &context, &found);
-        if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
-        const std::uint32_t fan = found.hit.primID;
-        hits[i] = {state.body, state.fan_primitives.empty() ? fan : state.fan_primitives[fan],
-                   double(found.ray.tfar)};
-      }
-    }
-    check();
+    threads_.call([&] { trace(query, rays, hits); });
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
@@ -208,6 +151,84 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   };
 
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  void make_device(const SceneView<S>& scene, const SampledMotion<S>& motion) {
+    const KeepFloatingPointState keep;
+    device_.reset(rtcNewDevice(LibraryThreads::are_limited() ? "threads=0,set_affinity=0"
+                                                             : "threads=1,set_affinity=0"));
+    if (!device_) fail("Embree cannot make a device", rtcGetDeviceError(nullptr));
+    rtcSetDeviceMemoryMonitorFunction(device_.get(), &count_memory, &memory_);
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+      for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
+      build(body);
+    }
+    check();
+  }
+
+  void collide(PairBuffer& out) {
+    const KeepFloatingPointState keep;
+    for (BodyState& state : bodies_)
+      if (state.boxes_are_old) {
+        refit_boxes(state);
+        KBVH_ASSERT(bounds_triangles(state));
+      }
+    collected_.out = &out;
+    collected_.thread = std::this_thread::get_id();
+    std::uint64_t tests = 0;
+    const auto box_of = [&](std::uint32_t body) {
+      Box<double> box;
+      if (!bodies_[body].boxes.scene) return box;
+      RTCBounds bounds;
+      rtcGetSceneBounds(bodies_[body].boxes.scene.get(), &bounds);
+      box.lower[0] = double(bounds.lower_x);
+      box.lower[1] = double(bounds.lower_y);
+      box.lower[2] = double(bounds.lower_z);
+      box.upper[0] = double(bounds.upper_x);
+      box.upper[1] = double(bounds.upper_y);
+      box.upper[2] = double(bounds.upper_z);
+      return box;
+    };
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
+      const BodyPair& pair = this->scene_.pairs()[i];
+      if (!bodies_[pair.first].boxes.scene || !bodies_[pair.second].boxes.scene) continue;
+      collected_.bodies = pair;
+      collected_.a = &bodies_[pair.first];
+      collected_.b = &bodies_[pair.second];
+      rtcCollide(collected_.a->boxes.scene.get(), collected_.b->boxes.scene.get(), &collect, &collected_);
+      append_overlapping(collected_, collected_.from_others);
+      collected_.from_others.clear();
+    }
+    this->count_.add(Counter::box_tests, tests + std::exchange(collected_.box_tests, 0));
+    check();
+  }
+
+  void trace(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) {
+    const KeepFloatingPointState keep;
+    for (BodyState& state : bodies_) bring_fans_up_to_date(state);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      hits[i] = {};
+      if (!is_valid(rays[i])) continue;
+      RTCRayHit found = ray_of(rays[i]);
+      for (BodyState& state : bodies_) {
+        if (!state.fans().scene) continue;
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        if (query == RayQuery::any) {
+          rtcOccluded1(state.fans().scene.get(), &context, &found.ray);
+          if (found.ray.tfar >= 0) continue;
+          hits[i] = {state.body, RayHit::none, std::numeric_limits<double>::quiet_NaN()};
+          break;
+        }
+        found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        rtcIntersect1(state.fans().scene.get(), &context, &found);
+        if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+        const std::uint32_t fan = found.hit.primID;
+        hits[i] = {state.body, state.fan_primitives.empty() ? fan : state.fan_primitives[fan],
+                   double(found.ray.tfar)};
+      }
+    }
+    check();
+  }
 
   void build(std::uint32_t body) {
     BodyState& state = bodies_[body];
@@ -441,6 +462,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   }
 
   Refits refits_;
+  LibraryThreads threads_;
   std::atomic<std::int64_t> memory_{0};  // must outlive the device
   DevicePointer device_;
   std::vector<BodyState> bodies_;
@@ -469,7 +491,8 @@ KBVH_STRATEGY(embree) {
                       {"user", "triangles"},
                       "geometry that the update refits: user geometry, which the query collides; or triangle "
                       "geometry, Embree's fastest refit, which Embree cannot collide: the query then refits "
-                      "user geometry first, and its time must not be quoted"}};
+                      "user geometry first, and its time must not be quoted"},
+                     threads_parameter("positions, refit and query")};
   std::vector<StrategyEntry> entries;
   entries.push_back(make_entry<EmbreeRefit, Scalars::float_only>(std::move(info)));
   return entries;

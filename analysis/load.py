@@ -256,6 +256,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "choice": record.text("choice", ""),
         "own_scalar": record.text("strategy.own_scalar", ""),
         "params": params,
+        "threads": _threads(params),
         "builder": builder,
         "over_time": _over_time(record),
         "times_over_time": _times_over_time(record),
@@ -365,6 +366,14 @@ def _repetitions(record: _Record, index: int, row: dict[str, Any]) -> list[dict[
         values["plan_changes"] += one.number("geometry_changes", 0.0)
         result.append({"run": index, "repetition": number, **values})
     return result
+
+
+def _threads(params: dict[str, Any]) -> int:
+    """Returns the threads that a contestant shared its work among."""
+    try:
+        return max(1, int(float(params.get("threads", 1))))
+    except (TypeError, ValueError):
+        return 1
 
 
 def _identity(strategy: str, params: dict[str, Any], builder: Optional[dict[str, Any]]) -> str:

@@ -141,6 +141,7 @@ def _row(row: object, all_ratios: Ratios) -> Row:
         label=row.label,
         note=text.listing(
             ([f"computes in {own}"] if own and own != row.scalar else [])
+            + ([f"{row.threads} threads"] if row.threads > 1 else [])
             + (["fetches positions itself"] if row.motion == 0 or (row.changes and row.positions_fetched_per_frame > 0) else [])
         ),
         guarantee=GUARANTEE_NAMES[row.guarantee],

@@ -481,6 +481,7 @@ KBVH_STRATEGY(auto) {
                       "1.1",
                       {},
                       "predicted speed-up from which on another strategy replaces the active one",
-                      1}},
+                      1},
+                     threads_parameter("positions and the work of the chosen strategies that take threads")},
   })};
 }

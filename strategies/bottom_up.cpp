@@ -2,16 +2,10 @@
 // known to us: wide nodes as structure of arrays, over unique vertices in padded lists
 // (core/families/wide/kernels/wide_refit.cpp). It is the usual denominator of the printed ratios.
 
-#include <algorithm>
-
 #include "core/contract/registry.hpp"
+#include "core/families/wide/shared_query.hpp"
+#include "core/families/wide/shared_refit.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
-
-#if defined(KBVH_WITH_TBB)
-#include <tbb/global_control.h>
-#include <tbb/parallel_for_each.h>
-#include <tbb/task_arena.h>
-#endif
 
 namespace kbvh {
 namespace {
@@ -27,16 +21,6 @@ std::vector<std::string> kernel_words() {
   return words;
 }
 
-/// A larger number would be cut to this one silently, and a result would name unused threads.
-double most_threads() {
-#if defined(KBVH_WITH_TBB)
-  return double(std::min<std::size_t>(
-      1024, tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
-#else
-  return 1;
-#endif
-}
-
 template <class S, class Count>
 class BottomUp final : public StoredHierarchyStrategy<S, Count>,
                        public AnswersSelfPairs,
@@ -48,11 +32,42 @@ class BottomUp final : public StoredHierarchyStrategy<S, Count>,
   static constexpr Foresight foresight = Foresight::none;
   BottomUp(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
            const Params& params)
-      : Base(scene, motion, std::move(topologies), params, chosen_kernels(params)),
-        threads_(int(params.number("threads"))) {
-#if defined(KBVH_WITH_TBB)
-    if (threads_ > 1) arena_.initialize(threads_);
-#endif
+      : Base(scene, motion, std::move(topologies), params, chosen_kernels(params)) {}
+
+  void advance_to(double t) override {
+    Workers& workers = this->sampled_.workers();
+    if (!workers.several()) return Base::advance_to(t);
+    shared_refit_.start();
+    for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) {
+      if (!this->scene_.moving(body) && !this->plans_changed_) continue;
+      this->hierarchies_[body].positions_changed();
+      shared_refit_.add(this->hierarchies_[body], this->sampled_.positions(body));
+      this->count_refit(body);
+    }
+    shared_refit_.run(workers);
+  }
+
+  /// A budget is spent in the order of one thread.
+  QueryStatus find_candidates(double t, PairBuffer& out, const Budget& budget) override {
+    Workers& workers = this->sampled_.workers();
+    if (!workers.several() || budget.box_tests != Budget{}.box_tests)
+      return Base::find_candidates(t, out, budget);
+    std::uint64_t tests = 0;
+    shared_query_.start();
+    this->for_near_bodies(tests, [&](const BodyPair& pair) {
+      shared_query_.add(this->side(pair.first), this->side(pair.second));
+    });
+    shared_query_.run(workers, out, tests);
+    this->count_.add(Counter::box_tests, tests);
+    return {};
+  }
+
+  void confirm_candidates(double /*t*/, PairBuffer& pairs) override {
+    shared_confirmation_.confirm(this->scene_, this->sampled_, pairs, this->triangle_stats_);
+  }
+
+  std::size_t bytes() const override {
+    return Base::bytes() + shared_refit_.bytes() + shared_query_.bytes() + shared_confirmation_.bytes();
   }
 
   void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
@@ -65,35 +80,11 @@ class BottomUp final : public StoredHierarchyStrategy<S, Count>,
   }
 
  private:
-  void update(std::uint32_t body) override {
-    auto& hierarchy = this->hierarchies_[body];
-    if (threads_ == 1)
-      hierarchy.refit(this->sampled_.positions(body));
-    else
-      refit_in_parallel(hierarchy, this->sampled_.positions(body));
-    this->count_refit(body);
-  }
+  void update(std::uint32_t body) override { this->refit_counted(body); }
 
-  void refit_in_parallel(WideHierarchy<S>& hierarchy, const S* positions) {
-#if defined(KBVH_WITH_TBB)
-    if (!hierarchy.subtrees().empty()) {
-      arena_.execute([&] {
-        tbb::parallel_for_each(hierarchy.subtrees(), [&](const auto& subtree) {
-          hierarchy.refit_nodes(positions, subtree.begin, subtree.end);
-        });
-      });
-      for (const std::uint32_t node : hierarchy.above_subtrees())
-        hierarchy.refit_nodes(positions, node, node + 1);
-      return;
-    }
-#endif
-    hierarchy.refit(positions);
-  }
-
-  int threads_;
-#if defined(KBVH_WITH_TBB)
-  tbb::task_arena arena_;
-#endif
+  SharedRefit<S> shared_refit_;
+  SharedQuery<S> shared_query_{this->scene_, this->sampled_};
+  SharedConfirmation<S> shared_confirmation_;
 };
 
 }  // namespace
@@ -111,13 +102,6 @@ KBVH_STRATEGY(bottom_up) {
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"kernels", "auto", kernel_words(),
                       "instruction set of refit and query; auto: the widest that this machine supports"},
-                     {"threads",
-                      "1",
-                      {},
-                      "threads of the refit (TBB), at most those of this machine; times with more than one "
-                      "thread are reported separately",
-                      1,
-                      most_threads(),
-                      Numbers::whole}},
+                     threads_parameter("positions, refit, query and triangle tests")},
   })};
 }

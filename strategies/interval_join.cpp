@@ -82,6 +82,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
           if (by_spans_[i]) one->joins[i].use_slabs();
     any_by_spans_ = std::find(by_spans_.begin(), by_spans_.end(), true) != by_spans_.end();
     all_by_spans_ = std::find(by_spans_.begin(), by_spans_.end(), false) == by_spans_.end();
+    for (Joins<S>* one : {&now_, &next_})
+      for (auto& answers : one->answers) answers.use(this->sampled_.workers());
   }
 
   void reset_to(double t) override {
@@ -135,16 +137,14 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
       else
         now_.joins[i].move_to(fraction);
     }
-    const auto confirm = [this](PairBuffer& pairs) {
-      confirm_pairs(this->scene_, this->sampled_, pairs, this->triangle_stats_);
-    };
+    const auto confirm = [this](PairBuffer& pairs) { confirm_all(pairs); };
     changes_.find(answer, parts(), confirm, begun, ended);
     if constexpr (works_ahead) join_ahead(bounds_.ahead(), share_due());
   }
 
   /// Undecided pairs are tested at the frame's positions.
-  void confirm_candidates(double t, PairBuffer& pairs) override {
-    if (!any_by_spans_ || pairs != answered_) return Strategy<S>::confirm_candidates(t, pairs);
+  void confirm_candidates(double /*t*/, PairBuffer& pairs) override {
+    if (!any_by_spans_ || pairs != answered_) return confirm_all(pairs);
     to_test_.clear();
     std::size_t kept = 0, at = 0;
     for (const Block& block : blocks_) {
@@ -155,7 +155,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
                       pairs.begin() + std::ptrdiff_t(at + block.open));
       at += block.open;
     }
-    confirm_pairs(this->scene_, this->sampled_, to_test_, this->triangle_stats_);
+    confirm_all(to_test_);
     pairs.resize(kept);
     pairs.insert(pairs.end(), to_test_.begin(), to_test_.end());
   }
@@ -200,7 +200,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
   std::size_t bytes() const override {
     std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes() + query_.bytes() + changes_.bytes() +
-                        parts_.capacity() * sizeof(parts_[0]) +
+                        shared_confirmation_.bytes() + parts_.capacity() * sizeof(parts_[0]) +
                         (answered_.capacity() + to_test_.capacity()) * sizeof(PrimitivePair) +
                         blocks_.capacity() * sizeof(Block) + joined_bodies_.capacity() * sizeof(BodyPair);
     for (const auto& sweep : sweeps_) total += sweep.bytes();
@@ -223,6 +223,10 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   /// More pairs of bodies than this are joined together: a separate join takes some kilobytes.
   static constexpr std::size_t most_joins = 16;
 
+  /// Keeps the pairs that intersect at the frame.
+  void confirm_all(PairBuffer& pairs) {
+    shared_confirmation_.confirm(this->scene_, this->sampled_, pairs, this->triangle_stats_);
+  }
   bool is_decidable(const BodyPair& pair) const { return decidable_[pair.first] && decidable_[pair.second]; }
   /// Returns the pairs of bodies of one join, among those that meet within the segment. Valid until the next
   /// call.
@@ -275,7 +279,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   }
   void join() {
     for (std::size_t i = 0; i < now_.joins.size(); ++i) {
-      now_.joins[i].join(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i));
+      now_.joins[i].join(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i),
+                         this->sampled_.workers());
       if (by_spans_[i]) now_.answers[i].start(now_.joins[i]);
       this->count_.add(Counter::box_tests, now_.joins[i].tests());
     }
@@ -356,6 +361,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   };
   std::vector<Block> blocks_;
   PairBuffer answered_, to_test_;
+  SharedConfirmation<S> shared_confirmation_;
   JoinChanges<S> changes_;
   std::vector<typename JoinChanges<S>::Part> parts_;
   LinearCounts<S> updates_;
@@ -377,6 +383,8 @@ std::vector<Parameter> join_parameters() {
                   {"on", "off"},
                   "with triangle_tests=spans: leave out triangles that the slab of a leaf separates "
                   "throughout the segment"});
+  list.push_back(threads_parameter(
+      "positions, boxes, joins, span tests and triangle tests (work that is done ahead takes one thread)"));
   return list;
 }
 

@@ -57,14 +57,40 @@ class MovedBytes final : public Limit<S, Foresight::none> {
     auto& hierarchy = hierarchies_[body];
     const WideArrays<S> arrays = hierarchy.arrays();
     const std::size_t nodes = hierarchy.node_count();
-    sum_ ^= this->kernels_->read(this->sampled_.positions(body),
-                                 std::size_t(3) * this->scene_.vertex_count(body) * sizeof(S));
-    sum_ ^= this->kernels_->read(arrays.vertices, hierarchy.listed_vertices() * sizeof(std::uint32_t));
-    sum_ ^= this->kernels_->read(arrays.nodes, nodes * sizeof(WideNode));
-    this->kernels_->write(arrays.child_bounds, nodes * lane_scalars(hierarchy.topology().width) * sizeof(S),
-                          sum_);
-    this->kernels_->write(arrays.node_bounds, nodes * 8 * sizeof(S), sum_);
+    const struct {
+      const void* data;
+      void* target;  ///< null: read only
+      std::size_t bytes;
+    } arrays_moved[] = {
+        {this->sampled_.positions(body), nullptr,
+         std::size_t(3) * this->scene_.vertex_count(body) * sizeof(S)},
+        {arrays.vertices, nullptr, hierarchy.listed_vertices() * sizeof(std::uint32_t)},
+        {arrays.nodes, nullptr, nodes * sizeof(WideNode)},
+        {nullptr, arrays.child_bounds, nodes * lane_scalars(hierarchy.topology().width) * sizeof(S)},
+        {nullptr, arrays.node_bounds, nodes * 8 * sizeof(S)}};
+    Workers& workers = this->sampled_.workers();
+    if (!workers.several()) {
+      for (const auto& one : arrays_moved) move(one.data, one.target, 0, one.bytes, sum_);
+      return;
+    }
+    sums_.assign(workers.threads(), {sum_});
+    for (const auto& one : arrays_moved) {
+      const Parts cut{one.bytes, std::size_t(1) << 15};
+      workers.for_each(cut.parts(), [&](std::size_t part, std::uint32_t runner) {
+        auto sum = unsigned(sums_[runner].value);
+        move(one.data, one.target, cut.begin(part), cut.end(part), sum);
+        sums_[runner].value = sum;
+      });
+    }
+    for (const OwnCount& sum : sums_) sum_ ^= unsigned(sum.value);
   }
+  void move(const void* data, void* target, std::size_t begin, std::size_t end, unsigned& sum) const {
+    if (target == nullptr)
+      sum ^= this->kernels_->read(static_cast<const char*>(data) + begin, end - begin);
+    else
+      this->kernels_->write(static_cast<char*>(target) + begin, end - begin, sum);
+  }
+  std::vector<OwnCount> sums_;  ///< [runner]
   std::vector<WideHierarchy<S>> hierarchies_;
   unsigned sum_ = 0;
 };
@@ -118,6 +144,7 @@ KBVH_STRATEGY(limits) {
   using namespace kbvh;
   Info bytes = limit("limit_moved_bytes", "limit: moving the bytes of a refit");
   bytes.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16};
+  bytes.parameters = {threads_parameter("positions and the moved bytes")};
   Info motion = limit("limit_plain_motion", "limit: plain interpolation of all positions");
   motion.positions = PositionUse::fetched;
   motion.topology.own = true;

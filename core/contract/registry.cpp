@@ -86,6 +86,8 @@ std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<
   const auto factory = entry.factory<S>();
   if (factory == nullptr)
     throw ConfigError("'" + entry.info.id + "' has no " + (sizeof(S) == 4 ? "float" : "double") + " version");
+  // A strategy within another one works with the threads of that one.
+  if (const std::uint32_t threads = threads_of(params); threads > 1) playback.use_threads(threads);
   return factory(scene, playback, std::move(topologies), params, policy);
 }
 

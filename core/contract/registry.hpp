@@ -155,7 +155,8 @@ std::string unsuitable_bodies(const Info& info, const Scene<S>& scene);
 template <class S>
 Topologies build_topologies(const SceneView<S>& scene, Playback<S>& playback, const BuilderConfig& config);
 
-/// Makes an instance. Throws ConfigError if the strategy does not exist in scalar S.
+/// Makes an instance, and gives the playback the threads that a parameter `threads` asks for. Throws
+/// ConfigError if the strategy does not exist in scalar S.
 template <class S>
 std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<S>& scene,
                                     Playback<S>& playback, Topologies topologies, const Params& params,

@@ -53,31 +53,42 @@ std::size_t FlightPlans<S>::segment_at(double t) const {
 
 template <class S>
 void FlightPlans<S>::evaluate(double t, S* out) const {
-  const auto& times = keyframes_->times;
-  const std::size_t k = segment_at(t), scalars = std::size_t(3) * keyframed_count_;
-  if (t <= times[k] || k + 1 == times.size()) {
-    std::copy_n(keyframe(k), scalars, out);
-  } else {
-    round_chord(keyframe(k), keyframe(k + 1), scalars, times[k], times[k + 1], t, out);
-  }
-  for (const OwnPlan& plan : own_plans_)
-    for (int axis = 0; plan.group == none && axis < 3; ++axis)
-      out[3 * std::size_t(plan.vertex) + std::size_t(axis)] = round_piece(own_piece(plan, axis, t), t);
-  evaluate_rays(t, out);
+  evaluate_keyframed(t, 0, keyframed_count_, out);
+  evaluate_own_plans(t, 0, 1, out);
 }
 
 template <class S>
-void FlightPlans<S>::evaluate_rays(double t, S* out) const {
+void FlightPlans<S>::evaluate_keyframed(double t, std::uint32_t begin, std::uint32_t end, S* out) const {
+  const auto& times = keyframes_->times;
+  const std::size_t k = segment_at(t), first = std::size_t(3) * begin,
+                    scalars = std::size_t(3) * (end - begin);
+  if (t <= times[k] || k + 1 == times.size())
+    std::copy_n(keyframe(k) + first, scalars, out + first);
+  else
+    round_chord(keyframe(k) + first, keyframe(k + 1) + first, scalars, times[k], times[k + 1], t,
+                out + first);
+}
+
+template <class S>
+void FlightPlans<S>::evaluate_own_plans(double t, std::size_t part, std::size_t parts, S* out) const {
+  const auto cut = [parts](std::size_t count, std::size_t which) { return count * which / parts; };
+  for (std::size_t i = cut(own_plans_.size(), part); i < cut(own_plans_.size(), part + 1); ++i) {
+    const OwnPlan& plan = own_plans_[i];
+    for (int axis = 0; plan.group == none && axis < 3; ++axis)
+      out[3 * std::size_t(plan.vertex) + std::size_t(axis)] = round_piece(own_piece(plan, axis, t), t);
+  }
   constexpr std::size_t block = 128;  // vertices
   S positions[3 * block];
-  for (const Rays& rays : rays_)
-    for (std::size_t first = 0; first < rays.vertices.size(); first += block) {
-      const std::size_t count = std::min(block, rays.vertices.size() - first);
+  for (const Rays& rays : rays_) {
+    const std::size_t end = cut(rays.vertices.size(), part + 1);
+    for (std::size_t first = cut(rays.vertices.size(), part); first < end; first += block) {
+      const std::size_t count = std::min(block, end - first);
       round_ray(rays.origins.data() + 3 * first, rays.velocities.data() + 3 * first, 3 * count, rays.t0, t,
                 positions);
       for (std::size_t i = 0; i < count; ++i)
         std::copy_n(positions + 3 * i, 3, out + std::size_t(3) * rays.vertices[first + i]);
     }
+  }
 }
 
 template <class S>
@@ -118,7 +129,7 @@ void FlightPlans<S>::leave_rays(const OwnPlan& plan) {
 }
 
 template <class S>
-void FlightPlans<S>::evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out) const {
+void FlightPlans<S>::evaluate_listed(double t, std::span<const std::uint32_t> vertices, S* out) const {
   const auto& times = keyframes_->times;
   const std::size_t k = segment_at(t);
   if (t <= times[k] || k + 1 == times.size()) {
@@ -133,13 +144,13 @@ void FlightPlans<S>::evaluate_keyframed(double t, std::span<const std::uint32_t>
 template <class S>
 void FlightPlans<S>::evaluate(double t, std::span<const std::uint32_t> vertices, S* out) const {
   if (vertex_count_ == keyframed_count_) {
-    evaluate_keyframed(t, vertices, out);
+    evaluate_listed(t, vertices, out);
   } else {
     // Vertices added at run time have no keyframes: only the runs between them are looked up there.
     const auto added = [this](std::uint32_t v) { return v >= keyframed_count_; };
     for (auto begin = vertices.begin(); begin != vertices.end();) {
       const auto end = std::find_if(begin, vertices.end(), added);
-      evaluate_keyframed(t, {begin, end}, out);
+      evaluate_listed(t, {begin, end}, out);
       begin = std::find_if_not(end, vertices.end(), added);
     }
   }

@@ -75,6 +75,11 @@ class FlightPlans {
   void evaluate(double t, S* out) const;
   /// Does the same for the listed vertices only, into the same layout.
   void evaluate(double t, std::span<const std::uint32_t> vertices, S* out) const;
+  /// Do the same in parts that threads can share. The first writes the positions of the keyframed vertices
+  /// [begin, end) as their keyframes say; the second, once these are written, part `part` of `parts` of the
+  /// vertices with plans of their own.
+  void evaluate_keyframed(double t, std::uint32_t begin, std::uint32_t end, S* out) const;
+  void evaluate_own_plans(double t, std::size_t part, std::size_t parts, S* out) const;
 
   /// Returns the index k of the segment [times[k], times[k+1]) that contains t; 0 before the first, the last
   /// index past the end.
@@ -145,7 +150,6 @@ class FlightPlans {
   };
   void join_rays(OwnPlan& plan);
   void leave_rays(const OwnPlan& plan);
-  void evaluate_rays(double t, S* out) const;
   Piece<S> own_piece(const OwnPlan& plan, int axis, double t) const;
   double longest_step(std::size_t segment) const;
   std::optional<Translation<S>> find_translation(std::size_t segment) const;
@@ -153,7 +157,7 @@ class FlightPlans {
   double own_speed_bound(double t) const;
   static void check_plan(double t, const PlanChange<S>& change, std::uint32_t vertex, const S* position);
   static OwnPlan own_plan(double t, const PlanChange<S>& change, std::uint32_t vertex, const S* position);
-  void evaluate_keyframed(double t, std::span<const std::uint32_t> vertices, S* out) const;
+  void evaluate_listed(double t, std::span<const std::uint32_t> vertices, S* out) const;
 
   std::uint32_t vertex_count_ = 0, keyframed_count_ = 0;
   bool handed_in_ = false;

@@ -41,6 +41,9 @@ class SampledMotion {
   bool all_current(std::uint32_t body) const { return playback_->all_current(body); }
   /// Returns the number of positions evaluated on demand since the playback was created.
   std::uint64_t fetched() const { return playback_->fetched(); }
+  /// Returns the driver's threads, which are the strategy's while it is called: several only if its parameter
+  /// `threads` asks for them, or that of the strategy of which it is a part.
+  Workers& workers() const { return playback_->workers(); }
 
  protected:
   Playback<S>* playback_;

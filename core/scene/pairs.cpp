@@ -37,12 +37,20 @@ struct PairedBody {
 /// bytes.
 constexpr std::size_t block = 128;
 
+/// Whether positions may have to be fetched, pair by pair.
+enum class Positions : std::uint8_t { to_be_fetched, fetched };
+
 /// Up to `block` candidates: pairs of triangles are collected, all others decided one by one.
 template <class S>
 class CandidateBlock {
  public:
-  CandidateBlock(const SceneView<S>& scene, const SampledMotion<S>& motion, TriangleTestStats& stats)
-      : scene_(&scene), motion_(&motion), stats_(&stats), kernels_(active_kernel_set()) {}
+  CandidateBlock(const SceneView<S>& scene, const SampledMotion<S>& motion, TriangleTestStats& stats,
+                 Positions positions = Positions::to_be_fetched)
+      : scene_(&scene),
+        motion_(&motion),
+        stats_(&stats),
+        fetched_(positions == Positions::fetched),
+        kernels_(active_kernel_set()) {}
 
   /// Returns one byte for each of `count` candidates: 1 if the pair intersects, else 0. The next call
   /// overwrites them.
@@ -75,7 +83,7 @@ class CandidateBlock {
 
   void collect(const PrimitivePair* candidates, std::size_t begin, std::size_t end, const PairedBody<S>& a,
                const PairedBody<S>& b) {
-    const bool polygons = a.polygons && b.polygons, current = a.current && b.current;
+    const bool polygons = a.polygons && b.polygons, current = fetched_ || (a.current && b.current);
     std::size_t size = size_;
     for (std::size_t i = begin; i < end; ++i) {
       const auto p = a[candidates[i].primitive_a], q = b[candidates[i].primitive_b];
@@ -103,6 +111,7 @@ class CandidateBlock {
   const SceneView<S>* scene_;
   const SampledMotion<S>* motion_;
   TriangleTestStats* stats_;
+  bool fetched_;
   KernelSet kernels_;
   std::size_t size_ = 0;  // number of triangle pairs
   TrianglePair<S> triangles_[block];
@@ -111,15 +120,14 @@ class CandidateBlock {
   std::uint8_t intersect_[block];  // of candidates
 };
 
-}  // namespace
-
+/// Moves the pairs among [begin, end) that intersect to `begin` and after, in their order; returns their
+/// number.
 template <class S>
-void confirm_pairs(const SceneView<S>& scene, const SampledMotion<S>& motion, PairBuffer& pairs,
-                   TriangleTestStats& stats) {
-  CandidateBlock<S> candidates(scene, motion, stats);
-  std::size_t kept = 0;
-  for (std::size_t first = 0; first < pairs.size(); first += block) {
-    const std::size_t count = std::min(block, pairs.size() - first);
+std::size_t keep_intersecting(CandidateBlock<S>& candidates, PairBuffer& pairs, std::size_t begin,
+                              std::size_t end) {
+  std::size_t kept = begin;
+  for (std::size_t first = begin; first < end; first += block) {
+    const std::size_t count = std::min(block, end - first);
     const std::uint8_t* const intersect = candidates.intersect(pairs.data() + first, count);
     // Branchless; a kept pair never moves to a later index.
     for (std::size_t i = 0; i < count; ++i) {
@@ -127,9 +135,70 @@ void confirm_pairs(const SceneView<S>& scene, const SampledMotion<S>& motion, Pa
       kept += intersect[i];
     }
   }
+  return kept - begin;
+}
+
+/// The pairs that one thread tests at once: tens of microseconds.
+constexpr std::size_t pairs_at_once = 16 * block;
+
+}  // namespace
+
+template <class S>
+void confirm_pairs(const SceneView<S>& scene, const SampledMotion<S>& motion, PairBuffer& pairs,
+                   TriangleTestStats& stats) {
+  CandidateBlock<S> candidates(scene, motion, stats);
+  pairs.resize(keep_intersecting(candidates, pairs, 0, pairs.size()));
+}
+
+template <class S>
+void SharedConfirmation<S>::confirm(const SceneView<S>& scene, const SampledMotion<S>& motion,
+                                    PairBuffer& pairs, TriangleTestStats& stats) {
+  Workers& workers = motion.workers();
+  const Parts cut{pairs.size(), pairs_at_once};
+  if (!workers.several() || cut.parts() < 2) return confirm_pairs(scene, motion, pairs, stats);
+  fetch(scene, motion, pairs);
+  parts_.resize(std::max(parts_.size(), cut.parts()));
+  workers.for_each(cut.parts(), [&](std::size_t i, std::uint32_t) {
+    TriangleTestStats own;
+    CandidateBlock<S> candidates(scene, motion, own, Positions::fetched);
+    parts_[i].kept = keep_intersecting(candidates, pairs, cut.begin(i), cut.end(i));
+    parts_[i].stats = own;
+  });
+  std::size_t kept = parts_[0].kept;
+  for (std::size_t i = 0; i < cut.parts(); ++i) {
+    stats.tests += parts_[i].stats.tests;
+    stats.filtered += parts_[i].stats.filtered;
+    stats.exact += parts_[i].stats.exact;
+    if (i == 0) continue;
+    const auto first = pairs.begin() + std::ptrdiff_t(cut.begin(i));
+    std::copy(first, first + std::ptrdiff_t(parts_[i].kept), pairs.begin() + std::ptrdiff_t(kept));
+    kept += parts_[i].kept;
+  }
   pairs.resize(kept);
 }
 
+/// Fetches all positions that the tests read: a fetch changes the playback, so threads cannot.
+template <class S>
+void SharedConfirmation<S>::fetch(const SceneView<S>& scene, const SampledMotion<S>& motion,
+                                  const PairBuffer& pairs) {
+  for (std::size_t begin = 0, end = 0; begin < pairs.size(); begin = end) {
+    const std::uint32_t bodies[2] = {pairs[begin].body_a, pairs[begin].body_b};
+    while (end < pairs.size() && pairs[end].body_a == bodies[0] && pairs[end].body_b == bodies[1]) ++end;
+    for (int side = 0; side < 2; ++side) {
+      if (motion.all_current(bodies[side])) continue;
+      const Primitives& primitives = scene.primitives(bodies[side]);
+      to_fetch_.clear();
+      for (std::size_t i = begin; i < end; ++i) {
+        const auto vertices = primitives[side == 0 ? pairs[i].primitive_a : pairs[i].primitive_b];
+        to_fetch_.insert(to_fetch_.end(), vertices.begin(), vertices.end());
+      }
+      motion.fetch(bodies[side], to_fetch_);
+    }
+  }
+}
+
+template class SharedConfirmation<float>;
+template class SharedConfirmation<double>;
 template void confirm_pairs(const SceneView<float>&, const SampledMotion<float>&, PairBuffer&,
                             TriangleTestStats&);
 template void confirm_pairs(const SceneView<double>&, const SampledMotion<double>&, PairBuffer&,

@@ -69,4 +69,27 @@ template <class S>
 void confirm_pairs(const SceneView<S>& scene, const SampledMotion<S>& motion, PairBuffer& pairs,
                    TriangleTestStats& stats);
 
+/// Does the same on the threads of the motion (SampledMotion::workers), with the same result and counts.
+template <class S>
+class SharedConfirmation {
+ public:
+  void confirm(const SceneView<S>& scene, const SampledMotion<S>& motion, PairBuffer& pairs,
+               TriangleTestStats& stats);
+  std::size_t bytes() const {
+    return parts_.capacity() * sizeof(Part) + to_fetch_.capacity() * sizeof(std::uint32_t);
+  }
+
+ private:
+  struct alignas(cache_line) Part {
+    std::size_t kept;
+    TriangleTestStats stats;
+  };
+  void fetch(const SceneView<S>& scene, const SampledMotion<S>& motion, const PairBuffer& pairs);
+
+  std::vector<Part> parts_;
+  std::vector<std::uint32_t> to_fetch_;
+};
+extern template class SharedConfirmation<float>;
+extern template class SharedConfirmation<double>;
+
 }  // namespace kbvh

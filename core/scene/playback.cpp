@@ -8,6 +8,11 @@
 
 namespace kbvh {
 
+namespace {
+/// The vertices that one thread evaluates at once: 48 KiB of floats read and written, some microseconds.
+constexpr std::uint32_t vertices_at_once = 2048, none_gathered = vertices_at_once + 1;
+}  // namespace
+
 template <class S>
 Playback<S>::Playback(const Scene<S>& scene) {
   std::size_t largest = 0;
@@ -41,11 +46,75 @@ void Playback<S>::seek(double t) {
 
 template <class S>
 void Playback<S>::evaluate_all() {
+  if (workers_.several()) return evaluate_shared();
   for (auto& state : bodies_) {
     if (state.all_current) continue;
     state.plans.evaluate(time_, state.positions.data());
     state.all_current = true;
   }
+}
+
+/// Large bodies in parts, small ones several at a time.
+template <class S>
+void Playback<S>::evaluate_shared() {
+  items_.clear();
+  std::uint32_t gathered = none_gathered;  // vertices of the last item, if bodies may be added to it
+  for (std::uint32_t body = 0; body < body_count(); ++body) {
+    const FlightPlans<S>& plans = bodies_[body].plans;
+    const std::uint32_t vertices = plans.vertex_count();
+    if (bodies_[body].all_current) {
+      gathered = none_gathered;
+    } else if (vertices < 2 * vertices_at_once) {
+      if (gathered + vertices > vertices_at_once) {
+        items_.push_back({body, body, 0, 0});
+        gathered = 0;
+      }
+      items_.back().end_body = body + 1;
+      gathered += vertices;
+    } else {
+      for (std::uint32_t begin = 0; begin < plans.keyframed_count(); begin += vertices_at_once)
+        items_.push_back(
+            {body, body + 1, begin, std::min(begin + vertices_at_once, plans.keyframed_count())});
+      gathered = none_gathered;
+    }
+  }
+  workers_.for_each(items_.size(), [this](std::size_t i, std::uint32_t) {
+    const Item item = items_[i];
+    for (std::uint32_t body = item.body; body < item.end_body; ++body) {
+      BodyState& state = bodies_[body];
+      if (item.end == 0)
+        state.plans.evaluate(time_, state.positions.data());
+      else
+        state.plans.evaluate_keyframed(time_, item.begin, item.end, state.positions.data());
+    }
+  });
+  for (BodyState& state : bodies_) {
+    if (state.all_current) continue;
+    if (state.plans.vertex_count() >= 2 * vertices_at_once) evaluate_own(state);
+    state.all_current = true;
+  }
+}
+
+template <class S>
+void Playback<S>::evaluate_own(BodyState& state) {
+  if (!state.plans.has_own_plans()) return;
+  const std::size_t parts = std::size_t(8) * workers_.threads();
+  workers_.for_each(parts, [&](std::size_t part, std::uint32_t) {
+    state.plans.evaluate_own_plans(time_, part, parts, state.positions.data());
+  });
+}
+
+template <class S>
+void Playback<S>::evaluate(BodyState& state) {
+  const std::uint32_t vertices = state.plans.vertex_count();
+  if (!workers_.several() || vertices < 2 * vertices_at_once)
+    return state.plans.evaluate(time_, state.positions.data());
+  const Parts cut{state.plans.keyframed_count(), vertices_at_once};
+  workers_.for_each(cut.parts(), [&](std::size_t part, std::uint32_t) {
+    state.plans.evaluate_keyframed(time_, std::uint32_t(cut.begin(part)), std::uint32_t(cut.end(part)),
+                                   state.positions.data());
+  });
+  evaluate_own(state);
 }
 
 template <class S>
@@ -78,13 +147,21 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
   }
   fetched_ += stale_.size();
   state.fetched += std::uint32_t(stale_.size());
-  state.plans.evaluate(time_, stale_, state.positions.data());
+  if (!workers_.several() || stale_.size() < 2 * vertices_at_once)
+    return state.plans.evaluate(time_, stale_, state.positions.data());
+  // Neighbours in the list may share a cache line of positions, but no position is written twice.
+  const Parts cut{stale_.size(), vertices_at_once};
+  workers_.for_each(cut.parts(), [&](std::size_t part, std::uint32_t) {
+    const std::span<const std::uint32_t> all(stale_);
+    state.plans.evaluate(time_, all.subspan(cut.begin(part), cut.end(part) - cut.begin(part)),
+                         state.positions.data());
+  });
 }
 
 template <class S>
 void Playback<S>::fetch_all(BodyState& state) {
   if (state.plans.moving()) fetched_ += state.plans.vertex_count() - state.fetched;
-  state.plans.evaluate(time_, state.positions.data());
+  evaluate(state);
   state.all_current = true;
 }
 

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "core/parallel/workers.hpp"
 #include "core/scene/scene.hpp"
 
 namespace kbvh {
@@ -66,6 +67,11 @@ class Playback {
   /// Returns the number of positions evaluated on demand so far.
   std::uint64_t fetched() const { return fetched_; }
 
+  /// Evaluates positions on this many threads from now on, which the strategy may use, too, while it is
+  /// called (Workers). Throws std::invalid_argument like Workers.
+  void use_threads(std::uint32_t threads) { workers_ = Workers(threads); }
+  Workers& workers() { return workers_; }
+
  private:
   struct BodyState {
     FlightPlans<S> plans, scene_plans;  ///< with changes, and as in the scene
@@ -77,14 +83,23 @@ class Playback {
 
     const S* data() const { return given != nullptr ? given : positions.data(); }
   };
+  /// Work of one thread: the vertices [begin, end) of one body, or all vertices of bodies.
+  struct Item {
+    std::uint32_t body, end_body, begin, end;
+  };
   void fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices);
   void fetch_all(BodyState& state);
+  void evaluate(BodyState& state);
+  void evaluate_own(BodyState& state);
+  void evaluate_shared();
 
   double time_ = 0;
   std::uint32_t epoch_ = 0;
   std::uint64_t fetched_ = 0;
   std::vector<BodyState> bodies_;
   std::vector<std::uint32_t> stale_;
+  Workers workers_;
+  std::vector<Item> items_;
 };
 
 extern template class Playback<float>;

@@ -8,50 +8,6 @@
 
 namespace kbvh {
 
-namespace {
-/// The smallest allocation for pairs of primitives.
-constexpr std::size_t chunk_room = 2048;
-
-/// Keeps the valid pairs within a body among pairs in columns, from a given index on.
-void keep_self_columns(const Primitives* neighbours, LeavesOf leaves, JoinColumns& pairs, std::size_t from) {
-  std::size_t kept = from;
-  for (std::size_t i = from; i < pairs.found; ++i) {
-    std::uint32_t a = pairs.primitive_a[i], b = pairs.primitive_b[i];
-    if (!keep_self_pair(neighbours, leaves, a, b)) continue;
-    pairs.primitive_a[kept] = a;
-    pairs.primitive_b[kept] = b;
-    if (pairs.begin != nullptr) {
-      pairs.begin[kept] = pairs.begin[i];
-      pairs.end[kept] = pairs.end[i];
-    }
-    ++kept;
-  }
-  pairs.found = kept;
-}
-}  // namespace
-
-template <class S>
-JoinColumns IntervalJoin<S>::Columns::view(std::size_t found, bool timed) {
-  if (primitive_a.size() < found + chunk_room) {
-    const std::size_t room = 2 * found + chunk_room;
-    for (auto* column : {&primitive_a, &primitive_b}) column->resize(room);
-    if (timed)
-      for (auto* column : {&begin, &end}) column->resize(room);
-  }
-  return {primitive_a.data(),
-          primitive_b.data(),
-          timed ? begin.data() : nullptr,
-          timed ? end.data() : nullptr,
-          found,
-          primitive_a.size()};
-}
-
-template <class S>
-std::size_t IntervalJoin<S>::Columns::bytes() const {
-  return (primitive_a.capacity() + primitive_b.capacity()) * sizeof(std::uint32_t) +
-         (begin.capacity() + end.capacity()) * sizeof(float);
-}
-
 template <class S>
 void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>& scene,
                             std::span<const BodyPair> bodies, std::size_t leaf_pairs) {
@@ -66,6 +22,7 @@ void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>&
   following_ = {};
   throughout_ = count_ = 0;
   traversal_ = {};
+  own_leaves_.clear();
   leaf_join_ = {};
   leaf_join_.throughout = found_throughout_.view(0, false);
   leaf_join_.partly = found_partly_.view(0, true);
@@ -143,8 +100,8 @@ bool IntervalJoin<S>::step(std::uint64_t box_tests) {
       traverse_(leaf_join_.a, leaf_join_.ends_a, leaf_join_.b, leaf_join_.ends_b, traversal_);
       leaf_join_.next = 0;
       if (self_) {
-        take_self_leaves(different_leaves_first(leaf_pairs_.data(), traversal_.found), LeavesOf::two);
-        take_self_leaves(traversal_.found, LeavesOf::one);
+        const std::size_t different = take_out_own_leaves(leaf_pairs_.data(), traversal_.found, own_leaves_);
+        take_self_leaves(different, LeavesOf::two);
       } else {
         take_leaves(traversal_.found, LeavesOf::two);
       }
@@ -155,6 +112,7 @@ bool IntervalJoin<S>::step(std::uint64_t box_tests) {
         traversal_.stack_room = stack_.size();
       }
     }
+    if (self_) take_own_leaves();
     end_bodies();
     if (found_.size() == bodies_.size()) break;
     begin_bodies();
@@ -200,6 +158,21 @@ void IntervalJoin<S>::take_self_leaves(std::size_t end, LeavesOf leaves) {
   take_leaves(end, leaves);
   keep_self_columns(neighbours_, leaves, leaf_join_.throughout, old_throughout);
   keep_self_columns(neighbours_, leaves, leaf_join_.partly, old_partly);
+}
+
+/// Pairs of a leaf with itself come last: the order then does not depend on how many pairs of leaves are
+/// taken at a time.
+template <class S>
+void IntervalJoin<S>::take_own_leaves() {
+  const std::size_t room = leaf_pairs_.size() / 2;
+  for (std::size_t begin = 0; begin < own_leaves_.size(); begin += room) {
+    const std::size_t count = std::min(room, own_leaves_.size() - begin);
+    for (std::size_t i = 0; i < count; ++i)
+      leaf_pairs_[2 * i] = leaf_pairs_[2 * i + 1] = own_leaves_[begin + i];
+    leaf_join_.next = 0;
+    take_self_leaves(count, LeavesOf::one);
+  }
+  own_leaves_.clear();
 }
 
 template <class S>
@@ -314,6 +287,8 @@ std::size_t IntervalJoin<S>::bytes() const {
          masks_.capacity() * sizeof(std::uint32_t) + found_throughout_.bytes() + found_partly_.bytes() +
          sorted_.capacity() * sizeof(JoinedPair) + alive_.capacity() * sizeof(PrimitivePair) +
          bodies_.capacity() * sizeof(BodyPair) + found_.capacity() * sizeof(Found) +
+         own_leaves_.capacity() * sizeof(LeafSlot) + shared_.bytes() +
+         (bucket_places_.capacity() + added_.capacity()) * sizeof(std::uint32_t) +
          (bodies_of_.capacity() + waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() +
           place_.capacity()) *
              sizeof(std::uint32_t);

@@ -7,6 +7,7 @@
 
 #include "core/families/linear/linear_segment.hpp"
 #include "core/families/linear/pair_marks.hpp"
+#include "core/families/linear/shared_join.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/scene/self_pairs.hpp"
 
@@ -40,6 +41,9 @@ class IntervalJoin {
     start(segment, scene, bodies, leaf_pairs_at_once);
     step(std::numeric_limits<std::uint64_t>::max());
   }
+  /// Joins anew on several threads: the same pairs in the same order.
+  void join(const LinearSegment<S>& segment, const SceneView<S>& scene, std::span<const BodyPair> bodies,
+            Workers& workers);
   /// Starts the same join in parts: `step` works until it has made the given number of box tests, or slightly
   /// more, and returns whether the join is complete. The segment's boxes and positions must stay valid until
   /// then. Pairs of leaves are processed in groups of `leaf_pairs`.
@@ -101,24 +105,15 @@ class IntervalJoin {
 
  private:
   static constexpr std::uint32_t none = ~std::uint32_t(0);
-  /// The pairs found by a join, in columns; the columns have spare space.
-  struct Columns {
-    std::vector<std::uint32_t> primitive_a, primitive_b;
-    std::vector<float> begin, end;
-
-    JoinColumns view(std::size_t found, bool timed);
-    std::size_t bytes() const;
-  };
-  /// The number of pairs found up to and including one pair of bodies.
-  struct Found {
-    std::size_t throughout, partly;
-  };
+  using Found = typename SharedJoin<S>::Ends;
   void begin_bodies();
   void end_bodies();
   void take_leaves(std::size_t end, LeavesOf leaves);
   std::size_t filter_leaves(std::size_t count);
   void take_self_leaves(std::size_t end, LeavesOf leaves);
+  void take_own_leaves();
   void sort_by_begin();
+  void sort_by_begin(Workers& workers);
   void start_reading();
   void begin_pair(std::uint32_t index);
   void end_pair(std::uint32_t index);
@@ -126,7 +121,7 @@ class IntervalJoin {
   const LinearSegment<S>* segment_ = nullptr;
   std::optional<SceneView<S>> scene_;
   std::vector<BodyPair> bodies_;  ///< the joined bodies
-  std::vector<Found> found_;      ///< [pair of bodies], completed ones
+  std::vector<Found> found_;      ///< [pair of bodies]: pairs up to and including it; completed ones
   std::size_t leaf_pairs_room_ = 0;
   std::uint64_t node_tests_ = 0;  ///< of completed pairs of bodies
   std::uint32_t padded_ = 4;      ///< lanes of a leaf
@@ -142,7 +137,8 @@ class IntervalJoin {
   const Primitives* neighbours_ = nullptr;
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
-  Columns found_throughout_, found_partly_;
+  std::vector<LeafSlot> own_leaves_;  ///< found with themselves, and not taken yet
+  JoinedColumns found_throughout_, found_partly_;
   std::vector<JoinedPair> sorted_;          ///< may be longer than the number of pairs
   std::vector<std::uint32_t> bodies_of_;    ///< [sorted_] index into bodies_, if there are several
   std::size_t throughout_ = 0, count_ = 0;  ///< counts in sorted_: from start to end, and all
@@ -159,6 +155,10 @@ class IntervalJoin {
   std::uint32_t ending_[FractionBuckets::count] = {}, present_ = 0;
   std::vector<std::uint32_t> next_ending_;
   FollowingMarks following_;
+  /// Only with several threads: the join; [part of the pairs][bucket] the place of the next pair; the pairs
+  /// of bodies that were joined.
+  SharedJoin<S> shared_;
+  std::vector<std::uint32_t> bucket_places_, added_;
 };
 
 extern template class IntervalJoin<float>;

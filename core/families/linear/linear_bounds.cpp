@@ -144,9 +144,16 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
 template <class S>
 void LinearBounds<S>::step_refit(std::uint32_t body, Refit& refit, std::uint64_t nodes) {
   if (refit.left == 0) return;
+  const WideHierarchy<S>& hierarchy = bodies_[body].hierarchy;
   const std::uint32_t begin = refit.left - std::uint32_t(std::min<std::uint64_t>(refit.left, nodes));
-  bodies_[body].hierarchy.refit_into(refit.child_bounds, refit.node_bounds, refit.positions, begin,
-                                     refit.left);
+  Workers& workers = motion_.workers();
+  if (workers.several() && begin == 0 && refit.left == hierarchy.node_count()) {
+    shared_refit_.start();
+    shared_refit_.add(hierarchy, refit.positions, refit.child_bounds, refit.node_bounds);
+    shared_refit_.run(workers);
+  } else {
+    hierarchy.refit_into(refit.child_bounds, refit.node_bounds, refit.positions, begin, refit.left);
+  }
   counts_[body].refitted += refit.left - begin;
   refit.left = begin;
   if (begin == 0 && refit.remembered != nullptr) refit.remembered->complete = true;
@@ -475,7 +482,7 @@ AuditView LinearBounds<S>::audit_view(std::uint32_t body, double t) const {
 
 template <class S>
 std::size_t LinearBounds<S>::bytes() const {
-  std::size_t total = memory_.bytes() + near_bodies_.bytes() +
+  std::size_t total = memory_.bytes() + near_bodies_.bytes() + shared_refit_.bytes() +
                       (middle_lanes_.size() + middle_own_.size() + middle_room_.capacity()) * sizeof(S);
   for (const LinearBody<S>& body : bodies_) total += body.bytes();
   for (const Segment& segment : segments_)

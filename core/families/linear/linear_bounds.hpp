@@ -9,6 +9,7 @@
 #include "core/families/linear/linear_segment.hpp"
 #include "core/families/linear/linear_settings.hpp"
 #include "core/families/wide/near_bodies.hpp"
+#include "core/families/wide/shared_refit.hpp"
 
 namespace kbvh {
 
@@ -144,6 +145,7 @@ class LinearBounds {
   AlignedArray<S> middle_lanes_,
       middle_own_;  ///< tight boxes in the middle of a piece, if looseness is measured
   std::vector<S> middle_room_;
+  SharedRefit<S> shared_refit_;
   std::vector<Counts> counts_, ahead_counts_;  ///< by body
   std::vector<std::uint8_t> near_;             ///< by body: whether it is near another one during the segment
 };

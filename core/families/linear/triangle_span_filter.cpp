@@ -7,6 +7,12 @@ namespace kbvh {
 namespace {
 /// An upper bound of all rounding of fractions in float.
 constexpr float fraction_slack = 0x1p-21F;
+/// The pairs that one thread attempts at once.
+constexpr std::size_t attempts_at_once = 1024;
+
+bool differ(const BodyPair& a, const BodyPair& b) {
+  return a.first != b.first || a.second != b.second;
+}
 }  // namespace
 
 /// Enters all pairs into the lists by their start; pairs that overlap at the start are attempted ahead, if
@@ -115,38 +121,33 @@ void TriangleSpanFilter<S>::collect_due(const IntervalJoin<S>& join, float fract
   open_.resize(kept);
 }
 
+/// Finds the verdicts on the pairs [begin, end) of those that are due.
 template <class S>
-void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>& scene,
-                                    const IntervalJoin<S>& join, float fraction, float share) {
-  if (due_.empty()) return;
-  BodyPair bodies = join.bodies_of(due_[0]);
+void TriangleSpanFilter<S>::decide(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                   const IntervalJoin<S>& join, float fraction, float share, S margin,
+                                   std::size_t begin, std::size_t end) {
+  BodyPair bodies = join.bodies_of(due_[begin]);
   const BodySegmentBounds<S>*a = nullptr, *b = nullptr;
   const std::uint32_t *corners_a = nullptr, *corners_b = nullptr;
-  S margin = 0;  // the largest margin: a larger one leaves more pairs open, but makes no wrong verdict
   const auto take_bodies = [&](const BodyPair& next) {
     bodies = next;
     a = &segment.sides[bodies.first];
     b = &segment.sides[bodies.second];
     corners_a = scene.primitives(bodies.first).vertices.data();
     corners_b = scene.primitives(bodies.second).vertices.data();
-    margin = std::max(margin, a->margin + b->margin);
   };
   take_bodies(bodies);
   const auto pairs = join.pairs();
-  tries_.resize(due_.size());
-  verdicts_.resize(due_.size());
-  for (std::size_t k = 0; k < due_.size(); ++k) {
+  for (std::size_t k = begin; k < end; ++k) {
     const JoinedPair pair = pairs[due_[k]];
-    if (const BodyPair joined = join.bodies_of(due_[k]);
-        joined.first != bodies.first || joined.second != bodies.second)
-      take_bodies(joined);
+    if (const BodyPair joined = join.bodies_of(due_[k]); differ(joined, bodies)) take_bodies(joined);
     SpanPair<S>& span = tries_[k];
     for (std::size_t c = 0; c < 3; ++c) {
       const std::size_t va = std::size_t(3) * corners_a[std::size_t(3) * pair.primitive_a + c];
       const std::size_t vb = std::size_t(3) * corners_b[std::size_t(3) * pair.primitive_b + c];
-      for (int end = 0; end < 2; ++end) {
-        span.corner[end][c] = a->at[end].positions + va;
-        span.corner[end][c + 3] = b->at[end].positions + vb;
+      for (int at = 0; at < 2; ++at) {
+        span.corner[at][c] = a->at[at].positions + va;
+        span.corner[at][c + 3] = b->at[at].positions + vb;
       }
     }
     // Lines extend beyond the span; a slightly longer span contains the frame's time, which the fraction
@@ -158,8 +159,36 @@ void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const Scene
   // ulp each, and so do the ends read here. Interpolation in S adds two and a half ulps at each of two
   // corners, their difference another one, products some more.
   span_test_kernels<S>(a->hierarchy().kernels())
-      .decide(tries_.data(), tries_.size(), {.gap = 2 * margin, .component = margin}, verdicts_.data());
+      .decide(tries_.data() + begin, end - begin, {.gap = 2 * margin, .component = margin},
+              verdicts_.data() + begin);
+}
+
+template <class S>
+void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>& scene,
+                                    const IntervalJoin<S>& join, float fraction, float share) {
+  if (due_.empty()) return;
+  // The largest margin: a larger one leaves more pairs open, but makes no wrong verdict.
+  S margin = 0;
+  BodyPair last = join.bodies_of(due_[0]);
+  const auto take_margin = [&](const BodyPair& bodies) {
+    margin = std::max(margin, segment.sides[bodies.first].margin + segment.sides[bodies.second].margin);
+  };
+  take_margin(last);
+  for (const std::uint32_t pair : due_)
+    if (const BodyPair bodies = join.bodies_of(pair); differ(bodies, last)) take_margin(last = bodies);
+  tries_.resize(due_.size());
+  verdicts_.resize(due_.size());
+  const auto attempt_part = [&](std::size_t begin, std::size_t end) {
+    decide(segment, scene, join, fraction, share, margin, begin, end);
+  };
+  const Parts cut{due_.size(), attempts_at_once};
+  if (workers_ != nullptr && workers_->several())
+    workers_->for_each(
+        cut.parts(), [&](std::size_t part, std::uint32_t) { attempt_part(cut.begin(part), cut.end(part)); });
+  else
+    attempt_part(0, due_.size());
   attempts_ += tries_.size();
+  const auto pairs = join.pairs();
   std::size_t left = 0;
   for (std::size_t k = 0; k < due_.size(); ++k) {
     const std::uint32_t pair = due_[k];

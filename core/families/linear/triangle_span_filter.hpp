@@ -46,6 +46,9 @@ class TriangleSpanFilter {
   /// Touches these marks whenever the state of a pair changes, until the next start.
   void follow(const FollowingMarks& marks) { following_ = marks; }
 
+  /// Decides pairs on these threads from now on, with the same verdicts.
+  void use(Workers& workers) { workers_ = &workers; }
+
   /// Return the attempts to decide a pair for a span, and the pairs that frames reported as decided, since
   /// these counts were cleared.
   std::uint64_t attempts() const { return attempts_; }
@@ -80,9 +83,12 @@ class TriangleSpanFilter {
   void begin(const IntervalJoin<S>& join, When when);
   void attempt(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                float fraction, float share);
+  void decide(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
+              float fraction, float share, S margin, std::size_t begin, std::size_t end);
   void attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                    float fraction);
 
+  Workers* workers_ = nullptr;
   std::size_t asked_ = 0;                            ///< pairs attempted ahead of time
   std::vector<std::uint32_t> intersecting_, place_;  ///< pairs by index in the join, and the inverse map
   std::vector<Item> open_;

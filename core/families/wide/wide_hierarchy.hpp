@@ -89,6 +89,8 @@ class WideHierarchy : public WideTree<S> {
     std::uint32_t begin, end;
   };
   const std::vector<Subtree>& subtrees() const { return subtrees_; }
+  /// Returns whether there are ranges, and no edit has changed the order of the nodes.
+  bool can_be_shared() const { return !subtrees_.empty() && !edited_; }
   const std::vector<std::uint32_t>& above_subtrees() const { return above_subtrees_; }
 
   static constexpr std::uint32_t no_node = ~std::uint32_t(0);

@@ -32,6 +32,7 @@ QueryStatus WideQuery<S>::run(const Side& a, const Side& b, PairBuffer& out, std
     take_leaves(a, b, state, out, tests);
     grow(state);
   }
+  take_own_leaves(a, b, out, tests);
   tests += state.tests;
   return {state.depth};
 }
@@ -47,6 +48,7 @@ void WideQuery<S>::run_leaves(const Side& a, const Side& b, std::span<const Leaf
     take_leaves(a, b, state, out, tests);
     pairs = pairs.subspan(some.size());
   }
+  take_own_leaves(a, b, out, tests);
 }
 
 template <class S>
@@ -109,6 +111,7 @@ typename WideQuery<S>::Wanted WideQuery<S>::step(const Side& a, const Side& b, P
   }
   // Processes the pairs found just before a pause, if no other work followed.
   if (lazy_.found != 0) take_leaves(a, b, lazy_, out, tests);
+  take_own_leaves(a, b, out, tests);
   tests += lazy_.tests;
   return {};
 }
@@ -139,15 +142,30 @@ void WideQuery<S>::take_leaves(const Side& a, const Side& b, WideTraversal& stat
   fetch_leaves(a, 0, count);
   fetch_leaves(b, 1, count);
   if (a.body != b.body) return append_pairs(a, b, 0, count, out, tests);
+  const std::size_t different = take_out_own_leaves(leaf_pairs_.data(), count, own_leaves_);
+  append_self_pairs(a, b, LeavesOf::two, different, out, tests);
+}
+
+/// Pairs of a leaf with itself come last: the order of the answer then does not depend on how many pairs of
+/// leaves are taken at a time.
+template <class S>
+void WideQuery<S>::take_own_leaves(const Side& a, const Side& b, PairBuffer& out, std::uint64_t& tests) {
+  for (std::size_t begin = 0; begin < own_leaves_.size(); begin += leaf_pair_room) {
+    const std::size_t count = std::min(leaf_pair_room, own_leaves_.size() - begin);
+    for (std::size_t i = 0; i < count; ++i)
+      leaf_pairs_[2 * i] = leaf_pairs_[2 * i + 1] = own_leaves_[begin + i];
+    append_self_pairs(a, b, LeavesOf::one, count, out, tests);
+  }
+  own_leaves_.clear();
+}
+
+template <class S>
+void WideQuery<S>::append_self_pairs(const Side& a, const Side& b, LeavesOf leaves, std::size_t count,
+                                     PairBuffer& out, std::uint64_t& tests) {
   const Primitives* neighbours = a.positions == nullptr && scene_ ? &scene_->primitives(a.body) : nullptr;
-  const std::size_t different = different_leaves_first(leaf_pairs_.data(), count);
-  const auto append = [&](LeavesOf leaves, std::size_t begin, std::size_t end) {
-    const std::size_t before = out.size();
-    append_pairs(a, b, begin, end, out, tests);
-    out.resize(before + keep_self_pairs(neighbours, leaves, out.data() + before, out.size() - before));
-  };
-  append(LeavesOf::two, 0, different);
-  append(LeavesOf::one, different, count);
+  const std::size_t before = out.size();
+  append_pairs(a, b, 0, count, out, tests);
+  out.resize(before + keep_self_pairs(neighbours, leaves, out.data() + before, out.size() - before));
 }
 
 template <class S>

@@ -9,6 +9,7 @@
 #include "core/families/wide/wide_tree.hpp"
 #include "core/scene/motion_view.hpp"
 #include "core/scene/pairs.hpp"
+#include "core/scene/self_pairs.hpp"
 #include "core/topology/traversal.hpp"
 
 namespace kbvh {
@@ -72,7 +73,8 @@ class WideQuery {
 
   /// Returns the memory of the buffers in bytes.
   std::size_t bytes() const {
-    return stack_.capacity() * sizeof(WidePair) + leaf_pairs_.capacity() * sizeof(LeafSlot) +
+    return stack_.capacity() * sizeof(WidePair) +
+           (leaf_pairs_.capacity() + own_leaves_.capacity()) * sizeof(LeafSlot) +
            chunk_.capacity() * sizeof(FoundPair) + to_fetch_.capacity() * sizeof(std::uint32_t);
   }
 
@@ -84,6 +86,9 @@ class WideQuery {
   void traverse(const Side& a, const Side& b, WideTraversal& state) const;
   /// Turns the found pairs of leaves into pairs of primitives.
   void take_leaves(const Side& a, const Side& b, WideTraversal& state, PairBuffer& out, std::uint64_t& tests);
+  void take_own_leaves(const Side& a, const Side& b, PairBuffer& out, std::uint64_t& tests);
+  void append_self_pairs(const Side& a, const Side& b, LeavesOf leaves, std::size_t count, PairBuffer& out,
+                         std::uint64_t& tests);
   void fetch_leaves(const Side& side, std::size_t which, std::size_t count);
   const S* positions(const Side& side) const {
     return side.positions != nullptr || !motion_ ? side.positions : motion_->positions(side.body);
@@ -95,6 +100,7 @@ class WideQuery {
   std::optional<SampledMotion<S>> motion_;
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
+  std::vector<LeafSlot> own_leaves_;  ///< found with themselves, and not taken yet
   std::vector<FoundPair> chunk_;
   std::vector<std::uint32_t> to_fetch_;
   WideTraversal lazy_{};

@@ -1,0 +1,175 @@
+#include "core/parallel/workers.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "core/parallel/library_threads.hpp"
+#include "core/parallel/pool.hpp"
+
+namespace kbvh {
+
+namespace {
+std::uint32_t checked(std::uint32_t threads) {
+  if (threads == 0 || threads > most_threads())
+    throw std::invalid_argument(std::to_string(threads) + " threads were asked for; there are 1 to " +
+                                std::to_string(most_threads()));
+  return threads;
+}
+}  // namespace
+
+/// The jobs of one Workers object, one at a time, and the helpers: tasks of the pool that wait for jobs for a
+/// short while. Waking a sleeping thread takes as long as a whole phase of a small scene, so helpers stay
+/// awake from one phase of a frame to the next. A job never waits for a helper that has not come: the caller
+/// works as well, and leaves only when all items are done.
+class Workers::Jobs {
+ public:
+  explicit Jobs(std::uint32_t threads)
+      : pool_(threads), helpers_(threads - 1), taken_(std::make_unique<Slot[]>(threads - 1)) {}
+
+  void run(std::size_t count, Call call, const void* context) {
+    count_ = count;
+    call_ = call;
+    context_ = context;
+    failure_ = nullptr;
+    failed_.store(false, std::memory_order_relaxed);
+    next_.store(0, std::memory_order_relaxed);
+    job_.fetch_add(1);  // open: odd
+    wake_helpers(count);
+    work(0);
+    job_.fetch_add(1);  // closed: even
+    while (inside_.load() != 0) pause();
+    if (failure_) std::rethrow_exception(failure_);
+  }
+  /// Ends the helpers; the last of them frees the memory.
+  void leave() {
+    ended_.store(true);
+    release();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::microseconds patience{200};
+  struct alignas(cache_line) Slot {
+    std::atomic<bool> taken{false};
+  };
+
+  void wake_helpers(std::size_t count) {
+    const auto wanted = std::uint32_t(std::min<std::size_t>(helpers_, count - 1));
+    for (std::uint32_t awake = awake_.load(); awake < wanted; ++awake) {
+      awake_.fetch_add(1);
+      users_.fetch_add(1);
+      pool_.start([](void* jobs) { static_cast<Jobs*>(jobs)->help(); }, this);
+    }
+  }
+  void help() {
+    std::uint32_t slot = 0;
+    while (awake_.load() == 0 || taken_[slot].taken.exchange(true)) slot = (slot + 1) % helpers_;
+    auto idle_since = Clock::now();
+    for (std::uint64_t last = 0; !ended_.load();) {
+      const std::uint64_t job = job_.load();
+      if (job % 2 == 1 && job != last) {
+        inside_.fetch_add(1);
+        if (job_.load() == job) work(slot + 1);  // else it closed meanwhile
+        inside_.fetch_sub(1);
+        last = job;
+        idle_since = Clock::now();
+      } else if (Clock::now() - idle_since > patience) {
+        break;
+      } else {
+        pause();
+      }
+    }
+    taken_[slot].taken.store(false);
+    awake_.fetch_sub(1);
+    release();
+  }
+  void work(std::uint32_t runner) {
+    try {
+      for (std::size_t item; (item = next_.fetch_add(1, std::memory_order_relaxed)) < count_;)
+        call_(context_, item, runner);
+    } catch (...) {
+      if (!failed_.exchange(true)) failure_ = std::current_exception();
+      next_.store(count_);  // the others stop, too
+    }
+  }
+  void release() {
+    if (users_.fetch_sub(1) == 1) delete this;
+  }
+  /// Lets other programs have the core, if it is wanted.
+  static void pause() {
+    for (int i = 0; i < 16; ++i) relax();
+    std::this_thread::yield();
+  }
+  static void relax() {
+#if defined(__x86_64__) || defined(__i386__)
+    __builtin_ia32_pause();
+#endif
+  }
+
+  Pool pool_;
+  std::uint32_t helpers_;
+  std::unique_ptr<Slot[]> taken_;  ///< [helper]: the number of its runner, less 1
+  std::size_t count_ = 0;
+  Call call_ = nullptr;
+  const void* context_ = nullptr;
+  std::exception_ptr failure_;
+  alignas(cache_line) std::atomic<std::size_t> next_{0};
+  alignas(cache_line) std::atomic<std::uint64_t> job_{0};
+  alignas(cache_line) std::atomic<std::uint32_t> inside_{0};  ///< helpers at work
+  std::atomic<std::uint32_t> awake_{0}, users_{1};
+  std::atomic<bool> failed_{false}, ended_{false};
+};
+
+void Workers::LeaveJobs::operator()(Jobs* jobs) const {
+  jobs->leave();
+}
+
+void Workers::run(std::size_t count, Call call, const void* context) {
+  jobs_->run(count, call, context);
+}
+
+Workers::Workers(std::uint32_t threads) : threads_(checked(threads)) {
+  if (several()) jobs_.reset(new Jobs(threads));
+}
+
+Workers::Workers(Workers&&) noexcept = default;
+Workers& Workers::operator=(Workers&&) noexcept = default;
+Workers::~Workers() = default;
+
+LibraryThreads::LibraryThreads(std::uint32_t threads) : pool_(std::make_unique<Pool>(checked(threads))) {}
+LibraryThreads::~LibraryThreads() = default;
+
+bool LibraryThreads::are_limited() {
+  return Pool::exists();
+}
+
+void LibraryThreads::within(void (*work)(void* context), void* context) {
+  pool_->within(work, context);
+}
+
+std::uint32_t most_threads() {
+  return Pool::most_threads();
+}
+
+Parameter threads_parameter(const std::string& what) {
+  return {"threads",
+          "1",
+          {},
+          "threads that share " + what +
+              ", at most those of this machine; times with more than one thread are reported separately",
+          1,
+          double(most_threads()),
+          Numbers::whole};
+}
+
+std::uint32_t threads_of(const Params& params) {
+  const auto given = params.values().find("threads");
+  return given == params.values().end() ? 1 : std::uint32_t(params.number("threads"));
+}
+
+}  // namespace kbvh

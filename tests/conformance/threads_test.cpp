@@ -1,0 +1,218 @@
+// Strategies with a parameter `threads` answer the same on every number of threads: the same pairs in the
+// same order, the same positions, boxes and counters. Built with ThreadSanitizer, this program also looks for
+// unordered accesses (CONTRIBUTING.md).
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <set>
+
+#include "core/base/hasher.hpp"
+#include "core/families/wide/shared_front.hpp"
+#include "core/judge/session.hpp"
+#include "core/parallel/workers.hpp"
+#include "tests/conformance/check.hpp"
+
+#if defined(KBVH_TEST_HAS_TBB)
+#include <tbb/global_control.h>
+#endif
+
+namespace kbvh::test {
+namespace {
+
+#if defined(KBVH_TEST_HAS_TBB)
+// Four threads on machines with fewer cores, too; before the registry states its parameters.
+const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
+#endif
+
+/// A sheet of 2 side^2 triangles that waves over one keyframe after another.
+template <class S>
+Body<S> sheet(std::uint32_t side, std::uint32_t keyframes, double tilt) {
+  Body<S> body;
+  std::vector<double> times;
+  std::vector<S> positions;
+  for (std::uint32_t k = 0; k < keyframes; ++k) {
+    times.push_back(k);
+    for (std::uint32_t j = 0; j <= side; ++j)
+      for (std::uint32_t i = 0; i <= side; ++i) {
+        const double x = i / double(side), y = j / double(side), phase = 9 * x + 7 * y + 0.4 * k;
+        const double bend = phase - 4 * double(int(phase / 4)) - 2;
+        positions.push_back(S(x));
+        positions.push_back(S(y + 0.02 * k * x));
+        positions.push_back(S(tilt * (x - 0.5) + 0.05 * bend * bend));
+      }
+  }
+  for (std::uint32_t j = 0; j < side; ++j)
+    for (std::uint32_t i = 0; i < side; ++i) {
+      const std::uint32_t a = j * (side + 1) + i, b = a + side + 1;
+      body.primitives.add(std::vector<std::uint32_t>{a, a + 1, b});
+      body.primitives.add(std::vector<std::uint32_t>{b, a + 1, b + 1});
+    }
+  body.plans = FlightPlans<S>((side + 1) * (side + 1), std::move(times), std::move(positions));
+  return body;
+}
+
+enum class Self : std::uint8_t { without, with };
+
+/// Two large sheets that cut each other, and a small one.
+template <class S>
+Scene<S> sheets(std::uint32_t side, Self self) {
+  Scene<S> scene;
+  scene.name = "sheets";
+  scene.bodies = {sheet<S>(side, 3, 0.3), sheet<S>(side, 3, -0.3), sheet<S>(6, 3, 0.1)};
+  scene.pairs = all_pairs(scene.bodies);
+  if (self == Self::with) scene.pairs.insert(scene.pairs.begin(), {0, 0});
+  std::sort(scene.pairs.begin(), scene.pairs.end(), [](const BodyPair& a, const BodyPair& b) {
+    return a.first != b.first ? a.first < b.first : a.second < b.second;
+  });
+  return scene;
+}
+
+/// What a strategy answers, frame by frame, in the order in which it answers.
+template <class S>
+std::vector<std::uint64_t> answers(const StrategyEntry& entry, const Scene<S>& scene,
+                                   std::map<std::string, std::string> params, std::uint32_t threads,
+                                   const BuilderConfig& builder) {
+  params["threads"] = std::to_string(threads);
+  Session<S> session(scene, {&entry, params, builder}, CountingPolicy::counting);
+  EXPECT_EQ(session.playback().workers().threads(), threads);
+  std::vector<std::uint64_t> hashes;
+  PairBuffer pairs, begun, ended;
+  PhaseTimes times;
+  std::size_t frame = 0;
+  for (const double t : frame_times(scene, 5)) {
+    if (frame++ == 0)
+      session.reset(t);
+    else
+      session.advance(t, times);
+    Hasher hasher;
+    pairs.clear();
+    session.strategy().candidates_at(t, pairs, {});
+    const auto add = [&hasher](const PairBuffer& list) {
+      hasher.mix(list.size());
+      hasher.bytes(list.data(), list.size() * sizeof(PrimitivePair));
+    };
+    add(pairs);
+    session.strategy().confirm(t, pairs);
+    add(pairs);
+    session.changes(Answer::pairs, begun, ended, times);
+    add(begun);
+    add(ended);
+    session.playback().evaluate_all();
+    for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+      hasher.bytes(session.playback().positions(body),
+                   std::size_t(3) * scene.bodies[body].plans.vertex_count() * sizeof(S));
+      if (const auto view = session.strategy().audit_view(body))
+        for (const Box<double>& box : view->boxes)
+          for (int axis = 0; axis < 3; ++axis)
+            for (const double bound : {box.lower[axis] + 0.0, box.upper[axis] + 0.0})
+              hasher.bytes(&bound, sizeof bound);
+    }
+    const Counters counters = session.strategy().counters();
+    for (const Counter counter :
+         {Counter::box_tests, Counter::nodes_visited, Counter::vertex_reads, Counter::triangle_tests,
+          Counter::triangle_tests_exact, Counter::span_tests, Counter::span_verdicts})
+      hasher.mix(counters[counter]);
+    hashes.push_back(hasher.value());
+  }
+  return hashes;
+}
+
+bool takes_threads(const StrategyEntry& entry) {
+  const auto& list = entry.info.parameters;
+  return std::any_of(list.begin(), list.end(), [](const Parameter& one) { return one.name == "threads"; });
+}
+
+template <class S>
+void expect_same_answers(const StrategyEntry& entry, std::uint32_t side, Self self) {
+  const Scene<S> scene = sheets<S>(side, self);
+  for (const std::uint32_t leaf : {1u, 16u}) {
+    if (leaf < entry.info.topology.min_leaf_size) continue;
+    BuilderConfig builder = entry.info.topology.preferred;
+    builder.leaf_size = leaf;
+    const auto expected = answers<S>(entry, scene, {}, 1, builder);
+    for (const std::uint32_t threads : {2u, 4u})
+      EXPECT_EQ(answers<S>(entry, scene, {}, threads, builder), expected)
+          << entry.info.id << ", " << threads << " threads, leaves of " << leaf
+          << (self == Self::with ? ", self" : "");
+  }
+}
+
+TEST(Threads, AnswerTheSameInTheSameOrder) {
+  if (most_threads() < 4) GTEST_SKIP() << "built without TBB";
+  std::size_t tried = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (!takes_threads(entry) || entry.info.guarantee == Guarantee::approximate || entry.info.topology.own)
+      continue;
+    ++tried;
+    expect_same_answers<float>(entry, 96, Self::without);
+    if (entry.info.can.self_pairs) expect_same_answers<double>(entry, 64, Self::with);
+  }
+  EXPECT_GE(tried, 1u);
+}
+
+TEST(Threads, AreCorrectOnChangingPlansAndManyBodies) {
+  if (most_threads() < 4) GTEST_SKIP() << "built without TBB";
+  for (const StrategyEntry& entry : registry()) {
+    if (!takes_threads(entry) || entry.info.guarantee == Guarantee::approximate || entry.info.topology.own)
+      continue;
+    for (const char* name : {"plan_changes", "four_bodies_own_keyframes"}) {
+      const std::string violation =
+          check(entry, synthetic_scene<float>(name, 7), 7, {{"threads", "4"}}, entry.info.topology.preferred);
+      EXPECT_TRUE(violation.empty() || violation.rfind("skipped", 0) == 0)
+          << entry.info.id << " on " << name << ": " << violation;
+    }
+  }
+}
+
+TEST(Workers, CallEachItemOnceWithARunnerOfItsOwn) {
+  if (most_threads() < 4) GTEST_SKIP() << "built without TBB";
+  Workers workers(4);
+  std::vector<std::uint32_t> calls(10000, 0);
+  std::atomic<std::uint32_t> busy[4] = {};
+  workers.for_each(calls.size(), [&](std::size_t item, std::uint32_t runner) {
+    EXPECT_EQ(busy[runner].fetch_add(1), 0u);
+    ++calls[item];
+    busy[runner].fetch_sub(1);
+  });
+  EXPECT_EQ(std::count(calls.begin(), calls.end(), 1u), 10000);
+}
+
+TEST(Workers, PassExceptionsOn) {
+  Workers workers(std::min(2u, most_threads()));
+  EXPECT_THROW(workers.for_each(100,
+                                [](std::size_t item, std::uint32_t) {
+                                  if (item == 50) throw std::runtime_error("item 50");
+                                }),
+               std::runtime_error);
+}
+
+TEST(Workers, RefuseMoreThreadsThanThereAre) {
+  EXPECT_THROW(Workers(0), std::invalid_argument);
+  EXPECT_THROW(Workers(most_threads() + 1), std::invalid_argument);
+}
+
+// The fault that a missing order of items would be: items in the order in which threads finish them.
+TEST(Faults, AnOrderOfCompletionIsNotTheOrderOfItems) {
+  if (most_threads() < 4) GTEST_SKIP() << "built without TBB";
+  Workers workers(4);
+  std::vector<std::size_t> finished(4000), expected(4000);
+  std::atomic<std::size_t> next{0};
+  bool differs = false;
+  for (int tries = 0; tries < 200 && !differs; ++tries) {
+    next = 0;
+    workers.for_each(finished.size(), [&](std::size_t item, std::uint32_t) {
+      std::atomic<int> work{0};
+      while (work.fetch_add(1) < 100) {
+      }
+      finished[next.fetch_add(1)] = item;
+    });
+    differs = !std::is_sorted(finished.begin(), finished.end());
+  }
+  EXPECT_TRUE(differs)
+      << "four threads never overtook each other: the comparison of orders above shows nothing";
+}
+
+}  // namespace
+}  // namespace kbvh::test
