@@ -5,8 +5,8 @@
 // that depends on the number of modes only: no vertex is read, and no parent needs its children. What the
 // modes leave of the motion is bounded per node, too, so that boxes are valid for any motion.
 //
-// Memory does not grow with the number of keyframes. Wins where few nodes are visited: bodies that hardly meet
-// cost a microsecond per frame. Where bodies cut each other the query dominates, and bounds of large
+// Memory does not grow with the number of keyframes. Wins where few nodes are visited: bodies that hardly
+// meet cost a microsecond per frame. Where bodies cut each other the query dominates, and bounds of large
 // deformations, such as of walking figures, are loose: there a refit is faster.
 #include "core/contract/registry.hpp"
 #include "core/families/blend/blended_strategy.hpp"
