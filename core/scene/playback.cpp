@@ -132,19 +132,19 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
     fetch_all(state);
     return;
   }
+  // A long list may exceed the limit at once: evaluated singly, a vertex costs 10 to 40 times as much.
+  const std::size_t most = std::max(64U, state.plans.vertex_count() / 16 - state.fetched);
   stale_.clear();
   for (std::uint32_t v : vertices)
     if (state.stamp[v] != epoch_) {
       state.stamp[v] = epoch_;
       stale_.push_back(v);
+      if (stale_.size() > most) {
+        fetch_all(state);
+        return;
+      }
     }
   if (stale_.empty()) return;
-  // A long list may exceed the limit at once: evaluated singly, a vertex costs 10 to 40 times as much.
-  if (stale_.size() > 64 &&
-      std::uint64_t(16) * (state.fetched + stale_.size()) > state.plans.vertex_count()) {
-    fetch_all(state);
-    return;
-  }
   fetched_ += stale_.size();
   state.fetched += std::uint32_t(stale_.size());
   if (!workers_.several() || stale_.size() < 2 * vertices_at_once)

@@ -9,6 +9,7 @@
 #include "experiments/io/animated_mesh_cache.hpp"
 #include "experiments/scenes/ageing.hpp"
 #include "experiments/scenes/garment.hpp"
+#include "experiments/scenes/modal.hpp"
 #include "experiments/scenes/shapes.hpp"
 #include "experiments/scenes/tablecloth.hpp"
 
@@ -160,6 +161,25 @@ Meshes flowing_soup(const BuiltinOptions& options, const MakeProgress&) {
           scenes::icosphere(obstacle_triangles(options), {0.46, 0.53, 0.51}, 0.2)};
 }
 
+scenes::ModalConfig modal(const BuiltinOptions& options) {
+  return {.triangles = options.triangles, .seed = options.seed, .keyframes = options.keyframes};
+}
+
+Meshes morphing_ball(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::morphing_ball(modal(options)),
+          scenes::icosphere(obstacle_triangles(options), {0.6, 0.25, 0.1}, 0.4)};
+}
+
+Meshes vibrating_plate(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::vibrating_plate(modal(options)),
+          scenes::icosphere(obstacle_triangles(options), {0.1, -0.05, 0.0}, 0.5)};
+}
+
+Meshes dented_sheet(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::dented_sheet(modal(options)),
+          scenes::icosphere(obstacle_triangles(options), {0.1, -0.05, -0.45}, 0.5)};
+}
+
 Meshes funnel_cloth(const BuiltinOptions& options, const MakeProgress&) {
   return {scenes::funnel_cloth(ageing(options)), scenes::funnel(obstacle_triangles(options))};
 }
@@ -197,6 +217,11 @@ const std::vector<BuiltinScene>& builtin_scenes() {
       {"funnel_cloth", "a cloth is pulled through a funnel and gathers into pleats", &funnel_cloth},
       {"running_figures", "two people run on the spot, 25 keyframes per second: steps as large as triangles",
        &two_alike<scenes::running_figures>},
+      {"morphing_ball", "a ball morphs between four shapes and cuts a sphere at rest: three modes",
+       &morphing_ball},
+      {"vibrating_plate", "a plate vibrates in eight modes and cuts a sphere at rest", &vibrating_plate},
+      {"dented_sheet", "a sheet gets dents one after the other and cuts a sphere at rest: few vertices move",
+       &dented_sheet},
   };
   return list;
 }

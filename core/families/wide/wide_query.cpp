@@ -123,6 +123,9 @@ void WideQuery<S>::fetch_leaves(const Side& side, std::size_t which, std::size_t
   // Fetches missing positions all at once: calls with a few vertices each cost more than the vertices.
   if (h.padded_leaf_size() == 1 || motion_->all_current(side.body)) return;
   to_fetch_.clear();
+  // Leaves that list so many corners need most positions: listing the others would cost more than evaluating
+  // all.
+  const std::size_t most = std::max<std::size_t>(256, scene_->vertex_count(side.body) / 4);
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t leaf = h.leaf_number(leaf_pairs_[2 * i + which]);
     if (!h.to_be_fetched(leaf)) continue;
@@ -130,6 +133,7 @@ void WideQuery<S>::fetch_leaves(const Side& side, std::size_t which, std::size_t
       const auto vertices = scene_->primitives(side.body)[primitive];
       to_fetch_.insert(to_fetch_.end(), vertices.begin(), vertices.end());
     }
+    if (to_fetch_.size() > most) return motion_->fetch_all(side.body);
   }
   motion_->fetch(side.body, to_fetch_);
 }

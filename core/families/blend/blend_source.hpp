@@ -1,0 +1,34 @@
+#pragma once
+#include <cstddef>
+#include <vector>
+
+#include "core/families/blend/kernels/blend_rows.hpp"
+
+namespace kbvh {
+
+/// The blend of one body at one time; keeps its memory from frame to frame.
+template <class S>
+struct BlendTerms {
+  std::vector<BlendTerm<S>> terms;
+  std::size_t stride = 0;
+  S offset[6] = {};
+
+  Blend<S> view() const {
+    Blend<S> blend{terms.data(), std::uint32_t(terms.size()), stride, {}};
+    for (std::size_t side = 0; side < 6; ++side) blend.offset[side] = offset[side];
+    return blend;
+  }
+};
+
+/// What is known of one body for the whole clip, from which its boxes at any time are blended.
+template <class S>
+class BlendSource {
+ public:
+  virtual ~BlendSource() = default;
+  /// Describes the blend at time t, such that every box contains the positions of its vertices, truth B. The
+  /// body moves as its keyframes say. Allocates only where `out` has less memory than at an earlier time.
+  virtual void blend_at(double t, BlendTerms<S>& out) const = 0;
+  virtual std::size_t bytes() const = 0;
+};
+
+}  // namespace kbvh

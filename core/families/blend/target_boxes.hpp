@@ -1,0 +1,64 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "core/families/blend/blend_source.hpp"
+#include "core/families/blend/field_rows.hpp"
+
+namespace kbvh {
+
+/// The boxes of one body at each of its keyframes, and their blend at any time (Larsson & Akenine-Möller
+/// 2003): a convex combination of boxes contains the same combination of points. Memory: 6 scalars for each
+/// node and keyframe. Build O(keyframes x (nodes + vertices of leaves)).
+template <class S>
+class TargetBoxes : public BlendSource<S> {
+ public:
+  TargetBoxes(const WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans)
+      : plans_(&plans), scalars_(lane_scalars(hierarchy.width())), targets_(plans.keyframe_count()) {
+    for (std::size_t k = 0; k < targets_.size(); ++k) {
+      Target& target = targets_[k];
+      target.rows.fit(hierarchy, plans.keyframe(k));
+      for (std::size_t i = 0; i < 8; ++i)
+        if (i % 4 != 3) target.largest = std::max(target.largest, std::abs(target.rows.node_bounds[i]));
+      target.rows.node_bounds = {};  // unions of blended children are smaller
+    }
+  }
+
+  void blend_at(double t, BlendTerms<S>& out) const override {
+    const auto times = plans_->keyframe_times();
+    const std::size_t k = plans_->segment_at(t);
+    const Target& first = targets_[k];
+    out.stride = scalars_;
+    out.terms.assign(1, {first.rows.child_bounds.data(), 1, 0});
+    std::fill_n(out.offset, 6, S(0));
+    if (k + 1 == times.size() || !(t > times[k])) return;
+    const Target& last = targets_[k + 1];
+    const double share = std::min((t - times[k]) / (times[k + 1] - times[k]), 1.0);
+    out.terms[0].weight = S(1 - share);
+    out.terms.push_back({last.rows.child_bounds.data(), S(share), 0});
+    // Roundings: half a unit each for weights, products, sums, the offset, and the frame's position; in all
+    // less than 4 units of the larger end.
+    const S margin = 8 * std::numeric_limits<S>::epsilon() * std::max(first.largest, last.largest) +
+                     8 * std::numeric_limits<S>::denorm_min();
+    std::fill_n(out.offset, 6, -margin);
+  }
+
+  std::size_t bytes() const override {
+    std::size_t total = targets_.capacity() * sizeof(Target);
+    for (const Target& target : targets_) total += target.rows.bytes();
+    return total;
+  }
+
+ private:
+  struct Target {
+    FieldRows<S> rows;
+    S largest = 0;  ///< coordinate
+  };
+  const FlightPlans<S>* plans_;
+  std::size_t scalars_;
+  std::vector<Target> targets_;  ///< [keyframe]
+};
+
+}  // namespace kbvh

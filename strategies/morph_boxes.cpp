@@ -1,0 +1,44 @@
+// Boxes of morph targets, blended by the weights of the targets (Larsson & Akenine-Moeller 2003). Targets are
+// the keyframes: the boxes of all keyframes are computed before the clip begins, and a frame blends the boxes
+// of two keyframes at the nodes that its query visits, top-down. Frames update nothing else. At keyframes the
+// boxes are tight.
+//
+// Between keyframes the boxes are those of `linear_bounds`, which makes the boxes of two keyframes when a
+// segment begins, for segments that all bodies share; here each body has segments of its own, and no frame
+// makes boxes from vertices, but the boxes of all keyframes take memory: about a third of that of the
+// keyframes' positions.
+#include "core/contract/registry.hpp"
+#include "core/families/blend/blended_strategy.hpp"
+#include "core/families/blend/target_boxes.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class Count>
+class MorphBoxes final : public BlendedStrategy<S, Count> {
+ public:
+  MorphBoxes(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+             const Params& /*params*/)
+      : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {
+    this->make_sources([](std::uint32_t, const WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans) {
+      return std::make_unique<TargetBoxes<S>>(hierarchy, plans);
+    });
+  }
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(morph_boxes) {
+  using namespace kbvh;
+  return {make_entry<MorphBoxes>({
+      .id = "morph_boxes",
+      .title = "blended boxes of keyframes",
+      .family = "linear",
+      .citation = "Larsson & Akenine-Möller 2003",
+      .tightness = Tightness::conservative,
+      .positions = PositionUse::fetched,
+      .declares = {.continuous = true, .time_budget = true},
+      .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+  })};
+}
