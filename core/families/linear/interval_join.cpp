@@ -60,7 +60,7 @@ void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>&
   found_.clear();
   leaf_pairs_room_ = leaf_pairs;
   node_tests_ = 0;
-  reading_ = false;
+  reading_ = indexed_ = has_beginning_ = false;
   following_ = {};
   throughout_ = count_ = 0;
   traversal_ = {};
@@ -211,7 +211,7 @@ void IntervalJoin<S>::start_reading() {
     place_.resize(count_);
   }
   for (std::size_t i = 0; i < throughout_; ++i) alive_[i] = primitives_of(i);
-  next_ = alive_count_ = std::uint32_t(throughout_);
+  next_ = alive_count_ = fixed_ = std::uint32_t(throughout_);
   waiting_.clear();
   std::fill(std::begin(ending_), std::end(ending_), none);
   present_ = 0;
@@ -256,16 +256,18 @@ void IntervalJoin<S>::move_to(float fraction) {
   for (std::size_t i = 0; i < before; ++i) begin_or_wait(waiting_[i]);
   for (; next_ < bucket_end_[bucket]; ++next_) begin_or_wait(next_);
   waiting_.resize(kept);
+  if (has_beginning_) begin_added(fraction, bucket);
   // Ending pairs: the lists of earlier buckets as a whole.
   for (; present_ < bucket; ++present_) {
-    for (std::uint32_t index = ending_[present_]; index != none; index = next_ending_[index]) end_pair(index);
+    for (std::uint32_t index = ending_[present_]; index != none; index = next_ending_[index])
+      if (!is_removed(index)) end_pair(index);
     ending_[present_] = none;
   }
   for (std::uint32_t* link = &ending_[bucket]; *link != none;) {
     const std::uint32_t index = *link;
     if (sorted_[index].end < fraction) {
       *link = next_ending_[index];
-      end_pair(index);
+      if (!is_removed(index)) end_pair(index);
     } else {
       link = &next_ending_[index];
     }
@@ -279,8 +281,10 @@ std::size_t IntervalJoin<S>::bytes() const {
          alive_.capacity() * sizeof(PrimitivePair) + bodies_.capacity() * sizeof(BodyPair) +
          found_.capacity() * sizeof(Found) +
          (bodies_of_.capacity() + waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() +
-          place_.capacity()) *
-             sizeof(std::uint32_t);
+          place_.capacity() + first_primitive_.capacity() + heads_.capacity() + links_.capacity() +
+          removed_.capacity()) *
+             sizeof(std::uint32_t) +
+         no_lanes_.capacity();
 }
 
 template class IntervalJoin<float>;

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/families/linear/changed_parts.hpp"
 #include "core/families/linear/linear_segment.hpp"
 #include "core/families/linear/pair_marks.hpp"
 #include "core/scene/pairs.hpp"
@@ -65,12 +66,24 @@ class IntervalJoin {
   /// pairs overlap.
   void move_to(float fraction);
   bool overlaps(std::uint32_t pair) const {
-    if (pair < throughout_) return true;
+    if (pair < fixed_) return true;
     const std::uint32_t place = place_[pair];
-    return place >= throughout_ && place < alive_count_ && alive_places_[place] == pair;
+    return place >= fixed_ && place < alive_count_ && alive_places_[place] == pair;
   }
   /// Touches these marks whenever a pair begins or ends to overlap, until the next join.
   void follow(const FollowingMarks& marks) { following_ = marks; }
+
+  /// The reader of the pairs: `read` and `move_to`, or a TriangleSpanFilter.
+  enum class Reader : std::uint8_t { join, filter };
+  /// Removes the pairs of primitives whose plans changed, and joins these primitives again: they, and all
+  /// pairs within the segment that they take part in from `fraction` on, which must not be before that of the
+  /// last call of `read` or `move_to`. Removed pairs keep their places in `pairs`, but end at -1; new pairs are
+  /// appended. `changed` holds the changes by body. Returns the box tests made. O(pairs) at the first call in
+  /// a segment; afterwards in proportion to the changed primitives, their pairs, and the nodes above them.
+  std::uint64_t repair(std::span<const ChangedParts> changed, float fraction, Reader reader);
+  /// Returns the pairs that the last `repair` removed, and the first one that it appended.
+  std::span<const std::uint32_t> removed() const { return removed_; }
+  std::uint32_t first_added() const { return first_added_; }
 
   /// Returns all pairs of the segment: first those that overlap from its start to its end, then the others
   /// roughly in the order of their start.
@@ -111,6 +124,15 @@ class IntervalJoin {
   void take_self_leaves(std::size_t end, LeavesOf leaves);
   void sort_by_begin();
   void start_reading();
+  bool is_removed(std::uint32_t index) const { return sorted_[index].end < 0; }
+  void index_pairs();
+  void link(std::uint32_t index);
+  void remove(std::uint32_t index, Reader reader);
+  void remove_changed(std::span<const ChangedParts> changed, Reader reader);
+  void join_changed(const ChangedParts& a, const ChangedParts& b);
+  void make_room(std::size_t pairs);
+  void add(const JoinedPair& pair, std::uint32_t bodies, float fraction, Reader reader);
+  void begin_added(float fraction, std::uint32_t bucket);
   void begin_pair(std::uint32_t index);
   void end_pair(std::uint32_t index);
 
@@ -145,7 +167,19 @@ class IntervalJoin {
   /// Alive pairs, in lists by the bucket of their end.
   std::uint32_t ending_[FractionBuckets::count] = {}, present_ = 0;
   std::vector<std::uint32_t> next_ending_;
+  std::uint32_t fixed_ = 0;  ///< so many pairs are the first of `alive_`, in their order
   FollowingMarks following_;
+
+  // Only after a repair in the segment:
+  bool indexed_ = false;
+  std::vector<std::uint32_t> first_primitive_;  ///< [body]: number of its first primitive in the scene
+  std::vector<std::uint32_t> heads_, links_;    ///< lists of pairs by primitive; links: [pair][side]
+  std::vector<std::uint32_t> removed_;
+  std::uint32_t first_added_ = 0;
+  /// Added pairs that have not begun, in lists by the bucket of their begin, linked in next_ending_.
+  std::uint32_t beginning_[FractionBuckets::count] = {}, beginning_from_ = 0;
+  bool has_beginning_ = false;
+  std::vector<std::uint8_t> no_lanes_;  ///< all 0
 };
 
 extern template class IntervalJoin<float>;

@@ -142,7 +142,7 @@ template <class S, std::size_t width>
 /// Boxes that are linear in time.
 template <class S, std::uint32_t width, bool self>
 struct SegmentView {
-  static constexpr bool within_one = self;
+  static constexpr bool within_one = self, selects = false;
   WideEnds<S> a, b;
   S margin;
   static constexpr std::size_t row_scalars = 6 * width;
@@ -182,6 +182,26 @@ struct SegmentView {
 template <class S, std::uint32_t width, bool self>
 void join(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b, WideTraversal& state) {
   SegmentView<S, width, self> view(ends_a, ends_b);
+  traverse_pairs(a, b, view, state);
+}
+
+/// Boxes that are linear in time, of which only pairs with a selected side are visited.
+template <class S, std::uint32_t width, bool self>
+struct SelectedView : SegmentView<S, width, self> {
+  static constexpr bool selects = true;
+  WideSelection selection;
+
+  [[gnu::always_inline]] SelectedView(const WideEnds<S>& first, const WideEnds<S>& second,
+                                      const WideSelection& lanes)
+      : SegmentView<S, width, self>(first, second), selection(lanes) {}
+  [[gnu::always_inline]] unsigned selected_a(std::uint32_t node) const { return selection.a[node]; }
+  [[gnu::always_inline]] unsigned selected_b(std::uint32_t node) const { return selection.b[node]; }
+};
+
+template <class S, std::uint32_t width, bool self>
+void join_selected(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b,
+                   WideSelection selection, WideTraversal& state) {
+  SelectedView<S, width, self> view(ends_a, ends_b, selection);
   traverse_pairs(a, b, view, state);
 }
 
@@ -418,7 +438,11 @@ constexpr WideLinearKernels<S> table{{&at<S, 2>, &at<S, 4>, &at<S, 8>},
                                      {&join<S, 2, false>, &join<S, 4, false>, &join<S, 8, false>},
                                      {&leaf_join<S, 4>, &leaf_join<S, 8>, &leaf_join<S, 16>},
                                      {&make<S, 2>, &make<S, 4>, &make<S, 8>},
-                                     {&join<S, 2, true>, &join<S, 4, true>, &join<S, 8, true>}};
+                                     {&join<S, 2, true>, &join<S, 4, true>, &join<S, 8, true>},
+                                     {&join_selected<S, 2, false>, &join_selected<S, 4, false>,
+                                      &join_selected<S, 8, false>},
+                                     {&join_selected<S, 2, true>, &join_selected<S, 4, true>,
+                                      &join_selected<S, 8, true>}};
 
 }  // namespace
 
