@@ -300,8 +300,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     for (std::size_t i = 0; i < now_.joins.size(); ++i) {
       IntervalJoin<S>& one = now_.joins[i];
       using Reader = typename IntervalJoin<S>::Reader;
-      this->count_.add(Counter::box_tests, one.repair(bounds_.changed(), fraction,
-                                                      by_spans_[i] ? Reader::filter : Reader::join));
+      this->count_.add(Counter::box_tests,
+                       one.repair(bounds_.changed(), fraction, by_spans_[i] ? Reader::filter : Reader::join));
       if (by_spans_[i]) now_.answers[i].repair(one);
       pairs_removed_ += one.removed().size();
       pairs_added_ += one.pairs().size() - one.first_added();

@@ -24,9 +24,9 @@ class ChangedParts {
   void clear();
   bool empty() const { return primitives_.empty(); }
 
-  /// Returns, per wide node, the lanes in or below which something is marked.
+  /// Returns, per wide node, the lanes in or below which something is marked; per leaf, its marked entries.
   const std::uint8_t* lanes() const { return lanes_.data(); }
-  bool is_marked(std::uint32_t primitive) const { return is_marked_[primitive] != 0; }
+  const std::uint16_t* entries() const { return marked_.data(); }
   std::span<const std::uint32_t> primitives() const { return primitives_; }
   /// Returns the marked leaves, numbered as by `WideNode::first_leaf`.
   std::span<const std::uint32_t> leaves() const { return leaves_; }
@@ -37,21 +37,27 @@ class ChangedParts {
   }
 
   std::size_t bytes() const {
-    return (entries_begin_.capacity() + entries_.capacity() + leaf_of_.capacity() + primitive_of_.capacity() +
-            slot_of_.capacity() + above_.capacity() + primitives_.capacity() + leaves_.capacity() +
+    return (entries_begin_.capacity() + above_.capacity() + primitives_.capacity() + leaves_.capacity() +
             nodes_.capacity()) *
                sizeof(std::uint32_t) +
-           lanes_.capacity() + is_marked_.capacity();
+           entries_.capacity() * sizeof(Entry) + lanes_.capacity() +
+           marked_.capacity() * sizeof(std::uint16_t);
   }
 
  private:
   static constexpr std::uint32_t none = ~std::uint32_t(0);
 
-  std::vector<std::uint32_t> entries_begin_, entries_;  ///< of each vertex: entries of the leaf lists
-  std::vector<std::uint32_t> leaf_of_, primitive_of_;   ///< [entry]
-  std::vector<std::uint32_t> slot_of_;                  ///< [leaf]: LeafSlot::word
-  std::vector<std::uint32_t> above_;                    ///< [wide node]: its place, as a LeafSlot::word
-  std::vector<std::uint8_t> lanes_, is_marked_;         ///< [wide node], [primitive]
+  /// A primitive as a leaf holds it.
+  struct Entry {
+    std::uint32_t primitive, leaf;
+    LeafSlot slot;
+    std::uint16_t bit;  ///< in the leaf
+  };
+  std::vector<std::uint32_t> entries_begin_;  ///< [vertex, and one more]: index into entries_
+  std::vector<Entry> entries_;                ///< by vertex
+  std::vector<std::uint32_t> above_;          ///< [wide node]: its place, as a LeafSlot::word
+  std::vector<std::uint8_t> lanes_;           ///< [wide node]
+  std::vector<std::uint16_t> marked_;         ///< [leaf]
   std::vector<std::uint32_t> primitives_, leaves_, nodes_;
 };
 
@@ -59,39 +65,30 @@ template <class S>
 void ChangedParts::prepare(WideHierarchy<S>& hierarchy, std::uint32_t vertices) {
   const WideNode* const nodes = hierarchy.arrays().nodes;
   const WideLeafLists lists = hierarchy.leaf_lists();
-  slot_of_.assign(hierarchy.leaf_count(), 0);
   above_.assign(hierarchy.node_count(), none);
   lanes_.assign(hierarchy.node_count(), 0);
-  for (std::uint32_t n = 0; n < hierarchy.node_count(); ++n)
-    for (std::uint32_t lane = 0; lane < nodes[n].count; ++lane)
-      if (lane < nodes[n].leaf_count)
-        slot_of_[nodes[n].first_leaf + lane] = LeafSlot::of(n, lane);
-      else
-        above_[nodes[n].first_child + lane - nodes[n].leaf_count] = LeafSlot::of(n, lane);
-  std::uint32_t entries = 0, primitives = 0;
-  for (std::uint32_t leaf = 0; leaf < hierarchy.leaf_count(); ++leaf)
-    entries = std::max(entries, lists.end_entry[leaf]);
-  leaf_of_.assign(entries, none);
-  primitive_of_.assign(entries, 0);
+  marked_.assign(hierarchy.leaf_count(), 0);
   entries_begin_.assign(std::size_t(vertices) + 2, 0);
   const auto for_corners = [&](const auto& use) {
-    for (std::uint32_t leaf = 0; leaf < hierarchy.leaf_count(); ++leaf)
-      for (std::uint32_t entry = lists.first_entry[leaf]; entry < lists.end_entry[leaf]; ++entry)
-        for (std::uint32_t c = lists.first_corner[entry]; c < lists.first_corner[entry + 1]; ++c)
-          use(leaf, entry, lists.corners[c] / 3);
+    for (std::uint32_t n = 0; n < hierarchy.node_count(); ++n)
+      for (std::uint32_t lane = 0; lane < nodes[n].leaf_count; ++lane) {
+        const std::uint32_t leaf = nodes[n].first_leaf + lane, first = lists.first_entry[leaf];
+        for (std::uint32_t entry = first; entry < lists.end_entry[leaf]; ++entry)
+          for (std::uint32_t c = lists.first_corner[entry]; c < lists.first_corner[entry + 1]; ++c)
+            use(lists.corners[c] / 3, Entry{lists.primitives[entry],
+                                            leaf,
+                                            {LeafSlot::of(n, lane)},
+                                            std::uint16_t(1U << (entry - first))});
+      }
   };
-  for_corners([&](std::uint32_t leaf, std::uint32_t entry, std::uint32_t vertex) {
-    leaf_of_[entry] = leaf;
-    primitive_of_[entry] = lists.primitives[entry];
-    primitives = std::max(primitives, lists.primitives[entry] + 1);
-    ++entries_begin_[vertex + 2];
-  });
+  for (std::uint32_t n = 0; n < hierarchy.node_count(); ++n)
+    for (std::uint32_t lane = nodes[n].leaf_count; lane < nodes[n].count; ++lane)
+      above_[nodes[n].first_child + lane - nodes[n].leaf_count] = LeafSlot::of(n, lane);
+  for_corners([&](std::uint32_t vertex, const Entry& /*entry*/) { ++entries_begin_[vertex + 2]; });
   for (std::size_t v = 2; v < entries_begin_.size(); ++v) entries_begin_[v] += entries_begin_[v - 1];
-  entries_.assign(entries_begin_.back(), 0);
-  for_corners([&](std::uint32_t /*leaf*/, std::uint32_t entry, std::uint32_t vertex) {
-    entries_[entries_begin_[vertex + 1]++] = entry;
-  });
-  is_marked_.assign(primitives, 0);
+  entries_.resize(entries_begin_.back());
+  for_corners(
+      [&](std::uint32_t vertex, const Entry& entry) { entries_[entries_begin_[vertex + 1]++] = entry; });
   primitives_.clear();
   leaves_.clear();
   nodes_.clear();
@@ -99,15 +96,15 @@ void ChangedParts::prepare(WideHierarchy<S>& hierarchy, std::uint32_t vertices) 
 
 inline void ChangedParts::mark(std::uint32_t vertex) {
   for (std::uint32_t k = entries_begin_[vertex]; k < entries_begin_[vertex + 1]; ++k) {
-    const std::uint32_t entry = entries_[k], primitive = primitive_of_[entry];
-    if (is_marked_[primitive] != 0) continue;
-    is_marked_[primitive] = 1;
-    primitives_.push_back(primitive);
-    const LeafSlot leaf{slot_of_[leaf_of_[entry]]};
-    const auto bit = std::uint8_t(1U << leaf.lane());
-    if ((lanes_[leaf.node()] & bit) != 0) continue;
-    leaves_.push_back(leaf_of_[entry]);
-    for (LeafSlot place = leaf;;) {
+    const Entry& entry = entries_[k];
+    std::uint16_t& marked = marked_[entry.leaf];
+    if ((marked & entry.bit) != 0) continue;
+    primitives_.push_back(entry.primitive);
+    const bool leaf_was_marked = marked != 0;
+    marked |= entry.bit;
+    if (leaf_was_marked) continue;
+    leaves_.push_back(entry.leaf);
+    for (LeafSlot place = entry.slot;;) {
       std::uint8_t& lanes = lanes_[place.node()];
       const bool was_marked = lanes != 0;
       lanes |= std::uint8_t(1U << place.lane());
@@ -120,7 +117,7 @@ inline void ChangedParts::mark(std::uint32_t vertex) {
 }
 
 inline void ChangedParts::clear() {
-  for (const std::uint32_t primitive : primitives_) is_marked_[primitive] = 0;
+  for (const std::uint32_t leaf : leaves_) marked_[leaf] = 0;
   for (const std::uint32_t node : nodes_) lanes_[node] = 0;
   primitives_.clear();
   leaves_.clear();

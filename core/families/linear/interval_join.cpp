@@ -284,7 +284,7 @@ std::size_t IntervalJoin<S>::bytes() const {
           place_.capacity() + first_primitive_.capacity() + heads_.capacity() + links_.capacity() +
           removed_.capacity()) *
              sizeof(std::uint32_t) +
-         no_lanes_.capacity();
+         no_lanes_.capacity() + no_entries_.capacity() * sizeof(std::uint16_t);
 }
 
 template class IntervalJoin<float>;

@@ -77,9 +77,10 @@ class IntervalJoin {
   enum class Reader : std::uint8_t { join, filter };
   /// Removes the pairs of primitives whose plans changed, and joins these primitives again: they, and all
   /// pairs within the segment that they take part in from `fraction` on, which must not be before that of the
-  /// last call of `read` or `move_to`. Removed pairs keep their places in `pairs`, but end at -1; new pairs are
-  /// appended. `changed` holds the changes by body. Returns the box tests made. O(pairs) at the first call in
-  /// a segment; afterwards in proportion to the changed primitives, their pairs, and the nodes above them.
+  /// last call of `read` or `move_to`. Removed pairs keep their places in `pairs`, but end at -1; new pairs
+  /// are appended. `changed` holds the changes by body. Returns the box tests made. O(pairs) at the first
+  /// call in a segment; afterwards in proportion to the changed primitives, their pairs, and the nodes above
+  /// them.
   std::uint64_t repair(std::span<const ChangedParts> changed, float fraction, Reader reader);
   /// Returns the pairs that the last `repair` removed, and the first one that it appended.
   std::span<const std::uint32_t> removed() const { return removed_; }
@@ -179,7 +180,8 @@ class IntervalJoin {
   /// Added pairs that have not begun, in lists by the bucket of their begin, linked in next_ending_.
   std::uint32_t beginning_[FractionBuckets::count] = {}, beginning_from_ = 0;
   bool has_beginning_ = false;
-  std::vector<std::uint8_t> no_lanes_;  ///< all 0
+  std::vector<std::uint8_t> no_lanes_;     ///< all 0
+  std::vector<std::uint16_t> no_entries_;  ///< all 0
 };
 
 extern template class IntervalJoin<float>;

@@ -82,7 +82,8 @@ class JoinChanges {
   std::size_t bytes() const {
     std::size_t total =
         (after_.capacity() + to_test_.capacity() + again_begun_.capacity() + again_ended_.capacity()) *
-            sizeof(PrimitivePair) + difference_.bytes();
+            sizeof(PrimitivePair) +
+        difference_.bytes();
     for (const One& one : of_) {
       total += one.before.capacity() * sizeof(PrimitivePair);
       for (const PairMarks& marks : one.marks) total += sizeof marks + marks.bytes();

@@ -7,25 +7,6 @@
 
 namespace kbvh {
 
-namespace {
-/// Keeps the pairs with a marked primitive among pairs in columns, from a given index on.
-void keep_changed_columns(const ChangedParts& a, const ChangedParts& b, JoinColumns& pairs, std::size_t from) {
-  std::size_t kept = from;
-  for (std::size_t i = from; i < pairs.found; ++i) {
-    const bool changed = (!a.empty() && a.is_marked(pairs.primitive_a[i])) ||
-                         (!b.empty() && b.is_marked(pairs.primitive_b[i]));
-    pairs.primitive_a[kept] = pairs.primitive_a[i];
-    pairs.primitive_b[kept] = pairs.primitive_b[i];
-    if (pairs.begin != nullptr) {
-      pairs.begin[kept] = pairs.begin[i];
-      pairs.end[kept] = pairs.end[i];
-    }
-    kept += changed ? 1 : 0;
-  }
-  pairs.found = kept;
-}
-}  // namespace
-
 /// Lists all pairs by their primitives.
 template <class S>
 void IntervalJoin<S>::index_pairs() {
@@ -77,19 +58,21 @@ template <class S>
 void IntervalJoin<S>::join_changed(const ChangedParts& a, const ChangedParts& b) {
   begin_bodies();
   if (traversal_.depth == 0) return;
-  const auto lanes = [this](const ChangedParts& parts) {
-    return parts.empty() ? no_lanes_.data() : parts.lanes();
-  };
   const BodyPair bodies = bodies_[found_.size()];
   const WideHierarchy<S>&first = segment_->sides[bodies.first].hierarchy(),
         &second = segment_->sides[bodies.second].hierarchy();
   no_lanes_.resize(std::max<std::size_t>({no_lanes_.size(), first.node_count(), second.node_count()}), 0);
-  const WideSelection selection{lanes(a), lanes(b)};
+  no_entries_.resize(std::max<std::size_t>({no_entries_.size(), first.leaf_count(), second.leaf_count()}), 0);
+  const WideSelection selection{a.empty() ? no_lanes_.data() : a.lanes(),
+                                b.empty() ? no_lanes_.data() : b.lanes()};
+  leaf_join_.selected_a = a.empty() ? no_entries_.data() : a.entries();
+  leaf_join_.selected_b = b.empty() ? no_entries_.data() : b.entries();
   const WideLinearKernels<S>& kernels = wide_linear_kernels<S>(first.kernels());
+  join_leaves_ =
+      kernels.leaf_join_selected(std::max({4u, first.padded_leaf_size(), second.padded_leaf_size()}));
   const auto traverse = self_ ? kernels.selected_self(first.width()) : kernels.selected(first.width());
   while (traversal_.depth > 0) {
     traverse(leaf_join_.a, leaf_join_.ends_a, leaf_join_.b, leaf_join_.ends_b, selection, traversal_);
-    const std::size_t throughout = leaf_join_.throughout.found, partly = leaf_join_.partly.found;
     leaf_join_.next = 0;
     if (self_) {
       take_self_leaves(different_leaves_first(leaf_pairs_.data(), traversal_.found), LeavesOf::two);
@@ -97,8 +80,6 @@ void IntervalJoin<S>::join_changed(const ChangedParts& a, const ChangedParts& b)
     } else {
       take_leaves(traversal_.found);
     }
-    keep_changed_columns(a, b, leaf_join_.throughout, throughout);
-    keep_changed_columns(a, b, leaf_join_.partly, partly);
     traversal_.found = 0;
     if (traversal_.depth + max_pairs_per_step >= traversal_.stack_room) {
       stack_.resize(2 * stack_.size());

@@ -25,10 +25,10 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
       cuts_(settings.cuts),
       memory_(scene.body_count(), settings.remembered_bytes),
       near_bodies_(scene.pairs(), scene.body_count()),
-      bodies_(scene.body_count()),
       horizon_(settings.horizon),
       changed_(scene.body_count()),
       to_remake_(scene.body_count(), 0),
+      bodies_(scene.body_count()),
       counts_(scene.body_count()),
       ahead_counts_(scene.body_count()),
       near_(scene.body_count(), 0) {

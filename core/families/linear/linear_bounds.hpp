@@ -52,7 +52,8 @@ class LinearBounds {
   /// Returns the parts of each body that changed since the segment began or `clear_changed` was called.
   std::span<const ChangedParts> changed() const { return changed_; }
   bool any_changed() const {
-    return std::any_of(changed_.begin(), changed_.end(), [](const ChangedParts& one) { return !one.empty(); });
+    return std::any_of(changed_.begin(), changed_.end(),
+                       [](const ChangedParts& one) { return !one.empty(); });
   }
   void clear_changed();
   /// Counts work since `start`: plan changes after which the segment was kept, or not; leaves and wide nodes
@@ -153,7 +154,9 @@ class LinearBounds {
   void finish(Segment& segment, const SegmentMotion<S>& motion);
   void make_margin(BodySegmentBounds<S>& side) const;
   bool take_over(std::uint32_t body);
-  void follow_line(std::uint32_t body, std::uint32_t vertex);
+  void follow_change(const PlanChange<S>& change);
+  void follow_pieces(std::uint32_t body, std::uint32_t vertex);
+  void follow_line(std::uint32_t body, std::uint32_t vertex, double t, const S* from, const S* last);
   bool pass_knots();
   bool remake_boxes();
   bool is_near_as_before();
@@ -167,9 +170,9 @@ class LinearBounds {
   double last_ = 0, step_ = 0;  ///< time of the last frame, and the step to it
   double foreseen_ = 1;         ///< length in frames of a segment without an end
   ChangeHorizon horizon_;
-  std::vector<ChangedParts> changed_;     ///< [body]
-  std::vector<std::uint8_t> to_remake_;   ///< [body]
-  std::vector<Knot> knots_;               ///< a heap
+  std::vector<ChangedParts> changed_;    ///< [body]
+  std::vector<std::uint8_t> to_remake_;  ///< [body]
+  std::vector<Knot> knots_;              ///< a heap
   Repairs repairs_;
   std::vector<LinearBody<S>> bodies_;
   Segment segments_[2];

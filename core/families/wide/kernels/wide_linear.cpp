@@ -344,12 +344,12 @@ struct PartlyBatch {
   }
 };
 
-/// Processes the pairs of the primitives of two leaves; only primitives of `outer` with a bit are visited.
+/// Processes the pairs of the primitives of two leaves; only primitives with a bit are visited.
 /// Branches on the overlap would cost as much as the comparisons, so only the ends of loops branch.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline void leaf_pairs(const LeafRows<S>& outer, unsigned bits,
-                                              const LeafRows<S>& inner, S margin, bool swapped,
-                                              WideLeafJoin<S>& state, PartlyBatch<S>& batch) {
+                                              const LeafRows<S>& inner, unsigned inner_bits, S margin,
+                                              bool swapped, WideLeafJoin<S>& state, PartlyBatch<S>& batch) {
   LeafReach<S, padded> reach;
   reach.make(outer, margin);
   JoinColumns& all = state.throughout;
@@ -364,7 +364,9 @@ template <class S, std::size_t padded>
   };
   for (; bits != 0; bits &= bits - 1) {
     const std::uint32_t i = lowest(bits);
-    const LaneBits found = compare<S, padded>(inner, reach, i);
+    LaneBits found = compare<S, padded>(inner, reach, i);
+    found.hit &= inner_bits;
+    found.throughout &= inner_bits;
     fill(column_outer + all.found, outer.primitives[i]);
     all.found += pack_lanes(found.throughout, inner.primitives, column_inner + all.found);
     fill(part_outer + parts, i);
@@ -384,7 +386,7 @@ template <class S, std::size_t padded>
 
 // The width is not a template parameter: it only determines the place of leaf boxes, and each copy of this
 // function is large.
-template <class S, std::size_t padded>
+template <class S, std::size_t padded, bool selected>
 void leaf_join(WideLeafJoin<S>& shared) {
   WideLeafJoin<S> state = shared;
   const S margin = state.ends_a.margin + state.ends_b.margin;
@@ -421,12 +423,21 @@ void leaf_join(WideLeafJoin<S>& shared) {
     const auto count_a = unsigned(__builtin_popcount(near_a)), count_b = unsigned(__builtin_popcount(near_b));
     state.tests += a.count + b.count;
     if (count_a == 0 || count_b == 0) continue;
-    if (count_a <= count_b) {
+    if constexpr (selected) {
+      // Selected primitives of a with all of b, then the others of a with the selected ones of b.
+      const unsigned selected_a = state.selected_a[number(state.a, slot_a)];
+      const unsigned first = near_a & selected_a, rest = near_a & ~selected_a;
+      const unsigned second = rest == 0 ? 0 : near_b & state.selected_b[number(state.b, slot_b)];
+      state.tests += std::uint64_t(unsigned(__builtin_popcount(first))) * b.count +
+                     std::uint64_t(unsigned(__builtin_popcount(second))) * a.count;
+      if (first != 0) leaf_pairs<S, padded>(a, first, b, ~0U, margin, false, state, batch);
+      if (second != 0) leaf_pairs<S, padded>(b, second, a, rest, margin, true, state, batch);
+    } else if (count_a <= count_b) {
       state.tests += std::uint64_t(count_a) * b.count;
-      leaf_pairs<S, padded>(a, near_a, b, margin, false, state, batch);
+      leaf_pairs<S, padded>(a, near_a, b, ~0U, margin, false, state, batch);
     } else {
       state.tests += std::uint64_t(count_b) * a.count;
-      leaf_pairs<S, padded>(b, near_b, a, margin, true, state, batch);
+      leaf_pairs<S, padded>(b, near_b, a, ~0U, margin, true, state, batch);
     }
   }
   if (batch.count > 0) batch.flush(state.partly);
@@ -434,15 +445,15 @@ void leaf_join(WideLeafJoin<S>& shared) {
 }
 
 template <class S>
-constexpr WideLinearKernels<S> table{{&at<S, 2>, &at<S, 4>, &at<S, 8>},
-                                     {&join<S, 2, false>, &join<S, 4, false>, &join<S, 8, false>},
-                                     {&leaf_join<S, 4>, &leaf_join<S, 8>, &leaf_join<S, 16>},
-                                     {&make<S, 2>, &make<S, 4>, &make<S, 8>},
-                                     {&join<S, 2, true>, &join<S, 4, true>, &join<S, 8, true>},
-                                     {&join_selected<S, 2, false>, &join_selected<S, 4, false>,
-                                      &join_selected<S, 8, false>},
-                                     {&join_selected<S, 2, true>, &join_selected<S, 4, true>,
-                                      &join_selected<S, 8, true>}};
+constexpr WideLinearKernels<S> table{
+    {&at<S, 2>, &at<S, 4>, &at<S, 8>},
+    {&join<S, 2, false>, &join<S, 4, false>, &join<S, 8, false>},
+    {&leaf_join<S, 4, false>, &leaf_join<S, 8, false>, &leaf_join<S, 16, false>},
+    {&make<S, 2>, &make<S, 4>, &make<S, 8>},
+    {&join<S, 2, true>, &join<S, 4, true>, &join<S, 8, true>},
+    {&join_selected<S, 2, false>, &join_selected<S, 4, false>, &join_selected<S, 8, false>},
+    {&join_selected<S, 2, true>, &join_selected<S, 4, true>, &join_selected<S, 8, true>},
+    {&leaf_join<S, 4, true>, &leaf_join<S, 8, true>, &leaf_join<S, 16, true>}};
 
 }  // namespace
 

@@ -74,6 +74,8 @@ struct WideLeafJoin {
   JoinColumns throughout;  ///< pairs that overlap from the start of the segment to its end
   JoinColumns partly;      ///< the others
   std::uint64_t tests;
+  /// [leaf]: bit i: entry i of the leaf is selected. For joins of selected pairs only.
+  const std::uint16_t *selected_a = nullptr, *selected_b = nullptr;
 };
 
 template <class S>
@@ -91,12 +93,13 @@ struct WideLinearKernels {
   using LeafJoin = void (*)(WideLeafJoin<S>& state);
   /// Computes the boxes of one node at a fraction.
   using Make = void (*)(const WideMoment<S>& moment, std::uint32_t node);
-  At at_width[3];                ///< [log2(width) - 1]
-  Join join_width[3];            ///< [log2(width) - 1]
-  LeafJoin leaf_join_padded[3];  ///< [padded leaf size 4, 8, 16]
-  Make make_width[3];            ///< [log2(width) - 1]
-  Join self_width[3];            ///< [log2(width) - 1]; a hierarchy with itself
+  At at_width[3];                                          ///< [log2(width) - 1]
+  Join join_width[3];                                      ///< [log2(width) - 1]
+  LeafJoin leaf_join_padded[3];                            ///< [padded leaf size 4, 8, 16]
+  Make make_width[3];                                      ///< [log2(width) - 1]
+  Join self_width[3];                                      ///< [log2(width) - 1]; a hierarchy with itself
   JoinSelected selected_width[3], selected_self_width[3];  ///< the same for selected pairs
+  LeafJoin leaf_join_selected_padded[3];                   ///< the same; one side of a pair is selected
 
   static constexpr std::size_t index(std::uint32_t width) { return width == 2 ? 0 : width == 4 ? 1 : 2; }
   At at(std::uint32_t width) const { return at_width[index(width)]; }
@@ -105,6 +108,9 @@ struct WideLinearKernels {
   JoinSelected selected(std::uint32_t width) const { return selected_width[index(width)]; }
   JoinSelected selected_self(std::uint32_t width) const { return selected_self_width[index(width)]; }
   LeafJoin leaf_join(std::uint32_t padded) const { return leaf_join_padded[index(padded / 2)]; }
+  LeafJoin leaf_join_selected(std::uint32_t padded) const {
+    return leaf_join_selected_padded[index(padded / 2)];
+  }
   Make make(std::uint32_t width) const { return make_width[index(width)]; }
 };
 KBVH_DECLARE_KERNELS(WideLinearKernels<float>, wide_linear_float)
