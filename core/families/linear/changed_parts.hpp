@@ -37,8 +37,8 @@ class ChangedParts {
   }
 
   std::size_t bytes() const {
-    return (entries_begin_.capacity() + above_.capacity() + primitives_.capacity() + leaves_.capacity() +
-            nodes_.capacity()) *
+    return (entries_begin_.capacity() + slots_.capacity() + above_.capacity() + primitives_.capacity() +
+            leaves_.capacity() + nodes_.capacity()) *
                sizeof(std::uint32_t) +
            entries_.capacity() * sizeof(Entry) + lanes_.capacity() +
            marked_.capacity() * sizeof(std::uint16_t);
@@ -47,14 +47,13 @@ class ChangedParts {
  private:
   static constexpr std::uint32_t none = ~std::uint32_t(0);
 
-  /// A primitive as a leaf holds it.
+  /// A primitive, and its place: 16 x leaf + entry of the leaf. There are at most 2^28 leaves.
   struct Entry {
-    std::uint32_t primitive, leaf;
-    LeafSlot slot;
-    std::uint16_t bit;  ///< in the leaf
+    std::uint32_t primitive, place;
   };
   std::vector<std::uint32_t> entries_begin_;  ///< [vertex, and one more]: index into entries_
   std::vector<Entry> entries_;                ///< by vertex
+  std::vector<std::uint32_t> slots_;          ///< [leaf]: its place, as a LeafSlot::word
   std::vector<std::uint32_t> above_;          ///< [wide node]: its place, as a LeafSlot::word
   std::vector<std::uint8_t> lanes_;           ///< [wide node]
   std::vector<std::uint16_t> marked_;         ///< [leaf]
@@ -69,17 +68,15 @@ void ChangedParts::prepare(WideHierarchy<S>& hierarchy, std::uint32_t vertices) 
   lanes_.assign(hierarchy.node_count(), 0);
   marked_.assign(hierarchy.leaf_count(), 0);
   entries_begin_.assign(std::size_t(vertices) + 2, 0);
+  slots_.assign(hierarchy.leaf_count(), 0);
+  for (std::uint32_t n = 0; n < hierarchy.node_count(); ++n)
+    for (std::uint32_t lane = 0; lane < nodes[n].leaf_count; ++lane)
+      slots_[nodes[n].first_leaf + lane] = LeafSlot::of(n, lane);
   const auto for_corners = [&](const auto& use) {
-    for (std::uint32_t n = 0; n < hierarchy.node_count(); ++n)
-      for (std::uint32_t lane = 0; lane < nodes[n].leaf_count; ++lane) {
-        const std::uint32_t leaf = nodes[n].first_leaf + lane, first = lists.first_entry[leaf];
-        for (std::uint32_t entry = first; entry < lists.end_entry[leaf]; ++entry)
-          for (std::uint32_t c = lists.first_corner[entry]; c < lists.first_corner[entry + 1]; ++c)
-            use(lists.corners[c] / 3, Entry{lists.primitives[entry],
-                                            leaf,
-                                            {LeafSlot::of(n, lane)},
-                                            std::uint16_t(1U << (entry - first))});
-      }
+    for (std::uint32_t leaf = 0; leaf < hierarchy.leaf_count(); ++leaf)
+      for (std::uint32_t first = lists.first_entry[leaf], e = first; e < lists.end_entry[leaf]; ++e)
+        for (std::uint32_t c = lists.first_corner[e]; c < lists.first_corner[e + 1]; ++c)
+          use(lists.corners[c] / 3, Entry{lists.primitives[e], 16 * leaf + (e - first)});
   };
   for (std::uint32_t n = 0; n < hierarchy.node_count(); ++n)
     for (std::uint32_t lane = nodes[n].leaf_count; lane < nodes[n].count; ++lane)
@@ -96,15 +93,17 @@ void ChangedParts::prepare(WideHierarchy<S>& hierarchy, std::uint32_t vertices) 
 
 inline void ChangedParts::mark(std::uint32_t vertex) {
   for (std::uint32_t k = entries_begin_[vertex]; k < entries_begin_[vertex + 1]; ++k) {
-    const Entry& entry = entries_[k];
-    std::uint16_t& marked = marked_[entry.leaf];
-    if ((marked & entry.bit) != 0) continue;
+    const Entry entry = entries_[k];
+    const std::uint32_t leaf = entry.place / 16;
+    const auto bit = std::uint16_t(1U << entry.place % 16);
+    std::uint16_t& marked = marked_[leaf];
+    if ((marked & bit) != 0) continue;
     primitives_.push_back(entry.primitive);
     const bool leaf_was_marked = marked != 0;
-    marked |= entry.bit;
+    marked |= bit;
     if (leaf_was_marked) continue;
-    leaves_.push_back(entry.leaf);
-    for (LeafSlot place = entry.slot;;) {
+    leaves_.push_back(leaf);
+    for (LeafSlot place{slots_[leaf]};;) {
       std::uint8_t& lanes = lanes_[place.node()];
       const bool was_marked = lanes != 0;
       lanes |= std::uint8_t(1U << place.lane());

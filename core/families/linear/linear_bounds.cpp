@@ -203,7 +203,7 @@ bool LinearBounds<S>::advance() {
     came_ahead_ = step_ahead(std::numeric_limits<std::uint64_t>::max());
   }
   if (came_ahead_) {
-    horizon_.next_segment();
+    horizon_.next_segment(share_made_anew());
     present_ = 1 - present_;
     for (std::uint32_t body = 0; body < body_count(); ++body) {
       counts_[body].at_rest += ahead_counts_[body].at_rest;
@@ -274,7 +274,7 @@ void LinearBounds<S>::next_segment() {
   forget_ahead();
   knots_.clear();
   clear_changed();
-  horizon_.next_segment();
+  horizon_.next_segment(share_made_anew());
   const double t = motion_.time();
   const Segment& before = segments_[present_];
   Segment& segment = segments_[1 - present_];

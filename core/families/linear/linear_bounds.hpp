@@ -160,6 +160,7 @@ class LinearBounds {
   bool pass_knots();
   bool remake_boxes();
   bool is_near_as_before();
+  double share_made_anew();
 
   SceneView<S> scene_;
   SegmentMotion<S> motion_;
@@ -174,6 +175,7 @@ class LinearBounds {
   std::vector<std::uint8_t> to_remake_;  ///< [body]
   std::vector<Knot> knots_;              ///< a heap
   Repairs repairs_;
+  std::uint64_t leaves_before_ = 0;  ///< of repairs_.leaves, when the segment began
   std::vector<LinearBody<S>> bodies_;
   Segment segments_[2];
   std::uint32_t present_ = 0;

@@ -1,6 +1,7 @@
 // Repairs of a segment's bounds where plans changed within it.
 
 #include <algorithm>
+#include <utility>
 
 #include "core/families/linear/linear_bounds.hpp"
 #include "core/families/linear/swept_root.hpp"
@@ -191,6 +192,15 @@ bool LinearBounds<S>::is_near_as_before() {
   return true;
 }
 
+/// Returns the share of all leaves that were made anew since the last call.
+template <class S>
+double LinearBounds<S>::share_made_anew() {
+  std::uint64_t all = 1;
+  for (const LinearBody<S>& body : bodies_) all += body.hierarchy.leaf_count();
+  const std::uint64_t before = std::exchange(leaves_before_, repairs_.leaves);
+  return double(repairs_.leaves - std::min(before, repairs_.leaves)) / double(all);
+}
+
 template <class S>
 void LinearBounds<S>::clear_changed() {
   for (ChangedParts& parts : changed_) parts.clear();
@@ -200,6 +210,8 @@ template bool LinearBounds<float>::repair(std::span<const PlanChange<float>>);
 template bool LinearBounds<double>::repair(std::span<const PlanChange<double>>);
 template bool LinearBounds<float>::pass_knots();
 template bool LinearBounds<double>::pass_knots();
+template double LinearBounds<float>::share_made_anew();
+template double LinearBounds<double>::share_made_anew();
 template void LinearBounds<float>::clear_changed();
 template void LinearBounds<double>::clear_changed();
 
