@@ -191,8 +191,10 @@ void IntervalJoin<S>::sort_by_begin() {
     bodies_of_[i] = bodies;
   }
   bodies = 0;
+  found_at_.resize(partly);
   for (std::size_t i = 0; i < partly; ++i) {
     const std::uint32_t to = place[FractionBuckets::of(found_partly_.begin[i])]++;
+    found_at_[i] = to;
     sorted_[to] = {found_partly_.primitive_a[i], found_partly_.primitive_b[i], found_partly_.begin[i],
                    found_partly_.end[i]};
     if (!several) continue;
@@ -282,7 +284,7 @@ std::size_t IntervalJoin<S>::bytes() const {
          found_.capacity() * sizeof(Found) +
          (bodies_of_.capacity() + waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() +
           place_.capacity() + first_primitive_.capacity() + heads_.capacity() + links_.capacity() +
-          removed_.capacity()) *
+          removed_.capacity() + found_at_.capacity()) *
              sizeof(std::uint32_t) +
          no_lanes_.capacity() + no_entries_.capacity() * sizeof(std::uint16_t);
 }

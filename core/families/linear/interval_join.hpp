@@ -93,6 +93,15 @@ class IntervalJoin {
   /// overlap throughout are first in it.
   std::size_t from_begin() const { return bucket_end_[0]; }
   std::size_t throughout() const { return throughout_; }
+  /// Calls use(pair) for all pairs in the order in which the traversal found them, those that overlap
+  /// throughout first: it is similar in consecutive segments.
+  template <class Use>
+  void for_found(const Use& use) const {
+    const std::size_t joined = throughout_ + found_at_.size();
+    for (std::uint32_t pair = 0; pair < throughout_; ++pair) use(pair);
+    for (const std::uint32_t pair : found_at_) use(pair);
+    for (auto pair = std::uint32_t(joined); pair < count_; ++pair) use(pair);
+  }
   /// Returns the bodies of one of `pairs`, by its index.
   BodyPair bodies_of(std::size_t pair) const {
     return bodies_.size() == 1 ? bodies_[0] : bodies_[bodies_of_[pair]];
@@ -155,6 +164,7 @@ class IntervalJoin {
   Columns found_throughout_, found_partly_;
   std::vector<JoinedPair> sorted_;          ///< may be longer than the number of pairs
   std::vector<std::uint32_t> bodies_of_;    ///< [sorted_] index into bodies_, if there are several
+  std::vector<std::uint32_t> found_at_;     ///< the other pairs in the order of discovery, by index
   std::size_t throughout_ = 0, count_ = 0;  ///< counts in sorted_: from start to end, and all
   bool reading_ = false;
   std::uint32_t bucket_end_[FractionBuckets::count] = {};  ///< in sorted_

@@ -103,14 +103,14 @@ class JoinChanges {
   static bool is_candidate(const Part& part, std::uint32_t pair) {
     return part.filter == nullptr ? part.join->overlaps(pair) : part.filter->may_intersect(pair);
   }
-  /// Appends the pairs that `is_in` selects.
+  /// Appends the pairs that `is_in` selects, in the order of their discovery.
   template <class IsIn>
   static void append(const Part& part, PairBuffer& out, const IsIn& is_in) {
-    const auto count = std::uint32_t(part.join->pairs().size());
     std::size_t size = out.size();
-    out.resize(size + count);
-    for (std::uint32_t pair = 0; pair < count; ++pair)
+    out.resize(size + part.join->pairs().size());
+    part.join->for_found([&](std::uint32_t pair) {
       if (is_in(pair)) out[size++] = part.join->primitives_of(pair);
+    });
     out.resize(size);
   }
   void follow(const Part& part, std::size_t i) {
