@@ -2,8 +2,8 @@
 // the pairs of primitives that come near each other in the segment, with their times; frames are read from
 // it. Prior art and the differences to it: core/adr/0010-prior-art-of-answering-intervals.md.
 //
-// Where plans change at run time, the segment is kept: leaves with a changed vertex, the boxes above them, and
-// the pairs of changed primitives are made anew. The length of segments follows the rate of changes. This
+// Where plans change at run time, the segment is kept: leaves with a changed vertex, the boxes above them,
+// and the pairs of changed primitives are made anew. The length of segments follows the rate of changes. This
 // pays while few leaves change: with 420 changed vertices a frame at the corner of a cloth of 65k triangles
 // (1 % of all leaves), candidates take half of the time of the best refit, and with a new segment at each
 // change twice the time. It does not pay where the changes are where the contacts are: with 163 changes a

@@ -57,8 +57,8 @@ Meshes tablecloth(const BuiltinOptions& options, const MakeProgress& progress) {
   return simulated(config, scenes::simulate_tablecloth, "tablecloth", progress);
 }
 
-// The hand holds a corner of the tablecloth and pulls it over the table, while the cloth falls. Ten frames per
-// keyframe, as many as cloth needs to be the easy case of other scenes; plans change at every frame.
+// The hand holds a corner of the tablecloth and pulls it over the table, while the cloth falls. Ten frames
+// per keyframe, as many as cloth needs to be the easy case of other scenes; plans change at every frame.
 DragRule dragged_corner(const BuiltinOptions& options, const Meshes& meshes) {
   constexpr std::uint32_t frames_per_keyframe = 10;
   DragRule rule;
@@ -191,7 +191,8 @@ const std::vector<BuiltinScene>& builtin_scenes() {
        "number of frames",
        &reversing_spheres, &reversing_rule},
       {"dragged_cloth",
-       "a tablecloth of which a hand drags one corner over the table, 10 frames per keyframe; plans change at "
+       "a tablecloth of which a hand drags one corner over the table, 10 frames per keyframe; plans change "
+       "at "
        "every frame",
        &tablecloth, nullptr, BodiesOf::several, &dragged_corner},
       {"passing_spheres", "two rigid spheres pass through each other", &passing_spheres},

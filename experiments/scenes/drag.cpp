@@ -61,10 +61,10 @@ PlanScript<S> drag_script(const Scene<S>& scene, const DragRule& rule) {
       change.vertex = one.vertex;
       for (std::size_t d = 0; d < 3; ++d) {
         const std::size_t at = std::size_t(3) * one.vertex + d;
-        const double own = k + 1 == times.size() ? 0.0
-                                                 : (double(plans.keyframe(k + 1)[at]) -
-                                                    double(plans.keyframe(k)[at])) /
-                                                       (times[k + 1] - times[k]);
+        const double own = k + 1 == times.size()
+                               ? 0.0
+                               : (double(plans.keyframe(k + 1)[at]) - double(plans.keyframe(k)[at])) /
+                                     (times[k + 1] - times[k]);
         change.velocity[d] = S(own + one.weight * hand * rule.path[d]);
       }
       step.changes.push_back(std::move(change));
