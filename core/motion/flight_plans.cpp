@@ -185,7 +185,15 @@ double FlightPlans<S>::lines_begin(double t) const {
   const auto& times = keyframes_->times;
   double begin =
       !has_knots() || t < times[0] ? -std::numeric_limits<double>::infinity() : times[segment_at(t)];
+  // Plans without a further knot are known by their groups, of which there are far fewer.
+  std::size_t on_rays = 0;
+  for (const Rays& rays : rays_) {
+    on_rays += rays.vertices.size();
+    if (rays.t0 <= t) begin = std::max(begin, rays.t0);
+  }
+  if (on_rays == own_plans_.size()) return begin;
   for (const OwnPlan& plan : own_plans_) {
+    if (plan.group != none) continue;
     const auto above = std::upper_bound(plan.times.begin(), plan.times.end(), t);
     if (above != plan.times.begin()) begin = std::max(begin, *(above - 1));
   }
@@ -197,7 +205,14 @@ double FlightPlans<S>::lines_end(double t) const {
   const auto& times = keyframes_->times;
   const auto above = has_knots() ? std::upper_bound(times.begin(), times.end(), t) : times.end();
   double end = above == times.end() ? std::numeric_limits<double>::infinity() : *above;
-  for (const OwnPlan& plan : own_plans_) end = std::min(end, piece_end(plan.vertex, t));
+  std::size_t on_rays = 0;
+  for (const Rays& rays : rays_) {
+    on_rays += rays.vertices.size();
+    if (t < rays.t0) end = std::min(end, rays.t0);
+  }
+  if (on_rays == own_plans_.size()) return end;
+  for (const OwnPlan& plan : own_plans_)
+    if (plan.group == none) end = std::min(end, piece_end(plan.vertex, t));
   return end;
 }
 

@@ -35,6 +35,15 @@ struct ReversalRule {
   std::uint32_t frames = 0;
 };
 
+/// A hand that drags a part of the first body along a straight path and back, while keyframes move the rest.
+struct DragRule {
+  std::array<double, 3> grip;  ///< position at the first keyframe
+  double radius = 0;           ///< vertices up to this distance are held, less firmly the further away
+  std::array<double, 3> path;  ///< of the grip, relative to its motion without the hand
+  double frames_per_second = 60;
+  std::uint32_t frames = 0;
+};
+
 /// The bodies that a scene's pairs are between.
 enum class BodiesOf : std::uint8_t {
   several,  ///< pairs between bodies
@@ -49,6 +58,11 @@ struct BuiltinScene {
   /// For scenes whose plans change at run time: they are played at the rule's frames. Else nullptr.
   ReversalRule (*reversal)(const BuiltinOptions& options) = nullptr;
   BodiesOf bodies = BodiesOf::several;
+  /// The same for scenes with a dragged part, as a function of the generated bodies.
+  DragRule (*drag)(const BuiltinOptions& options, const std::vector<io::AnimatedMesh>& meshes) = nullptr;
+
+  /// Returns whether the scene makes its own changes of plans, and defines its frames.
+  bool changes_plans() const { return reversal != nullptr || drag != nullptr; }
 };
 
 const std::vector<BuiltinScene>& builtin_scenes();

@@ -171,7 +171,7 @@ const char* word(VertexOrder order) {
 
 bool has_own_frames(const SceneSpec& spec) {
   return (spec.script && spec.script->frames > 0) ||
-         (!spec.builtin.empty() && find_builtin_scene(spec.builtin).reversal != nullptr);
+         (!spec.builtin.empty() && find_builtin_scene(spec.builtin).changes_plans());
 }
 
 std::string given_name(const SceneSpec& spec) {
@@ -264,7 +264,7 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
     }
   }
   if (const json* script = keys.find("script")) {
-    if (!base.builtin.empty() && find_builtin_scene(base.builtin).reversal != nullptr)
+    if (!base.builtin.empty() && find_builtin_scene(base.builtin).changes_plans())
       keys.fail("script", "the scene '" + base.builtin + "' records its own");
     base.script = read_script_spec(*script, place + ": script", folder);
   }
@@ -320,6 +320,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     loaded.meshes = builtin.make(spec.options, progress);
     if (builtin.bodies == BodiesOf::one) loaded.self.assign(loaded.meshes.size(), true);
     if (builtin.reversal != nullptr) loaded.reversal = builtin.reversal(spec.options);
+    if (builtin.drag != nullptr) loaded.drag = builtin.drag(spec.options, loaded.meshes);
     loaded.name = spec.builtin;
     // Shapes end their names with the number of triangles that their pattern allowed.
     if (!loaded.meshes.empty()) loaded.name += "-" + std::to_string(loaded.meshes[0].primitive_count());

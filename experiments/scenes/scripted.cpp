@@ -8,6 +8,7 @@
 #include "experiments/common/environment.hpp"
 #include "experiments/common/json_reader.hpp"
 #include "experiments/io/bytes.hpp"
+#include "experiments/scenes/drag.hpp"
 #include "experiments/scenes/reversal.hpp"
 #include "experiments/scenes/scene_spec.hpp"
 
@@ -169,20 +170,21 @@ PlanScript<S> tried_out(const Scene<S>& scene, const ScriptSpec& spec) {
 template <class S>
 PlanScript<S> script_of(const Scene<S>& scene, const LoadedScene& loaded, const MakeProgress& progress) {
   if (loaded.reversal) return recorded_reversals(scene, *loaded.reversal, cache_folder(), progress);
+  if (loaded.drag) return drag_script(scene, *loaded.drag);
   if (loaded.script) return tried_out(scene, *loaded.script);
   return {};
 }
 
 bool has_own_frames(const LoadedScene& loaded) {
-  return loaded.reversal || (loaded.script && loaded.script->frames > 0);
+  return loaded.reversal || loaded.drag || (loaded.script && loaded.script->frames > 0);
 }
 
 template <class S>
 std::vector<double> frames_of(const Scene<S>& scene, const LoadedScene& loaded, const PlanScript<S>& script,
                               std::uint32_t per_keyframe, std::size_t most) {
   std::vector<double> frames;
-  if (loaded.reversal) {
-    frames = frames_of(*loaded.reversal);
+  if (loaded.reversal || loaded.drag) {
+    frames = loaded.drag ? frames_of(*loaded.drag) : frames_of(*loaded.reversal);
     frames.resize(std::min(frames.size(), most));
     return frames;
   }

@@ -103,7 +103,7 @@ py::dict make_scene(const std::string& description, const std::string& folder, c
         precision == "float32" ? played<float>(loaded, per_keyframe) : played<double>(loaded, per_keyframe);
     return out;
   }
-  out["changes"] = loaded.reversal.has_value() || loaded.script.has_value();
+  out["changes"] = loaded.reversal.has_value() || loaded.drag.has_value() || loaded.script.has_value();
   py::list bodies;
   for (std::size_t i = 0; i < loaded.meshes.size(); ++i)
     bodies.append(body_of(loaded.meshes[i], i < loaded.self.size() && loaded.self[i]));

@@ -18,7 +18,7 @@ void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>&
   leaf_pairs_room_ = leaf_pairs;
   node_tests_ = 0;
   leaf_pairs_seen_ = leaf_pairs_left_ = 0;
-  reading_ = false;
+  reading_ = indexed_ = has_beginning_ = false;
   following_ = {};
   throughout_ = count_ = 0;
   traversal_ = {};
@@ -200,8 +200,10 @@ void IntervalJoin<S>::sort_by_begin() {
     bodies_of_[i] = bodies;
   }
   bodies = 0;
+  found_at_.resize(partly);
   for (std::size_t i = 0; i < partly; ++i) {
     const std::uint32_t to = place[FractionBuckets::of(found_partly_.begin[i])]++;
+    found_at_[i] = to;
     sorted_[to] = {found_partly_.primitive_a[i], found_partly_.primitive_b[i], found_partly_.begin[i],
                    found_partly_.end[i]};
     if (!several) continue;
@@ -220,7 +222,7 @@ void IntervalJoin<S>::start_reading() {
     place_.resize(count_);
   }
   for (std::size_t i = 0; i < throughout_; ++i) alive_[i] = primitives_of(i);
-  next_ = alive_count_ = std::uint32_t(throughout_);
+  next_ = alive_count_ = fixed_ = std::uint32_t(throughout_);
   waiting_.clear();
   std::fill(std::begin(ending_), std::end(ending_), none);
   present_ = 0;
@@ -265,16 +267,18 @@ void IntervalJoin<S>::move_to(float fraction) {
   for (std::size_t i = 0; i < before; ++i) begin_or_wait(waiting_[i]);
   for (; next_ < bucket_end_[bucket]; ++next_) begin_or_wait(next_);
   waiting_.resize(kept);
+  if (has_beginning_) begin_added(fraction, bucket);
   // Ending pairs: the lists of earlier buckets as a whole.
   for (; present_ < bucket; ++present_) {
-    for (std::uint32_t index = ending_[present_]; index != none; index = next_ending_[index]) end_pair(index);
+    for (std::uint32_t index = ending_[present_]; index != none; index = next_ending_[index])
+      if (!is_removed(index)) end_pair(index);
     ending_[present_] = none;
   }
   for (std::uint32_t* link = &ending_[bucket]; *link != none;) {
     const std::uint32_t index = *link;
     if (sorted_[index].end < fraction) {
       *link = next_ending_[index];
-      end_pair(index);
+      if (!is_removed(index)) end_pair(index);
     } else {
       link = &next_ending_[index];
     }
@@ -290,8 +294,10 @@ std::size_t IntervalJoin<S>::bytes() const {
          own_leaves_.capacity() * sizeof(LeafSlot) + shared_.bytes() +
          (bucket_places_.capacity() + added_.capacity()) * sizeof(std::uint32_t) +
          (bodies_of_.capacity() + waiting_.capacity() + alive_places_.capacity() + next_ending_.capacity() +
-          place_.capacity()) *
-             sizeof(std::uint32_t);
+          place_.capacity() + first_primitive_.capacity() + heads_.capacity() + links_.capacity() +
+          removed_.capacity() + found_at_.capacity()) *
+             sizeof(std::uint32_t) +
+         no_lanes_.capacity() + no_entries_.capacity() * sizeof(std::uint16_t);
 }
 
 template class IntervalJoin<float>;

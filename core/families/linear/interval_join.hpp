@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/families/linear/changed_parts.hpp"
 #include "core/families/linear/linear_segment.hpp"
 #include "core/families/linear/pair_marks.hpp"
 #include "core/families/linear/shared_join.hpp"
@@ -77,12 +78,25 @@ class IntervalJoin {
   /// pairs overlap.
   void move_to(float fraction);
   bool overlaps(std::uint32_t pair) const {
-    if (pair < throughout_) return true;
+    if (pair < fixed_) return true;
     const std::uint32_t place = place_[pair];
-    return place >= throughout_ && place < alive_count_ && alive_places_[place] == pair;
+    return place >= fixed_ && place < alive_count_ && alive_places_[place] == pair;
   }
   /// Touches these marks whenever a pair begins or ends to overlap, until the next join.
   void follow(const FollowingMarks& marks) { following_ = marks; }
+
+  /// The reader of the pairs: `read` and `move_to`, or a TriangleSpanFilter.
+  enum class Reader : std::uint8_t { join, filter };
+  /// Removes the pairs of primitives whose plans changed, and joins these primitives again: they, and all
+  /// pairs within the segment that they take part in from `fraction` on, which must not be before that of the
+  /// last call of `read` or `move_to`. Removed pairs keep their places in `pairs`, but end at -1; new pairs
+  /// are appended. `changed` holds the changes by body. Returns the box tests made. O(pairs) at the first
+  /// call in a segment; afterwards in proportion to the changed primitives, their pairs, and the nodes above
+  /// them.
+  std::uint64_t repair(std::span<const ChangedParts> changed, float fraction, Reader reader);
+  /// Returns the pairs that the last `repair` removed, and the first one that it appended.
+  std::span<const std::uint32_t> removed() const { return removed_; }
+  std::uint32_t first_added() const { return first_added_; }
 
   /// Returns all pairs of the segment: first those that overlap from its start to its end, then the others
   /// roughly in the order of their start.
@@ -91,6 +105,15 @@ class IntervalJoin {
   /// overlap throughout are first in it.
   std::size_t from_begin() const { return bucket_end_[0]; }
   std::size_t throughout() const { return throughout_; }
+  /// Calls use(pair) for all pairs in the order in which the traversal found them, those that overlap
+  /// throughout first: it is similar in consecutive segments.
+  template <class Use>
+  void for_found(const Use& use) const {
+    const std::size_t joined = throughout_ + found_at_.size();
+    for (std::uint32_t pair = 0; pair < throughout_; ++pair) use(pair);
+    for (const std::uint32_t pair : found_at_) use(pair);
+    for (auto pair = std::uint32_t(joined); pair < count_; ++pair) use(pair);
+  }
   /// Returns the bodies of one of `pairs`, by its index.
   BodyPair bodies_of(std::size_t pair) const {
     return bodies_.size() == 1 ? bodies_[0] : bodies_[bodies_of_[pair]];
@@ -115,6 +138,15 @@ class IntervalJoin {
   void sort_by_begin();
   void sort_by_begin(Workers& workers);
   void start_reading();
+  bool is_removed(std::uint32_t index) const { return sorted_[index].end < 0; }
+  void index_pairs();
+  void link(std::uint32_t index);
+  void remove(std::uint32_t index, Reader reader);
+  void remove_changed(std::span<const ChangedParts> changed, Reader reader);
+  void join_changed(const ChangedParts& a, const ChangedParts& b);
+  void make_room(std::size_t pairs);
+  void add(const JoinedPair& pair, std::uint32_t bodies, float fraction, Reader reader);
+  void begin_added(float fraction, std::uint32_t bucket);
   void begin_pair(std::uint32_t index);
   void end_pair(std::uint32_t index);
 
@@ -141,6 +173,7 @@ class IntervalJoin {
   JoinedColumns found_throughout_, found_partly_;
   std::vector<JoinedPair> sorted_;          ///< may be longer than the number of pairs
   std::vector<std::uint32_t> bodies_of_;    ///< [sorted_] index into bodies_, if there are several
+  std::vector<std::uint32_t> found_at_;     ///< the other pairs in the order of discovery, by index
   std::size_t throughout_ = 0, count_ = 0;  ///< counts in sorted_: from start to end, and all
   bool reading_ = false;
   std::uint32_t bucket_end_[FractionBuckets::count] = {};  ///< in sorted_
@@ -154,11 +187,24 @@ class IntervalJoin {
   /// Alive pairs, in lists by the bucket of their end.
   std::uint32_t ending_[FractionBuckets::count] = {}, present_ = 0;
   std::vector<std::uint32_t> next_ending_;
+  std::uint32_t fixed_ = 0;  ///< so many pairs are the first of `alive_`, in their order
   FollowingMarks following_;
   /// Only with several threads: the join; [part of the pairs][bucket] the place of the next pair; the pairs
   /// of bodies that were joined.
   SharedJoin<S> shared_;
   std::vector<std::uint32_t> bucket_places_, added_;
+
+  // Only after a repair in the segment:
+  bool indexed_ = false;
+  std::vector<std::uint32_t> first_primitive_;  ///< [body]: number of its first primitive in the scene
+  std::vector<std::uint32_t> heads_, links_;    ///< lists of pairs by primitive; links: [pair][side]
+  std::vector<std::uint32_t> removed_;
+  std::uint32_t first_added_ = 0;
+  /// Added pairs that have not begun, in lists by the bucket of their begin, linked in next_ending_.
+  std::uint32_t beginning_[FractionBuckets::count] = {}, beginning_from_ = 0;
+  bool has_beginning_ = false;
+  std::vector<std::uint8_t> no_lanes_;     ///< all 0
+  std::vector<std::uint16_t> no_entries_;  ///< all 0
 };
 
 extern template class IntervalJoin<float>;

@@ -73,6 +73,7 @@ void IntervalJoin<S>::sort_by_begin(Workers& workers) {
                                               [&](const Found& found) { return found.*member <= i; }) -
                          found_.begin());
   };
+  found_at_.resize(partly);
   const Parts fixed{throughout_, pairs_at_once}, cut{partly, pairs_at_once};
   bucket_places_.assign(cut.parts() * buckets, 0);
   workers.for_each(fixed.parts() + cut.parts(), [&](std::size_t part, std::uint32_t) {
@@ -102,6 +103,7 @@ void IntervalJoin<S>::sort_by_begin(Workers& workers) {
     std::uint32_t bodies = several ? first_bodies(cut.begin(part), &Found::partly) : 0;
     for (std::size_t i = cut.begin(part); i < cut.end(part); ++i) {
       const std::uint32_t to = place[FractionBuckets::of(found_partly_.begin[i])]++;
+      found_at_[i] = to;
       sorted_[to] = {found_partly_.primitive_a[i], found_partly_.primitive_b[i], found_partly_.begin[i],
                      found_partly_.end[i]};
       if (!several) continue;

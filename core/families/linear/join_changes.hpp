@@ -39,6 +39,10 @@ class JoinChanges {
         append(parts[i], one.before, [&](std::uint32_t pair) { return one.marks[i].is_reported(pair); });
     }
   }
+  /// Notes that the joins were repaired: a pair may end and begin again, in another place.
+  void repaired() {
+    for (One& one : of_) one.repaired = true;
+  }
   /// Appends the changes since the last call for the same answer. Pairs need span tests in every part.
   /// `confirm(pairs)` keeps those that intersect, in their order.
   template <class Confirm>
@@ -46,6 +50,11 @@ class JoinChanges {
             PairBuffer& ended) {
     One& one = of_[std::size_t(answer)];
     if (!one.follows) after_.clear();
+    const bool again = one.follows && one.repaired;
+    one.repaired = false;
+    again_begun_.clear();
+    again_ended_.clear();
+    PairBuffer &begins = again ? again_begun_ : begun, &ends = again ? again_ended_ : ended;
     for (std::size_t i = 0; i < parts.size(); ++i) {
       PairMarks& marks = one.marks[i];
       if (!one.follows) marks.start(parts[i].join->pairs().size());
@@ -59,9 +68,10 @@ class JoinChanges {
       if (!one.follows)
         append(parts[i], after_, [&](std::uint32_t pair) { return is_in(pair) && marks.set_reported(pair); });
       marks.report(is_in, [&](std::uint32_t pair, bool began) {
-        (began ? begun : ended).push_back(parts[i].join->primitives_of(pair));
+        (began ? begins : ends).push_back(parts[i].join->primitives_of(pair));
       });
     }
+    if (again) difference_.find(again_ended_, again_begun_, begun, ended);
     if (one.follows) return;
     one.follows = true;
     for (std::size_t i = 0; i < parts.size(); ++i) follow(parts[i], i);
@@ -71,7 +81,9 @@ class JoinChanges {
 
   std::size_t bytes() const {
     std::size_t total =
-        (after_.capacity() + to_test_.capacity()) * sizeof(PrimitivePair) + difference_.bytes();
+        (after_.capacity() + to_test_.capacity() + again_begun_.capacity() + again_ended_.capacity()) *
+            sizeof(PrimitivePair) +
+        difference_.bytes();
     for (const One& one : of_) {
       total += one.before.capacity() * sizeof(PrimitivePair);
       for (const PairMarks& marks : one.marks) total += sizeof marks + marks.bytes();
@@ -84,20 +96,21 @@ class JoinChanges {
   struct One {
     std::vector<PairMarks> marks;  ///< [part]
     bool follows = false;          ///< the marks belong to the current segment
+    bool repaired = false;         ///< since the last answer
     PairBuffer before;             ///< reported in earlier segments, unless the marks follow
   };
 
   static bool is_candidate(const Part& part, std::uint32_t pair) {
     return part.filter == nullptr ? part.join->overlaps(pair) : part.filter->may_intersect(pair);
   }
-  /// Appends the pairs that `is_in` selects.
+  /// Appends the pairs that `is_in` selects, in the order of their discovery.
   template <class IsIn>
   static void append(const Part& part, PairBuffer& out, const IsIn& is_in) {
-    const auto count = std::uint32_t(part.join->pairs().size());
     std::size_t size = out.size();
-    out.resize(size + count);
-    for (std::uint32_t pair = 0; pair < count; ++pair)
+    out.resize(size + part.join->pairs().size());
+    part.join->for_found([&](std::uint32_t pair) {
       if (is_in(pair)) out[size++] = part.join->primitives_of(pair);
+    });
     out.resize(size);
   }
   void follow(const Part& part, std::size_t i) {
@@ -124,7 +137,7 @@ class JoinChanges {
   }
 
   One of_[2];  ///< [Answer]
-  PairBuffer after_, to_test_;
+  PairBuffer after_, to_test_, again_begun_, again_ended_;
   PairDifference difference_;
 };
 

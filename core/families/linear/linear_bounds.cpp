@@ -6,34 +6,14 @@
 #include <stdexcept>
 
 #include "core/families/linear/segment_interval.hpp"
+#include "core/families/linear/swept_root.hpp"
 #include "core/families/linear/translated_boxes.hpp"
 #include "core/families/wide/kernels/bounds.hpp"
 #include "core/geometry/predicates.hpp"
-#include "core/motion/admissible.hpp"
 
 namespace kbvh {
 
 namespace {
-template <class S>
-Box<S> swept(const BodySegmentBounds<S>& side) {
-  Box<S> box;
-  for (const EndpointBounds<S>& end : side.at)
-    for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] = std::min(box.lower[axis], end.node_bounds[axis] - 2 * side.margin);
-      box.upper[axis] = std::max(box.upper[axis], end.node_bounds[axis + 4] + 2 * side.margin);
-    }
-  return box;
-}
-
-/// Tests whether the body stays near the admissible range until this end. Beyond it differences of boxes
-/// could overflow.
-template <class S>
-bool admissible_root(const EndpointBounds<S>& end) {
-  const auto near = [](S x) { return std::abs(x) <= 2 * admissible_reach<S>; };
-  return std::all_of(end.node_bounds, end.node_bounds + 3, near) &&
-         std::all_of(end.node_bounds + 4, end.node_bounds + 7, near);
-}
-
 constexpr std::uint32_t none_used = ~std::uint32_t(0);
 }  // namespace
 
@@ -45,6 +25,9 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
       cuts_(settings.cuts),
       memory_(scene.body_count(), settings.remembered_bytes),
       near_bodies_(scene.pairs(), scene.body_count()),
+      horizon_(settings.horizon),
+      changed_(scene.body_count()),
+      to_remake_(scene.body_count(), 0),
       bodies_(scene.body_count()),
       counts_(scene.body_count()),
       ahead_counts_(scene.body_count()),
@@ -62,8 +45,8 @@ template <class S>
 void LinearBounds<S>::choose_segment(Segment& segment, const SegmentMotion<S>& motion, double t) const {
   // Plans without an end: as many frames ahead as segments have lasted lately.
   const double endless_duration = 1.01 * foreseen_ * (step_ > 0 ? step_ : 1.0 / 64);
-  const SegmentInterval interval =
-      segment_interval(motion, body_count(), t, segment.pieces, endless_duration);
+  SegmentInterval interval = segment_interval(motion, body_count(), t, segment.pieces, endless_duration);
+  if (!whole_ && segment.pieces == 1) horizon_.cut(interval, t, step_, segments_[present_].end);
   segment.begin = interval.begin;
   segment.end = interval.end;
   segment.knot = interval.knot;
@@ -174,7 +157,8 @@ void LinearBounds<S>::make_margin(BodySegmentBounds<S>& side) const {
   S largest = 0;
   if (!side.hierarchy().empty())
     largest = std::max(largest_coordinate(side.at[0]), largest_coordinate(side.at[1]));
-  side.margin = 8 * std::numeric_limits<S>::epsilon() * largest + 8 * std::numeric_limits<S>::denorm_min();
+  const S ulps = side.repaired ? 12 : 8;
+  side.margin = ulps * std::numeric_limits<S>::epsilon() * largest + 8 * std::numeric_limits<S>::denorm_min();
 }
 
 template <class S>
@@ -183,6 +167,8 @@ void LinearBounds<S>::start() {
   last_ = motion_.time();
   step_ = 0;
   foreseen_ = 1;
+  horizon_.start_over();
+  repairs_ = {};
   near_bodies_.start_over();
   std::fill(counts_.begin(), counts_.end(), Counts{});
   restart();
@@ -191,6 +177,8 @@ void LinearBounds<S>::start() {
 template <class S>
 void LinearBounds<S>::plans_changed() {
   foreseen_ = std::max(1.0, foreseen_ / 2);
+  horizon_.changed();
+  ++repairs_.restarted;
   restart();
 }
 
@@ -213,11 +201,16 @@ template <class S>
 bool LinearBounds<S>::advance() {
   note_time();
   came_ahead_ = false;
-  if (end() != none && motion_.time() <= end()) return false;
+  if (end() != none && motion_.time() <= end()) {
+    if (pass_knots()) return false;
+    restart();
+    return true;
+  }
   if (ahead_exists_ && motion_.time() <= ahead().end) {
     came_ahead_ = step_ahead(std::numeric_limits<std::uint64_t>::max());
   }
   if (came_ahead_) {
+    horizon_.next_segment(share_made_anew());
     present_ = 1 - present_;
     for (std::uint32_t body = 0; body < body_count(); ++body) {
       counts_[body].at_rest += ahead_counts_[body].at_rest;
@@ -251,6 +244,7 @@ bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const 
   BodySegmentBounds<S>& side = segment.sides[body];
   const BodySegmentBounds<S>& old = before.sides[body];
   side.apart = old.apart;
+  side.repaired = false;
   side.at_rest = motion.at_rest(body);
   side.current = true;
   std::array<std::uint32_t, 3> used{none_used, none_used, none_used};
@@ -285,6 +279,9 @@ bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const 
 template <class S>
 void LinearBounds<S>::next_segment() {
   forget_ahead();
+  knots_.clear();
+  clear_changed();
+  horizon_.next_segment(share_made_anew());
   const double t = motion_.time();
   const Segment& before = segments_[present_];
   Segment& segment = segments_[1 - present_];
@@ -482,9 +479,11 @@ AuditView LinearBounds<S>::audit_view(std::uint32_t body, double t) const {
 
 template <class S>
 std::size_t LinearBounds<S>::bytes() const {
-  std::size_t total = memory_.bytes() + near_bodies_.bytes() + shared_refit_.bytes() +
+  std::size_t total = memory_.bytes() + near_bodies_.bytes() + shared_refit_.bytes() + to_remake_.capacity() +
+                      knots_.capacity() * sizeof(Knot) +
                       (middle_lanes_.size() + middle_own_.size() + middle_room_.capacity()) * sizeof(S);
   for (const LinearBody<S>& body : bodies_) total += body.bytes();
+  for (const ChangedParts& parts : changed_) total += parts.bytes();
   for (const Segment& segment : segments_)
     total += segment.near_pairs.capacity() * sizeof(std::uint32_t) +
              segment.sides.size() * sizeof(BodySegmentBounds<S>);

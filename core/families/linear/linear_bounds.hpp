@@ -6,6 +6,8 @@
 
 #include "core/contract/strategy.hpp"
 #include "core/families/linear/bounds_cache.hpp"
+#include "core/families/linear/change_horizon.hpp"
+#include "core/families/linear/changed_parts.hpp"
 #include "core/families/linear/linear_segment.hpp"
 #include "core/families/linear/linear_settings.hpp"
 #include "core/families/wide/near_bodies.hpp"
@@ -42,6 +44,25 @@ class LinearBounds {
   void enter();
   /// Registers that plans changed at the motion's current time: the rest of the segment is a new one.
   void plans_changed();
+  /// Follows changes of plans at the motion's current time within the segment: only leaves with a changed
+  /// vertex, and the boxes above them, are made anew, from lines that are extended back to the segment's
+  /// begin. Boxes hold from the current time on. Returns false if the segment cannot be kept: call
+  /// `plans_changed` then. Later knots of these plans are followed by `advance`, as far as they lie in the
+  /// segment. O(changes x (primitives of a vertex + height)); the first call for a body is linear in it.
+  bool repair(std::span<const PlanChange<S>> changes);
+  /// Returns the parts of each body that changed since the segment began or `clear_changed` was called.
+  std::span<const ChangedParts> changed() const { return changed_; }
+  bool any_changed() const {
+    return std::any_of(changed_.begin(), changed_.end(),
+                       [](const ChangedParts& one) { return !one.empty(); });
+  }
+  void clear_changed();
+  /// Counts work since `start`: plan changes after which the segment was kept, or not; leaves and wide nodes
+  /// made anew in these segments.
+  struct Repairs {
+    std::uint64_t kept = 0, restarted = 0, leaves = 0, nodes = 0;
+  };
+  const Repairs& repairs() const { return repairs_; }
 
   /// Starts building the next segment; `motion` is the view from the current segment's end. Returns false if
   /// this is not possible: no segment follows, segments are cut by looseness, or `enter` was called after the
@@ -106,6 +127,11 @@ class LinearBounds {
     Refit refit;             ///< of the preceding body
     bool finished = false;
   };
+  /// A knot of a changed plan within the segment.
+  struct Knot {
+    double time;
+    std::uint32_t body, vertex;
+  };
   /// Whether the preceding segment ends or stays in use.
   enum class Before : std::uint8_t { ends, stays };
   static constexpr double none = -std::numeric_limits<double>::infinity();  ///< the end of no segment
@@ -128,6 +154,14 @@ class LinearBounds {
                 double t);
   void finish(Segment& segment, const SegmentMotion<S>& motion);
   void make_margin(BodySegmentBounds<S>& side) const;
+  bool take_over(std::uint32_t body);
+  void follow_change(const PlanChange<S>& change);
+  void follow_pieces(std::uint32_t body, std::uint32_t vertex);
+  void follow_line(std::uint32_t body, std::uint32_t vertex, double t, const S* from, const S* last);
+  bool pass_knots();
+  bool remake_boxes();
+  bool is_near_as_before();
+  double share_made_anew();
 
   SceneView<S> scene_;
   SegmentMotion<S> motion_;
@@ -137,6 +171,12 @@ class LinearBounds {
   bool whole_ = false;          ///< segments are not cut
   double last_ = 0, step_ = 0;  ///< time of the last frame, and the step to it
   double foreseen_ = 1;         ///< length in frames of a segment without an end
+  ChangeHorizon horizon_;
+  std::vector<ChangedParts> changed_;    ///< [body]
+  std::vector<std::uint8_t> to_remake_;  ///< [body]
+  std::vector<Knot> knots_;              ///< a heap
+  Repairs repairs_;
+  std::uint64_t leaves_before_ = 0;  ///< of repairs_.leaves, when the segment began
   std::vector<LinearBody<S>> bodies_;
   Segment segments_[2];
   std::uint32_t present_ = 0;

@@ -94,6 +94,9 @@ struct BodySegmentBounds {
   bool at_rest = false, current = false;
   /// The body meets no other body's box over this segment; only its root's box is read.
   bool apart = false;
+  /// Plans changed within the segment: lines of changed vertices are extended back to its begin, where only
+  /// they are in these places.
+  bool repaired = false;
   S margin = 0;  ///< margin by which every box is inflated
 
   WideHierarchy<S>& hierarchy() const { return body->hierarchy; }

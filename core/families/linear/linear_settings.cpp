@@ -22,12 +22,19 @@ std::vector<Parameter> linear_parameters() {
            "megabytes for boxes at segment ends that are reused when the clip plays again; a study replays "
            "the clip for each repetition, so its times are then those of a loop, not of a first play",
            0,
-           1e6}};
+           1e6},
+          {"horizon",
+           "0",
+           {},
+           "frames of a segment while plans change at run time; 0: chosen by the rate of changes",
+           0,
+           1024}};
 }
 
 LinearSettings linear_settings(const Params& params) {
   return {{std::uint32_t(params.number("pieces")), params.number("max_looseness")},
-          std::size_t(params.number("remember_mb") * 1e6)};
+          std::size_t(params.number("remember_mb") * 1e6),
+          params.number("horizon")};
 }
 
 }  // namespace kbvh

@@ -21,6 +21,8 @@ struct SegmentCuts {
 struct LinearSettings {
   SegmentCuts cuts;
   std::size_t remembered_bytes = 0;  ///< memory for boxes that are reused when the clip plays again
+  /// The frames of a segment within which plans change; 0: chosen.
+  double horizon = 0;
 };
 
 /// Returns the parameters of strategies with linear bounds, or converts their values to settings. Throws

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -13,6 +14,8 @@ class PairMarks {
     marks_.assign(pairs, 0);
     touched_.clear();
   }
+  /// Adds pairs to the segment, not reported, up to the given number. O(added pairs).
+  void extend(std::size_t pairs) { marks_.resize(std::max(marks_.size(), pairs), 0); }
   /// Notes that a pair may have begun or ended.
   void touch(std::uint32_t pair) {
     if ((marks_[pair] & touched) != 0) return;
@@ -53,6 +56,10 @@ struct FollowingMarks {
   void touch(std::uint32_t pair) const {
     for (PairMarks* marks : of)
       if (marks != nullptr) marks->touch(pair);
+  }
+  void extend(std::size_t pairs) const {
+    for (PairMarks* marks : of)
+      if (marks != nullptr) marks->extend(pairs);
   }
 };
 

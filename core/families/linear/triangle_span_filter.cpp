@@ -59,6 +59,33 @@ bool TriangleSpanFilter<S>::step(const LinearSegment<S>& segment, const SceneVie
 }
 
 template <class S>
+void TriangleSpanFilter<S>::repair(const IntervalJoin<S>& join) {
+  const auto pairs = join.pairs();
+  bool any_open = false;
+  for (const std::uint32_t pair : join.removed()) {
+    if (state_[pair] == State::intersecting)
+      cease_to_intersect(pair);
+    else if (state_[pair] == State::open)
+      any_open = true;
+  }
+  if (any_open) {
+    std::size_t kept = 0;
+    for (const Item item : open_)
+      if (pairs[item.pair].end >= 0)
+        open_[kept++] = item;
+      else
+        set_state(item.pair, State::apart);
+    open_.resize(kept);
+  }
+  if (next_.size() < pairs.size())
+    for (auto* column : {&next_, &place_}) column->resize(2 * pairs.size());
+  time_.resize(next_.size());
+  state_.resize(pairs.size(), State::apart);
+  following_.extend(pairs.size());
+  for (std::uint32_t pair = join.first_added(); pair < pairs.size(); ++pair) wait(pair, pairs[pair].begin);
+}
+
+template <class S>
 void TriangleSpanFilter<S>::wait(std::uint32_t pair, float until) {
   const std::uint32_t bucket = std::max(FractionBuckets::of(std::max(until, 0.0F)), bucket_);
   time_[pair] = until;

@@ -35,6 +35,8 @@ class TriangleSpanFilter {
   /// tell the states.
   void move_to(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                float fraction);
+  /// Follows a repair of the join.
+  void repair(const IntervalJoin<S>& join);
   bool intersects(std::uint32_t pair) const { return state_[pair] == State::intersecting; }
   /// Returns whether the pair is a candidate.
   bool may_intersect(std::uint32_t pair) const { return state_[pair] != State::apart; }

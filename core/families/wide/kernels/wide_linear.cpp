@@ -142,7 +142,7 @@ template <class S, std::size_t width>
 /// Boxes that are linear in time.
 template <class S, std::uint32_t width, bool self>
 struct SegmentView {
-  static constexpr bool within_one = self;
+  static constexpr bool within_one = self, selects = false;
   WideEnds<S> a, b;
   S margin;
   static constexpr std::size_t row_scalars = 6 * width;
@@ -182,6 +182,26 @@ struct SegmentView {
 template <class S, std::uint32_t width, bool self>
 void join(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b, WideTraversal& state) {
   SegmentView<S, width, self> view(ends_a, ends_b);
+  traverse_pairs(a, b, view, state);
+}
+
+/// Boxes that are linear in time, of which only pairs with a selected side are visited.
+template <class S, std::uint32_t width, bool self>
+struct SelectedView : SegmentView<S, width, self> {
+  static constexpr bool selects = true;
+  WideSelection selection;
+
+  [[gnu::always_inline]] SelectedView(const WideEnds<S>& first, const WideEnds<S>& second,
+                                      const WideSelection& lanes)
+      : SegmentView<S, width, self>(first, second), selection(lanes) {}
+  [[gnu::always_inline]] unsigned selected_a(std::uint32_t node) const { return selection.a[node]; }
+  [[gnu::always_inline]] unsigned selected_b(std::uint32_t node) const { return selection.b[node]; }
+};
+
+template <class S, std::uint32_t width, bool self>
+void join_selected(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b,
+                   WideSelection selection, WideTraversal& state) {
+  SelectedView<S, width, self> view(ends_a, ends_b, selection);
   traverse_pairs(a, b, view, state);
 }
 
@@ -366,7 +386,7 @@ template <class S, std::size_t padded>
 
 // The width is not a template parameter: it only determines the place of leaf boxes, and each copy of this
 // function is large.
-template <class S, std::size_t padded>
+template <class S, std::size_t padded, bool selected>
 void leaf_join(WideLeafJoin<S>& shared) {
   WideLeafJoin<S> state = shared;
   const S margin = state.ends_a.margin + state.ends_b.margin;
@@ -404,7 +424,16 @@ void leaf_join(WideLeafJoin<S>& shared) {
     const auto count_a = unsigned(__builtin_popcount(near_a)), count_b = unsigned(__builtin_popcount(near_b));
     state.tests += a.count + b.count;
     if (count_a == 0 || count_b == 0) continue;
-    if (count_a <= count_b) {
+    if constexpr (selected) {
+      // Selected primitives of a with all of b, then the others of a with the selected ones of b.
+      const unsigned selected_a = state.selected_a[number(state.a, slot_a)];
+      const unsigned first = near_a & selected_a, rest = near_a & ~selected_a;
+      const unsigned second = rest == 0 ? 0 : near_b & state.selected_b[number(state.b, slot_b)];
+      state.tests += std::uint64_t(unsigned(__builtin_popcount(first))) * b.count +
+                     std::uint64_t(unsigned(__builtin_popcount(second))) * a.count;
+      if (first != 0) leaf_pairs<S, padded>(a, first, b, near_b, margin, false, state, batch);
+      if (second != 0) leaf_pairs<S, padded>(b, second, a, rest, margin, true, state, batch);
+    } else if (count_a <= count_b) {
       state.tests += std::uint64_t(count_a) * b.count;
       leaf_pairs<S, padded>(a, near_a, b, near_b, margin, false, state, batch);
     } else {
@@ -417,11 +446,15 @@ void leaf_join(WideLeafJoin<S>& shared) {
 }
 
 template <class S>
-constexpr WideLinearKernels<S> table{{&at<S, 2>, &at<S, 4>, &at<S, 8>},
-                                     {&join<S, 2, false>, &join<S, 4, false>, &join<S, 8, false>},
-                                     {&leaf_join<S, 4>, &leaf_join<S, 8>, &leaf_join<S, 16>},
-                                     {&make<S, 2>, &make<S, 4>, &make<S, 8>},
-                                     {&join<S, 2, true>, &join<S, 4, true>, &join<S, 8, true>}};
+constexpr WideLinearKernels<S> table{
+    {&at<S, 2>, &at<S, 4>, &at<S, 8>},
+    {&join<S, 2, false>, &join<S, 4, false>, &join<S, 8, false>},
+    {&leaf_join<S, 4, false>, &leaf_join<S, 8, false>, &leaf_join<S, 16, false>},
+    {&make<S, 2>, &make<S, 4>, &make<S, 8>},
+    {&join<S, 2, true>, &join<S, 4, true>, &join<S, 8, true>},
+    {&join_selected<S, 2, false>, &join_selected<S, 4, false>, &join_selected<S, 8, false>},
+    {&join_selected<S, 2, true>, &join_selected<S, 4, true>, &join_selected<S, 8, true>},
+    {&leaf_join<S, 4, true>, &leaf_join<S, 8, true>, &leaf_join<S, 16, true>}};
 
 }  // namespace
 

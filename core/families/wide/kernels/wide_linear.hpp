@@ -26,6 +26,12 @@ struct WideMoment {
   S fraction;
 };
 
+/// The lanes that a traversal is restricted to, per node of each hierarchy: bit i: something in or below lane
+/// i is selected. A pair is visited if either side is selected.
+struct WideSelection {
+  const std::uint8_t *a, *b;
+};
+
 /// Two primitives whose boxes overlap at some time of a segment, with the fractions at which the overlap
 /// begins and ends. Closed; rounded outwards.
 struct JoinedPair {
@@ -71,6 +77,8 @@ struct WideLeafJoin {
   /// [pair of leaves] bit i: primitive i of the first leaf counts; bit 16 + i: primitive i of the second.
   /// Null: all count.
   const std::uint32_t* masks = nullptr;
+  /// [leaf]: bit i: entry i of the leaf is selected. For joins of selected pairs only.
+  const std::uint16_t *selected_a = nullptr, *selected_b = nullptr;
 };
 
 template <class S>
@@ -80,22 +88,32 @@ struct WideLinearKernels {
   /// The same for boxes that overlap at any time of the segment.
   using Join = void (*)(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b,
                         WideTraversal& state);
+  /// The same for pairs with a selected side.
+  using JoinSelected = void (*)(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b,
+                                WideSelection selection, WideTraversal& state);
   /// Continues until all pairs of leaves are done or the next one might exceed the free space
   /// (`JoinColumns::has_room`).
   using LeafJoin = void (*)(WideLeafJoin<S>& state);
   /// Computes the boxes of one node at a fraction.
   using Make = void (*)(const WideMoment<S>& moment, std::uint32_t node);
-  At at_width[3];                ///< [log2(width) - 1]
-  Join join_width[3];            ///< [log2(width) - 1]
-  LeafJoin leaf_join_padded[3];  ///< [padded leaf size 4, 8, 16]
-  Make make_width[3];            ///< [log2(width) - 1]
-  Join self_width[3];            ///< [log2(width) - 1]; a hierarchy with itself
+  At at_width[3];                                          ///< [log2(width) - 1]
+  Join join_width[3];                                      ///< [log2(width) - 1]
+  LeafJoin leaf_join_padded[3];                            ///< [padded leaf size 4, 8, 16]
+  Make make_width[3];                                      ///< [log2(width) - 1]
+  Join self_width[3];                                      ///< [log2(width) - 1]; a hierarchy with itself
+  JoinSelected selected_width[3], selected_self_width[3];  ///< the same for selected pairs
+  LeafJoin leaf_join_selected_padded[3];                   ///< the same; one side of a pair is selected
 
   static constexpr std::size_t index(std::uint32_t width) { return width == 2 ? 0 : width == 4 ? 1 : 2; }
   At at(std::uint32_t width) const { return at_width[index(width)]; }
   Join join(std::uint32_t width) const { return join_width[index(width)]; }
   Join self(std::uint32_t width) const { return self_width[index(width)]; }
+  JoinSelected selected(std::uint32_t width) const { return selected_width[index(width)]; }
+  JoinSelected selected_self(std::uint32_t width) const { return selected_self_width[index(width)]; }
   LeafJoin leaf_join(std::uint32_t padded) const { return leaf_join_padded[index(padded / 2)]; }
+  LeafJoin leaf_join_selected(std::uint32_t padded) const {
+    return leaf_join_selected_padded[index(padded / 2)];
+  }
   Make make(std::uint32_t width) const { return make_width[index(width)]; }
 };
 KBVH_DECLARE_KERNELS(WideLinearKernels<float>, wide_linear_float)

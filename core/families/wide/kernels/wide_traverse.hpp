@@ -78,6 +78,8 @@ template <class S, std::size_t width>
 ///   unsigned meeting_a(node, Box), meeting_b(node, Box)   bit i: lane i of the node meets the box
 ///   bool within_one   both hierarchies are the same: each two different leaves are found once, and each leaf
 ///     with itself
+///   bool selects      only pairs with a selected side are visited; then also
+///   unsigned selected_a(node), selected_b(node)    bit i: lane i of the node is selected
 template <class S, class View>
 [[gnu::always_inline]] inline void traverse_pairs(const WideArrays<S>& a, const WideArrays<S>& b, View& view,
                                                   WideTraversal& shared) {
@@ -91,10 +93,14 @@ template <class S, class View>
     if (((pair.first | pair.second) & WidePair::leaf_bit) == 0) {
       const WideNode node_a = a.nodes[pair.first], node_b = b.nodes[pair.second];
       unsigned first = view.meeting_a(pair.first, view.own_b(pair.second));
+      if constexpr (View::selects)
+        if (view.selected_b(pair.second) == 0) first &= view.selected_a(pair.first);
       state.tests += node_a.count + std::uint64_t(unsigned(__builtin_popcount(first))) * node_b.count;
       for (; first != 0; first &= first - 1) {
         const std::uint32_t i = lowest(first), child_a = child(node_a, pair.first, i);
         unsigned second = view.meeting_b(pair.second, view.lane_a(pair.first, i));
+        if constexpr (View::selects)
+          if ((view.selected_a(pair.first) >> i & 1) == 0) second &= view.selected_b(pair.second);
         // For a node with itself, the other half mirrors this one.
         if (View::within_one && pair.first == pair.second) second &= ~0U << i;
         for (; second != 0; second &= second - 1)
@@ -104,12 +110,16 @@ template <class S, class View>
       const LeafSlot leaf{pair.first & ~WidePair::leaf_bit};
       const WideNode node = b.nodes[pair.second];
       unsigned hit = view.meeting_b(pair.second, view.lane_a(leaf.node(), leaf.lane()));
+      if constexpr (View::selects)
+        if ((view.selected_a(leaf.node()) >> leaf.lane() & 1) == 0) hit &= view.selected_b(pair.second);
       state.tests += node.count;
       for (; hit != 0; hit &= hit - 1) emit(state, pair.first, child(node, pair.second, lowest(hit)));
     } else {
       const LeafSlot leaf{pair.second & ~WidePair::leaf_bit};
       const WideNode node = a.nodes[pair.first];
       unsigned hit = view.meeting_a(pair.first, view.lane_b(leaf.node(), leaf.lane()));
+      if constexpr (View::selects)
+        if ((view.selected_b(leaf.node()) >> leaf.lane() & 1) == 0) hit &= view.selected_a(pair.first);
       state.tests += node.count;
       for (; hit != 0; hit &= hit - 1) emit(state, child(node, pair.first, lowest(hit)), pair.second);
     }
@@ -120,7 +130,7 @@ template <class S, class View>
 /// Boxes stored in the rows.
 template <class S, std::uint32_t width>
 struct StoredView {
-  static constexpr bool within_one = false;
+  static constexpr bool within_one = false, selects = false;
   const S *lanes_a, *lanes_b, *all_own_b;
   static constexpr std::size_t row_scalars = 6 * width;
 

@@ -1,0 +1,218 @@
+// Repairs of a segment's bounds where plans changed within it.
+
+#include <algorithm>
+#include <utility>
+
+#include "core/families/linear/linear_bounds.hpp"
+#include "core/families/linear/swept_root.hpp"
+#include "core/families/wide/kernels/wide_refit.hpp"
+#include "core/geometry/predicates.hpp"
+#include "core/motion/round_positions.hpp"
+
+namespace kbvh {
+
+namespace {
+/// Orders a heap of knots, the earliest first.
+constexpr auto later = [](const auto& a, const auto& b) { return a.time > b.time; };
+
+/// Returns the coordinate at a time later than the piece's begin, on its line beyond its end, if necessary.
+template <class S>
+S extended(const Piece<S>& piece, double t) {
+  if (piece.kind == PieceKind::ray || t <= piece.t1) return round_piece(piece, t);
+  const double slope = (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
+  return S(double(piece.x0) + slope * (t - piece.t0));
+}
+
+/// Enlarges a node's box by a vertex.
+template <class S>
+void enlarge(S* node_bounds, const S* position) {
+  for (int axis = 0; axis < 3; ++axis) {
+    node_bounds[axis] = std::min(node_bounds[axis], position[axis]);
+    node_bounds[axis + 4] = std::max(node_bounds[axis + 4], position[axis]);
+  }
+}
+}  // namespace
+
+template <class S>
+bool LinearBounds<S>::repair(std::span<const PlanChange<S>> changes) {
+  forget_ahead();
+  const Segment& segment = segments_[present_];
+  const double t = motion_.time();
+  if (horizon_.frames() > 0) horizon_.changed();
+  // At the segment's end every vertex is still where it was foreseen, and the next segment knows its plan.
+  if (t == segment.end) return true;
+  if (horizon_.frames() == 0 || whole_ || !(segment.begin <= t && t < segment.end) ||
+      !(segment.end <= t + 2 * horizon_.frames() * step_))
+    return false;
+  for (const PlanChange<S>& change : changes)
+    if (!hierarchy(change.body).empty() && !take_over(change.body)) return false;
+  for (const PlanChange<S>& change : changes)
+    if (!hierarchy(change.body).empty()) follow_change(change);
+  const bool kept = remake_boxes();
+  repairs_.kept += kept;
+  return kept;
+}
+
+/// Puts the vertices of which knots have passed onto their next lines.
+template <class S>
+bool LinearBounds<S>::pass_knots() {
+  const double t = motion_.time();
+  if (knots_.empty() || !(knots_.front().time < t)) return true;
+  while (!knots_.empty() && knots_.front().time < t) {
+    const Knot knot = knots_.front();
+    std::pop_heap(knots_.begin(), knots_.end(), later);
+    knots_.pop_back();
+    follow_pieces(knot.body, knot.vertex);
+  }
+  return remake_boxes();
+}
+
+/// Makes a body's positions at both ends its own, so that single ones can be replaced. Returns false if its
+/// boxes are not: those of a body at rest belong to both ends, remembered ones to later plays.
+template <class S>
+bool LinearBounds<S>::take_over(std::uint32_t index) {
+  LinearBody<S>& body = bodies_[index];
+  BodySegmentBounds<S>& side = segments_[present_].sides[index];
+  if (!side.current || side.at_rest) return false;
+  for (EndpointBounds<S>& end : side.at) {
+    if (end.child_bounds != body.child_bounds[end.slot].data()) return false;
+    std::vector<S>& room = body.room[end.slot];
+    if (end.positions == room.data()) continue;
+    room.assign(end.positions, end.positions + std::size_t(3) * scene_.vertex_count(index) + 1);
+    end.positions = room.data();
+  }
+  if (!changed_[index].is_prepared()) changed_[index].prepare(body.hierarchy, scene_.vertex_count(index));
+  return true;
+}
+
+/// Follows a new plan from the present time on. Plans without a knot are read from the change: that costs a
+/// tenth of reading their pieces.
+template <class S>
+void LinearBounds<S>::follow_change(const PlanChange<S>& change) {
+  if (!change.times.empty()) return follow_pieces(change.body, change.vertex);
+  const S* const from = motion_.position(change.body, change.vertex);
+  const double rest = end() - motion_.time();
+  S last[3];
+  for (int axis = 0; axis < 3; ++axis)
+    last[axis] = S(double(from[axis]) + double(change.velocity[axis]) * rest);
+  follow_line(change.body, change.vertex, motion_.time(), from, last);
+}
+
+/// Follows the plan of a vertex from its last knot on.
+template <class S>
+void LinearBounds<S>::follow_pieces(std::uint32_t body, std::uint32_t vertex) {
+  S from[3], last[3];
+  Piece<S> piece;
+  for (int axis = 0; axis < 3; ++axis) {
+    piece = motion_.piece(body, vertex, axis);
+    from[axis] = piece.x0;
+    last[axis] = extended(piece, end());
+  }
+  if (piece.t1 < end()) {
+    knots_.push_back({piece.t1, body, vertex});
+    std::push_heap(knots_.begin(), knots_.end(), later);
+  }
+  follow_line(body, vertex, piece.t0, from, last);
+}
+
+/// Moves a vertex to the line from `from` at time t to `last` at the segment's end, extended back to the
+/// segment's begin, to from - (last - from) * back. The roundings of that number, and of `last` multiplied by
+/// `back`, shrink from there to t by 1 / (1 + back): after t, the line is off by at most 2 ulps more than one
+/// between two stored positions.
+template <class S>
+void LinearBounds<S>::follow_line(std::uint32_t index, std::uint32_t vertex, double t, const S* from,
+                                  const S* last) {
+  BodySegmentBounds<S>& side = segments_[present_].sides[index];
+  side.repaired = true;
+  S* position[2];
+  for (std::size_t end = 0; end < 2; ++end)
+    position[end] = bodies_[index].room[side.at[end].slot].data() + std::size_t(3) * vertex;
+  const double back = (t - begin()) / (end() - t);
+  for (int axis = 0; axis < 3; ++axis) {
+    position[0][axis] = S(double(from[axis]) - (double(last[axis]) - double(from[axis])) * back);
+    position[1][axis] = last[axis];
+  }
+  if (side.apart) {
+    for (std::size_t end = 0; end < 2; ++end)
+      enlarge(bodies_[index].node_bounds[side.at[end].slot].data(), position[end]);
+  } else {
+    changed_[index].mark(vertex);
+    to_remake_[index] = 1;
+  }
+}
+
+/// Makes the boxes of marked leaves and above anew. Returns whether the segment still serves: boxes are in
+/// the range of numbers, and no bodies have come near each other that were apart.
+template <class S>
+bool LinearBounds<S>::remake_boxes() {
+  Segment& segment = segments_[present_];
+  for (std::uint32_t index = 0; index < body_count(); ++index) {
+    BodySegmentBounds<S>& side = segment.sides[index];
+    if (to_remake_[index] != 0) {
+      to_remake_[index] = 0;
+      LinearBody<S>& body = bodies_[index];
+      const std::span<const std::uint32_t> nodes = changed_[index].nodes();
+      const auto refit = wide_refit_kernels<S>(body.hierarchy.kernels()).listed(body.hierarchy.width());
+      WideArrays<S> arrays = body.hierarchy.arrays();
+      for (const EndpointBounds<S>& end : side.at) {
+        arrays.child_bounds = body.child_bounds[end.slot].data();
+        arrays.node_bounds = body.node_bounds[end.slot].data();
+        refit(arrays, end.positions, nodes.data(), std::uint32_t(nodes.size()));
+        auto& stamps = body.stamps[end.slot];
+        if (!stamps.empty())
+          for (const std::uint32_t leaf : changed_[index].leaves()) stamps[leaf] = 0;
+      }
+      counts_[index].refitted += 2 * nodes.size();
+      repairs_.leaves += changed_[index].leaves().size();
+      repairs_.nodes += 2 * nodes.size();
+    }
+    if (!side.repaired) continue;
+    make_margin(side);
+    if (!admissible_root(side.at[0]) || !admissible_root(side.at[1])) return false;
+  }
+  return is_near_as_before();
+}
+
+/// Returns whether all bodies that may meet now are among those that were found to do so.
+template <class S>
+bool LinearBounds<S>::is_near_as_before() {
+  const Segment& segment = segments_[present_];
+  const auto box_of = [&](std::uint32_t body) {
+    const BodySegmentBounds<S>& side = segment.sides[body];
+    return side.hierarchy().empty() ? Box<double>{} : to_double(swept(side));
+  };
+  std::uint64_t tests = 0;
+  for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
+    const BodyPair& pair = scene_.pairs()[i];
+    const BodySegmentBounds<S>&a = segment.sides[pair.first], &b = segment.sides[pair.second];
+    if (a.hierarchy().empty() || b.hierarchy().empty() || !overlap(swept(a), swept(b))) continue;
+    if (a.apart || b.apart || !std::binary_search(segment.near_pairs.begin(), segment.near_pairs.end(), i))
+      return false;
+  }
+  return true;
+}
+
+/// Returns the share of all leaves that were made anew since the last call.
+template <class S>
+double LinearBounds<S>::share_made_anew() {
+  std::uint64_t all = 1;
+  for (const LinearBody<S>& body : bodies_) all += body.hierarchy.leaf_count();
+  const std::uint64_t before = std::exchange(leaves_before_, repairs_.leaves);
+  return double(repairs_.leaves - std::min(before, repairs_.leaves)) / double(all);
+}
+
+template <class S>
+void LinearBounds<S>::clear_changed() {
+  for (ChangedParts& parts : changed_) parts.clear();
+}
+
+template bool LinearBounds<float>::repair(std::span<const PlanChange<float>>);
+template bool LinearBounds<double>::repair(std::span<const PlanChange<double>>);
+template bool LinearBounds<float>::pass_knots();
+template bool LinearBounds<double>::pass_knots();
+template double LinearBounds<float>::share_made_anew();
+template double LinearBounds<double>::share_made_anew();
+template void LinearBounds<float>::clear_changed();
+template void LinearBounds<double>::clear_changed();
+
+}  // namespace kbvh

@@ -1,0 +1,160 @@
+// Segments that are repaired where plans change within them: an interval join in its simplest form conforms,
+// and so it does not with one seeded fault. (plan_changes_test.cpp and the suite: the registered strategies.)
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/families/linear/interval_join.hpp"
+#include "core/families/linear/linear_bounds.hpp"
+#include "core/families/linear/triangle_span_filter.hpp"
+#include "tests/conformance/check.hpp"
+
+namespace kbvh::test {
+namespace {
+
+enum class Fault : std::uint8_t {
+  none,
+  never_kept,     // no fault: every change begins a new segment
+  leaf_left_out,  // changed leaves of the second body are not joined again
+  root_left_out,  // the root's boxes are those before the change
+  span_not_cut,   // what was proved of a pair before the change is reported after it
+};
+
+template <class S, class Count, Fault fault>
+class Repaired : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+ public:
+  static constexpr Foresight foresight = Foresight::next_keyframe;
+  Repaired(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params&)
+      : CountedStrategy<S, Count>(scene, motion),
+        bounds_(scene, motion, std::move(topologies), active_kernel_set(), {}) {}
+  void reset_to(double /*t*/) override {
+    bounds_.start();
+    join();
+  }
+  void advance_to(double /*t*/) override {
+    if (bounds_.advance()) join();
+  }
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
+    std::vector<S> roots = fault == Fault::root_left_out ? exchange_roots({}) : std::vector<S>{};
+    const bool kept = fault != Fault::never_kept && bounds_.repair(changes);
+    if (kept) {
+      if (fault == Fault::root_left_out) exchange_roots(roots);
+      if (fault == Fault::span_not_cut) proved_before_ = proved_;
+      return;
+    }
+    bounds_.plans_changed();
+    join();
+  }
+  QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*none*/) override {
+    const float fraction = float(bounds_.fraction(t));
+    if (bounds_.any_changed()) {
+      std::vector<ChangedParts> changed(bounds_.changed().begin(), bounds_.changed().end());
+      if (fault == Fault::leaf_left_out) changed[1].clear();
+      join_.repair(changed, fraction, IntervalJoin<S>::Reader::filter);
+      filter_.repair(join_);
+      bounds_.clear_changed();
+    }
+    const std::size_t open = filter_.read(bounds_.segment(), this->scene_, join_, fraction, out);
+    proved_.assign(out.begin(), out.end() - std::ptrdiff_t(open));
+    for (const PrimitivePair& pair : proved_before_)
+      if (std::find(out.begin(), out.end(), pair) == out.end()) {
+        out.insert(out.begin(), pair);
+        proved_.push_back(pair);
+      }
+    return {};
+  }
+  void confirm_candidates(double t, PairBuffer& pairs) override {
+    PairBuffer open(pairs.begin() + std::ptrdiff_t(proved_.size()), pairs.end());
+    Strategy<S>::confirm_candidates(t, open);
+    pairs.resize(proved_.size());
+    pairs.insert(pairs.end(), open.begin(), open.end());
+  }
+  std::size_t bytes() const override { return bounds_.bytes() + join_.bytes() + filter_.bytes(); }
+  std::optional<AuditView> audit_view(std::uint32_t body) const override {
+    return bounds_.audit_view(body, this->time());
+  }
+
+ protected:
+  void add_counts(Counters& table) const override { table.add("segments_kept", bounds_.repairs().kept); }
+
+ private:
+  void join() {
+    join_.join(bounds_.segment(), this->scene_, this->scene_.pairs());
+    filter_.start(join_);
+    bounds_.clear_changed();
+    proved_before_.clear();
+  }
+  /// Returns the boxes of the roots' children at both ends, and replaces them unless `by` is empty.
+  std::vector<S> exchange_roots(const std::vector<S>& by) {
+    std::vector<S> roots;
+    for (std::uint32_t body = 0; body < bounds_.body_count(); ++body)
+      for (const EndpointBounds<S>& end : bounds_.side(body).at)
+        for (std::size_t i = 0; i < lane_scalars(8); ++i) {
+          roots.push_back(end.child_bounds[i]);
+          if (!by.empty()) const_cast<S*>(end.child_bounds)[i] = by[roots.size() - 1];
+        }
+    return roots;
+  }
+  LinearBounds<S> bounds_;
+  IntervalJoin<S> join_;
+  TriangleSpanFilter<S> filter_;
+  PairBuffer proved_, proved_before_;
+};
+
+template <Fault fault>
+struct With {
+  template <class S, class Count>
+  using Strategy = Repaired<S, Count, fault>;
+};
+
+/// Plays triangles whose plans change at every third frame or so, some with knots, and returns the first
+/// violation; counts the segments that were kept.
+template <class S, Fault fault>
+std::string violation(std::uint64_t& kept) {
+  Info info;
+  info.id = "repaired";
+  info.tightness = Tightness::conservative;
+  info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
+  const StrategyEntry entry = make_entry<With<fault>::template Strategy>(info);
+  const auto test = synthetic_scene<S>("plan_changes", 7);
+  Session<S> session(test.scene, {&entry, {}, info.topology.preferred}, CountingPolicy::counting);
+  const Verification result =
+      verify(session, std::span<const double>(test.frames.empty() ? frame_times(test.scene, 7) : test.frames),
+             shared_oracle(test), &test.script);
+  for (const auto& named : session.strategy().counters().named) kept += named.value;
+  return result.first_violation;
+}
+
+template <Fault fault>
+void expect(const std::string& expected, bool keeps) {
+  std::uint64_t kept = 0;
+  const std::string in_float = violation<float, fault>(kept), in_double = violation<double, fault>(kept);
+  EXPECT_EQ(kept > 0, keeps);
+  if (expected.empty()) {
+    EXPECT_EQ(in_float, "");
+    EXPECT_EQ(in_double, "");
+    return;
+  }
+  EXPECT_NE(in_float.find(expected), std::string::npos) << "in float: " << in_float;
+  EXPECT_NE(in_double.find(expected), std::string::npos) << "in double: " << in_double;
+}
+
+TEST(PlanRepairs, SoundOnesPass) {
+  expect<Fault::none>("", true);
+}
+TEST(PlanRepairs, NewSegmentsPass) {
+  expect<Fault::never_kept>("", false);
+}
+TEST(PlanRepairs, AChangedLeafThatIsNotJoinedAgain) {
+  expect<Fault::leaf_left_out>("t = ", true);
+}
+TEST(PlanRepairs, AnAncestorsBoxThatIsNotEnlarged) {
+  expect<Fault::root_left_out>("protrudes", true);
+}
+TEST(PlanRepairs, ASpanThatIsNotCut) {
+  expect<Fault::span_not_cut>("t = ", true);
+}
+
+}  // namespace
+}  // namespace kbvh::test
