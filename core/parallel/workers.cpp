@@ -42,7 +42,9 @@ class Workers::Jobs {
     wake_helpers(count);
     work(0);
     job_.fetch_add(1);  // closed: even
-    while (inside_.load() != 0) pause();
+    // A helper may have lost its core: then it needs this one, perhaps.
+    for (std::uint32_t spins = 0; inside_.load() != 0; ++spins)
+      spins < 256 ? relax() : std::this_thread::yield();
     if (failure_) std::rethrow_exception(failure_);
   }
   /// Ends the helpers; the last of them frees the memory.
@@ -53,7 +55,7 @@ class Workers::Jobs {
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::microseconds patience{200};
+  static constexpr std::chrono::microseconds patience{1000};
   struct alignas(cache_line) Slot {
     std::atomic<bool> taken{false};
   };
@@ -81,7 +83,7 @@ class Workers::Jobs {
       } else if (Clock::now() - idle_since > patience) {
         break;
       } else {
-        pause();
+        relax();  // a helper that yielded would lose its core for milliseconds where cores are wanted
       }
     }
     taken_[slot].taken.store(false);
@@ -100,15 +102,13 @@ class Workers::Jobs {
   void release() {
     if (users_.fetch_sub(1) == 1) delete this;
   }
-  /// Lets other programs have the core, if it is wanted.
-  static void pause() {
-    for (int i = 0; i < 16; ++i) relax();
-    std::this_thread::yield();
-  }
+  /// Spends some hundred nanoseconds.
   static void relax() {
+    for (int i = 0; i < 8; ++i) {
 #if defined(__x86_64__) || defined(__i386__)
-    __builtin_ia32_pause();
+      __builtin_ia32_pause();
 #endif
+    }
   }
 
   Pool pool_;

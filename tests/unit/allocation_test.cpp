@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <malloc.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cmath>
@@ -171,6 +172,20 @@ std::string allocations_of_rays(const StrategyEntry& entry, const TestScene<S>& 
         return "t = " + std::to_string(t) + ": " + std::to_string(allocations - before) + " allocations";
     }
   return {};
+}
+
+// TBB keeps its own pool of blocks, which it fills at first.
+TEST(Allocation, NoneOnceWarmOnSeveralThreads) {
+  if (most_threads() < 2) GTEST_SKIP() << "one thread";
+  for (const StrategyEntry& entry : registry()) {
+    const auto& list = entry.info.parameters;
+    if (std::none_of(list.begin(), list.end(), [](const Parameter& one) { return one.name == "threads"; }) ||
+        entry.info.guarantee != Guarantee::exact)
+      continue;
+    for (const char* const name : {"soups", "sheets", "four_bodies_own_keyframes"})
+      EXPECT_EQ(allocations_when_warm(entry, synthetic_scene<float>(name, 7), {{"threads", "2"}}), "")
+          << entry.info.id << " on " << name;
+  }
 }
 
 TEST(Allocation, NoneOfRaysOnceWarm) {

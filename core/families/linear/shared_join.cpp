@@ -84,7 +84,24 @@ void SharedJoin<S>::run(Workers& workers, JoinedColumns& throughout, JoinedColum
   results_.resize(batches.size());
   workers.for_each(batches.size(),
                    [this](std::size_t batch, std::uint32_t runner) { join_leaves(batch, runner); });
-  for (const Runner& room : runners_) tests += room.tests;
+  std::size_t most[kinds] = {}, most_partly[kinds] = {};
+  for (const Runner& room : runners_) {
+    tests += room.tests;
+    for (std::size_t kind = 0; kind < kinds; ++kind) {
+      most[kind] += room.throughout_count[kind];
+      most_partly[kind] += room.partly_count[kind];
+    }
+  }
+  // Another segment may give all work to one thread: nothing is allocated then.
+  for (Runner& room : runners_) {
+    for (std::size_t kind = 0; kind < kinds; ++kind) {
+      room.throughout[kind].view(most[kind], false);
+      room.partly[kind].view(most_partly[kind], true);
+    }
+    room.claimed.reserve(leaf_pair_room);
+    for (auto* list : {&room.leaves, &room.own, &room.own_pairs})
+      list->reserve(SharedFront::most_batch_slots);
+  }
 
   std::size_t all = 0, parts = 0, batch = 0;
   ends.clear();

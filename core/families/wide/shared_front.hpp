@@ -37,6 +37,9 @@ class SharedFront {
     std::span<const LeafSlot> pairs;  ///< first, second, ...
   };
 
+  /// Pairs of leaves per batch: some tens of microseconds of work; and their leaves.
+  static constexpr std::size_t batch_pairs = 256, most_batch_slots = 2 * batch_pairs;
+
   /// Starts anew, without traversals.
   void start() {
     items_.clear();
@@ -66,6 +69,16 @@ class SharedFront {
     });
     std::uint64_t tests = expansion_tests_;
     most_tests_ = 0;
+    std::size_t all = 0, deepest = 0;
+    for (const Runner& runner : runners_) {
+      all += runner.found.size();
+      deepest = std::max(deepest, runner.stack.size());
+    }
+    // Another frame may give all work to one thread: nothing is allocated then.
+    for (Runner& runner : runners_) {
+      runner.found.reserve(all);
+      runner.stack.resize(deepest);
+    }
     for (const Runner& runner : runners_) {
       tests += runner.tests;
       most_tests_ = std::max(most_tests_, runner.tests);
@@ -94,8 +107,6 @@ class SharedFront {
   static constexpr std::uint32_t most_levels = 12;
   /// As many as `leaf_pair_room`: they stay in the cache.
   static constexpr std::size_t leaf_pairs_at_once = 2048;
-  /// Pairs of leaves per batch: some tens of microseconds of work.
-  static constexpr std::size_t batch_pairs = 256;
 
   /// A pair to be traversed, or, afterwards, pairs of leaves found by a runner: [begin, end) of its list.
   struct Item {

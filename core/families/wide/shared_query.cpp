@@ -10,6 +10,10 @@
 
 namespace kbvh {
 
+namespace {
+constexpr std::size_t found_at_once = 2048;
+}  // namespace
+
 template <class S>
 void SharedQuery<S>::run(Workers& workers, PairBuffer& out, std::uint64_t& tests) {
   runners_.resize(workers.threads());
@@ -42,7 +46,21 @@ void SharedQuery<S>::run(Workers& workers, PairBuffer& out, std::uint64_t& tests
   results_.resize(batches.size());
   workers.for_each(batches.size(),
                    [this](std::size_t batch, std::uint32_t runner) { compare(batch, runner); });
-  for (const Runner& room : runners_) tests += room.tests;
+  std::size_t all = 0, all_own = 0;
+  for (const Runner& room : runners_) {
+    tests += room.tests;
+    all += room.found.size();
+    all_own += room.found_own.size();
+  }
+  // Another frame may give all work to one thread: nothing is allocated then.
+  for (Runner& room : runners_) {
+    room.found.reserve(all);
+    room.found_own.reserve(all_own);
+    room.claimed.reserve(leaf_pair_room);
+    room.chunk.reserve(found_at_once);
+    for (auto* list : {&room.leaves, &room.own, &room.own_pairs})
+      list->reserve(SharedFront::most_batch_slots);
+  }
   const auto append_range = [&out](const PairBuffer& from, std::size_t begin, std::size_t end) {
     out.insert(out.end(), from.begin() + std::ptrdiff_t(begin), from.begin() + std::ptrdiff_t(end));
   };
@@ -113,8 +131,7 @@ void SharedQuery<S>::append(const Bodies& bodies, const LeafSlot* leaves, std::s
                      b.leaf_primitives(b.leaf_number(leaves[2 * i + 1]))[0]});
     return;
   }
-  constexpr std::size_t chunk_room = 2048;
-  room.chunk.resize(chunk_room);
+  room.chunk.resize(found_at_once);
   WideLeafPairs<S> state{a.arrays(),
                          b.arrays(),
                          a.leaves(positions(bodies.a)),
@@ -126,7 +143,7 @@ void SharedQuery<S>::append(const Bodies& bodies, const LeafSlot* leaves, std::s
                          bodies.b.body,
                          room.chunk.data(),
                          0,
-                         chunk_room,
+                         found_at_once,
                          0};
   const auto kernel = wide_overlap_kernels<S>(a.kernels()).pairs(a.width(), a.padded_leaf_size());
   while (state.next < state.count) {
