@@ -3,6 +3,13 @@
 // ends it. The probability comes from a grid in each node's box, which says where it is filled with polygons,
 // and from the overlap of the two boxes (core/families/average/pair_probability.hpp). The answer lacks the
 // pairs that were not reached; with neither budget nor threshold it is exact.
+//
+// When it wins: by box tests, not by time, for all pairs. On a tablecloth of 16k triangles 6,400 box tests
+// miss 0.59 of the pairs, where 8,300 tests in the order of the tree (`bottom_up_budget`) miss 0.69; in
+// shattering balls a test finds seven times as much. But a test costs several times as much time, so at
+// equal time the order of the tree finds more. Grids do not last: after eight keyframes of a tablecloth their
+// order of pairs is right in 0.70 instead of 0.81 of all cases, and to make all of them anew costs 175
+// refits.
 #include "core/contract/registry.hpp"
 #include "core/families/average/probable_pairs.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"

@@ -3,6 +3,13 @@
 // performs what is due, and tests the triangles of the leaves that overlap; it reads no tree. The ends are
 // those of boxes that are linear over a segment, so two of them exchange their places at most once, and no
 // event is a change of realiser.
+//
+// When it wins: not seen yet. The tablecloth of 65k triangles has 188,000 exchanges a frame at l = 10, of
+// which 24 change the set of pairs: 22 ns each by events, 4 ns by sorting at each frame, and a thirtieth of
+// the speed of `bottom_up` (a seventh by sorting; at l = 100 a sixth and a third). Exchanges grow with the
+// square of the boxes, so large leaves are best, and a list of all overlaps on one axis, or of single
+// triangles, is out of the question. At l = 100 it is 1.6 times as fast
+// as `sweep`; at l = 10 four times as slow.
 #include <algorithm>
 #include <vector>
 
