@@ -10,6 +10,9 @@
 // equal time the order of the tree finds more. Grids do not last: after eight keyframes of a tablecloth their
 // order of pairs is right in 0.70 instead of 0.81 of all cases, and to make all of them anew costs 175
 // refits.
+// The first hit takes 3,000 instead of 12,600 box tests (depth first) in swarms of 4k triangles, as many on a
+// tablecloth, and 44,600 instead of 5,400 in shattering balls: where polygons are sparse, probabilities fall
+// from level to level, and the queue goes breadth first.
 #include "core/contract/registry.hpp"
 #include "core/families/average/probable_pairs.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"

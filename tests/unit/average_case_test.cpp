@@ -77,6 +77,11 @@ struct Calibration {
 /// Whether the grids are those of the frame, or of the first keyframe.
 enum class Grids : std::uint8_t { current, first };
 
+/// Box tests until the first pair of leaves that meet was reached, summed over frames and pairs of bodies.
+struct FirstHits {
+  double by_probability = 0, in_order = 0, cases = 0;
+};
+
 struct Study {
   explicit Study(const char* name, std::uint32_t triangles) {
     SceneSpec spec;
@@ -163,13 +168,65 @@ struct Study {
         return any;
       };
       if (trees[first].empty() || trees[second].empty()) continue;
+      const auto meets = [&](const ProbablePairs<float>::Entry& entry) {
+        return ProbablePairs<float>::is_leaf(a, entry.a) && ProbablePairs<float>::is_leaf(b, entry.b) &&
+               meeting.count(
+                   {i, trees[first].leaf_number({entry.a}), trees[second].leaf_number({entry.b})}) != 0;
+      };
+      find_first(i, a, b, distribution, meets);
       ProbablePairs<float> top;
       top.start(i, a, b, distribution);
       follow(top);
     }
   }
 
+  /// Looks for the first pair of leaves that meet: the most probable pairs first, and depth first. A pair of
+  /// leaves of 8 counts as 64 tests.
+  template <class Meets>
+  void find_first(std::uint32_t i, const ProbablePairs<float>::Side& a, const ProbablePairs<float>::Side& b,
+                  Distribution distribution, const Meets& meets) {
+    const auto both_leaves = [&](const ProbablePairs<float>::Entry& entry) {
+      return ProbablePairs<float>::is_leaf(a, entry.a) && ProbablePairs<float>::is_leaf(b, entry.b);
+    };
+    double best_first = 0, depth_first = 0;
+    bool found = false;
+    ProbablePairs<float> queue;
+    best_first += double(queue.start(i, a, b, distribution));
+    while (!queue.empty() && !found) {
+      const auto entry = queue.pop();
+      found = meets(entry);
+      best_first += both_leaves(entry) ? 64 : double(queue.expand(entry, a, b, distribution));
+    }
+    if (!found) return;
+    found = false;
+    std::vector<ProbablePairs<float>::Entry> stack;
+    const auto push = [&](ProbablePairs<float>& children) {
+      const std::size_t before = stack.size();
+      while (!children.empty()) stack.push_back(children.pop());
+      std::sort(stack.begin() + std::ptrdiff_t(before), stack.end(),
+                [](const auto& x, const auto& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; });
+    };
+    ProbablePairs<float> children;
+    depth_first += double(children.start(i, a, b, distribution));
+    push(children);
+    while (!found) {
+      const auto entry = stack.back();
+      stack.pop_back();
+      found = meets(entry);
+      if (both_leaves(entry)) {
+        depth_first += 64;
+      } else {
+        depth_first += double(children.expand(entry, a, b, distribution));
+        push(children);
+      }
+    }
+    hits.by_probability += best_first;
+    hits.in_order += depth_first;
+    ++hits.cases;
+  }
+
   Scene<float> scene;
+  FirstHits hits;
 };
 
 class AverageCase : public testing::TestWithParam<const char*> {};
@@ -177,12 +234,16 @@ class AverageCase : public testing::TestWithParam<const char*> {};
 TEST_P(AverageCase, PredictionsOrderAndBound) {
   Study study(GetParam(), 4000);
   const std::string name = GetParam();
-  const Calibration cells = study.run(Distribution::cells, Grids::current),
-                    count = study.run(Distribution::count, Grids::current),
+  const Calibration cells = study.run(Distribution::cells, Grids::current);
+  const FirstHits hits = study.hits;
+  const Calibration count = study.run(Distribution::count, Grids::current),
                     old = study.run(Distribution::cells, Grids::first);
   cells.print((name + ", cells").c_str());
   count.print((name + ", count").c_str());
   old.print((name + ", cells of the first frame").c_str());
+  if (std::getenv("KBVH_TABLES") != nullptr)
+    std::printf("%s: box tests to the first hit: %.0f by probability, %.0f depth first; %.0f cases\n",
+                name.c_str(), hits.by_probability / hits.cases, hits.in_order / hits.cases, hits.cases);
   EXPECT_GT(cells.pairs(), 500);
   EXPECT_EQ(cells.pairs(), count.pairs());
   // The order of the traversal has information, and where a node is filled tells more than how much of it.
