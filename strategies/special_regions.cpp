@@ -4,8 +4,9 @@
 // by comparing its two ends: nodes below which nothing moves keep their boxes until the segment ends. Boxes
 // are tight, for control nets, polygons and points.
 //
-// Pays where a small part of a body moves at a time, if segments have several frames. Where all of a body
-// moves, the search is added to the refit once per segment: as dear as a refit at one frame per segment.
+// Measured at 65k triangles over the best refit: 1.2 where a twentieth of a sheet moves and l = 10
+// (dented_sheet). Where all of a body moves, the search is added to the refit once per segment: 0.84 at l =
+// 1, 0.95 to 0.98 at l = 10.
 #include <limits>
 #include <utility>
 

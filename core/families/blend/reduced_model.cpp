@@ -167,7 +167,6 @@ ReducedModel<S>::ReducedModel(const FlightPlans<S>& plans, const Settings& setti
         squares[k] += value * value;
       }
   });
-  double sum = 0;
   // Positions are multiples of their unit of rounding: the remainder has at least about that size.
   const double unit = (largest_of(rest) + largest_of(translations)) * std::numeric_limits<S>::epsilon() +
                       double(std::numeric_limits<S>::min());
@@ -177,13 +176,12 @@ ReducedModel<S>::ReducedModel(const FlightPlans<S>& plans, const Settings& setti
     double left = squares[k];
     for (std::size_t m = 0; m < mode_count; ++m) left -= to[4 + m] * to[4 + m];
     left = std::max(left, 0.0);
-    sum += left;
     to[3] = std::max(std::sqrt(left / double(vertices)), unit);
   }
-  rms = std::sqrt(sum / double(keyframes * vertices));
 
   // The remainder itself, whatever the decomposition was worth.
   constexpr double infinity = std::numeric_limits<double>::infinity();
+  double sum = 0;
   low.assign(count + 1, 0);
   high.assign(count + 1, 0);
   offsets.for_blocks([&](std::size_t first, std::size_t many, const double* values) {
@@ -194,6 +192,7 @@ ReducedModel<S>::ReducedModel(const FlightPlans<S>& plans, const Settings& setti
         const double* const at = &coordinates_[k * row()];
         double left = values[i * keyframes + k];
         for (std::size_t m = 0; m < mode_count; ++m) left -= at[4 + m] * fields[i * mode_count + m];
+        sum += left * left;
         const double share = left / at[3];
         least_seen = std::min(least_seen, share);
         most_seen = std::max(most_seen, share);
@@ -202,6 +201,7 @@ ReducedModel<S>::ReducedModel(const FlightPlans<S>& plans, const Settings& setti
       high[first + i] = S(most_seen);
     }
   });
+  rms = std::sqrt(sum / double(keyframes * vertices));
   measure();
 }
 

@@ -36,7 +36,7 @@ struct ReducedModel {
   /// Ranges of the remainder per unit of its size, over all keyframes; as `rest`. In exact numbers the
   /// remainder exceeds them by less than `magnitude` * (mode_count + 6) units of rounding.
   std::vector<S> low, high;
-  double rms = 0;  ///< root mean square of the remainder, estimated from the decomposition
+  double rms = 0;  ///< root mean square of the remainder's length
 
   /// Makes the model of a body without vertices' own plans. O(vertices x keyframes x (samples + modes)), for
   /// at most `samples` keyframes from which shapes are taken.
