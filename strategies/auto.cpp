@@ -80,6 +80,7 @@ struct Candidate {
 const std::vector<Candidate>& candidates() {
   static const std::vector<Candidate> list{
       {"leaf_slabs", {}, &refit_cost},  // first: it answers until observations exist
+      {"bottom_up", {}, &refit_cost},   // in programs without the first
       {"drift_boxes", {}, &drift_cost},
       {"interval_join", {}, &join_cost},
   };
@@ -102,6 +103,8 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
         return entry.info.id == candidate.id;
       });
       if (found == registry().end() || !found->info.can.plan_changes) continue;
+      const auto does_the_same = [&](const Runner& other) { return other.candidate->cost == candidate.cost; };
+      if (std::any_of(runners_.begin(), runners_.end(), does_the_same)) continue;
       const Params own(found->info.id, found->info.parameters, candidate.params);
       runners_.push_back({&candidate, found->info.positions == PositionUse::all,
                           NestedStrategies<S>::create(*found, scene, motion, topologies, own, policy)});

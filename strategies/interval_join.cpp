@@ -1,6 +1,8 @@
 // One time-parametrised traversal per segment of the flight plans, over boxes that are linear in time, yields
 // the pairs of primitives that come near each other in the segment, with their times; frames are read from
-// it. Prior art and the differences to it: core/adr/0010-prior-art-of-answering-intervals.md.
+// it. Prior art and the differences to it: core/adr/0010-prior-art-of-answering-intervals.md. Bodies of
+// triangles are compared by slabs of leaves first (core/adr/0014-slabs-of-leaves.md): what a slab separates
+// throughout the segment is no pair.
 //
 // Where plans change at run time, the segment is kept: leaves with a changed vertex, the boxes above them,
 // and the pairs of changed primitives are made anew. The length of segments follows the rate of changes. This

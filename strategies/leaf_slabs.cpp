@@ -1,11 +1,17 @@
-// Bottom-up refit whose leaves have a slab of their own beside the box: two parallel planes, across the mean
-// normal of the leaf's triangles, between which the leaf lies. Where two leaves' boxes overlap, the triangles
-// of each are compared with the slab of the other, eight or sixteen at a time, before any two triangles are
-// compared. A leaf of a smooth surface is flat, so its slab is thin: surfaces that lie next to each other, as
-// cloth does on a body, are separated leaf by leaf, and of surfaces that cross only the triangles near the
-// curve of intersection are left. In each leaf this is the local slab of a k-DOP in a direction of the leaf's
-// own (compare the slab volumes of Kay & Kajiya 1986 and the oriented boxes of Gottschalk et al. 1996). Needs
-// no foresight.
+// Bottom-up refit whose leaves have a slab beside the box: two parallel planes, across the mean normal of the
+// leaf's triangles, between which the leaf lies (the slabs of Kay & Kajiya 1986, in one direction of the
+// leaf's own). Where the boxes of two leaves overlap, the triangles of each are compared with the slab of the
+// other, many at a time, before any two triangles are. A leaf of a smooth surface is flat, so its slab is
+// thin: of surfaces that lie on each other, as cloth does on a body, hardly a pair is left, and of surfaces
+// that cross, those near the curve of intersection. Slabs are made where a query needs them, which costs two
+// thirds as much as the boxes of a leaf's triangles. Needs no foresight; bodies that are not made of
+// triangles are queried by boxes.
+//
+// When it wins: with exact tests and without interpolation (l = 1), against `bottom_up`: 2.3 to 2.9 times on
+// a recorded tablecloth and a dancer's skirt, 1.5 on garments of 65k triangles, 1.2 to 1.6 on five captured
+// or animated figures with a sphere in them (Zen 5, float). It gains least on a tablecloth of 65k triangles
+// that cuts into its table (1.06 to 1.17) and on a morph stress test (1.03 to 1.08), whose leaves are rough.
+// Update and candidates alone take 0.5 to 1.2 of the refit's time.
 #include "core/contract/registry.hpp"
 #include "core/families/slabs/slab_query.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
