@@ -81,8 +81,9 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>,
     this->count_.add(Counter::box_tests, tests);
   }
 
-  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
-    bounds_.plans_changed();
+  void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
+    if (!bounds_.repair(changes)) bounds_.plans_changed();
+    bounds_.clear_changed();
     count_update();
     new_frame();
   }

@@ -27,11 +27,16 @@ class ChangeHorizon {
     ++changes_;
     if (frames_ == 0) frames_ = fixed_ > 0 ? fixed_ : first;
   }
+  /// Notes that plans changed, and the segment could not be kept: it was too long.
+  void restarted() {
+    if (frames_ > 0 && fixed_ == 0) frames_ = std::max(std::floor(frames_ / 2), shortest / 2);
+    changed();
+  }
   /// Notes that a segment ends in which this share of all leaves was made anew, each time counted.
   void next_segment(double share_of_leaves) {
     if (frames_ > 0 && changes_ == 0)
       frames_ = frames_ < most ? 2 * frames_ : 0;
-    else if (frames_ > 0 && fixed_ == 0)
+    else if (frames_ > 0 && fixed_ == 0 && share_of_leaves > 0)
       frames_ = std::clamp(std::floor(frames_ * std::clamp(largest_share / share_of_leaves, 0.5, 2.0)),
                            shortest, longest);
     changes_ = 0;

@@ -177,7 +177,7 @@ void LinearBounds<S>::start() {
 template <class S>
 void LinearBounds<S>::plans_changed() {
   foreseen_ = std::max(1.0, foreseen_ / 2);
-  horizon_.changed();
+  horizon_.restarted();
   ++repairs_.restarted;
   restart();
 }
@@ -315,8 +315,8 @@ bool LinearBounds<S>::start_ahead(const SegmentMotion<S>& motion) {
   forget_ahead();
   const Segment& before = segments_[present_];
   Segment& segment = segments_[1 - present_];
-  // The cuts of such a segment are decided only when it begins.
-  if (whole_ || cuts_.max_looseness > 0 || motion.time() != before.end) return false;
+  // The cuts of such a segment are decided only when it begins; a change of plans would undo the work.
+  if (whole_ || cuts_.max_looseness > 0 || horizon_.frames() > 0 || motion.time() != before.end) return false;
   bool ends = false;
   for (std::uint32_t body = 0; body < body_count(); ++body)
     ends = ends || motion.lines_end(body) != std::numeric_limits<double>::infinity();

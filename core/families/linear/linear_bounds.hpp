@@ -65,9 +65,9 @@ class LinearBounds {
   const Repairs& repairs() const { return repairs_; }
 
   /// Starts building the next segment; `motion` is the view from the current segment's end. Returns false if
-  /// this is not possible: no segment follows, segments are cut by looseness, or `enter` was called after the
-  /// last `start`. The work is discarded if plans change, if `advance` does not reach the segment, or if the
-  /// segment leaves the range of numbers.
+  /// this is not possible: no segment follows, segments are cut by looseness, plans changed lately, or
+  /// `enter` was called after the last `start`. The work is discarded if plans change, if `advance` does not
+  /// reach the segment, or if the segment leaves the range of numbers.
   bool start_ahead(const SegmentMotion<S>& motion);
   /// Continues building until at least `nodes` nodes were done by this call. Returns whether all bounds are
   /// complete.
