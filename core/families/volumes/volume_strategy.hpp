@@ -139,7 +139,7 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
   template <class Hierarchy>
   void search(State<Hierarchy>& state, PairBuffer& out, BoxTests& tests, const Budget& budget,
               QueryStatus& status) {
-    const auto& bodies = state.bodies;
+    auto& bodies = state.bodies;
     const auto box_of = [&](std::uint32_t body) {
       return bodies[body].empty() ? Box<double>{} : enclosing_box(bodies[body].volume(0));
     };
@@ -149,10 +149,15 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
         ++status.pending;
         continue;
       }
-      const Hierarchy &a = bodies[pair.first], &b = bodies[pair.second];
-      LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
-                                    b.topology(), tests, out);
-      status.pending += Hierarchy::search(a, b, state.scratch, tests, budget, leaves);
+      Hierarchy &a = bodies[pair.first], &b = bodies[pair.second];
+      if constexpr (requires { &Hierarchy::find_pairs; }) {
+        status.pending +=
+            Hierarchy::find_pairs(a, pair.first, b, pair.second, state.scratch, tests, budget, out);
+      } else {
+        LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
+                                      b.topology(), tests, out);
+        status.pending += Hierarchy::search(a, b, state.scratch, tests, budget, leaves);
+      }
     }
   }
 

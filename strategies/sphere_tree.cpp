@@ -1,0 +1,47 @@
+// Spheres on eight-wide nodes (Hubbard 1996), eight children at a time in refit and query. A sphere's centre
+// is that of the box around the points below: no other centre lowers the number of tests by more than 4 %
+// (the smallest sphere of every node, cloth of 65k triangles on a ball). Wrapped spheres reach to the
+// furthest point below a node, layered ones to the furthest sphere of a child, but not beyond the box around
+// the points (the terms are those of Agarwal, Guibas et al. 2004). With that cut, wrapped spheres save 0.4 to
+// 2 % of the tests and take up to a third more time to refit. Measured on that cloth, leaves of 16: the refit
+// takes 1.7 times, the query 1.5 times as long as those of boxes (`bottom_up`), so spheres lose on surfaces
+// that lie close to each other.
+#include "core/contract/registry.hpp"
+#include "core/families/volumes/sphere_hierarchy.hpp"
+#include "core/families/volumes/volume_strategy.hpp"
+
+namespace kbvh {
+namespace {
+
+template <class S, class Count>
+class SphereTree final : public HierarchyStrategy<S, Count, SphereHierarchy<S, SphereBounds::wrapped>,
+                                                  SphereHierarchy<S, SphereBounds::layered>> {
+  using Base = HierarchyStrategy<S, Count, SphereHierarchy<S, SphereBounds::wrapped>,
+                                 SphereHierarchy<S, SphereBounds::layered>>;
+
+ public:
+  SphereTree(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
+             const Params& params)
+      : Base(scene, motion, std::move(topologies), params.word("bounds") == "wrapped" ? 0 : 1) {}
+};
+
+}  // namespace
+}  // namespace kbvh
+
+KBVH_STRATEGY(sphere_tree) {
+  using namespace kbvh;
+  return {make_entry<SphereTree>({
+      .id = "sphere_tree",
+      .title = "sphere tree",
+      .family = "volumes",
+      .citation =
+          "Hubbard 1996; Bradshaw & O'Sullivan 2004; wrapped and layered: Agarwal, Guibas et al. 2004",
+      .tightness = Tightness::conservative,
+      .declares = {.time_budget = true},
+      .topology = {.widths = {8}, .preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
+      .parameters = {{"bounds",
+                      "layered",
+                      {"layered", "wrapped"},
+                      "what a node's sphere contains: the spheres of its children, or the points below"}},
+  })};
+}
