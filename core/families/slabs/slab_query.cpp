@@ -79,10 +79,8 @@ QueryStatus SlabQuery<S>::run(const Side& a, const Side& b, S reach, PairBuffer&
     traverse(leaves.a, leaves.b, state);
     leaf_pairs_seen_ += state.found;
     leaves.next = 0;
-    const std::size_t different =
-        self ? different_leaves_first(leaf_pairs_.data(), state.found) : state.found;
-    take(different, LeavesOf::two);
-    take(state.found, LeavesOf::one);
+    take(self ? take_out_own_leaves(leaf_pairs_.data(), state.found, own_leaves_) : state.found,
+         LeavesOf::two);
     state.found = 0;
     if (state.depth + max_pairs_per_step >= state.stack_room) {
       stack_.resize(2 * stack_.size());
@@ -90,6 +88,16 @@ QueryStatus SlabQuery<S>::run(const Side& a, const Side& b, S reach, PairBuffer&
       state.stack_room = stack_.size();
     }
   }
+  // Pairs of a leaf with itself come last: the order does not depend on the room for pairs of leaves.
+  const std::size_t room = leaf_pairs_.size() / 2;
+  for (std::size_t begin = 0; begin < own_leaves_.size(); begin += room) {
+    const std::size_t count = std::min(room, own_leaves_.size() - begin);
+    for (std::size_t i = 0; i < count; ++i)
+      leaf_pairs_[2 * i] = leaf_pairs_[2 * i + 1] = own_leaves_[begin + i];
+    leaves.next = 0;
+    take(count, LeavesOf::one);
+  }
+  own_leaves_.clear();
   tests += state.tests + leaves.tests;
   separated_ += leaves.separated;
   return {state.depth};

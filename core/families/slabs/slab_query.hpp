@@ -57,7 +57,8 @@ class SlabQuery {
   /// Returns whether a body consists of triangles only. O(primitives).
   static bool accepts(const Primitives& primitives);
   std::size_t bytes() const {
-    return stack_.capacity() * sizeof(WidePair) + leaf_pairs_.capacity() * sizeof(LeafSlot) +
+    return stack_.capacity() * sizeof(WidePair) +
+           (leaf_pairs_.capacity() + own_leaves_.capacity()) * sizeof(LeafSlot) +
            (column_a_.capacity() + column_b_.capacity()) * sizeof(std::uint32_t);
   }
 
@@ -65,6 +66,7 @@ class SlabQuery {
   SceneView<S> scene_;
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;
+  std::vector<LeafSlot> own_leaves_;  ///< found with themselves, and not taken yet
   std::vector<std::uint32_t> column_a_, column_b_;
   std::uint64_t leaf_pairs_seen_ = 0, separated_ = 0;
 };
