@@ -28,6 +28,7 @@ FAMILIES: dict[str, tuple[str, str]] = {
     "restructuring": ("#5D4A9C", ">"),
     "sweep": ("#117733", "*"),
     "volumes": ("#6B4C2A", "H"),
+    "cgal": ("#4B7A00", "boat"),
 }
 
 #: Choices for unknown families.
@@ -139,6 +140,7 @@ def looks(contestants: Iterable[tuple[str, str, str]]) -> dict[str, Look]:
 
 #: Outlines of the markers in a box from -5 to 5, for symbols inside the page's text.
 _POLYGONS: dict[str, str] = {
+    "boat": "-5,-3 5,-3 2,4 -2,4",
     "s": "-4,-4 4,-4 4,4 -4,4",
     "^": "0,-5 5,4 -5,4",
     "v": "0,5 5,-4 -5,-4",

@@ -21,6 +21,7 @@ const std::vector<Eager>& eager() {
       {"partial_rebuild", {{"price", "0"}, {"share", "0.5"}}, "leaves_renewed"},
       {"selective_restructuring", {{"drift", "1"}, {"budget", "1"}}, "subtrees_rebuilt"},
       {"rotations", {{"most", "30"}}, "rotations"},
+      {"reinsertion", {{"tried", "1"}, {"growth", "1"}, {"price", "0"}, {"least", "0"}}, "reinsertions"},
   };
   return all;
 }

@@ -207,7 +207,8 @@ TEST(Allocation, NoneOnceWarmWhereTreesAreRestructured) {
       {"drift_rebuild", {{"measure", "surface"}, {"drift", "1"}, {"spread", "2"}}},
       {"partial_rebuild", {{"price", "0"}}},
       {"selective_restructuring", {{"drift", "1"}, {"budget", "1"}}},
-      {"rotations", {}}};
+      {"rotations", {}},
+      {"reinsertion", {{"tried", "1"}, {"growth", "1"}, {"price", "0"}, {"least", "0"}}}};
   for (const char* const name : {"soups", "sheets", "four_bodies_own_keyframes"})
     for (const auto& [id, params] : eager) {
       const StrategyEntry& entry = find_strategy(id);

@@ -4,8 +4,7 @@
 #include <string>
 
 #include "core/base/assert.hpp"
-#include "core/topology/collapse.hpp"
-#include "core/topology/topology_edit.hpp"
+#include "core/families/wide/tree_topology.hpp"
 
 namespace kbvh {
 
@@ -70,65 +69,12 @@ void BuiltTree<S>::fit(const S* primitive_boxes) {
   kernels.nodes(this->arrays(), leaf_boxes_.data(), node_count());
 }
 
-namespace {
-template <class S>
-Box<double> box_at(const S* corners) {
-  Box<double> box;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    box.lower[axis] = corners[axis];
-    box.upper[axis] = corners[axis + 4];
-  }
-  return box;
-}
-}  // namespace
-
 template <class S>
 Topology BuiltTree<S>::topology(std::vector<Box<double>>& boxes) const {
-  boxes.clear();
-  if (this->empty()) {
-    Topology topology;
-    topology.width = most_children;
-    topology.leaf_size = this->leaf_size_;
-    return topology;
-  }
-  Topology topology = with_root(most_children, this->leaf_size_);
-  boxes.push_back(box_at(this->node_bounds_.data()));
-  const auto make_leaf = [&](std::uint32_t index, std::uint32_t leaf) {
-    const auto entries = this->leaf_primitives(leaf);
-    topology.nodes[index] =
-        TopologyNode::leaf(std::uint32_t(topology.primitives.size()), std::uint32_t(entries.size()));
-    topology.primitives.insert(topology.primitives.end(), entries.begin(), entries.end());
-  };
-  if (this->nodes_[0].count == 1) {
-    make_leaf(0, 0);
-    topology.perfect = is_perfect(topology);
-    return topology;
-  }
-  struct Open {
-    std::uint32_t wide, index;
-  };
-  std::vector<Open> open{{0, 0}};
-  while (!open.empty()) {
-    const auto [wide, index] = open.back();
-    open.pop_back();
-    const WideNode& node = this->nodes_[wide];
-    const std::uint32_t first = add_children(topology, index, node.count);
-    for (std::uint32_t lane = 0; lane < node.count; ++lane) {
-      Box<double> box;
-      const S* const rows = this->child_bounds_.data() + wide * lane_scalars(most_children) + lane;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        box.lower[axis] = rows[axis * most_children];
-        box.upper[axis] = -rows[(axis + 3) * most_children];
-      }
-      boxes.push_back(box);
-      if (lane < node.leaf_count)
-        make_leaf(first + lane, node.first_leaf + lane);
-      else
-        open.push_back({node.first_child + lane - node.leaf_count, first + lane});
-    }
-  }
-  topology.perfect = is_perfect(topology);
-  return topology;
+  return topology_of(
+      std::span<const WideNode>(this->nodes_), this->child_bounds_.data(), this->node_bounds_.data(),
+      most_children, this->leaf_size_, [&](std::uint32_t leaf) { return this->leaf_primitives(leaf); },
+      boxes);
 }
 
 template class BuiltTree<float>;
