@@ -45,7 +45,10 @@ void LaneSearch<S>::take_leaves(PairBuffer& out) {
   const std::size_t count = state_.found;
   state_.found = 0;
   if (a_.body != b_.body) return append(0, count, out);
-  const std::size_t different = different_leaves_first(scratch_->leaves.data(), count);
+  scratch_->own.clear();
+  const std::size_t different = take_out_own_leaves(scratch_->leaves.data(), count, scratch_->own);
+  for (std::size_t i = different; i < count; ++i)
+    scratch_->leaves[2 * i] = scratch_->leaves[2 * i + 1] = scratch_->own[i - different];
   const auto within = [&](LeavesOf leaves, std::size_t begin, std::size_t end) {
     const std::size_t before = out.size();
     append(begin, end, out);

@@ -10,10 +10,10 @@ namespace kbvh {
 /// The memory of searches in trees of eight lanes; one serves all bodies.
 struct LaneScratch {
   std::vector<WidePair> stack = std::vector<WidePair>(1024);
-  std::vector<LeafSlot> leaves;
+  std::vector<LeafSlot> leaves, own;  ///< own: those found with themselves
   std::vector<FoundPair> found;
   std::size_t bytes() const {
-    return stack.capacity() * sizeof(WidePair) + leaves.capacity() * sizeof(LeafSlot) +
+    return stack.capacity() * sizeof(WidePair) + (leaves.capacity() + own.capacity()) * sizeof(LeafSlot) +
            found.capacity() * sizeof(FoundPair);
   }
 };

@@ -307,7 +307,7 @@ template <class S, class V>
 
 template <class S, bool within>
 struct ObbView {
-  static constexpr bool within_one = within;
+  static constexpr bool within_one = within, selects = false;
   const ObbPair<S>& pair;
 
   [[gnu::always_inline]] static bool waits(const WideTraversal&) { return false; }

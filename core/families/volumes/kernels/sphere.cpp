@@ -194,7 +194,7 @@ template <class S>
 
 template <class S, bool within>
 struct SphereView {
-  static constexpr bool within_one = within;
+  static constexpr bool within_one = within, selects = false;
   const SpherePair<S>& pair;
 
   [[gnu::always_inline]] static bool waits(const WideTraversal&) { return false; }
