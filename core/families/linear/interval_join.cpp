@@ -98,19 +98,7 @@ bool IntervalJoin<S>::step(std::uint64_t box_tests) {
       const std::uint64_t left = box_tests - made, most = Budget{}.box_tests;
       traversal_.test_limit = left < most - traversal_.tests ? traversal_.tests + left : most;
       traverse_(leaf_join_.a, leaf_join_.ends_a, leaf_join_.b, leaf_join_.ends_b, traversal_);
-      leaf_join_.next = 0;
-      if (self_) {
-        const std::size_t different = take_out_own_leaves(leaf_pairs_.data(), traversal_.found, own_leaves_);
-        take_self_leaves(different, LeavesOf::two);
-      } else {
-        take_leaves(traversal_.found, LeavesOf::two);
-      }
-      traversal_.found = 0;
-      if (traversal_.depth + max_pairs_per_step >= traversal_.stack_room) {
-        stack_.resize(2 * stack_.size());
-        traversal_.stack = stack_.data();
-        traversal_.stack_room = stack_.size();
-      }
+      take_found_leaves();
     }
     if (self_) take_own_leaves();
     end_bodies();
@@ -150,6 +138,24 @@ void IntervalJoin<S>::take_leaves(std::size_t end, LeavesOf leaves) {
     join_leaves_(leaf_join_);
   }
   leaf_join_.next = end;
+}
+
+/// Turns the pairs of leaves that the traversal has found into pairs of primitives, and makes room for more.
+template <class S>
+void IntervalJoin<S>::take_found_leaves() {
+  leaf_join_.next = 0;
+  if (self_) {
+    const std::size_t different = take_out_own_leaves(leaf_pairs_.data(), traversal_.found, own_leaves_);
+    take_self_leaves(different, LeavesOf::two);
+  } else {
+    take_leaves(traversal_.found, LeavesOf::two);
+  }
+  traversal_.found = 0;
+  if (traversal_.depth + max_pairs_per_step >= traversal_.stack_room) {
+    stack_.resize(2 * stack_.size());
+    traversal_.stack = stack_.data();
+    traversal_.stack_room = stack_.size();
+  }
 }
 
 template <class S>

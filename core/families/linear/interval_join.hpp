@@ -135,6 +135,7 @@ class IntervalJoin {
   std::size_t filter_leaves(std::size_t count);
   void take_self_leaves(std::size_t end, LeavesOf leaves);
   void take_own_leaves();
+  void take_found_leaves();
   void sort_by_begin();
   void sort_by_begin(Workers& workers);
   void start_reading();

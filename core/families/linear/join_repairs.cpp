@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "core/families/linear/interval_join.hpp"
-#include "core/families/wide/leaf_slots.hpp"
 
 namespace kbvh {
 
@@ -74,19 +73,7 @@ void IntervalJoin<S>::join_changed(const ChangedParts& a, const ChangedParts& b)
   const auto traverse = self_ ? kernels.selected_self(first.width()) : kernels.selected(first.width());
   while (traversal_.depth > 0) {
     traverse(leaf_join_.a, leaf_join_.ends_a, leaf_join_.b, leaf_join_.ends_b, selection, traversal_);
-    leaf_join_.next = 0;
-    if (self_) {
-      const std::size_t different = take_out_own_leaves(leaf_pairs_.data(), traversal_.found, own_leaves_);
-      take_self_leaves(different, LeavesOf::two);
-    } else {
-      take_leaves(traversal_.found, LeavesOf::two);
-    }
-    traversal_.found = 0;
-    if (traversal_.depth + max_pairs_per_step >= traversal_.stack_room) {
-      stack_.resize(2 * stack_.size());
-      traversal_.stack = stack_.data();
-      traversal_.stack_room = stack_.size();
-    }
+    take_found_leaves();
   }
   if (self_) take_own_leaves();
 }
