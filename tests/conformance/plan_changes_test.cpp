@@ -206,7 +206,9 @@ TEST_P(PlanChanges, ErrorsChangeNothing) {
       session.query(pairs, times);
       std::sort(pairs.begin(), pairs.end());
       undisturbed.seek(t);
-      EXPECT_EQ(pairs, sweep_pairs(test.scene, undisturbed)) << GetParam() << " at frame " << f;
+      if (entry.info.guarantee != Guarantee::approximate) {
+        EXPECT_EQ(pairs, sweep_pairs(test.scene, undisturbed)) << GetParam() << " at frame " << f;
+      }
       PlanChange<S> odd_sizes = goes_to<S>(0, 2, t + 1, 0, 0, 0), two_knots = odd_sizes;
       odd_sizes.positions.pop_back();
       two_knots.times = {t + 1, t + 1};

@@ -271,7 +271,8 @@ TEST(IntervalJoinAhead, SpreadsTheWorkOfASegment) {
 
 TEST(IntervalJoinAhead, CountsNoBoxesThatItDidNotMake) {
   const Scene<float> scene = waves(160, 3);
-  Play<float> ahead(scene, "interval_join_ahead", {}), at_once(scene, "interval_join", {});
+  const std::map<std::string, std::string> restarted{{"plan_changes", "restarted"}};
+  Play<float> ahead(scene, "interval_join_ahead", restarted), at_once(scene, "interval_join", restarted);
   PlanScript<float>::Step step;
   for (int f = 1; f <= 20; ++f) {
     // A change at every frame: what has been begun ahead is forgotten.

@@ -85,6 +85,7 @@ struct Place {
 template <class S>
 std::vector<Place> children(const MovingTree<S>& tree) {
   std::vector<Place> all;
+  if (tree.node_count() == 0) return all;
   std::vector<std::uint32_t> open{0};
   while (!open.empty()) {
     const std::uint32_t n = open.back();

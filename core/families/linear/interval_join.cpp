@@ -66,18 +66,26 @@ void IntervalJoin<S>::begin_bodies() {
                 leaf_join_.tests};
   if (!with_slabs_) return;
   masks_.resize(leaf_pairs_.size() / 2);
+  slabs_ = slabs_of(a, b);
+  slabs_.pairs = leaf_pairs_.data();
+  slabs_.masks = masks_.data();
+}
+
+/// Describes the slabs of two bodies, without pairs of leaves.
+template <class S>
+SlabSpanPairs<S> IntervalJoin<S>::slabs_of(const BodySegmentBounds<S>& a, const BodySegmentBounds<S>& b) {
   // Positions at frames and at ends differ from the lines by half an ulp each; the products of directions and
   // corners, two sums of which are compared, by less than two ulps of the largest coordinate each. A body's
   // margin is 8 ulps.
-  slabs_ = {a.hierarchy().arrays(),
-            b.hierarchy().arrays(),
-            a.slab_leaves(),
-            b.slab_leaves(),
-            2 * (a.margin + b.margin) + std::numeric_limits<S>::min(),
-            leaf_pairs_.data(),
-            0,
-            masks_.data(),
-            0};
+  return {a.hierarchy().arrays(),
+          b.hierarchy().arrays(),
+          a.slab_leaves(),
+          b.slab_leaves(),
+          2 * (a.margin + b.margin) + std::numeric_limits<S>::min(),
+          nullptr,
+          0,
+          nullptr,
+          0};
 }
 
 template <class S>

@@ -133,6 +133,7 @@ class IntervalJoin {
   void end_bodies();
   void take_leaves(std::size_t end, LeavesOf leaves);
   std::size_t filter_leaves(std::size_t count);
+  static SlabSpanPairs<S> slabs_of(const BodySegmentBounds<S>& a, const BodySegmentBounds<S>& b);
   void take_self_leaves(std::size_t end, LeavesOf leaves);
   void take_own_leaves();
   void take_found_leaves();

@@ -38,6 +38,7 @@ void IntervalJoin<S>::join(const LinearSegment<S>& segment, const SceneView<S>& 
     join.leaves_b = b.leaves();
     shared_.add(join, a.hierarchy().kernels(), padded, self,
                 self && !with_neighbours_ ? &scene.primitives(bodies_[i].first) : nullptr);
+    if (with_slabs_) shared_.use_slabs(slabs_of(a, b));
     added_.push_back(i);
     ++tests;  // of the roots, as a traversal counts
   }

@@ -158,9 +158,10 @@ bool LinearBounds<S>::remake_boxes() {
         arrays.child_bounds = body.child_bounds[end.slot].data();
         arrays.node_bounds = body.node_bounds[end.slot].data();
         refit(arrays, end.positions, nodes.data(), std::uint32_t(nodes.size()));
-        auto& stamps = body.stamps[end.slot];
-        if (!stamps.empty())
-          for (const std::uint32_t leaf : changed_[index].leaves()) stamps[leaf] = 0;
+        // Rows and slabs of the changed leaves are not current; 0 is the stamp of nothing.
+        for (auto* stamps : {&body.stamps[end.slot], &body.block_stamps[end.slot], &body.slab_stamps})
+          if (!stamps->empty())
+            for (const std::uint32_t leaf : changed_[index].leaves()) (*stamps)[leaf] = 0;
       }
       counts_[index].refitted += 2 * nodes.size();
       repairs_.leaves += changed_[index].leaves().size();

@@ -154,6 +154,14 @@ void SharedJoin<S>::claim_leaves(const Batch& batch, Runner& room) {
       leaf_rows_kernels<S>(bodies.kernels)
           .fit(bodies.padded)(at_end, room.claimed.data(), room.claimed.size());
     }
+    if (!bodies.with_slabs) continue;
+    const SlabSpanLeaves<S>& spans = which == 0 ? bodies.slabs.leaves_a : bodies.slabs.leaves_b;
+    room.claimed.clear();
+    for (std::size_t i = which; i < batch.pairs.size(); i += 2) {
+      const std::uint32_t leaf = nodes[batch.pairs[i].node()].first_leaf + batch.pairs[i].lane();
+      if (claim_leaf(spans.slab_stamps[leaf], spans.slab_stamp)) room.claimed.push_back(leaf);
+    }
+    slab_span_kernels<S>(bodies.kernels).make(bodies.padded)(spans, room.claimed.data(), room.claimed.size());
   }
 }
 
@@ -165,26 +173,43 @@ void SharedJoin<S>::join_leaves(std::size_t which, std::uint32_t runner) {
   Result& result = results_[which];
   result.runner = runner;
   const std::size_t count = batch.pairs.size() / 2;
-  if (!bodies.self) {
-    join_some(bodies, batch.pairs.data(), count, room, of_two, result);
-    join_some(bodies, nullptr, 0, room, of_one, result);
+  if (!bodies.self && !bodies.with_slabs) {
+    join_some(bodies, batch.pairs.data(), count, room, of_two, nullptr, result);
+    join_some(bodies, nullptr, 0, room, of_one, nullptr, result);
     return;
   }
   room.leaves.assign(batch.pairs.begin(), batch.pairs.end());
   room.own.clear();
   room.own_pairs.clear();
-  const std::size_t different = take_out_own_leaves(room.leaves.data(), count, room.own);
+  std::size_t different = bodies.self ? take_out_own_leaves(room.leaves.data(), count, room.own) : count;
   for (const LeafSlot leaf : room.own) room.own_pairs.insert(room.own_pairs.end(), 2, leaf);
-  join_some(bodies, room.leaves.data(), different, room, of_two, result);
-  join_some(bodies, room.own_pairs.data(), room.own.size(), room, of_one, result);
+  if (bodies.with_slabs) different = filter_leaves(bodies, different, room);
+  join_some(bodies, room.leaves.data(), different, room, of_two,
+            bodies.with_slabs ? room.masks.data() : nullptr, result);
+  join_some(bodies, room.own_pairs.data(), room.own.size(), room, of_one, nullptr, result);
+}
+
+/// Leaves out pairs of leaves that slabs separate, of `room.leaves`; returns the number of the others.
+template <class S>
+std::size_t SharedJoin<S>::filter_leaves(const Bodies& bodies, std::size_t count, Runner& room) {
+  if (room.masks.size() < count) room.masks.resize(count);
+  SlabSpanPairs<S> slabs = bodies.slabs;
+  slabs.pairs = room.leaves.data();
+  slabs.count = count;
+  slabs.masks = room.masks.data();
+  slabs.tests = 0;
+  slab_span_kernels<S>(bodies.kernels).filter(bodies.padded)(slabs);
+  room.tests += slabs.tests;
+  return slabs.count;
 }
 
 template <class S>
 void SharedJoin<S>::join_some(const Bodies& bodies, const LeafSlot* leaves, std::size_t count, Runner& room,
-                              Kind kind, Result& result) {
+                              Kind kind, const std::uint32_t* masks, Result& result) {
   const std::size_t begin = room.throughout_count[kind], begin_partly = room.partly_count[kind];
   WideLeafJoin<S> join = bodies.join;
   join.pairs = leaves;
+  join.masks = masks;
   join.next = 0;
   join.count = count;
   join.tests = 0;
@@ -213,7 +238,7 @@ std::size_t SharedJoin<S>::bytes() const {
   std::size_t total =
       front_.bytes() + bodies_.capacity() * sizeof(Bodies) + results_.capacity() * sizeof(Result);
   for (const Runner& room : runners_) {
-    total += sizeof room + room.claimed.capacity() * sizeof(std::uint32_t) +
+    total += sizeof room + (room.claimed.capacity() + room.masks.capacity()) * sizeof(std::uint32_t) +
              (room.leaves.capacity() + room.own.capacity() + room.own_pairs.capacity()) * sizeof(LeafSlot);
     for (std::size_t kind = 0; kind < kinds; ++kind)
       total += room.throughout[kind].bytes() + room.partly[kind].bytes();

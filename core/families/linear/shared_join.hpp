@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/families/linear/linear_segment.hpp"
+#include "core/families/slabs/kernels/slab_spans.hpp"
 #include "core/families/wide/shared_front.hpp"
 #include "core/parallel/workers.hpp"
 #include "core/scene/self_pairs.hpp"
@@ -35,6 +36,11 @@ class SharedJoin {
   /// pairs that share a vertex are left out.
   void add(const WideLeafJoin<S>& bodies, KernelSet kernels, std::uint32_t padded, bool self,
            const Primitives* neighbours);
+  /// Leaves out what slabs separate, of the pair of bodies that was added last; `slabs` without pairs.
+  void use_slabs(const SlabSpanPairs<S>& slabs) {
+    bodies_.back().slabs = slabs;
+    bodies_.back().with_slabs = true;
+  }
   /// Joins, and writes the pairs behind those of `throughout` and `partly`; adds the box tests made to
   /// `tests`. `ends` becomes, for each added pair of bodies, the number of pairs found up to and including
   /// it.
@@ -53,11 +59,14 @@ class SharedJoin {
     std::uint32_t padded;
     bool self;
     const Primitives* neighbours;
+    SlabSpanPairs<S> slabs{};
+    bool with_slabs = false;
   };
   enum Kind : std::uint8_t { of_two, of_one, kinds };  ///< leaves, or bodies
   struct alignas(cache_line) Runner {
     std::vector<std::uint32_t> claimed;
-    std::vector<LeafSlot> leaves, own, own_pairs;  ///< of a batch within one body
+    std::vector<LeafSlot> leaves, own, own_pairs;  ///< of a batch within one body, or that slabs filter
+    std::vector<std::uint32_t> masks;              ///< that slabs leave
     JoinedColumns throughout[kinds], partly[kinds];
     std::size_t throughout_count[kinds], partly_count[kinds];
     std::uint64_t tests;
@@ -73,7 +82,8 @@ class SharedJoin {
   void claim_leaves(const Batch& batch, Runner& room);
   void join_leaves(std::size_t batch, std::uint32_t runner);
   void join_some(const Bodies& bodies, const LeafSlot* leaves, std::size_t count, Runner& room, Kind kind,
-                 Result& result);
+                 const std::uint32_t* masks, Result& result);
+  std::size_t filter_leaves(const Bodies& bodies, std::size_t count, Runner& room);
 
   std::vector<Bodies> bodies_;
   SharedFront front_;

@@ -31,20 +31,36 @@ template <class S, std::size_t padded>
     find_extent<S, padded>(leaf.blocks[end], slab.direction, slab.low[end], slab.high[end]);
 }
 
-/// Computes what is not current of a leaf.
 template <class S, std::size_t padded>
-[[gnu::always_inline]] inline SpanLeaf<S> span_leaf(const SlabSpanLeaves<S>& leaves, std::uint32_t leaf) {
+[[gnu::always_inline]] inline SpanLeaf<S> span_of(const SlabSpanLeaves<S>& leaves, std::uint32_t leaf) {
   const std::size_t place = std::size_t(leaf) * SpanBlock::scalars(padded);
-  SpanLeaf<S> result{{leaves.blocks[0] + place, leaves.blocks[1] + place}, leaves.slabs + leaf};
-  if (leaves.slab_stamps[leaf] == leaves.slab_stamp) return result;
+  return {{leaves.blocks[0] + place, leaves.blocks[1] + place}, leaves.slabs + leaf};
+}
+
+template <class S, std::size_t padded>
+[[gnu::noinline]] void make_span(const SlabSpanLeaves<S>& leaves, std::uint32_t leaf) {
+  const std::size_t place = std::size_t(leaf) * SpanBlock::scalars(padded);
   for (std::size_t end = 0; end < 2; ++end) {
     if (leaves.stamps[end][leaf] == leaves.stamp[end]) continue;
     leaves.stamps[end][leaf] = leaves.stamp[end];
     make_span_block<S, padded>(leaves.lists, leaf, leaves.positions[end], leaves.blocks[end] + place);
   }
-  make_slab<S, padded>(result, leaves.slabs[leaf]);
-  leaves.slab_stamps[leaf] = leaves.slab_stamp;
-  return result;
+  make_slab<S, padded>(span_of<S, padded>(leaves, leaf), leaves.slabs[leaf]);
+}
+
+template <class S, std::size_t padded>
+void make_spans(const SlabSpanLeaves<S>& leaves, const std::uint32_t* list, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) make_span<S, padded>(leaves, list[i]);
+}
+
+/// Computes what is not current of a leaf.
+template <class S, std::size_t padded>
+[[gnu::always_inline]] inline SpanLeaf<S> span_leaf(const SlabSpanLeaves<S>& leaves, std::uint32_t leaf) {
+  if (leaves.slab_stamps[leaf] != leaves.slab_stamp) {
+    make_span<S, padded>(leaves, leaf);
+    leaves.slab_stamps[leaf] = leaves.slab_stamp;
+  }
+  return span_of<S, padded>(leaves, leaf);
 }
 
 /// Returns a mask. Bit i: triangle i is not certain to stay on one side of the slab.
@@ -93,7 +109,8 @@ void filter(SlabSpanPairs<S>& shared) {
 }
 
 template <class S>
-constexpr SlabSpanKernels<S> table{{&filter<S, 4>, &filter<S, 8>, &filter<S, 16>}};
+constexpr SlabSpanKernels<S> table{{&filter<S, 4>, &filter<S, 8>, &filter<S, 16>},
+                                   {&make_spans<S, 4>, &make_spans<S, 8>, &make_spans<S, 16>}};
 
 }  // namespace
 

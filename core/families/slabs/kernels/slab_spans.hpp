@@ -55,8 +55,14 @@ struct SlabSpanPairs {
 
 template <class S>
 struct SlabSpanKernels {
+  /// Filters; computes the blocks and slabs that are not current.
   using Filter = void (*)(SlabSpanPairs<S>& state);
+  /// Computes the slabs of a list of leaves, and their blocks unless they are current. Stamps slabs only by
+  /// the caller: several threads may make different leaves.
+  using Make = void (*)(const SlabSpanLeaves<S>& leaves, const std::uint32_t* list, std::size_t count);
   Filter padded_filter[3];  ///< [padded leaf size 4, 8, 16]
+  Make padded_make[3];
+  Make make(std::uint32_t padded) const { return padded_make[padded <= 4 ? 0 : padded <= 8 ? 1 : 2]; }
   Filter filter(std::uint32_t padded) const { return padded_filter[padded <= 4 ? 0 : padded <= 8 ? 1 : 2]; }
 };
 KBVH_DECLARE_KERNELS(SlabSpanKernels<float>, slab_spans_float)
