@@ -8,8 +8,8 @@
 // which 24 change the set of pairs: 22 ns each by events, 4 ns by sorting at each frame, and a thirtieth of
 // the speed of `bottom_up` (a seventh by sorting; at l = 100 a sixth and a third). Exchanges grow with the
 // square of the boxes, so large leaves are best, and a list of all overlaps on one axis, or of single
-// triangles, is out of the question. At l = 100 it is 1.6 times as fast
-// as `sweep`; at l = 10 four times as slow.
+// triangles, is out of the question. At l = 100 it is 1.6 times as fast as `sweep`; at l = 10 it takes four
+// times as long.
 #include <algorithm>
 #include <vector>
 

@@ -4,8 +4,8 @@
 // turns with them; frames chosen anew at every frame make 1 % fewer tests and a refit 60 times as long, fixed
 // axes 1.6 times as many tests (cloth of 65k triangles that clings to a ball). Measured at 65k triangles, in
 // all: oriented boxes take 1.7 times (leaves of 16) as long as aligned ones (`bottom_up`) on the built-in
-// tablecloth, and 1.9 times (leaves of 8) on mixing swarms. Their queries are faster only where
-// surfaces cling to each other: two thirds of the time on the cloth around a ball.
+// tablecloth, and 1.9 times (leaves of 8) on mixing swarms. Their queries are faster only where surfaces
+// cling to each other: two thirds of the time on the cloth around a ball.
 #include "core/contract/registry.hpp"
 #include "core/families/volumes/obb_hierarchy.hpp"
 #include "core/families/volumes/volume_strategy.hpp"
