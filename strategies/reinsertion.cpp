@@ -128,6 +128,7 @@ class Reinsertion final : public CountedStrategy<S, Count>,
                           this->sampled_.positions(own.body));
       assign(own.body);
       refit(own.body);
+      bodies_[own.body].tree.settle();
     }
   }
 

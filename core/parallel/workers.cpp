@@ -65,7 +65,13 @@ class Workers::Jobs {
     for (std::uint32_t awake = awake_.load(); awake < wanted; ++awake) {
       awake_.fetch_add(1);
       users_.fetch_add(1);
-      pool_.start([](void* jobs) { static_cast<Jobs*>(jobs)->help(); }, this);
+      try {
+        pool_.start([](void* jobs) { static_cast<Jobs*>(jobs)->help(); }, this);
+      } catch (...) {  // no memory for a helper: the caller works alone
+        awake_.fetch_sub(1);
+        users_.fetch_sub(1);
+        return;
+      }
     }
   }
   void help() {

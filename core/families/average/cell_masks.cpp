@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace kbvh {
 
@@ -36,7 +37,8 @@ auto CellMasks<S>::grid_of(const S* rows, std::uint32_t width, std::uint32_t slo
 template <class S>
 void CellMasks<S>::add_triangle(const Grid& grid, int cuts, const S* const (&corners)[3], float area) {
   const S step = S(1) / S(3 * cuts);
-  const float share = area / float(cuts * cuts);
+  // A cell that holds a polygon is filled, however small (or not a number) the computed area is.
+  const float share = std::max(std::numeric_limits<float>::min(), area / float(cuts * cuts));
   for (int i = 0; i < cuts; ++i)
     for (int j = 0; j < cuts - i; ++j)
       for (int up = 0; up < (i + j + 1 < cuts ? 2 : 1); ++up) {

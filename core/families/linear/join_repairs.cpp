@@ -164,9 +164,25 @@ std::uint64_t IntervalJoin<S>::repair(std::span<const ChangedParts> changed, flo
   return tests() - before;
 }
 
-template std::uint64_t IntervalJoin<float>::repair(std::span<const ChangedParts>, float, Reader);
-template std::uint64_t IntervalJoin<double>::repair(std::span<const ChangedParts>, float, Reader);
+// The header announces instances of the whole class, so that every member is instantiated where it is
+// defined.
+template void IntervalJoin<float>::index_pairs();
+template void IntervalJoin<float>::link(std::uint32_t);
+template void IntervalJoin<float>::remove(std::uint32_t, Reader);
+template void IntervalJoin<float>::remove_changed(std::span<const ChangedParts>, Reader);
+template void IntervalJoin<float>::join_changed(const ChangedParts&, const ChangedParts&);
+template void IntervalJoin<float>::make_room(std::size_t);
+template void IntervalJoin<float>::add(const JoinedPair&, std::uint32_t, float, Reader);
 template void IntervalJoin<float>::begin_added(float, std::uint32_t);
+template std::uint64_t IntervalJoin<float>::repair(std::span<const ChangedParts>, float, Reader);
+template void IntervalJoin<double>::index_pairs();
+template void IntervalJoin<double>::link(std::uint32_t);
+template void IntervalJoin<double>::remove(std::uint32_t, Reader);
+template void IntervalJoin<double>::remove_changed(std::span<const ChangedParts>, Reader);
+template void IntervalJoin<double>::join_changed(const ChangedParts&, const ChangedParts&);
+template void IntervalJoin<double>::make_room(std::size_t);
+template void IntervalJoin<double>::add(const JoinedPair&, std::uint32_t, float, Reader);
 template void IntervalJoin<double>::begin_added(float, std::uint32_t);
+template std::uint64_t IntervalJoin<double>::repair(std::span<const ChangedParts>, float, Reader);
 
 }  // namespace kbvh

@@ -207,13 +207,29 @@ void LinearBounds<S>::clear_changed() {
   for (ChangedParts& parts : changed_) parts.clear();
 }
 
+// The header announces instances of the whole class, so that every member is instantiated where it is
+// defined.
 template bool LinearBounds<float>::repair(std::span<const PlanChange<float>>);
-template bool LinearBounds<double>::repair(std::span<const PlanChange<double>>);
 template bool LinearBounds<float>::pass_knots();
-template bool LinearBounds<double>::pass_knots();
+template bool LinearBounds<float>::take_over(std::uint32_t);
+template void LinearBounds<float>::follow_change(const PlanChange<float>&);
+template void LinearBounds<float>::follow_pieces(std::uint32_t, std::uint32_t);
+template void LinearBounds<float>::follow_line(std::uint32_t, std::uint32_t, double, const float*,
+                                               const float*);
+template bool LinearBounds<float>::remake_boxes();
+template bool LinearBounds<float>::is_near_as_before();
 template double LinearBounds<float>::share_made_anew();
-template double LinearBounds<double>::share_made_anew();
 template void LinearBounds<float>::clear_changed();
+template bool LinearBounds<double>::repair(std::span<const PlanChange<double>>);
+template bool LinearBounds<double>::pass_knots();
+template bool LinearBounds<double>::take_over(std::uint32_t);
+template void LinearBounds<double>::follow_change(const PlanChange<double>&);
+template void LinearBounds<double>::follow_pieces(std::uint32_t, std::uint32_t);
+template void LinearBounds<double>::follow_line(std::uint32_t, std::uint32_t, double, const double*,
+                                                const double*);
+template bool LinearBounds<double>::remake_boxes();
+template bool LinearBounds<double>::is_near_as_before();
+template double LinearBounds<double>::share_made_anew();
 template void LinearBounds<double>::clear_changed();
 
 }  // namespace kbvh

@@ -99,6 +99,7 @@ void SharedJoin<S>::run(Workers& workers, JoinedColumns& throughout, JoinedColum
       room.partly[kind].view(most_partly[kind], true);
     }
     room.claimed.reserve(leaf_pair_room);
+    room.masks.reserve(SharedFront::batch_pairs);
     for (auto* list : {&room.leaves, &room.own, &room.own_pairs})
       list->reserve(SharedFront::most_batch_slots);
   }

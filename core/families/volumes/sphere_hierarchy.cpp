@@ -51,16 +51,15 @@ void SphereHierarchy<S, bounds>::refit(const S* positions) {
 
 template <class S, SphereBounds bounds>
 void SphereHierarchy<S, bounds>::refit_without_kernels() {
-  std::vector<std::uint32_t> points;
   for (std::uint32_t n = tree_.node_count(); n-- > 0;) {
     const WideNode& node = tree_.nodes()[n];
     Sphere<S> children[8], own;
     for (std::uint32_t lane = 0; lane < node.count; ++lane) {
       if (lane < node.leaf_count) {
-        points.clear();
+        list_.clear();
         for (std::uint32_t i = 0; i < node.length; ++i)
-          points.push_back(tree_.lists()[node.list + 8 * i + list_place(lane, 8)] / 3);
-        fit(children[lane], PointSet<S>(points, placed_));
+          list_.push_back(tree_.lists()[node.list + 8 * i + list_place(lane, 8)] / 3);
+        fit(children[lane], PointSet<S>(list_, placed_));
       } else {
         const S* const child = own_.data() + std::size_t(4) * (node.first_child + lane - node.leaf_count);
         std::copy_n(child, 3, children[lane].centre);
@@ -111,9 +110,10 @@ std::vector<Sphere<S>> SphereHierarchy<S, bounds>::volumes() const {
 
 template <class S, SphereBounds bounds>
 std::size_t SphereHierarchy<S, bounds>::bytes() const {
-  return tree_.bytes() + (rows_.capacity() + own_.capacity() + boxes_.capacity() + coordinates_.capacity() +
-                          scratch_.capacity()) *
-                             sizeof(S);
+  return tree_.bytes() + list_.capacity() * sizeof(std::uint32_t) +
+         (rows_.capacity() + own_.capacity() + boxes_.capacity() + coordinates_.capacity() +
+          scratch_.capacity()) *
+             sizeof(S);
 }
 
 template <class S, SphereBounds bounds>

@@ -62,6 +62,7 @@ class SphereHierarchy {
   LaneTree<S> tree_;
   Cover cover_;
   const S* placed_ = nullptr;
+  std::vector<std::uint32_t> list_;  ///< points of a leaf, where kernels are not used
   AlignedArray<S> rows_, own_, boxes_, coordinates_, scratch_;
 };
 
