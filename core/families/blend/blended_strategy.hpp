@@ -66,9 +66,10 @@ class BlendedStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>,
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
       Body& body = bodies_[index];
       body.rows.start_over();
-      body.known = !this->scene_.moving(index)      ? Known::still
-                   : motion_.as_in_the_scene(index) ? Known::blended
-                                                    : Known::refitted;
+      // A body without primitives has no source of blended boxes.
+      body.known = !this->scene_.moving(index)                                ? Known::still
+                   : body.source != nullptr && motion_.as_in_the_scene(index) ? Known::blended
+                                                                              : Known::refitted;
       if (body.known == Known::blended)
         new_blend(index, t);
       else
