@@ -51,7 +51,7 @@ KBVH_STRATEGY(bd_tree) {
       .citation = "James & Pai 2004",
       .tightness = Tightness::conservative,
       .positions = PositionUse::fetched,
-      .declares = {.continuous = true, .time_budget = true},
+      .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters =
           {{"modes", "16", {}, "largest number of modes of a body", 0, 64, Numbers::whole},

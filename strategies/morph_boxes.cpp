@@ -40,7 +40,7 @@ KBVH_STRATEGY(morph_boxes) {
       .citation = "Larsson & Akenine-Möller 2003",
       .tightness = Tightness::conservative,
       .positions = PositionUse::fetched,
-      .declares = {.continuous = true, .time_budget = true},
+      .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
   })};
 }

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <map>
+#include <set>
 
 #include "tests/conformance/check.hpp"
 
@@ -29,6 +31,30 @@ TEST(SegmentCuts, KeepGuaranteesInFloat) {
 }
 TEST(SegmentCuts, KeepGuaranteesInDouble) {
   keep_guarantees<double>({{"max_looseness", "0.01"}});
+}
+
+// Fractions of a segment that round to 0 or to 1, for every strategy.
+template <class S>
+void keep_guarantees_beside_keyframes() {
+  for (const std::string scene : {"sheets", "soups"}) {
+    TestScene<S> test = synthetic_scene<S>(scene, 1);
+    std::set<double> frames;
+    for (const double t : test.frames.empty() ? frame_times(test.scene, 1) : test.frames)
+      for (const double other : {t, std::nextafter(t, -1e9), std::nextafter(t, 1e9)})
+        if (other >= 0) frames.insert(other);
+    test.frames.assign(frames.begin(), frames.end());
+    for (const StrategyEntry& entry : registry())
+      if (skipped(entry, test).empty()) {
+        EXPECT_EQ(check(entry, test, 1, {}, entry.info.topology.preferred), "")
+            << entry.info.id << " on " << scene;
+      }
+  }
+}
+TEST(FramesBesideKeyframes, KeepGuaranteesInFloat) {
+  keep_guarantees_beside_keyframes<float>();
+}
+TEST(FramesBesideKeyframes, KeepGuaranteesInDouble) {
+  keep_guarantees_beside_keyframes<double>();
 }
 
 double looseness(const std::string& scene, const std::map<std::string, std::string>& params) {

@@ -176,7 +176,10 @@ ReducedModel<S>::ReducedModel(const FlightPlans<S>& plans, const Settings& setti
     double left = squares[k];
     for (std::size_t m = 0; m < mode_count; ++m) left -= to[4 + m] * to[4 + m];
     left = std::max(left, 0.0);
-    to[3] = std::max(std::sqrt(left / double(vertices)), unit);
+    // Where modes leave little, the difference above is mostly rounding.
+    const double rounding =
+        double(std::numeric_limits<S>::epsilon()) * std::sqrt(squares[k] / double(vertices));
+    to[3] = std::max({std::sqrt(left / double(vertices)), unit, rounding});
   }
 
   // The remainder itself, whatever the decomposition was worth.

@@ -36,10 +36,13 @@ class TargetBoxes : public BlendSource<S> {
     if (k + 1 == times.size() || !(t > times[k])) return;
     const Target& last = targets_[k + 1];
     const double share = std::min((t - times[k]) / (times[k + 1] - times[k]), 1.0);
-    out.terms[0].weight = S(1 - share);
-    out.terms.push_back({last.rows.child_bounds.data(), S(share), 0});
-    // Roundings: half a unit each for weights, products, sums, the offset, and the frame's position; in all
-    // less than 4 units of the larger end.
+    // Not 0: empty lanes are infinite, and 0 times infinity is no number. The margin covers the difference.
+    const S least = std::numeric_limits<S>::min();
+    out.terms[0].weight = std::max(S(1 - share), least);
+    out.terms.push_back({last.rows.child_bounds.data(), std::max(S(share), least), 0});
+    // Roundings: half a unit each for weights, products, sums, the offset, and the frame's position, and
+    // three in double for the share, of a difference of up to two ends; in all less than 6 units of the
+    // larger end.
     const S margin = 8 * std::numeric_limits<S>::epsilon() * std::max(first.largest, last.largest) +
                      8 * std::numeric_limits<S>::denorm_min();
     std::fill_n(out.offset, 6, -margin);

@@ -174,6 +174,7 @@ class LinearBounds {
   ChangeHorizon horizon_;
   std::vector<ChangedParts> changed_;    ///< [body]
   std::vector<std::uint8_t> to_remake_;  ///< [body]
+  bool overflowed_ = false;              ///< a changed vertex leaves the range of numbers within the segment
   std::vector<Knot> knots_;              ///< a heap
   Repairs repairs_;
   std::uint64_t leaves_before_ = 0;  ///< of repairs_.leaves, when the segment began

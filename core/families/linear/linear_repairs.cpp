@@ -1,6 +1,7 @@
 // Repairs of a segment's bounds where plans changed within it.
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/families/linear/linear_bounds.hpp"
@@ -31,6 +32,11 @@ void enlarge(S* node_bounds, const S* position) {
     node_bounds[axis + 4] = std::max(node_bounds[axis + 4], position[axis]);
   }
 }
+/// Returns whether a line that begins at t can be extended back over the segment: near the segment's end the
+/// rounding of its last position would be multiplied by any number.
+bool extends_back(double begin, double t, double end) {
+  return t - begin <= 16 * (end - t);
+}
 }  // namespace
 
 template <class S>
@@ -42,7 +48,7 @@ bool LinearBounds<S>::repair(std::span<const PlanChange<S>> changes) {
   // At the segment's end every vertex is still where it was foreseen, and the next segment knows its plan.
   if (t == segment.end) return true;
   if (horizon_.frames() == 0 || whole_ || !(segment.begin <= t && t < segment.end) ||
-      !(segment.end <= t + 2 * horizon_.frames() * step_))
+      !extends_back(segment.begin, t, segment.end) || !(segment.end <= t + 2 * horizon_.frames() * step_))
     return false;
   for (const PlanChange<S>& change : changes)
     if (!hierarchy(change.body).empty() && !take_over(change.body)) return false;
@@ -62,6 +68,7 @@ bool LinearBounds<S>::pass_knots() {
     const Knot knot = knots_.front();
     std::pop_heap(knots_.begin(), knots_.end(), later);
     knots_.pop_back();
+    if (!extends_back(begin(), knot.time, end())) return false;
     follow_pieces(knot.body, knot.vertex);
   }
   return remake_boxes();
@@ -131,6 +138,8 @@ void LinearBounds<S>::follow_line(std::uint32_t index, std::uint32_t vertex, dou
   for (int axis = 0; axis < 3; ++axis) {
     position[0][axis] = S(double(from[axis]) - (double(last[axis]) - double(from[axis])) * back);
     position[1][axis] = last[axis];
+    // A box hides what is no number: the segment does not serve.
+    overflowed_ = overflowed_ || !std::isfinite(position[0][axis]) || !std::isfinite(position[1][axis]);
   }
   if (side.apart) {
     for (std::size_t end = 0; end < 2; ++end)
@@ -146,6 +155,7 @@ void LinearBounds<S>::follow_line(std::uint32_t index, std::uint32_t vertex, dou
 template <class S>
 bool LinearBounds<S>::remake_boxes() {
   Segment& segment = segments_[present_];
+  const bool overflowed = std::exchange(overflowed_, false);
   for (std::uint32_t index = 0; index < body_count(); ++index) {
     BodySegmentBounds<S>& side = segment.sides[index];
     if (to_remake_[index] != 0) {
@@ -171,7 +181,7 @@ bool LinearBounds<S>::remake_boxes() {
     make_margin(side);
     if (!admissible_root(side.at[0]) || !admissible_root(side.at[1])) return false;
   }
-  return is_near_as_before();
+  return !overflowed && is_near_as_before();
 }
 
 /// Returns whether all bodies that may meet now are among those that were found to do so.

@@ -63,6 +63,7 @@ void WideQuery<S>::traverse(const Side& a, const Side& b, WideTraversal& state) 
 
 template <class S>
 WideTraversal WideQuery<S>::fresh_traversal(const Budget& budget) {
+  own_leaves_.clear();  // of a query that was abandoned
   stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
   leaf_pairs_.resize(2 * leaf_pair_room);
   return {stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pair_room, 1, budget.box_tests};

@@ -33,7 +33,7 @@ struct Blend {
 template <class S>
 struct BlendKernels {
   /// Writes the rows of the listed wide nodes, and their own boxes: the union of the children's. Empty lanes
-  /// have to be infinite in the first term, and 0 or infinite in all others.
+  /// have to be infinite in the first term, and 0 or, with a weight that is not 0, infinite in all others.
   using Make = void (*)(WideArrays<S> hierarchy, const Blend<S>& blend, const std::uint32_t* nodes,
                         std::size_t count);
   Make width2, width4, width8;
