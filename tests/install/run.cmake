@@ -65,15 +65,13 @@ endwhile()
 if(NOT shown STREQUAL "my_refit;periodic_rebuild")
   message(FATAL_ERROR "the tutorial shows these strategies: ${shown}")
 endif()
-list(TRANSFORM shown PREPEND ${WORK_DIR}/ OUTPUT_VARIABLE shown_files)
-list(TRANSFORM shown_files APPEND .cpp)
 
 # The compiler's flags as kbvh had them, because sanitizers must agree on both sides.
 string(TOUPPER "${BUILD_TYPE}" build_type)
 step("configure" ${CMAKE_COMMAND} -S ${CONSUMER_DIR} -B ${build} -G ${GENERATOR}
   -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_CXX_COMPILER=${COMPILER} "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}"
   -DCMAKE_BUILD_TYPE=${BUILD_TYPE} "-DCMAKE_CXX_FLAGS=${FLAGS}" "-DCMAKE_CXX_FLAGS_${build_type}=${TYPE_FLAGS}"
-  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON "-DFROM_TUTORIAL=${shown_files}")
+  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DTUTORIAL=${WORK_DIR})
 refuse("configure" "${errors}" "Warning")
 
 file(READ ${build}/compile_commands.json commands)
