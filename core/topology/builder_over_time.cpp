@@ -97,6 +97,7 @@ Topology build_topology_over_time(const Primitives& primitives, std::span<const 
   if (count == 0) return topology;
   topology = MedianTree(splitter, config).build(count);
   topology.primitives = splitter.take_order();
+  sort_leaves(topology);
   topology.perfect = is_perfect(topology);
   return topology;
 }

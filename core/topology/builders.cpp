@@ -246,6 +246,13 @@ void check_builder(const BuilderConfig& config) {
     throw std::invalid_argument("SAH needs at least 2 bins, got " + std::to_string(config.sah_bins));
 }
 
+void sort_leaves(Topology& topology) {
+  for (const TopologyNode node : topology.nodes)
+    if (node.is_leaf())
+      std::sort(topology.primitives.begin() + node.first(),
+                topology.primitives.begin() + node.first() + node.count());
+}
+
 template <class S>
 Topology build_topology(std::span<const Box<S>> boxes, const BuilderConfig& config) {
   check_builder(config);
@@ -266,6 +273,7 @@ Topology build_topology(std::span<const Box<S>> boxes, const BuilderConfig& conf
   }
   topology.primitives.reserve(boxes.size());
   for (const BuildItem& item : builder.items()) topology.primitives.push_back(item.primitive);
+  sort_leaves(topology);
   topology.perfect = is_perfect(topology);
   return topology;
 }

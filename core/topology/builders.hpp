@@ -32,6 +32,10 @@ void check_builder(const BuilderConfig& config);
 template <class S>
 std::vector<Box<S>> primitive_boxes(const Primitives& primitives, const S* positions);
 
+/// Sorts the primitives within each leaf. Builders end with it: partitions leave the order within a leaf to
+/// the standard library, and a tree must not depend on that. O(n log leaf size).
+void sort_leaves(Topology& topology);
+
 /// Builds a topology over the boxes. Deterministic: ties are broken by primitive id. O(n log n). Nodes are
 /// stored depth first. SAH and Morton trees are built as binary trees and then collapsed, largest child
 /// first. Throws std::invalid_argument on an inadmissible width or leaf size.

@@ -1,6 +1,5 @@
 #pragma once
-#include <vector>
-
+#include "tests/support/grids.hpp"
 #include "tests/support/play.hpp"
 
 namespace kbvh::test {
@@ -9,23 +8,10 @@ namespace kbvh::test {
 /// vertex (i, j) by step(i) along z from one to the next.
 template <class S, class Step>
 Body<S> grid(std::uint32_t n, double x, double y, std::uint32_t keyframes, Step&& step) {
-  Body<S> body;
-  std::vector<double> times;
-  std::vector<S> positions;
-  for (std::uint32_t k = 0; k < keyframes; ++k) {
-    times.push_back(k);
-    for (std::uint32_t j = 0; j <= n; ++j)
-      for (std::uint32_t i = 0; i <= n; ++i)
-        for (const double c : {x + i / double(n), y + j / double(n), k * step(i)}) positions.push_back(S(c));
-  }
-  for (std::uint32_t j = 0; j < n; ++j)
-    for (std::uint32_t i = 0; i < n; ++i) {
-      const std::uint32_t a = j * (n + 1) + i, b = a + n + 1;
-      body.primitives.add(std::vector<std::uint32_t>{a, a + 1, b});
-      body.primitives.add(std::vector<std::uint32_t>{b, a + 1, b + 1});
-    }
-  body.plans = FlightPlans<S>((n + 1) * (n + 1), std::move(times), std::move(positions));
-  return body;
+  return placed_grid<S>(n, keyframes,
+                        [&](std::uint32_t k, std::uint32_t i, std::uint32_t j, int axis) -> double {
+                          return axis == 0 ? x + i / double(n) : axis == 1 ? y + j / double(n) : k * step(i);
+                        });
 }
 
 /// A grid that moves and one at rest, `apart` from it along x.

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
@@ -59,6 +61,10 @@ TEST(BuilderOverTime, TreesAreSoundAndTheSameAtEachBuild) {
         const auto times = body.times();
         const Topology topology = build_topology_over_time<double>(body.primitives, times, config);
         EXPECT_EQ(check_topology(topology, body.primitives), "");
+        for (const TopologyNode node : topology.nodes) {
+          const auto begin = topology.primitives.begin() + node.first();
+          EXPECT_TRUE(!node.is_leaf() || std::is_sorted(begin, begin + node.count()));
+        }
         const Topology again = build_topology_over_time<double>(body.primitives, times, config);
         EXPECT_EQ(topology.primitives, again.primitives);
         const Topology median = build_topology(body.primitives, body.first.data(), config);

@@ -145,6 +145,41 @@ TYPED_TEST(SlabsTest, SlackKeepsWhatTouches) {
   EXPECT_GT(lost_without, 0U) << "the fault without slack is not seen";
 }
 
+// Rows are padded with the last triangle, which must not count more than the others.
+TYPED_TEST(SlabsTest, SlabsAreAcrossTheSumOfTheNormalsOfTheirTriangles) {
+  using S = TypeParam;
+  const Scene<S> scene = crossing_waves<S>();
+  SlabbedBodies<S> bodies(scene, {.method = BuildMethod::median, .width = 8, .leaf_size = 11},
+                          active_kernel_set());
+  bodies.seek(0);
+  bodies.by_slabs();
+  const WideHierarchy<S>& hierarchy = bodies.hierarchies[0];
+  const S* const positions = bodies.playback.positions(0);
+  const SlabLeaves<S> leaves = bodies.blocks[0].of(bodies.hierarchies[0], positions);
+  std::size_t padded_leaves = 0;
+  for (std::uint32_t leaf = 0; leaf < hierarchy.leaf_count(); ++leaf) {
+    if (leaves.stamps[leaf] != leaves.stamp) continue;
+    double sum[3] = {0, 0, 0};
+    const auto primitives = bodies.hierarchies[0].leaf_primitives(leaf);
+    for (const std::uint32_t primitive : primitives) {
+      const auto corners = scene.bodies[0].primitives[primitive];
+      const S* const p[3] = {positions + std::size_t(3) * corners[0], positions + std::size_t(3) * corners[1],
+                             positions + std::size_t(3) * corners[2]};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::size_t j = (axis + 1) % 3, k = (axis + 2) % 3;
+        sum[axis] += (double(p[1][j]) - p[0][j]) * (double(p[2][k]) - p[0][k]) -
+                     (double(p[1][k]) - p[0][k]) * (double(p[2][j]) - p[0][j]);
+      }
+    }
+    const double size = std::abs(sum[0]) + std::abs(sum[1]) + std::abs(sum[2]);
+    const S* const direction = leaves.blocks + leaf * SlabBlock::scalars(hierarchy.padded_leaf_size()) +
+                               SlabBlock::rows * hierarchy.padded_leaf_size();
+    for (std::size_t axis = 0; axis < 3; ++axis) EXPECT_NEAR(double(direction[axis]), sum[axis] / size, 1e-4);
+    padded_leaves += primitives.size() < hierarchy.padded_leaf_size();
+  }
+  EXPECT_GT(padded_leaves, 10U);
+}
+
 TYPED_TEST(SlabsTest, StaleSlabsAndThoseOfOtherLeavesLosePairs) {
   using S = TypeParam;
   const Scene<S> scene = crossing_waves<S>();

@@ -73,13 +73,17 @@ template <class S, std::size_t padded>
   }
 }
 
-/// Writes the direction of the slab: the sum of the normals, or zero, which separates nothing, where that is
-/// too small or too large to be scaled.
+/// Writes the direction of the slab: the sum of the normals of the first `count` triangles, or zero, which
+/// separates nothing, where that is too small or too large to be scaled. The other triangles repeat the last
+/// one.
 template <class S, std::size_t padded>
-[[gnu::always_inline]] inline void find_direction(const S (&normals)[3][padded], S* direction) {
+[[gnu::always_inline]] inline void find_direction(const S (&normals)[3][padded], std::uint32_t count,
+                                                  S* direction) {
   S n[3], size = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    n[axis] = reduced<S, padded>(normals[axis], add_lanes);
+    alignas(64) S row[padded];
+    for (std::size_t i = 0; i < padded; ++i) row[i] = i < count ? normals[axis][i] : S(0);
+    n[axis] = reduced<S, padded>(row, add_lanes);
     size += n[axis] < 0 ? -n[axis] : n[axis];
   }
   constexpr S least = sizeof(S) == 4 ? S(0x1p-100) : S(0x1p-900), most = 1 / least;

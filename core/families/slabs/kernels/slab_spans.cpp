@@ -11,7 +11,8 @@ template <class S, std::size_t padded>
   load_corners<S, padded>(lists, leaf, positions, block);
   alignas(64) S normals[3][padded];
   find_normals<S, padded>(block, normals);
-  find_direction<S, padded>(normals, block + SpanBlock::rows * padded);
+  find_direction<S, padded>(normals, lists.end_entry[leaf] - lists.first_entry[leaf],
+                            block + SpanBlock::rows * padded);
 }
 
 /// The corners of one leaf at both ends, and its slab.

@@ -41,7 +41,7 @@ template <class S, std::size_t padded>
   load_corners<S, padded>(lists, leaf, positions, corners);
   box_corners<S, padded>(lists, leaf, block);
   find_normals<S, padded>(corners, normals);
-  find_direction<S, padded>(normals, tail);
+  find_direction<S, padded>(normals, lists.end_entry[leaf] - lists.first_entry[leaf], tail);
   find_planes<S, padded>(normals, block);
   const S direction[3] = {tail[0], tail[1], tail[2]};
   find_extent<S, padded>(corners, direction, tail[3], tail[4]);
