@@ -61,7 +61,7 @@ PlanScript<S> drag_script(const Scene<S>& scene, const DragRule& rule) {
       change.vertex = one.vertex;
       for (std::size_t d = 0; d < 3; ++d) {
         const std::size_t at = std::size_t(3) * one.vertex + d;
-        const double own = k + 1 == times.size()
+        const double own = k + 1 == times.size() || frames[f] < times[0]  // at rest
                                ? 0.0
                                : (double(plans.keyframe(k + 1)[at]) - double(plans.keyframe(k)[at])) /
                                      (times[k + 1] - times[k]);

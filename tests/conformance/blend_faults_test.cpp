@@ -7,6 +7,7 @@
 #include "core/families/blend/reduced_boxes.hpp"
 #include "core/families/blend/target_boxes.hpp"
 #include "tests/conformance/check.hpp"
+#include "tests/support/grids.hpp"
 
 namespace kbvh::test {
 namespace {
@@ -113,12 +114,7 @@ TestScene<S> three_modes() {
     std::vector<double> times;
     for (int k = 0; k < keyframes; ++k) times.push_back(k / 30.0);
     body.plans = FlightPlans<S>(side * side, times, std::move(positions));
-    for (std::uint32_t y = 0; y + 1 < side; ++y)
-      for (std::uint32_t x = 0; x + 1 < side; ++x) {
-        const std::uint32_t v = y * side + x;
-        body.primitives.add(std::vector<std::uint32_t>{v, v + 1, v + side});
-        body.primitives.add(std::vector<std::uint32_t>{v + 1, v + side + 1, v + side});
-      }
+    add_grid_triangles(body.primitives, side - 1);
     test.scene.bodies.push_back(std::move(body));
   }
   test.scene.pairs = all_pairs(test.scene.bodies);

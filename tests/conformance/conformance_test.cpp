@@ -11,6 +11,7 @@
 #include "core/kernels/kernel_set.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "tests/conformance/check.hpp"
+#include "tests/support/grids.hpp"
 
 namespace kbvh::test {
 namespace {
@@ -173,12 +174,7 @@ TestScene<S> bending_grid(std::uint32_t side) {
           positions.push_back(y);
           positions.push_back(body == 0 ? (x - S(0.4)) * (S(0.1) + S(keyframe) * y) : S(0.01));
         }
-    for (std::uint32_t j = 0; j < side; ++j)
-      for (std::uint32_t i = 0; i < side; ++i) {
-        const std::uint32_t a = j * (side + 1) + i, b = a + side + 1;
-        made.primitives.add(std::vector<std::uint32_t>{a, a + 1, b});
-        made.primitives.add(std::vector<std::uint32_t>{b, a + 1, b + 1});
-      }
+    add_grid_triangles(made.primitives, side);
     const std::vector<double> times = body == 0 ? std::vector<double>{0, 1} : std::vector<double>{0};
     made.plans = FlightPlans<S>((side + 1) * (side + 1), times, std::move(positions));
     test.scene.bodies.push_back(std::move(made));

@@ -7,7 +7,7 @@
 #include "core/families/linear/segment_interval.hpp"
 #include "core/families/sweep/kinetic_overlaps.hpp"
 #include "core/scene/self_pairs.hpp"
-#include "tests/conformance/check.hpp"
+#include "tests/conformance/list_faults.hpp"
 
 namespace kbvh::test {
 namespace {
@@ -127,33 +127,15 @@ struct Seeded {
   };
 };
 
-/// The first violations in float and in double.
-template <Fault fault, KeptBy kept = KeptBy::events>
-std::pair<std::string, std::string> violations(const char* scene) {
-  Info info;
-  info.id = "faulty";
-  info.tightness = Tightness::none;
-  info.topology = {.own = true};
-  const StrategyEntry entry = make_entry<Seeded<fault, kept>::template Strategy>(info);
-  constexpr std::uint32_t l = 7;
-  return {check(entry, synthetic_scene<float>(scene, l), l, {}, {}),
-          check(entry, synthetic_scene<double>(scene, l), l, {}, {})};
-}
 template <Fault fault>
 void expect_caught(const char* scene) {
-  const auto [in_float, in_double] = violations<fault>(scene);
-  EXPECT_NE(in_float.find("not among the candidates"), std::string::npos) << "in float: " << in_float;
-  EXPECT_NE(in_double.find("not among the candidates"), std::string::npos) << "in double: " << in_double;
+  expect_lost_candidates<Seeded<fault, KeptBy::events>::template Strategy>(scene);
 }
 
 TEST(KineticSweepFaults, SoundListsPass) {
   for (const char* const scene : {"soups", "sheets", "four_bodies_own_keyframes"}) {
-    const auto [in_float, in_double] = violations<Fault::none>(scene);
-    EXPECT_EQ(in_float, "") << scene;
-    EXPECT_EQ(in_double, "") << scene;
-    const auto [sorted_in_float, sorted_in_double] = violations<Fault::none, KeptBy::sorting>(scene);
-    EXPECT_EQ(sorted_in_float, "") << scene;
-    EXPECT_EQ(sorted_in_double, "") << scene;
+    expect_sound_candidates<Seeded<Fault::none, KeptBy::events>::Strategy>(scene);
+    expect_sound_candidates<Seeded<Fault::none, KeptBy::sorting>::Strategy>(scene);
   }
 }
 TEST(KineticSweepFaults, ALostSwap) {

@@ -195,16 +195,23 @@ TEST_P(PlanChanges, ErrorsChangeNothing) {
     using S = KBVH_SCALAR(test);
     if (entry.factory<S>() == nullptr) return;
     constexpr S infinity = std::numeric_limits<S>::infinity(), nan = std::numeric_limits<S>::quiet_NaN();
-    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    const Contestant contestant{&entry, {}, entry.info.topology.preferred};
+    Session<S> session(test.scene, contestant, CountingPolicy::silent);
+    Session<S> other(test.scene, contestant, CountingPolicy::silent);  // nobody asks it for changes
     Playback<S> undisturbed(test.scene);
-    PairBuffer pairs;
+    PairBuffer pairs, expected;
     PhaseTimes times;
     session.reset(test.frames[0]);
+    other.reset(test.frames[0]);
     for (std::size_t f = 0; f < test.frames.size(); ++f) {
       const double t = test.frames[f];
       if (f > 0) session.advance(t, times);
+      if (f > 0) other.advance(t, times);
       session.query(pairs, times);
+      other.query(expected, times);
       std::sort(pairs.begin(), pairs.end());
+      std::sort(expected.begin(), expected.end());
+      EXPECT_EQ(pairs, expected) << GetParam() << " at frame " << f;
       undisturbed.seek(t);
       if (entry.info.guarantee != Guarantee::approximate) {
         EXPECT_EQ(pairs, sweep_pairs(test.scene, undisturbed)) << GetParam() << " at frame " << f;

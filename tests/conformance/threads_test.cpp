@@ -13,6 +13,7 @@
 #include "core/judge/session.hpp"
 #include "core/parallel/workers.hpp"
 #include "tests/conformance/check.hpp"
+#include "tests/support/grids.hpp"
 
 #if defined(KBVH_TEST_HAS_TBB)
 #include <tbb/global_control.h>
@@ -29,28 +30,12 @@ const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
 /// A sheet of 2 side^2 triangles that waves over one keyframe after another.
 template <class S>
 Body<S> sheet(std::uint32_t side, std::uint32_t keyframes, double tilt) {
-  Body<S> body;
-  std::vector<double> times;
-  std::vector<S> positions;
-  for (std::uint32_t k = 0; k < keyframes; ++k) {
-    times.push_back(k);
-    for (std::uint32_t j = 0; j <= side; ++j)
-      for (std::uint32_t i = 0; i <= side; ++i) {
+  return placed_grid<S>(
+      side, keyframes, [&](std::uint32_t k, std::uint32_t i, std::uint32_t j, int axis) -> double {
         const double x = i / double(side), y = j / double(side), phase = 9 * x + 7 * y + 0.4 * k;
         const double bend = phase - 4 * double(int(phase / 4)) - 2;
-        positions.push_back(S(x));
-        positions.push_back(S(y + 0.02 * k * x));
-        positions.push_back(S(tilt * (x - 0.5) + 0.05 * bend * bend));
-      }
-  }
-  for (std::uint32_t j = 0; j < side; ++j)
-    for (std::uint32_t i = 0; i < side; ++i) {
-      const std::uint32_t a = j * (side + 1) + i, b = a + side + 1;
-      body.primitives.add(std::vector<std::uint32_t>{a, a + 1, b});
-      body.primitives.add(std::vector<std::uint32_t>{b, a + 1, b + 1});
-    }
-  body.plans = FlightPlans<S>((side + 1) * (side + 1), std::move(times), std::move(positions));
-  return body;
+        return axis == 0 ? x : axis == 1 ? y + 0.02 * k * x : tilt * (x - 0.5) + 0.05 * bend * bend;
+      });
 }
 
 enum class Self : std::uint8_t { without, with };

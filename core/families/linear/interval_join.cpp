@@ -174,19 +174,12 @@ void IntervalJoin<S>::take_self_leaves(std::size_t end, LeavesOf leaves) {
   keep_self_columns(neighbours_, leaves, leaf_join_.partly, old_partly);
 }
 
-/// Pairs of a leaf with itself come last: the order then does not depend on how many pairs of leaves are
-/// taken at a time.
 template <class S>
 void IntervalJoin<S>::take_own_leaves() {
-  const std::size_t room = leaf_pairs_.size() / 2;
-  for (std::size_t begin = 0; begin < own_leaves_.size(); begin += room) {
-    const std::size_t count = std::min(room, own_leaves_.size() - begin);
-    for (std::size_t i = 0; i < count; ++i)
-      leaf_pairs_[2 * i] = leaf_pairs_[2 * i + 1] = own_leaves_[begin + i];
+  for_own_leaves(own_leaves_, leaf_pairs_.data(), leaf_pairs_.size() / 2, [&](std::size_t count) {
     leaf_join_.next = 0;
     take_self_leaves(count, LeavesOf::one);
-  }
-  own_leaves_.clear();
+  });
 }
 
 template <class S>

@@ -88,16 +88,10 @@ QueryStatus SlabQuery<S>::run(const Side& a, const Side& b, S reach, PairBuffer&
       state.stack_room = stack_.size();
     }
   }
-  // Pairs of a leaf with itself come last: the order does not depend on the room for pairs of leaves.
-  const std::size_t room = leaf_pairs_.size() / 2;
-  for (std::size_t begin = 0; begin < own_leaves_.size(); begin += room) {
-    const std::size_t count = std::min(room, own_leaves_.size() - begin);
-    for (std::size_t i = 0; i < count; ++i)
-      leaf_pairs_[2 * i] = leaf_pairs_[2 * i + 1] = own_leaves_[begin + i];
+  for_own_leaves(own_leaves_, leaf_pairs_.data(), leaf_pair_room, [&](std::size_t count) {
     leaves.next = 0;
     take(count, LeavesOf::one);
-  }
-  own_leaves_.clear();
+  });
   tests += state.tests + leaves.tests;
   separated_ += leaves.separated;
   return {state.depth};

@@ -4,6 +4,7 @@
 
 #include "core/families/volumes/lane_tree.hpp"
 #include "core/scene/pairs.hpp"
+#include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
 
@@ -44,6 +45,7 @@ class LaneSearch {
       take_leaves(out);
       grow();
     }
+    take_own_leaves(out);
     return state_.depth;
   }
   /// Returns the tests of nodes and of primitives' boxes, with those before.
@@ -51,7 +53,9 @@ class LaneSearch {
 
  private:
   void take_leaves(PairBuffer& out);
-  void append(std::size_t begin, std::size_t end, PairBuffer& out);
+  void take_own_leaves(PairBuffer& out);
+  void append(std::size_t count, PairBuffer& out);
+  void append_within(LeavesOf leaves, std::size_t count, PairBuffer& out);
   void grow();
 
   LaneSide<S> a_, b_;

@@ -10,10 +10,6 @@
 
 namespace kbvh {
 
-namespace {
-constexpr std::size_t found_at_once = 2048;
-}  // namespace
-
 template <class S>
 void SharedQuery<S>::run(Workers& workers, PairBuffer& out, std::uint64_t& tests) {
   runners_.resize(workers.threads());
@@ -119,43 +115,6 @@ void SharedQuery<S>::compare(std::size_t which, std::uint32_t runner) {
     keep(LeavesOf::one, room.found_own, begin_own);
   }
   result = {runner, begin, room.found.size(), begin_own, room.found_own.size()};
-}
-
-template <class S>
-void SharedQuery<S>::append(const Bodies& bodies, const LeafSlot* leaves, std::size_t count, Runner& room,
-                            PairBuffer& out) {
-  WideTree<S>&a = *bodies.a.hierarchy, &b = *bodies.b.hierarchy;
-  if (a.padded_leaf_size() == 1) {
-    for (std::size_t i = 0; i < count; ++i)
-      out.push_back({bodies.a.body, a.leaf_primitives(a.leaf_number(leaves[2 * i]))[0], bodies.b.body,
-                     b.leaf_primitives(b.leaf_number(leaves[2 * i + 1]))[0]});
-    return;
-  }
-  room.chunk.resize(found_at_once);
-  WideLeafPairs<S> state{a.arrays(),
-                         b.arrays(),
-                         a.leaves(positions(bodies.a)),
-                         b.leaves(positions(bodies.b)),
-                         leaves,
-                         0,
-                         count,
-                         bodies.a.body,
-                         bodies.b.body,
-                         room.chunk.data(),
-                         0,
-                         found_at_once,
-                         0};
-  const auto kernel = wide_overlap_kernels<S>(a.kernels()).pairs(a.width(), a.padded_leaf_size());
-  while (state.next < state.count) {
-    kernel(state);
-    const std::size_t before = out.size();
-    out.resize(before + state.found);
-    for (std::size_t i = 0; i < state.found; ++i)
-      out[before + i] = {room.chunk[i].body_a, room.chunk[i].primitive_a, room.chunk[i].body_b,
-                         room.chunk[i].primitive_b};
-    state.found = 0;
-  }
-  room.tests += state.tests;
 }
 
 template <class S>

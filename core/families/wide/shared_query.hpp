@@ -57,7 +57,11 @@ class SharedQuery {
   };
   void claim_leaves(const Batch& batch, Runner& room);
   void compare(std::size_t batch, std::uint32_t runner);
-  void append(const Bodies& bodies, const LeafSlot* leaves, std::size_t count, Runner& room, PairBuffer& out);
+  void append(const Bodies& bodies, const LeafSlot* leaves, std::size_t count, Runner& room,
+              PairBuffer& out) {
+    append_leaf_pairs(bodies.a, positions(bodies.a), bodies.b, positions(bodies.b), leaves, 0, count,
+                      room.chunk, out, room.tests);
+  }
   const S* positions(const Side& side) const {
     return side.positions != nullptr ? side.positions : motion_.positions(side.body);
   }

@@ -9,12 +9,6 @@
 
 namespace kbvh {
 
-namespace {
-
-constexpr std::size_t chunk_room = 2048;
-
-}  // namespace
-
 template <class S>
 QueryStatus WideQuery<S>::run(const Side& a, const Side& b, PairBuffer& out, std::uint64_t& tests,
                               const Budget& budget) {
@@ -151,17 +145,10 @@ void WideQuery<S>::take_leaves(const Side& a, const Side& b, WideTraversal& stat
   append_self_pairs(a, b, LeavesOf::two, different, out, tests);
 }
 
-/// Pairs of a leaf with itself come last: the order of the answer then does not depend on how many pairs of
-/// leaves are taken at a time.
 template <class S>
 void WideQuery<S>::take_own_leaves(const Side& a, const Side& b, PairBuffer& out, std::uint64_t& tests) {
-  for (std::size_t begin = 0; begin < own_leaves_.size(); begin += leaf_pair_room) {
-    const std::size_t count = std::min(leaf_pair_room, own_leaves_.size() - begin);
-    for (std::size_t i = 0; i < count; ++i)
-      leaf_pairs_[2 * i] = leaf_pairs_[2 * i + 1] = own_leaves_[begin + i];
-    append_self_pairs(a, b, LeavesOf::one, count, out, tests);
-  }
-  own_leaves_.clear();
+  for_own_leaves(own_leaves_, leaf_pairs_.data(), leaf_pair_room,
+                 [&](std::size_t count) { append_self_pairs(a, b, LeavesOf::one, count, out, tests); });
 }
 
 template <class S>
@@ -174,41 +161,36 @@ void WideQuery<S>::append_self_pairs(const Side& a, const Side& b, LeavesOf leav
 }
 
 template <class S>
-void WideQuery<S>::append_pairs(const Side& side_a, const Side& side_b, std::size_t begin, std::size_t end,
-                                PairBuffer& out, std::uint64_t& tests) {
+void append_leaf_pairs(const WideSide<S>& side_a, const S* positions_a, const WideSide<S>& side_b,
+                       const S* positions_b, const LeafSlot* leaves, std::size_t begin, std::size_t end,
+                       std::vector<FoundPair>& chunk, PairBuffer& out, std::uint64_t& tests) {
   WideTree<S>&a = *side_a.hierarchy, &b = *side_b.hierarchy;
   if (a.padded_leaf_size() == 1) {
     for (std::size_t i = begin; i < end; ++i)
-      out.push_back({side_a.body, a.leaf_primitives(a.leaf_number(leaf_pairs_[2 * i]))[0], side_b.body,
-                     b.leaf_primitives(b.leaf_number(leaf_pairs_[2 * i + 1]))[0]});
+      out.push_back({side_a.body, a.leaf_primitives(a.leaf_number(leaves[2 * i]))[0], side_b.body,
+                     b.leaf_primitives(b.leaf_number(leaves[2 * i + 1]))[0]});
     return;
   }
-  chunk_.resize(chunk_room);
-  WideLeafPairs<S> state{a.arrays(),
-                         b.arrays(),
-                         a.leaves(positions(side_a)),
-                         b.leaves(positions(side_b)),
-                         leaf_pairs_.data(),
-                         begin,
-                         end,
-                         side_a.body,
-                         side_b.body,
-                         chunk_.data(),
-                         0,
-                         chunk_room,
-                         0};
+  chunk.resize(found_at_once);
+  WideLeafPairs<S> state{
+      a.arrays(), b.arrays(),  a.leaves(positions_a), b.leaves(positions_b), leaves, begin,
+      end,        side_a.body, side_b.body,           chunk.data(),          0,      found_at_once,
+      0};
   const auto kernel = wide_overlap_kernels<S>(a.kernels()).pairs(a.width(), a.padded_leaf_size());
   while (state.next < state.count) {
     kernel(state);
-    const std::size_t before = out.size();
-    out.resize(before + state.found);
-    for (std::size_t i = 0; i < state.found; ++i)
-      out[before + i] = {chunk_[i].body_a, chunk_[i].primitive_a, chunk_[i].body_b, chunk_[i].primitive_b};
+    append_found({chunk.data(), state.found}, out);
     state.found = 0;
   }
   tests += state.tests;
 }
 
+template void append_leaf_pairs(const WideSide<float>&, const float*, const WideSide<float>&, const float*,
+                                const LeafSlot*, std::size_t, std::size_t, std::vector<FoundPair>&,
+                                PairBuffer&, std::uint64_t&);
+template void append_leaf_pairs(const WideSide<double>&, const double*, const WideSide<double>&,
+                                const double*, const LeafSlot*, std::size_t, std::size_t,
+                                std::vector<FoundPair>&, PairBuffer&, std::uint64_t&);
 template class WideQuery<float>;
 template class WideQuery<double>;
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/families/wide/kernels/wide_linear.hpp"
+#include "core/families/wide/kernels/wide_overlap.hpp"
 #include "core/families/wide/wide_tree.hpp"
 #include "core/scene/motion_view.hpp"
 #include "core/scene/pairs.hpp"
@@ -29,6 +30,14 @@ struct WideSide {
   /// box of the root must be current.
   const std::uint8_t* stale = nullptr;
 };
+
+/// Appends the pairs of primitives whose boxes overlap in the pairs of leaves [begin, end) of a list, of
+/// which the leaves of side a are leaves[2 i]; adds the box tests made to `tests`. `positions_a` and
+/// `positions_b` are those of the sides, or of the scene. `chunk` is memory that is kept from call to call.
+template <class S>
+void append_leaf_pairs(const WideSide<S>& a, const S* positions_a, const WideSide<S>& b, const S* positions_b,
+                       const LeafSlot* leaves, std::size_t begin, std::size_t end,
+                       std::vector<FoundPair>& chunk, PairBuffer& out, std::uint64_t& tests);
 
 /// Queries two wide hierarchies; keeps its buffers from frame to frame.
 template <class S>
@@ -94,7 +103,9 @@ class WideQuery {
     return side.positions != nullptr || !motion_ ? side.positions : motion_->positions(side.body);
   }
   void append_pairs(const Side& a, const Side& b, std::size_t begin, std::size_t end, PairBuffer& out,
-                    std::uint64_t& tests);
+                    std::uint64_t& tests) {
+    append_leaf_pairs(a, positions(a), b, positions(b), leaf_pairs_.data(), begin, end, chunk_, out, tests);
+  }
 
   std::optional<SceneView<S>> scene_;
   std::optional<SampledMotion<S>> motion_;
