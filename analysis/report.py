@@ -284,7 +284,7 @@ def _made(study: Study) -> list[tuple[str, str]]:
                  + (f", {span} repetitions each" if span else "")
                  + (f"; {len(study.refused)} refused" if len(study.refused) else "")),
         ("Verified", f"{text.count(runs['verified_frames'].sum())} frames against the oracle before any time was taken"
-                     + ("" if every <= 1 else f" (long clips on a sample: every {text.ordinal(every)} frame at the least)")),
+                     + ("" if every <= 1 else f" (of long clips a sample, down to every {text.ordinal(every)} frame)")),
     ]  # fmt: skip
 
 
