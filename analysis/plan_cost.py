@@ -1,6 +1,6 @@
 """Estimates roughly how long each study of a plan takes, from costs per frame that were measured once.
 
-usage: plan_cost.py PLAN.json
+usage: plan_cost.py PLAN.json [--study NAME]...
 
 The estimates serve to choose a piece, not as results: the costs are of one machine, grow with the number of polygons alone,
 and ignore contact. Only the standard library is needed.
@@ -8,6 +8,7 @@ and ignore contact. Only the standard library is needed.
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 from itertools import product
@@ -96,15 +97,36 @@ def pieces(plan: dict[str, Any]) -> dict[str, float]:
     return result
 
 
+def about(length: float) -> str:
+    """Returns a duration in minutes as text."""
+    if length < 1:
+        return "   under 1 min"
+    return f"about {length:5.0f} min" if length < 90 else f"about {length / 60:5.1f} h"
+
+
 def main() -> int:
-    """Prints a line per piece."""
-    if len(sys.argv) != 2:
-        print("usage: plan_cost.py PLAN.json", file=sys.stderr)
+    """Prints a line per study; all of them, or those asked for."""
+    parser = argparse.ArgumentParser(prog="plan_cost.py", description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("plan", metavar="PLAN.json")
+    parser.add_argument("--study", action="append", default=[], metavar="NAME", help="only this study; may be repeated")
+    asked = parser.parse_args()
+    try:
+        found = pieces(json.loads(Path(asked.plan).read_text(encoding="utf-8")))
+    except (OSError, ValueError) as reason:
+        print(f"plan_cost: {asked.plan}: {getattr(reason, 'strerror', None) or reason}", file=sys.stderr)
         return 2
-    found = pieces(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
-    for name, length in found.items():
-        print(f"{name:<24} about {length:5.0f} min")
-    print(f"{'all':<24} about {sum(found.values()) / 60:5.1f} h")
+    except (AttributeError, KeyError, TypeError):
+        print(f"plan_cost: {asked.plan} is not a plan (experiments/RESULTS.md describes plans)", file=sys.stderr)
+        return 2
+    for name in asked.study:
+        if name not in found:
+            known = ", ".join(f"'{one}'" for one in found)
+            print(f"plan_cost: {asked.plan} has no study '{name}'; it has {known}", file=sys.stderr)
+            return 2
+    kept = {name: length for name, length in found.items() if not asked.study or name in asked.study}
+    for name, length in kept.items():
+        print(f"{name:<24} {about(length)}")
+    print(f"{'all':<24} {about(sum(kept.values()))}")
     return 0
 
 

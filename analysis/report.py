@@ -61,16 +61,16 @@ def main(arguments: Optional[list[str]] = None) -> int:
 
 def run(options: argparse.Namespace) -> int:
     """Does what the options say; returns the exit code."""
-    try:
-        explorer = explore.PAGE if explore.program() else ""
-    except explore.NotBuilt as reason:
-        explorer = ""
-        print(f"report: {explore.PAGE} is not written: {reason}", file=sys.stderr)
     study = load(options.folder)
     file = options.folder / targets_table.FILE_NAME
     targets = targets_table.load_targets(file) if file.exists() else []
     claims = paper_claims.evaluate(study, options.folder)
     paper_claims.write(claims, options.folder)
+    try:
+        explorer = explore.PAGE if explore.program() else ""
+    except explore.NotBuilt as reason:
+        explorer = ""
+        print(f"report: {explore.PAGE} is not written: {reason}", file=sys.stderr)
     page = write(study, options.folder, options.title, options.figures, targets, claims, explorer)
     if explorer:
         title = "" if options.title == explore.TITLE else options.title  # else the plan's question
@@ -284,7 +284,7 @@ def _made(study: Study) -> list[tuple[str, str]]:
                  + (f", {span} repetitions each" if span else "")
                  + (f"; {len(study.refused)} refused" if len(study.refused) else "")),
         ("Verified", f"{text.count(runs['verified_frames'].sum())} frames against the oracle before any time was taken"
-                     + ("" if every <= 1 else f" (long clips on a sample: every {text.ordinal(every)} frame at the least)")),
+                     + ("" if every <= 1 else f" (of long clips a sample, down to every {text.ordinal(every)} frame)")),
     ]  # fmt: skip
 
 

@@ -49,6 +49,8 @@ class Body:
             )
         if self.times is None and self.positions.ndim == 3:
             raise ValueError(f"body '{self.name}': {self.positions.shape[0]} keyframes need times")
+        if self.times is not None and np.size(self.times) != self.keyframes:
+            raise ValueError(f"body '{self.name}': {np.size(self.times)} times, but positions at {self.keyframes} keyframes")
         if not self.known and self.positions.ndim == 3:
             raise ValueError(f"body '{self.name}': an unknown motion has no keyframes")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
 from typing import Any, Iterator, Mapping, Optional, Sequence, Union
 
@@ -111,7 +112,12 @@ class World:
         self._core = _core.World(precision)
         for body in self.scene.bodies:
             times = None if not body.known else [0.0] if body.times is None else body.times
-            self._core.add_body(body.name, body.indices, body.offsets, body.shape, times, body.positions)
+            try:
+                self._core.add_body(body.name, body.indices, body.offsets, body.shape, times, body.positions)
+            except ValueError as reason:
+                if f"'{body.name}'" in str(reason):
+                    raise
+                raise type(reason)(f"body '{body.name}': {reason}") from None
         for a, b in self.scene.pairs_asked() or ():
             self._core.add_pair(a, b)
         if strategy is not None:
@@ -141,7 +147,9 @@ class World:
 
     def frames(self, l: int = 1) -> npt.NDArray[np.float64]:
         """Returns the times of a clip: l frames for each interval between the keyframes of all bodies, and the last keyframe."""
-        return np.asarray(self._core.frame_times(l))
+        if operator.index(l) < 1:
+            raise ValueError(f"{l} frames per keyframe interval, but at least 1 is needed")
+        return np.asarray(self._core.frame_times(operator.index(l)))
 
     def play(self, l: int = 1) -> Iterator[float]:
         """Starts over and stops at each frame of the clip, for questions.

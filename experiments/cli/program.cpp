@@ -22,8 +22,8 @@ namespace kbvh::experiments {
 
 namespace {
 
-/// Makes one line of a message, without control characters. Cuts the middle of overlong values or paths,
-/// because both ends are informative.
+/// Makes one line of a message, without control characters. Cuts the middle of overlong values, lists or
+/// paths, because both ends are informative; between words if one ends nearby.
 std::string one_line(std::string text) {
   constexpr std::size_t longest = 290, tail = 90;
   for (char& c : text)
@@ -35,6 +35,11 @@ std::string one_line(std::string text) {
   std::size_t head = longest - tail - 5, rest = text.size() - tail;
   while (head > 0 && continues(head)) --head;
   while (rest < text.size() && continues(rest)) ++rest;
+  constexpr std::size_t nearby = 40;
+  if (const std::size_t space = text.rfind(' ', head); space != text.npos && head - space < nearby)
+    head = space;
+  if (const std::size_t space = text.find(' ', rest - 1); space != text.npos && space + 1 - rest < nearby)
+    rest = space + 1;
   return text.substr(0, head) + " ... " + text.substr(rest);
 }
 
@@ -142,6 +147,7 @@ int run_program(int argc, const char* const* argv) {
   if (argc > 1 && argv[1][0] != '-' && std::find(commands.begin(), commands.end(), argv[1]) == commands.end())
     return wrong("there is no command " + io::printable(argv[1]) + "; known are " + joined(commands) +
                  suggestion(argv[1], commands) + " (try --help)");
+  if (argc < 2) return wrong("a command is missing; known are " + joined(commands) + " (try --help)");
   if (const auto option = option_without_value(argc, argv))
     return wrong(*option + ": is empty, but needs a value (try --help)");
   try {
@@ -149,6 +155,8 @@ int run_program(int argc, const char* const* argv) {
   } catch (const CLI::ExtrasError&) {
     return wrong(unexpected(program));
   } catch (const CLI::ParseError& problem) {
+    // Without a command, CLI11 does not say that it knows no such option either.
+    if (problem.get_exit_code() != 0 && program.get_subcommands().empty()) return wrong(unexpected(program));
     if (problem.get_exit_code() != 0) return wrong(std::string(problem.what()) + " (try --help)");
     // Help and version arrive here as well, and print themselves.
     std::ostringstream text;

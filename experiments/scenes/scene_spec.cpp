@@ -361,6 +361,8 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     if (mesh.kind != io::MeshKind::polygons)
       loaded.notes.push_back(
           source + ": " +
+          (mesh.kind == io::MeshKind::points && body.as == io::TakeAs::given ? "has no polygons, only "
+                                                                             : "") +
           counted(mesh.primitive_count(), mesh.kind == io::MeshKind::points ? "point" : "control net") +
           "; pairs with them are overlaps of boxes, not intersections");
     place(mesh, body.placement);

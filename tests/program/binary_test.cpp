@@ -22,7 +22,7 @@ TEST_F(Binary, WrongUseIsCodeTwoAndOneSentence) {
   write_text(folder_ / "bad.obj", "v 0 0 0\nv 1 0 0\nv 0 1 nan\nf 1 2 3\n");
   write_text(folder_ / "file", "x");
   const std::pair<std::string, std::string> cases[] = {
-      {"", "subcommand"},
+      {"", "a command is missing"},
       {"fly", "fly"},
       {"run --triangles many", "many"},
       {"run --l 0", "l: expected a whole number"},

@@ -421,5 +421,39 @@ TEST_F(Binary, ASceneWithoutPairsSaysSo) {
   EXPECT_EQ(self.err, "");
 }
 
+// ---- A newcomer's mistakes
+// ---------------------------------------------------------------------------------------
+
+TEST_F(Binary, AMissingCommandIsSaid) {
+  const Outcome none = kbvh("");
+  EXPECT_EQ(none.code, 2);
+  EXPECT_EQ(none.err.find("kbvh: a command is missing; known are list, run, bench, "), 0u) << none.err;
+  const Outcome option = kbvh("--helb");
+  EXPECT_EQ(option.code, 2);
+  EXPECT_EQ(option.err, "kbvh: kbvh has no option '--helb'; did you mean '--help'? (try kbvh --help)\n");
+}
+
+TEST_F(Binary, AnOverlongListIsCutBetweenItsWords) {
+  const Outcome outcome = kbvh("run --scene tablecoth");
+  EXPECT_EQ(outcome.code, 2);
+  const std::size_t cut = outcome.err.find(", ... ");
+  ASSERT_NE(cut, std::string::npos) << outcome.err;
+  const std::string after = outcome.err.substr(cut + 6);
+  EXPECT_EQ(kbvh("scene " + after.substr(0, after.find(',')) + " --triangles 300 --keyframes 2").code, 0)
+      << outcome.err;
+  EXPECT_NE(outcome.err.find("did you mean 'tablecloth'?"), std::string::npos) << outcome.err;
+}
+
+TEST_F(Binary, AMeshWithoutPolygonsIsSaid) {
+  write_text(folder_ / "cloud.obj", "v 0 0 0\nv 1 0 0\n");
+  const std::string rest = " --body sphere:triangles=20 --strategies bottom_up --repetitions 1";
+  EXPECT_EQ(
+      kbvh("run --body cloud.obj" + rest).err,
+      "kbvh: note: cloud.obj: has no polygons, only 2 points; pairs with them are overlaps of boxes, not "
+      "intersections\n");
+  EXPECT_EQ(kbvh("run --body cloud.obj,as=points" + rest).err,
+            "kbvh: note: cloud.obj: 2 points; pairs with them are overlaps of boxes, not intersections\n");
+}
+
 }  // namespace
 }  // namespace kbvh::experiments
