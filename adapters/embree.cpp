@@ -33,7 +33,8 @@
 //
 // Rays. rtcIntersect1 and rtcOccluded1 on triangle geometry, body after body: the fan of each polygon in a
 // compact scene that is refitted like the others (with geometry=triangles and bodies of triangles, by the
-// update itself; otherwise at the first rays of a frame, so the time of rays then includes that refit).
+// update itself; otherwise at the first rays of a frame that enter the body, so the time of rays then
+// includes that refit). Bodies are entered front to back, and not at all behind the closest hit so far.
 // Embree decides in float without a bound on its error, and may miss rays through edges and corners: its
 // answers are Embree's own, marked approximate, and their differences from the truth are counted.
 //
@@ -52,6 +53,7 @@
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/parallel/library_threads.hpp"
+#include "core/topology/ray_traversal.hpp"
 #include "embree.hpp"
 
 namespace kbvh {
@@ -175,19 +177,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     collected_.out = &out;
     collected_.thread = std::this_thread::get_id();
     std::uint64_t tests = 0;
-    const auto box_of = [&](std::uint32_t body) {
-      Box<double> box;
-      if (!bodies_[body].boxes.scene) return box;
-      RTCBounds bounds;
-      rtcGetSceneBounds(bodies_[body].boxes.scene.get(), &bounds);
-      box.lower[0] = double(bounds.lower_x);
-      box.lower[1] = double(bounds.lower_y);
-      box.lower[2] = double(bounds.lower_z);
-      box.upper[0] = double(bounds.upper_x);
-      box.upper[1] = double(bounds.upper_y);
-      box.upper[2] = double(bounds.upper_z);
-      return box;
-    };
+    const auto box_of = [&](std::uint32_t body) { return to_double(bounds_of_scene(bodies_[body].boxes)); };
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
       if (!bodies_[pair.first].boxes.scene || !bodies_[pair.second].boxes.scene) continue;
@@ -202,31 +192,46 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     check();
   }
 
+  /// Returns the box of a body of polygons. Boxes that the update has refitted serve; a body behind others is
+  /// not refitted for rays.
+  Box<float> box_for_rays(BodyState& state) {
+    if (state.primitives->kind != PrimitiveKind::polygons || !state.boxes.scene) return {};
+    if (!state.boxes_are_old) return bounds_of_scene(state.boxes);
+    bring_fans_up_to_date(state);
+    return bounds_of_scene(state.fans());
+  }
+
   void trace(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) {
     const KeepFloatingPointState keep;
-    for (BodyState& state : bodies_) bring_fans_up_to_date(state);
+    std::uint64_t tests = 0;
+    ray_order_.start(this->scene_, [&](std::uint32_t body) { return box_for_rays(bodies_[body]); });
     for (std::size_t i = 0; i < rays.size(); ++i) {
       hits[i] = {};
       if (!is_valid(rays[i])) continue;
       RTCRayHit found = ray_of(rays[i]);
-      for (BodyState& state : bodies_) {
-        if (!state.fans().scene) continue;
+      const auto limit = [&] { return double(found.ray.tfar); };
+      tests += ray_order_.follow(RaySearch<S>(rays[i], query).line(), limit, [&](std::uint32_t body, bool) {
+        BodyState& state = bodies_[body];
+        bring_fans_up_to_date(state);
         RTCIntersectContext context;
         rtcInitIntersectContext(&context);
         if (query == RayQuery::any) {
           rtcOccluded1(state.fans().scene.get(), &context, &found.ray);
-          if (found.ray.tfar >= 0) continue;
+          if (found.ray.tfar >= 0) return false;
           hits[i] = {state.body, RayHit::none, std::numeric_limits<double>::quiet_NaN()};
-          break;
+          return true;
         }
         found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
         rtcIntersect1(state.fans().scene.get(), &context, &found);
-        if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+        if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
         const std::uint32_t fan = found.hit.primID;
         hits[i] = {state.body, state.fan_primitives.empty() ? fan : state.fan_primitives[fan],
                    double(found.ray.tfar)};
-      }
+        return false;
+      });
     }
+    ray_order_.count(this->ray_bodies());
+    this->count_.add(Counter::box_tests, tests);
     check();
   }
 
@@ -308,14 +313,6 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     state.boxes_are_old = false;
   }
 
-  /// Embree asserts that rays are within its range of numbers; others count as misses.
-  static bool is_valid(const Ray<S>& ray) {
-    for (const S* const values : {ray.origin, ray.direction})
-      for (int axis = 0; axis < 3; ++axis)
-        if (!(std::abs(values[axis]) <= largest)) return false;
-    return true;
-  }
-
   /// Makes or refits the triangles that rays meet.
   void bring_fans_up_to_date(BodyState& state) {
     const Primitives& primitives = *state.primitives;
@@ -380,8 +377,6 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     return box;
   }
 
-  static constexpr float largest = 1.8e18f;  // largest bound that is passed to Embree
-
   template <auto bounds_of>
   static void fit(const RTCBoundsFunctionArguments* args) {
     hand_over(bounds_of(*static_cast<const BodyState*>(args->geometryUserPtr), args->primID),
@@ -392,8 +387,8 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     constexpr float twice_smallest = 2 * std::numeric_limits<float>::min();
     constexpr float ulp = std::numeric_limits<float>::epsilon();
     const Lanes sides[2] = {
-        (tight.lower - twice_smallest).max(-largest).min(largest),
-        (tight.upper + (tight.upper.abs() * ulp + twice_smallest)).max(-largest).min(largest)};
+        (tight.lower - twice_smallest).max(-largest_bound).min(largest_bound),
+        (tight.upper + (tight.upper.abs() * ulp + twice_smallest)).max(-largest_bound).min(largest_bound)};
     static_assert(sizeof(RTCBounds) == sizeof(sides));
     std::memcpy(&box, sides, sizeof(box));
   }
@@ -405,8 +400,8 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     rtcGetSceneBounds(state.boxes.scene.get(), &boxes);
     rtcGetSceneBounds(state.triangles.scene.get(), &triangles);
     const auto within = [](float lower, float inner_lower, float inner_upper, float upper) {
-      return lower <= std::clamp(inner_lower, -largest, largest) &&
-             std::clamp(inner_upper, -largest, largest) <= upper;
+      return lower <= std::clamp(inner_lower, -largest_bound, largest_bound) &&
+             std::clamp(inner_upper, -largest_bound, largest_bound) <= upper;
     };
     return within(boxes.lower_x, triangles.lower_x, triangles.upper_x, boxes.upper_x) &&
            within(boxes.lower_y, triangles.lower_y, triangles.upper_y, boxes.upper_y) &&
@@ -467,6 +462,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   DevicePointer device_;
   std::vector<BodyState> bodies_;
   NearBodies near_bodies_;
+  RayBodyOrder ray_order_;
   Collected collected_;
 };
 

@@ -90,7 +90,10 @@ const std::vector<Candidate>& candidates() {
 /// Counts nothing itself: its counters are those of its instances, with the triangle tests of silent ones, so
 /// it is no CountedStrategy.
 template <class S, class Count>
-class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPlanChanges<S> {
+class Auto final : public Strategy<S>,
+                   public AnswersChanges<S>,
+                   public AnswersRays<S>,
+                   public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
 
@@ -102,7 +105,7 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
       const auto found = std::find_if(registry().begin(), registry().end(), [&](const StrategyEntry& entry) {
         return entry.info.id == candidate.id;
       });
-      if (found == registry().end() || !found->info.can.plan_changes) continue;
+      if (found == registry().end() || !found->info.can.plan_changes || !found->info.can.rays) continue;
       const auto does_the_same = [&](const Runner& other) { return other.candidate->cost == candidate.cost; };
       if (std::any_of(runners_.begin(), runners_.end(), does_the_same)) continue;
       const Params own(found->info.id, found->info.parameters, candidate.params);
@@ -202,6 +205,10 @@ class Auto final : public Strategy<S>, public AnswersChanges<S>, public TakesPla
     see_candidates(reported.pairs.size());
     touching_.clear();
     reported.pairs.sample(samples, touching_);
+  }
+
+  void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
+    runners_[active_].strategy->hits_at(t, query, rays, hits);
   }
 
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {

@@ -87,12 +87,16 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>,
 
   void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
                  std::span<RayHit> hits) override {
-    find_hits_by_body(
-        this->scene_, this->sampled_, query, rays, hits, [&](std::uint32_t body, RaySearch<S>& search) {
-          return roots_[body] != nullptr &&
-                 follow_ray(PeriodTree<S>{roots_[body]}, search, body, this->scene_.primitives(body),
+    const auto box_of = [&](std::uint32_t body) {
+      return roots_[body] == nullptr ? Box<S>{} : roots_[body]->box;
+    };
+    const std::uint64_t tests = find_hits_by_body(
+        this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
+        [&](std::uint32_t body, RaySearch<S>& search) {
+          return follow_ray(PeriodTree<S>{roots_[body]}, search, body, this->scene_.primitives(body),
                             this->sampled_.positions(body), ray_stack_, this->count_, this->triangle_stats_);
         });
+    this->count_.add(Counter::box_tests, tests);
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
@@ -107,7 +111,8 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>,
 
   std::size_t bytes() const override {
     std::size_t total = near_bodies_.bytes() + nodes_.size() * heap_block_bytes(sizeof(Node)) +
-                        nodes_.capacity() * sizeof(nodes_[0]) + ray_stack_.capacity() * sizeof(ray_stack_[0]);
+                        nodes_.capacity() * sizeof(nodes_[0]) + ray_order_.bytes() +
+                        ray_stack_.capacity() * sizeof(ray_stack_[0]);
     for (const Topology& topology : topologies_) total += topology.bytes();
     return total;
   }
@@ -179,6 +184,7 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>,
   std::vector<std::unique_ptr<Node>> nodes_;
   std::vector<Node*> roots_;
   std::vector<RayNode<const Node*>> ray_stack_;
+  RayBodyOrder ray_order_;
   bool plans_changed_ = false;
 };
 

@@ -70,14 +70,18 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>,
 
   void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
                  std::span<RayHit> hits) override {
-    find_hits_by_body(
-        this->scene_, this->sampled_, query, rays, hits, [&](std::uint32_t index, RaySearch<S>& search) {
+    const auto box_of = [&](std::uint32_t index) {
+      return bodies_[index].topology.empty() ? Box<S>{} : bodies_[index].boxes[0];
+    };
+    const std::uint64_t tests = find_hits_by_body(
+        this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
+        [&](std::uint32_t index, RaySearch<S>& search) {
           const Body& body = bodies_[index];
-          if (body.topology.empty()) return false;
           const TopologyTree tree{body.topology, [&](std::uint32_t node) { return body.boxes[node]; }};
           return follow_ray(tree, search, index, *body.primitives, body.positions, ray_stack_, this->count_,
                             this->triangle_stats_);
         });
+    this->count_.add(Counter::box_tests, tests);
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
@@ -91,7 +95,8 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>,
   }
 
   std::size_t bytes() const override {
-    std::size_t total = near_bodies_.bytes() + ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
+    std::size_t total =
+        near_bodies_.bytes() + ray_order_.bytes() + ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
     for (const Body& body : bodies_) total += body.topology.bytes() + body.boxes.size() * sizeof(Box<S>);
     return total;
   }
@@ -162,6 +167,7 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>,
   NearBodies near_bodies_;
   std::vector<Body> bodies_;
   std::vector<RayNode<std::uint32_t>> ray_stack_;
+  RayBodyOrder ray_order_;
   bool plans_changed_ = false;
 };
 

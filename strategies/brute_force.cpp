@@ -3,8 +3,9 @@
 
 #include "core/contract/registry.hpp"
 #include "core/geometry/lane_box.hpp"
+#include "core/geometry/ray_box.hpp"
+#include "core/scene/rays.hpp"
 #include "core/scene/self_pairs.hpp"
-#include "core/topology/ray_traversal.hpp"
 
 namespace kbvh {
 namespace {
@@ -75,18 +76,12 @@ class BruteForce final : public CountedStrategy<S, Count>,
 
   void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
                  std::span<RayHit> hits) override {
-    find_hits_by_body(
-        this->scene_, this->sampled_, query, rays, hits, [&](std::uint32_t body, RaySearch<S>& search) {
-          const RaySlabs slabs(search.line());
-          const Primitives& primitives = this->scene_.primitives(body);
-          this->count_.add(Counter::box_tests, boxes_[body].size());
-          double near = 0;
-          for (std::uint32_t p = 0; p < boxes_[body].size(); ++p)
-            if (primitives.alive(p) && slabs.meet(boxes_[body][p], search.limit(), near) &&
-                search.offer(body, p, primitives[p], this->sampled_.positions(body), this->triangle_stats_))
-              return true;
-          return false;
-        });
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      RaySearch<S> search(rays[i], query);
+      bool over = false;
+      for (std::uint32_t body = 0; body < boxes_.size() && !over; ++body) over = follow(body, search);
+      hits[i] = search.hit();
+    }
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}
@@ -100,6 +95,18 @@ class BruteForce final : public CountedStrategy<S, Count>,
   }
 
  private:
+  bool follow(std::uint32_t body, RaySearch<S>& search) {
+    const Primitives& primitives = this->scene_.primitives(body);
+    if (primitives.kind != PrimitiveKind::polygons) return false;
+    const RaySlabs slabs(search.line());
+    this->count_.add(Counter::box_tests, boxes_[body].size());
+    double near = 0;
+    for (std::uint32_t p = 0; p < boxes_[body].size(); ++p)
+      if (primitives.alive(p) && slabs.meet(boxes_[body][p], search.limit(), near) &&
+          search.offer(body, p, primitives[p], this->sampled_.positions(body), this->triangle_stats_))
+        return true;
+    return false;
+  }
   bool neighbours(std::uint32_t body, std::uint32_t i, std::uint32_t j) const {
     const Primitives& primitives = this->scene_.primitives(body);
     return share_vertex(primitives[i], primitives[j]);

@@ -16,6 +16,7 @@
 #include "core/contract/registry.hpp"
 #include "core/families/drift/drift_body.hpp"
 #include "core/families/drift/drift_model.hpp"
+#include "core/families/drift/drift_rays.hpp"
 #include "core/families/drift/near_pairs.hpp"
 #include "core/families/wide/kernels/bounds.hpp"
 #include "core/families/wide/near_bodies.hpp"
@@ -25,7 +26,7 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count, class Motion>
-class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+class DriftStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>, public TakesPlanChanges<S> {
   using Body = DriftBody<S>;
   using Watch = typename Body::Watch;
   static constexpr bool bounded = std::is_same_v<Motion, SteppedMotion<S>>;
@@ -58,7 +59,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
       std::fill_n(body.rate_high, 3, 0.0);
       body.watch = may_move(index) ? Watch::drift : Watch::nothing;
       make_boxes(index);
-      measure_leaves(index);
+      body.leaf_size = mean_leaf_side(hierarchies_[index]);
       remember(index);
     }
     // A body that rests again may have been moved by its own plans before.
@@ -76,6 +77,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     period_ = 0;
     plain_left_ = 1;
     search_due_ = plans_changed_ = false;
+    rays_.moved();
   }
 
   void advance_to(double t) override {
@@ -84,6 +86,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) observe(index, last, t);
     listed() ? advance_listed() : advance_plain();
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) count_skipped(index);
+    rays_.moved();
   }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
@@ -103,7 +106,16 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     return {};
   }
 
+  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
+                 std::span<RayHit> hits) override {
+    std::uint64_t tests = 0;
+    rays_.find(hierarchies_, bodies_, listed(), query, rays, hits, this->triangle_stats_, tests,
+               this->ray_bodies());
+    this->count_.add(Counter::box_tests, tests);
+  }
+
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
+    rays_.moved();
     for (const PlanChange<S>& change : changes) {
       Body& body = bodies_[change.body];
       body.changed = true;
@@ -121,12 +133,12 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     const Body& body = bodies_[index];
     const auto& hierarchy = hierarchies_[index];
     AuditView view{hierarchy.topology(), {}, {}};
-    const bool old = listed() && body.watch == Watch::drift;
+    const StoredBoxes stored = stored_boxes(body, listed());
     for (std::uint32_t node = 0; node < view.topology.size(); ++node) {
       const Box<double> box = to_double(hierarchy.box(node));
-      view.boxes.push_back(old ? body.moved_on(box) : box);
+      view.boxes.push_back(stored == StoredBoxes::old ? body.moved_on(box) : box);
     }
-    if (body.near || body.watch == Watch::nothing || view.boxes.empty()) return view;
+    if (stored != StoredBoxes::unknown || view.boxes.empty()) return view;
     view.stale.assign(view.boxes.size(), 1);
     view.boxes[0] = body.box;
     view.stale[0] = 0;
@@ -139,7 +151,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     for (const auto& body : bodies_) total += body.before.capacity() * sizeof(S);
     for (const auto& lists : lists_of_) total += lists.bytes();
     for (const auto& rows : rows_) total += rows.bytes();
-    return total + work_.bytes() + near_bodies_.bytes() + pair_is_near_.size() +
+    return total + work_.bytes() + rays_.bytes() + near_bodies_.bytes() + pair_is_near_.size() +
            near_pairs_.capacity() * sizeof(std::uint32_t);
   }
 
@@ -420,19 +432,6 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
     return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin, &rows_[index]};
   }
 
-  /// Measures the mean side of the leaves' boxes.
-  void measure_leaves(std::uint32_t index) {
-    const auto& hierarchy = hierarchies_[index];
-    double sum = 0, leaves = 0;
-    for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
-      if (!hierarchy.topology().nodes[node].is_leaf()) continue;
-      const Box<S> box = hierarchy.box(node);
-      for (int axis = 0; axis < 3; ++axis) sum += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
-      ++leaves;
-    }
-    bodies_[index].leaf_size = leaves == 0 ? 0 : sum / leaves;
-  }
-
   Motion motion_;
   KernelSet kernels_;
   Lists lists_;
@@ -446,6 +445,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public TakesPlanChanges<
   std::vector<NearPairs<S>> lists_of_;  ///< [near pair], and more if there were more before
   NearWork<S> work_;
   WideQuery<S> query_{this->scene_, this->sampled_};
+  DriftRays<S> rays_{this->scene_, this->sampled_};
   DriftModel model_;
   int frames_ = 0;      ///< since positions were remembered
   int period_ = 0;      ///< frames that one search lasts; 0: refit and query at every frame

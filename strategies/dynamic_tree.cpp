@@ -80,20 +80,24 @@ class Dynamic final : public BuiltEachFrame<S, Count, DynamicBody<S>>, public An
     return view;
   }
   std::size_t bytes() const override {
-    return Base::bytes() + stack_.capacity() * sizeof(NodePair) +
+    return Base::bytes() + stack_.capacity() * sizeof(NodePair) + ray_order_.bytes() +
            ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
   }
 
  protected:
   void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
                  std::span<RayHit> hits) override {
-    find_hits_by_body(
-        this->scene_, this->sampled_, query, rays, hits, [&](std::uint32_t body, RaySearch<S>& search) {
-          const DynamicTree<S>& tree = bodies_[body].tree;
-          return !tree.empty() &&
-                 follow_ray(DynamicRays<S>{tree}, search, body, this->scene_.primitives(body),
+    const auto box_of = [&](std::uint32_t body) {
+      const DynamicTree<S>& tree = bodies_[body].tree;
+      return tree.empty() ? Box<S>{} : tree.node(tree.root()).box;
+    };
+    const std::uint64_t tests = find_hits_by_body(
+        this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
+        [&](std::uint32_t body, RaySearch<S>& search) {
+          return follow_ray(DynamicRays<S>{bodies_[body].tree}, search, body, this->scene_.primitives(body),
                             this->sampled_.positions(body), ray_stack_, this->count_, this->triangle_stats_);
         });
+    this->count_.add(Counter::box_tests, tests);
   }
 
  private:
@@ -159,6 +163,7 @@ class Dynamic final : public BuiltEachFrame<S, Count, DynamicBody<S>>, public An
   double margin_, ahead_;
   std::vector<NodePair> stack_;
   std::vector<RayNode<std::uint32_t>> ray_stack_;
+  RayBodyOrder ray_order_;
   std::uint64_t reinserted_ = 0;
 };
 

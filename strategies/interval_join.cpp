@@ -21,6 +21,7 @@
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/join_changes.hpp"
 #include "core/families/linear/linear_bounds.hpp"
+#include "core/families/linear/linear_rays.hpp"
 #include "core/families/linear/triangle_span_filter.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
 
@@ -61,6 +62,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
                                    public AnswersSelfPairs,
                                    public AnswersChanges<S>,
                                    public AnswersSweeps<S>,
+                                   public AnswersRays<S>,
                                    public TakesPlanChanges<S> {
   static constexpr bool works_ahead = F == Foresight::whole_clip;
   using Motion = MotionView<F, S>;
@@ -101,6 +103,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     for (Joins<S>* one : {&now_, &next_})
       for (auto& answers : one->answers) answers.clear_counts();
     bounds_.start();
+    ray_boxes_are_old_ = true;
     changes_.start_over();
     new_segment();
     before_ = t;
@@ -110,6 +113,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
   void advance_to(double /*t*/) override {
     before_ = this->previous_time();
+    ray_boxes_are_old_ = true;
     if (bounds_.advance()) new_segment();
     if constexpr (works_ahead) make_bounds_ahead();
   }
@@ -172,7 +176,20 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     pairs.insert(pairs.end(), to_test_.begin(), to_test_.end());
   }
 
+  /// Follows rays in the boxes of the segment, interpolated at t where rays read them.
+  void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
+    if (std::exchange(ray_boxes_are_old_, false)) {
+      ray_stale_.resize(bounds_.body_count());
+      for (std::uint32_t body = 0; body < bounds_.body_count(); ++body)
+        ray_stale_[body].assign(bounds_.hierarchy(body).node_count(), 1);
+    }
+    std::uint64_t tests = 0;
+    rays_.find(bounds_, t, ray_stale_, query, rays, hits, this->triangle_stats_, tests, this->ray_bodies());
+    this->count_.add(Counter::box_tests, tests);
+  }
+
   void prepare_sweep(double /*t*/) override {
+    ray_boxes_are_old_ = true;
     if (plans_changed_) return;  // lines may have no end: the sweep's own ends are known only when it is over
     bounds_.enter();
     if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
@@ -202,7 +219,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
   /// Keeps the segment, if possible; its joins are repaired when they are read.
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
-    plans_changed_ = true;
+    plans_changed_ = ray_boxes_are_old_ = true;
     ahead_ = {};
     if (repairs_ && bounds_.repair(changes)) {
       if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
@@ -218,10 +235,11 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
   std::size_t bytes() const override {
     std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes() + query_.bytes() + changes_.bytes() +
-                        shared_confirmation_.bytes() + parts_.capacity() * sizeof(parts_[0]) +
+                        rays_.bytes() + shared_confirmation_.bytes() + parts_.capacity() * sizeof(parts_[0]) +
                         (answered_.capacity() + to_test_.capacity()) * sizeof(PrimitivePair) +
                         blocks_.capacity() * sizeof(Block) + joined_bodies_.capacity() * sizeof(BodyPair);
     for (const auto& sweep : sweeps_) total += sweep.bytes();
+    for (const auto& marks : ray_stale_) total += marks.capacity();
     return total + (swept_ ? swept_->bytes() : 0);
   }
 
@@ -392,6 +410,9 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   std::vector<IntervalJoin<S>> sweeps_;       ///< the same for contacts, after the first request
   std::optional<SweptHierarchies<S>> swept_;  ///< the same after changes of plans
   WideQuery<S> query_;
+  LinearRays<S> rays_{this->scene_, this->sampled_};
+  std::vector<std::vector<std::uint8_t>> ray_stale_;  ///< [body][wide node], from the first rays on
+  bool ray_boxes_are_old_ = true;
   bool plans_changed_ = false, repairs_ = true;
   std::uint64_t pairs_removed_ = 0, pairs_added_ = 0;
   std::vector<bool> by_spans_;   ///< by join

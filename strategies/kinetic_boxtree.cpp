@@ -119,7 +119,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
           return {.hierarchy = &rows_[body].hierarchy(), .body = body, .stale = rows_[body].stale()};
         },
         [&](std::uint32_t body, std::uint32_t node) { make_wanted(body, node); }, this->triangle_stats_,
-        tests);
+        tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
 

@@ -118,19 +118,29 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
         ray_boxes_[body].resize(forest.tree(body).topology().size());
         ray_boxes_[body].new_frame();
       }
-      find_hits_by_body(
-          this->scene_, this->sampled_, query, rays, hits, [&](std::uint32_t body, RaySearch<S>& search) {
-            const Topology& topology = forest.tree(body).topology();
-            if (topology.empty()) return false;
-            RealiserBoxes<S> boxes(forest.tree(body).realisers(0), this->sampled_, body, ray_boxes_[body]);
-            const TopologyTree tree{topology, [&](std::uint32_t node) {
-                                      boxes.ensure(node);
-                                      return boxes(node);
-                                    }};
-            return follow_ray(tree, search, body, this->scene_.primitives(body),
-                              this->sampled_.positions(body), ray_stack_, this->count_,
-                              this->triangle_stats_);
-          });
+      const auto boxes_of = [&](std::uint32_t body) {
+        return RealiserBoxes<S>(forest.tree(body).realisers(0), this->sampled_, body, ray_boxes_[body]);
+      };
+      const auto box_of = [&](std::uint32_t body) {
+        if (forest.tree(body).topology().empty()) return Box<S>{};
+        auto boxes = boxes_of(body);
+        boxes.ensure(0);
+        return Box<S>(boxes(0));
+      };
+      const std::uint64_t tests =
+          find_hits_by_body(this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(),
+                            box_of, [&](std::uint32_t body, RaySearch<S>& search) {
+                              const Topology& topology = forest.tree(body).topology();
+                              auto boxes = boxes_of(body);
+                              const TopologyTree tree{topology, [&](std::uint32_t node) {
+                                                        boxes.ensure(node);
+                                                        return boxes(node);
+                                                      }};
+                              return follow_ray(tree, search, body, this->scene_.primitives(body),
+                                                this->sampled_.positions(body), ray_stack_, this->count_,
+                                                this->triangle_stats_);
+                            });
+      this->count_.add(Counter::box_tests, tests);
     });
   }
 
@@ -242,7 +252,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   }
 
   std::size_t bytes() const override {
-    std::size_t total = rows_.bytes() + open_.capacity() * sizeof(std::uint32_t) +
+    std::size_t total = rows_.bytes() + open_.capacity() * sizeof(std::uint32_t) + ray_order_.bytes() +
                         ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
     for (const auto& boxes : ray_boxes_) total += boxes.bytes();
     return total + on_collision([](auto& collision) { return collision.bytes(); });
@@ -345,6 +355,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   KineticRowsQuery<S> rows_;            ///< empty unless by_rows_
   std::vector<BoxCache<S>> ray_boxes_;  ///< [body], made at the first request for rays
   std::vector<RayNode<std::uint32_t>> ray_stack_;
+  RayBodyOrder ray_order_;
   std::uint64_t first_step_ = 0;
   std::size_t vertices_ = 0;      ///< of the initial scene
   bool many_candidates_ = false;  ///< in the last frame

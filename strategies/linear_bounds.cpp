@@ -5,7 +5,7 @@
 #include "core/families/linear/linear_bounds.hpp"
 
 #include "core/contract/registry.hpp"
-#include "core/families/wide/wide_rays.hpp"
+#include "core/families/linear/linear_rays.hpp"
 
 namespace kbvh {
 namespace {
@@ -56,28 +56,9 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>,
     return status;
   }
 
-  /// Interpolates the boxes that rays read. A body that is apart from all others has only one box in the
-  /// segment: its boxes are computed from its positions.
   void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
     std::uint64_t tests = 0;
-    moments_.clear();
-    for (std::uint32_t body = 0; body < bounds_.body_count(); ++body) {
-      moments_.push_back(moment(body, t));
-      if (bounds_.hierarchy(body).empty() || stale_[body][0] == 0) continue;
-      if (bounds_.side(body).apart) {
-        this->sampled_.fetch_all(body);
-        bounds_.hierarchy(body).refit(this->sampled_.positions(body));
-        std::fill(stale_[body].begin(), stale_[body].end(), 0);
-      } else {
-        make_row(body, 0);
-      }
-    }
-    rays_.find(
-        query, rays, hits,
-        [&](std::uint32_t body) -> WideSide<S> {
-          return {.hierarchy = &bounds_.hierarchy(body), .body = body, .stale = stale_[body].data()};
-        },
-        [&](std::uint32_t body, std::uint32_t node) { make_row(body, node); }, this->triangle_stats_, tests);
+    rays_.find(bounds_, t, stale_, query, rays, hits, this->triangle_stats_, tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
 
@@ -93,8 +74,7 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>,
   }
 
   std::size_t bytes() const override {
-    std::size_t total =
-        bounds_.bytes() + query_.bytes() + rays_.bytes() + moments_.capacity() * sizeof(WideMoment<S>);
+    std::size_t total = bounds_.bytes() + query_.bytes() + rays_.bytes();
     for (const auto& marks : stale_) total += marks.size();
     return total;
   }
@@ -113,19 +93,13 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>,
     return {bounds_.hierarchy(body).arrays(), bounds_.side(body).ends(), stale_[body].data(),
             bounds_.fraction(t)};
   }
-  void make_row(std::uint32_t body, std::uint32_t node) {
-    const auto& hierarchy = bounds_.hierarchy(body);
-    wide_linear_kernels<S>(hierarchy.kernels()).make(hierarchy.width())(moments_[body], node);
-    stale_[body][node] = 0;
-  }
   void count_update() {
     if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
   }
 
   LinearBounds<S> bounds_;
   WideQuery<S> query_{this->scene_, this->sampled_};
-  WideRays<S> rays_{this->scene_, this->sampled_};
-  std::vector<WideMoment<S>> moments_;            ///< [body], of the current rays
+  LinearRays<S> rays_{this->scene_, this->sampled_};
   std::vector<std::vector<std::uint8_t>> stale_;  ///< [body][wide node]
   LinearCounts<S> updates_;
 };

@@ -106,7 +106,8 @@ class Reinsertion final : public CountedStrategy<S, Count>,
                  std::span<RayHit> hits) override {
     std::uint64_t tests = 0;
     rays_.find(
-        query, rays, hits, [&](std::uint32_t body) { return side(body); }, this->triangle_stats_, tests);
+        query, rays, hits, [&](std::uint32_t body) { return side(body); }, this->triangle_stats_, tests,
+        this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {

@@ -395,11 +395,15 @@ class CountedStrategy : public Strategy<S> {
   /// counters (Counters::add). Called for counting instances only.
   virtual void add_counts(Counters& /*table*/) const {}
 
+  /// Returns where queries of rays count the bodies that they enter or leave out; null for silent instances.
+  RayBodies* ray_bodies() { return Count::enabled ? &ray_bodies_ : nullptr; }
+
   Count count_;
 
  private:
   void start_counting() final {
     count_.table = {};
+    ray_bodies_ = {};
     first_fetch_ = this->sampled_.fetched();
     counts_cleared();
   }
@@ -408,11 +412,17 @@ class CountedStrategy : public Strategy<S> {
     if constexpr (Count::enabled) {
       table[Counter::positions_fetched] += this->sampled_.fetched() - first_fetch_;
       add_counts(table);
+      if (ray_bodies_.entered + ray_bodies_.hidden + ray_bodies_.unmet > 0) {
+        table.add("ray_bodies_entered", ray_bodies_.entered);
+        table.add("ray_bodies_hidden", ray_bodies_.hidden);
+        table.add("ray_bodies_unmet", ray_bodies_.unmet);
+      }
     }
     return table;
   }
 
   std::uint64_t first_fetch_ = 0;
+  RayBodies ray_bodies_;
 };
 
 /// One topology per body; empty for strategies that build their own.

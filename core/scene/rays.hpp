@@ -42,6 +42,14 @@ struct RayHit {
   bool operator==(const RayHit&) const = default;
 };
 
+/// Counts bodies of polygons by what queries of rays did with them, each body once a call. Bodies are entered
+/// front to back: a ray enters a body only where it may meet the body's box before the closest hit so far.
+struct RayBodies {
+  std::uint64_t entered = 0;  ///< searched for at least one ray
+  std::uint64_t hidden = 0;   ///< never searched: each ray that meets the box had found its answer before
+  std::uint64_t unmet = 0;    ///< never searched: no ray meets the box
+};
+
 /// The search for the answer to one ray: compares its candidates exactly.
 template <class S>
 class RaySearch {

@@ -86,20 +86,95 @@ struct TopologyTree {
 template <class BoxOf>
 TopologyTree(const Topology&, BoxOf) -> TopologyTree<BoxOf>;
 
-/// Answers rays over all bodies of a scene, one after the other: the shared part of strategies without a wide
-/// hierarchy. follow(body, search) follows a ray through one body that consists of polygons, and returns
-/// whether the search is over.
-template <class S, class Follow>
-void find_hits_by_body(const SceneView<S>& scene, const SampledMotion<S>& motion, RayQuery query,
-                       std::span<const Ray<S>> rays, std::span<RayHit> hits, Follow&& follow) {
-  for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-    if (scene.primitives(body).kind == PrimitiveKind::polygons) motion.fetch_all(body);
+/// The bodies of a scene in the order in which a ray may meet them; keeps its buffers from call to call.
+class RayBodyOrder {
+ public:
+  /// Starts a call: box_of(body) returns a box around a body, empty if there is nothing to meet.
+  template <class S, class BoxOf>
+  void start(const SceneView<S>& scene, const BoxOf& box_of) {
+    bodies_.clear();
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+      if (scene.primitives(body).kind != PrimitiveKind::polygons) continue;
+      const Box<double> box = to_double(box_of(body));
+      if (!box.empty()) bodies_.push_back({box, body, Seen::unmet});
+    }
+  }
+
+  /// Follows one ray: calls enter(body, first), `first` at the body's first time in this call, for the bodies
+  /// whose boxes the ray may meet at a parameter of at most limit() at that time, front to back, until a call
+  /// returns true. Bodies that lie behind what has been found are left out. Returns the number of box tests.
+  template <class Limit, class Enter>
+  std::uint64_t follow(const RayLine& line, const Limit& limit, const Enter& enter) {
+    const RaySlabs slabs(line);
+    met_.clear();
+    for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+      double near = 0;
+      if (slabs.meet(bodies_[i].box, limit(), near)) met_.push_back({near, i});
+    }
+    std::sort(met_.begin(), met_.end(), [](const auto& a, const auto& b) {
+      return a.near != b.near ? a.near < b.near : a.node < b.node;
+    });
+    bool over = false;
+    for (const RayNode<std::uint32_t>& next : met_) {
+      Body& body = bodies_[next.node];
+      over = over || !RaySlabs::within(next.near, limit());
+      if (over) {
+        body.seen = std::max(body.seen, Seen::hidden);
+        continue;
+      }
+      const bool first = body.seen != Seen::entered;
+      body.seen = Seen::entered;
+      over = enter(body.id, first);
+    }
+    return bodies_.size();
+  }
+
+  /// Adds what the call did with each body; null: nothing.
+  void count(RayBodies* bodies) const {
+    if (bodies == nullptr) return;
+    for (const Body& body : bodies_)
+      ++(body.seen == Seen::entered  ? bodies->entered
+         : body.seen == Seen::hidden ? bodies->hidden
+                                     : bodies->unmet);
+  }
+
+  std::size_t bytes() const {
+    return bodies_.capacity() * sizeof(Body) + met_.capacity() * sizeof(RayNode<std::uint32_t>);
+  }
+
+ private:
+  enum class Seen : std::uint8_t { unmet, hidden, entered };
+  struct Body {
+    Box<double> box;
+    std::uint32_t id;
+    Seen seen;
+  };
+  std::vector<Body> bodies_;
+  std::vector<RayNode<std::uint32_t>> met_;
+};
+
+/// Answers rays over all bodies of a scene, front to back: the shared part of strategies without a wide
+/// hierarchy. box_of(body) returns a box around a body, empty if it has none. follow(body, search) follows a
+/// ray through one body that consists of polygons, and returns whether the search is over. Positions are
+/// fetched of the bodies that a ray enters. Adds to `counts` what the call did with each body (null: not
+/// counted); returns the tests of rays and bodies.
+template <class S, class BoxOf, class Follow>
+std::uint64_t find_hits_by_body(const SceneView<S>& scene, const SampledMotion<S>& motion, RayQuery query,
+                                std::span<const Ray<S>> rays, std::span<RayHit> hits, RayBodyOrder& order,
+                                RayBodies* counts, const BoxOf& box_of, Follow&& follow) {
+  std::uint64_t tests = 0;
+  order.start(scene, box_of);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     RaySearch<S> search(rays[i], query);
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-      if (scene.primitives(body).kind == PrimitiveKind::polygons && follow(body, search)) break;
+    const auto limit = [&] { return search.limit(); };
+    tests += order.follow(search.line(), limit, [&](std::uint32_t body, bool first) {
+      if (first) motion.fetch_all(body);
+      return follow(body, search);
+    });
     hits[i] = search.hit();
   }
+  order.count(counts);
+  return tests;
 }
 
 }  // namespace kbvh

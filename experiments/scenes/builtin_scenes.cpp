@@ -193,6 +193,29 @@ Meshes dented_sheet(const BuiltinOptions& options, const MakeProgress&) {
           scenes::icosphere(obstacle_triangles(options), {0.1, -0.05, -0.45}, 0.5)};
 }
 
+/// Hides a crowd of spinning balls behind three walls from the camera of coherent rays, which looks from +x,
+/// -y, +z; every tenth ball is on the camera's side. Balls and walls share the triangles evenly.
+Meshes hidden_crowd(const BuiltinOptions& options, const MakeProgress&) {
+  constexpr std::uint32_t across = 6, layers = 3, balls = across * across * layers;
+  constexpr double spacing = 0.3, radius = 0.12, thickness = 0.02;
+  const double half = 0.5 * spacing * across, height = spacing * layers;
+  const std::uint32_t each = std::max(20U, options.triangles / balls);
+  const std::uint32_t of_wall =
+      options.obstacle_triangles > 0 ? std::max(12U, options.obstacle_triangles / 3) : each;
+  Meshes meshes{scenes::box(of_wall, {half, -half, 0}, {half + thickness, half, height}),
+                scenes::box(of_wall, {-half, -half - thickness, 0}, {half, -half, height}),
+                scenes::box(of_wall, {-half, -half, height}, {half, half, height + thickness})};
+  for (std::uint32_t i = 0; i < balls; ++i) {
+    const bool outside = i % 10 == 9;
+    const scenes::Point centre{-half + spacing * (0.5 + i % across),
+                               -half + spacing * (0.5 + i / across % across),
+                               spacing * (0.5 + i / across / across) + (outside ? height : 0)};
+    meshes.push_back(scenes::rotated(scenes::icosphere(each, centre, radius), centre,
+                                     (i % 2 == 0 ? 1 : -1) / 60.0, options.keyframes));
+  }
+  return meshes;
+}
+
 Meshes funnel_cloth(const BuiltinOptions& options, const MakeProgress&) {
   return {scenes::funnel_cloth(ageing(options)), scenes::funnel(obstacle_triangles(options))};
 }
@@ -232,6 +255,8 @@ const std::vector<BuiltinScene>& builtin_scenes() {
        &alone<scenes::tightening_knot>, nullptr, BodiesOf::one},
       {"unrolling_yarns", "two balls of yarn roll over a floor and leave their threads there",
        &two_alike<scenes::unrolling_yarns>},
+      {"hidden_crowd", "108 balls spin behind three walls, and some before them: what a camera does not see",
+       &hidden_crowd},
       {"funnel_cloth", "a cloth is pulled through a funnel and gathers into pleats", &funnel_cloth},
       {"running_figures", "two people run on the spot, 25 keyframes per second: steps as large as triangles",
        &two_alike<scenes::running_figures>},

@@ -21,6 +21,9 @@ enum class Fault : std::uint8_t {
   stale_boxes,        // boxes are those of the first frame
   one_triangle,       // polygons are their first triangle
   untested,           // a primitive whose leaf is entered counts as any hit
+  hidden_early,       // a body is hidden where its box begins beyond half of the closest hit
+  hidden_unsorted,    // bodies in the order of the scene: the first one that is hidden ends the search
+  hidden_for_all,     // a body that the first ray does not enter is hidden from all rays
 };
 
 /// The slabs of a box without any slack, in the scene's scalar.
@@ -67,16 +70,57 @@ class Simple : public CountedStrategy<S, Count>,
       Ray<S> ray = rays[i];
       if (fault == Fault::length_forgotten) ray.length = std::numeric_limits<S>::infinity();
       hits[i] = {};
-      for (std::uint32_t body = 0; body < topologies_.size(); ++body) {
-        if (topologies_[body].empty() || this->scene_.primitives(body).kind != PrimitiveKind::polygons)
-          continue;
-        if (fault == Fault::last_body_only) hits[i] = {};
-        follow(ray, query, body, 0, hits[i]);
-      }
+      find_hit(ray, query, hits[i]);
+      if (i == 0) first_entered_ = entered_;
     }
   }
 
  private:
+  void find_hit(const Ray<S>& ray, RayQuery query, RayHit& hit) {
+    const auto limit = [&] {
+      if (query == RayQuery::any && hit) return -1.0;
+      return limit_of(ray, hit) * (hit && fault == Fault::hidden_early ? 0.5 : 1);
+    };
+    entered_.assign(topologies_.size(), false);
+    const auto enter = [&](std::uint32_t body, bool = false) {
+      entered_[body] = true;
+      if (fault == Fault::hidden_for_all && !first_entered_.empty() && !first_entered_[body]) return false;
+      if (fault == Fault::last_body_only) hit = {};
+      follow(ray, query, body, 0, hit);
+      return false;
+    };
+    const auto box_of = [&](std::uint32_t body) {
+      return topologies_[body].empty() ? Box<S>{} : boxes_[body][0];
+    };
+    if (fault == Fault::hidden_unsorted) {
+      for (std::uint32_t body = 0; body < topologies_.size(); ++body) {
+        double near = 0;
+        if (this->scene_.primitives(body).kind != PrimitiveKind::polygons || topologies_[body].empty())
+          continue;
+        if (RaySlabs(line_of(ray)).meet(box_of(body), std::numeric_limits<double>::infinity(), near) &&
+            !RaySlabs::within(near, limit()))
+          return;
+        enter(body);
+      }
+      return;
+    }
+    // Bodies are seen as they were when the boxes were made.
+    order_.start(this->scene_, box_of);
+    order_.follow(line_of(ray), limit, enter);
+  }
+
+  static RayLine line_of(const Ray<S>& ray) {
+    RayLine line{};
+    for (int axis = 0; axis < 3; ++axis) {
+      line.origin[axis] = double(ray.origin[axis]);
+      line.direction[axis] = double(ray.direction[axis]);
+    }
+    return line;
+  }
+  static double limit_of(const Ray<S>& ray, const RayHit& hit) {
+    return hit ? hit.parameter * (fault == Fault::early_limit ? 0.9 : 1.000001) + 1e-30 : double(ray.length);
+  }
+
   void refit() {
     boxes_.resize(topologies_.size());
     for (std::uint32_t body = 0; body < topologies_.size(); ++body) {
@@ -95,17 +139,11 @@ class Simple : public CountedStrategy<S, Count>,
 
   void follow(const Ray<S>& ray, RayQuery query, std::uint32_t body, std::uint32_t node, RayHit& hit) {
     if (query == RayQuery::any && hit) return;
-    const double limit =
-        hit ? hit.parameter * (fault == Fault::early_limit ? 0.9 : 1.000001) + 1e-30 : double(ray.length);
+    const double limit = limit_of(ray, hit);
     const bool own = fault == Fault::open_slabs || fault == Fault::narrow_slabs;
-    RayLine line{};
-    for (int axis = 0; axis < 3; ++axis) {
-      line.origin[axis] = double(ray.origin[axis]);
-      line.direction[axis] = double(ray.direction[axis]);
-    }
     double near = 0;
     if (!(own ? meets(ray, boxes_[body][node], limit, fault)
-              : RaySlabs(line).meet(boxes_[body][node], limit, near)))
+              : RaySlabs(line_of(ray)).meet(boxes_[body][node], limit, near)))
       return;
     const Topology& topology = topologies_[body];
     const TopologyNode content = topology.nodes[node];
@@ -142,6 +180,8 @@ class Simple : public CountedStrategy<S, Count>,
 
   Topologies topologies_;
   std::vector<std::vector<Box<S>>> boxes_;
+  RayBodyOrder order_;
+  std::vector<bool> entered_, first_entered_;  ///< [body], by the current ray and by the first one
 };
 
 template <Fault fault>
@@ -189,6 +229,12 @@ TEST(RayFaults, EverySeededFaultIsCaught) {
   EXPECT_NE(first_violation<Fault::stale_boxes>(), "");
   EXPECT_NE(first_violation<Fault::one_triangle>(), "");
   EXPECT_NE(first_violation<Fault::untested>(), "");
+}
+
+TEST(RayFaults, EveryWrongTestOfHiddenBodiesIsCaught) {
+  EXPECT_NE(first_violation<Fault::hidden_early>(), "");
+  EXPECT_NE(first_violation<Fault::hidden_unsorted>(), "");
+  EXPECT_NE(first_violation<Fault::hidden_for_all>(), "");
 }
 
 }  // namespace

@@ -53,6 +53,12 @@ TEST(RaysInEveryWay, MeetWhatEveryPrimitiveSays) {
       {"kinetic_aabb", {}},
       {"kinetic_separation_list", {}},
       {"linear_bounds", {}},
+      {"interval_join", {}},
+      {"interval_join_ahead", {}},
+      {"drift_boxes", {}},
+      {"drift_boxes_bounded", {}},
+      {"drift_boxes", {{"lists", "never"}}},
+      {"auto", {}},
       {"bottom_up_volumes", {{"volume", "sphere"}}},
       {"bottom_up_volumes", {{"volume", "obb"}}},
   };
@@ -83,9 +89,27 @@ TEST(RaysOfStrategies, AreAnsweredByAllWithAHierarchyOfBoxes) {
   std::vector<std::string> able;
   for (const StrategyEntry& entry : registry())
     if (entry.info.can.rays) able.push_back(entry.info.id);
-  for (const char* id : {"bottom_up", "hybrid", "inflated_lazy", "rebuild", "lbvh", "ploc", "rotations",
-                         "selective_restructuring", "tsah", "kdop", "kinetic_aabb", "kinetic_kdop",
-                         "kinetic_boxtree", "kinetic_envelope", "linear_bounds", "brute_force"})
+  for (const char* id : {"bottom_up",
+                         "hybrid",
+                         "inflated_lazy",
+                         "rebuild",
+                         "lbvh",
+                         "ploc",
+                         "rotations",
+                         "selective_restructuring",
+                         "tsah",
+                         "kdop",
+                         "kinetic_aabb",
+                         "kinetic_kdop",
+                         "kinetic_boxtree",
+                         "kinetic_envelope",
+                         "linear_bounds",
+                         "interval_join",
+                         "interval_join_ahead",
+                         "drift_boxes",
+                         "drift_boxes_bounded",
+                         "auto",
+                         "brute_force"})
     EXPECT_NE(std::find(able.begin(), able.end(), id), able.end()) << id;
   for (const char* id : {"sweep", "hash_grid"}) EXPECT_FALSE(find_strategy(id).info.can.rays) << id;
 }

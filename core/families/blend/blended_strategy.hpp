@@ -162,7 +162,7 @@ class BlendedStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>,
     rays_.find(
         query, rays, hits, [&](std::uint32_t index) { return lazy_side(index); },
         [&](std::uint32_t index, std::uint32_t node) { make_wanted(index, node); }, this->triangle_stats_,
-        tests);
+        tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
 

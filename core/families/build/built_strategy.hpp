@@ -77,7 +77,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
                  std::span<RayHit> hits) override {
     std::uint64_t tests = 0;
     const auto side_of = [&](std::uint32_t body) -> WideSide<S> { return {&bodies_[body], body}; };
-    rays_.find(query, rays, hits, side_of, this->triangle_stats_, tests);
+    rays_.find(query, rays, hits, side_of, this->triangle_stats_, tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
   /// Computes the boxes of a tree that keeps its shape.

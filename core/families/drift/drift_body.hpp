@@ -128,6 +128,19 @@ struct DriftBody {
   void put_box() { box = moved_on(box_then); }
 };
 
+/// Returns the mean side of the boxes of a hierarchy's leaves; 0 without leaves.
+template <class S>
+double mean_leaf_side(const WideHierarchy<S>& hierarchy) {
+  double sum = 0, leaves = 0;
+  for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
+    if (!hierarchy.topology().nodes[node].is_leaf()) continue;
+    const Box<S> box = hierarchy.box(node);
+    for (int axis = 0; axis < 3; ++axis) sum += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
+    ++leaves;
+  }
+  return leaves == 0 ? 0 : sum / leaves;
+}
+
 /// Returns an upper bound on the closing of side k of the gap between two bodies (near_pairs.hpp) since then.
 template <class S>
 double closing(const DriftBody<S>& a, const DriftBody<S>& b, std::size_t k) {

@@ -102,7 +102,7 @@ class RealiserStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>
           Body& body = bodies_[index];
           reads += body.rows.make_wanted(node, this->sampled_, index, places_of(body));
         },
-        this->triangle_stats_, tests);
+        this->triangle_stats_, tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
     this->count_.add(Counter::positions_fetched, reads);
   }

@@ -169,7 +169,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays
       std::size_t total = kind.forest.bytes();
       for (const auto& volumes : kind.volumes) total += volumes.bytes();
       return total + near_bodies_.bytes() + rows_.bytes() + stack_.capacity() * sizeof(NodePair) +
-             ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
+             ray_order_.bytes() + ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
     });
   }
 
@@ -181,19 +181,26 @@ class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays
       if constexpr (of_boxes<decltype(kind)>)
         for (std::uint32_t body = 0; by_rows_ && body < kind.volumes.size(); ++body)
           kind.volumes[body].resize(kind.forest.tree(body).topology().size());
-      find_hits_by_body(this->scene_, this->sampled_, query, rays, hits,
-                        [&](std::uint32_t body, RaySearch<S>& search) {
-                          const Topology& topology = kind.forest.tree(body).topology();
-                          if (topology.empty()) return false;
-                          auto&& volumes = view(kind, body);
-                          const TopologyTree tree{topology, [&](std::uint32_t node) {
-                                                    volumes.ensure(node);
-                                                    return enclosing_box(volumes(node));
-                                                  }};
-                          return follow_ray(tree, search, body, this->scene_.primitives(body),
-                                            this->sampled_.positions(body), ray_stack_, this->count_,
-                                            this->triangle_stats_);
-                        });
+      const auto box_of = [&](std::uint32_t body) {
+        if (kind.forest.tree(body).topology().empty()) return Box<double>{};
+        auto&& volumes = view(kind, body);
+        volumes.ensure(0);
+        return to_double(enclosing_box(volumes(0)));
+      };
+      const std::uint64_t tests =
+          find_hits_by_body(this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(),
+                            box_of, [&](std::uint32_t body, RaySearch<S>& search) {
+                              const Topology& topology = kind.forest.tree(body).topology();
+                              auto&& volumes = view(kind, body);
+                              const TopologyTree tree{topology, [&](std::uint32_t node) {
+                                                        volumes.ensure(node);
+                                                        return enclosing_box(volumes(node));
+                                                      }};
+                              return follow_ray(tree, search, body, this->scene_.primitives(body),
+                                                this->sampled_.positions(body), ray_stack_, this->count_,
+                                                this->triangle_stats_);
+                            });
+      this->count_.add(Counter::box_tests, tests);
     });
   }
 
@@ -278,6 +285,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays
   KineticRowsQuery<S> rows_;  ///< empty for queries node by node
   std::vector<NodePair> stack_;
   std::vector<RayNode<std::uint32_t>> ray_stack_;
+  RayBodyOrder ray_order_;
   std::uint64_t first_step_ = 0;
 };
 

@@ -99,7 +99,7 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
   std::size_t bytes() const override {
     return std::visit(
         [&](const auto& state) {
-          std::size_t total = near_bodies_.bytes() + state.scratch.bytes() +
+          std::size_t total = near_bodies_.bytes() + ray_order_.bytes() + state.scratch.bytes() +
                               ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
           for (const auto& body : state.bodies) total += body.bytes();
           return total;
@@ -112,16 +112,20 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
   void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
                  std::span<RayHit> hits) override {
     on_bodies([&](const auto& bodies) {
-      find_hits_by_body(this->scene_, this->sampled_, query, rays, hits,
-                        [&](std::uint32_t body, RaySearch<S>& search) {
-                          if (bodies[body].empty()) return false;
-                          const TopologyTree tree{bodies[body].topology(), [&](std::uint32_t node) {
-                                                    return enclosing_box(bodies[body].volume(node));
-                                                  }};
-                          return follow_ray(tree, search, body, this->scene_.primitives(body),
-                                            this->sampled_.positions(body), ray_stack_, this->count_,
-                                            this->triangle_stats_);
-                        });
+      const auto box_of = [&](std::uint32_t body) {
+        return bodies[body].empty() ? Box<double>{} : to_double(enclosing_box(bodies[body].volume(0)));
+      };
+      const std::uint64_t tests =
+          find_hits_by_body(this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(),
+                            box_of, [&](std::uint32_t body, RaySearch<S>& search) {
+                              const TopologyTree tree{bodies[body].topology(), [&](std::uint32_t node) {
+                                                        return enclosing_box(bodies[body].volume(node));
+                                                      }};
+                              return follow_ray(tree, search, body, this->scene_.primitives(body),
+                                                this->sampled_.positions(body), ray_stack_, this->count_,
+                                                this->triangle_stats_);
+                            });
+      this->count_.add(Counter::box_tests, tests);
     });
   }
 
@@ -196,6 +200,7 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
   NearBodies near_bodies_;
   std::variant<State<Hierarchies>...> state_;
   std::vector<RayNode<std::uint32_t>> ray_stack_;
+  RayBodyOrder ray_order_;
   bool plans_changed_ = false;
 };
 

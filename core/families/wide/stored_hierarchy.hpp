@@ -109,7 +109,8 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>, public Ans
     std::uint64_t tests = 0;
     rays_.find(
         query, rays, hits, [&](std::uint32_t body) { return ray_side(body); },
-        [&](std::uint32_t body, std::uint32_t node) { make_row(body, node); }, this->triangle_stats_, tests);
+        [&](std::uint32_t body, std::uint32_t node) { make_row(body, node); }, this->triangle_stats_, tests,
+        this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
   /// Returns what rays read of a body; lazy strategies add the marks of stale nodes, for which `make_row` is

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/ray_box.hpp"
 #include "core/topology/builders.hpp"
 
 namespace kbvh {
@@ -74,7 +75,7 @@ void WideRays<S>::refit_bodies() {
     built_area_ = -1;
   }
   for (std::size_t i = 0; i < ids_.size(); ++i) {
-    const Box<S> box = sides_[ids_[i]].hierarchy->root_box();
+    const Box<S> box = sides_[ids_[i]].root_box();
     std::copy_n(box.lower, 3, corners_.data() + 6 * i);
     std::copy_n(box.upper, 3, corners_.data() + 6 * i + 3);
   }
@@ -99,10 +100,9 @@ void WideRays<S>::refit_bodies() {
 }
 
 template <class S>
-void WideRays<S>::follow(WideTree<S>& tree, WideRayJob<S>& job, std::vector<WideRayItem<S>>& stack) {
+void WideRays<S>::follow(const WideTree<S>& tree, WideRayJob<S>& job, std::vector<WideRayItem<S>>& stack) {
   const WideLeafLists leaves = tree.leaf_lists();
   job.ray = &ray_;
-  job.tree = tree.arrays();
   job.first_entry = leaves.first_entry;
   job.end_entry = leaves.end_entry;
   job.entries = leaves.primitives;
@@ -123,11 +123,14 @@ void WideRays<S>::follow(WideTree<S>& tree, WideRayJob<S>& job, std::vector<Wide
 
 template <class S>
 bool WideRays<S>::enter(std::uint32_t body) {
-  const WideSide<S>& side = sides_[body];
+  const WideRaySide<S>& side = sides_[body];
   const Primitives& primitives = scene_.primitives(body);
   motion_.fetch_all(body);
+  entered_[body] = 1;
   body_ = body;
   WideRayJob<S> job{};
+  job.tree = side.hierarchy->arrays();
+  if (side.child_bounds != nullptr) job.tree.child_bounds = side.child_bounds;
   job.offsets = primitives.offsets.data();
   job.vertices = primitives.vertices.data();
   job.positions = motion_.positions(body);
@@ -153,6 +156,7 @@ template <class S>
 void WideRays<S>::run(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits,
                       TriangleTestStats& stats, std::uint64_t& tests) {
   refit_bodies();
+  entered_.assign(sides_.size(), 0);
   stats_ = &stats;
   tests_ = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -163,6 +167,7 @@ void WideRays<S>::run(RayQuery query, std::span<const Ray<S>> rays, std::span<Ra
       enter(ids_[0]);
     } else if (!ids_.empty()) {
       WideRayJob<S> job{};
+      job.tree = bodies_.arrays();
       job.decide = [](void* context, std::uint32_t primitive) {
         auto& all = *static_cast<WideRays*>(context);
         return all.enter(all.ids_[primitive]);
@@ -176,11 +181,27 @@ void WideRays<S>::run(RayQuery query, std::span<const Ray<S>> rays, std::span<Ra
 }
 
 template <class S>
+void WideRays<S>::count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) const {
+  for (std::size_t i = 0; i < ids_.size(); ++i) {
+    if (entered_[ids_[i]] != 0) {
+      ++bodies.entered;
+      continue;
+    }
+    const Box<S> box = sides_[ids_[i]].root_box();
+    const bool met = std::any_of(rays.begin(), rays.end(), [&](const Ray<S>& ray) {
+      double near = 0;
+      return RaySlabs(RaySearch<S>(ray, RayQuery::any).line()).meet(box, double(ray.length), near);
+    });
+    ++(met ? bodies.hidden : bodies.unmet);
+  }
+}
+
+template <class S>
 std::size_t WideRays<S>::bytes() const {
   return bodies_.bytes() +
          (primitives_.offsets.capacity() + primitives_.vertices.capacity() + ids_.capacity()) *
              sizeof(std::uint32_t) +
-         corners_.capacity() * sizeof(S) + sides_.capacity() * sizeof(WideSide<S>) +
+         corners_.capacity() * sizeof(S) + sides_.capacity() * sizeof(WideRaySide<S>) + entered_.capacity() +
          (body_stack_.capacity() + stack_.capacity()) * sizeof(WideRayItem<S>);
 }
 

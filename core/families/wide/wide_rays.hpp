@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -9,21 +10,39 @@
 
 namespace kbvh {
 
+/// What rays read of one body.
+template <class S>
+struct WideRaySide {
+  WideTree<S>* hierarchy;
+  /// stale[wide node] is not 0 while the boxes of the node's children must be made; null: all are current.
+  const std::uint8_t* stale = nullptr;
+  /// A box around the body; if there is none, that of the hierarchy's root, which must be current.
+  std::optional<Box<S>> root{};
+  /// Boxes of children as in `WideArrays`, in place of the hierarchy's; null: those of the hierarchy.
+  S* child_bounds = nullptr;
+
+  WideRaySide(WideTree<S>* tree, const std::uint8_t* stale_nodes) : hierarchy(tree), stale(stale_nodes) {}
+  WideRaySide(const WideSide<S>& side) : hierarchy(side.hierarchy), stale(side.stale) {}
+
+  Box<S> root_box() const { return root ? *root : hierarchy->root_box(); }
+};
+
 /// Answers rays over the wide hierarchies of all bodies of a scene; keeps its buffers from call to call. A
 /// tree over the bodies' boxes, refitted at each call and built anew when the bodies have mixed, leads to the
-/// bodies, which are searched nearest first.
+/// bodies, which are searched nearest first. This is occlusion culling: a body that lies behind the hits of
+/// all rays is never searched, its positions are not fetched, and none of its stale boxes are made.
 template <class S>
 class WideRays {
  public:
   WideRays(const SceneView<S>& scene, const SampledMotion<S>& motion) : scene_(scene), motion_(motion) {}
 
-  /// Sets hits[i] to the answer to rays[i]. side_of(body) returns the WideSide<S> of a body, of which the
-  /// hierarchy and the marks of stale nodes are used; the boxes of roots must be current. make(body, wide
-  /// node) computes the boxes of the node's children and clears the node's mark. All positions of bodies that
-  /// rays come near are fetched. Adds box tests, those of the filter of triangles included, to `tests`.
+  /// Sets hits[i] to the answer to rays[i]. side_of(body) returns the WideRaySide<S> of a body, or its
+  /// WideSide<S>. make(body, wide node) computes the boxes of the node's children and clears the node's mark;
+  /// all positions of the body are current then. Adds box tests, those of the filter of triangles included,
+  /// to `tests`, and to `bodies` what the call did with each body; null: this is not counted.
   template <class SideOf, class Make>
   void find(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, const SideOf& side_of,
-            const Make& make, TriangleTestStats& stats, std::uint64_t& tests) {
+            const Make& make, TriangleTestStats& stats, std::uint64_t& tests, RayBodies* bodies = nullptr) {
     sides_.clear();
     for (std::uint32_t body = 0; body < scene_.body_count(); ++body) sides_.push_back(side_of(body));
     make_context_ = const_cast<Make*>(&make);
@@ -31,13 +50,14 @@ class WideRays {
       (*static_cast<const Make*>(context))(body, node);
     };
     run(query, rays, hits, stats, tests);
+    if (bodies != nullptr) count_bodies(rays, *bodies);
   }
   /// Does the same for hierarchies whose boxes are all current.
   template <class SideOf>
   void find(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, const SideOf& side_of,
-            TriangleTestStats& stats, std::uint64_t& tests) {
+            TriangleTestStats& stats, std::uint64_t& tests, RayBodies* bodies = nullptr) {
     find(
-        query, rays, hits, side_of, [](std::uint32_t, std::uint32_t) {}, stats, tests);
+        query, rays, hits, side_of, [](std::uint32_t, std::uint32_t) {}, stats, tests, bodies);
   }
 
   /// Builds the tree over the bodies anew at the next call, so that a restarted clip costs the same as
@@ -50,13 +70,15 @@ class WideRays {
   void run(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, TriangleTestStats& stats,
            std::uint64_t& tests);
   void refit_bodies();
-  void follow(WideTree<S>& tree, WideRayJob<S>& job, std::vector<WideRayItem<S>>& stack);
+  void count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) const;
+  void follow(const WideTree<S>& tree, WideRayJob<S>& job, std::vector<WideRayItem<S>>& stack);
   /// Follows the current ray through one body. Returns whether the search is over.
   bool enter(std::uint32_t body);
 
   SceneView<S> scene_;
   SampledMotion<S> motion_;
-  std::vector<WideSide<S>> sides_;
+  std::vector<WideRaySide<S>> sides_;
+  std::vector<std::uint8_t> entered_;  ///< [body], by this call
   void* make_context_ = nullptr;
   void (*make_)(void* context, std::uint32_t body, std::uint32_t node) = nullptr;
   // The tree over bodies: one primitive of two corners for each body that rays can meet.

@@ -1,0 +1,142 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "core/families/drift/drift_body.hpp"
+#include "core/families/wide/wide_rays.hpp"
+
+namespace kbvh {
+
+/// What the stored boxes of a body are at the current frame.
+enum class StoredBoxes : std::uint8_t {
+  current,  ///< they contain the body
+  old,      ///< they contain the body after DriftBody::moved_on
+  unknown,  ///< only DriftBody::box does
+};
+
+/// Tells what the stored boxes of a body are. `listed`: boxes are kept as long as the lists that were made
+/// with them.
+template <class S>
+StoredBoxes stored_boxes(const DriftBody<S>& body, bool listed) {
+  if (!body.near && body.watch != DriftBody<S>::Watch::nothing) return StoredBoxes::unknown;
+  return listed && body.watch == DriftBody<S>::Watch::drift ? StoredBoxes::old : StoredBoxes::current;
+}
+
+/// Answers rays in boxes that were made at an earlier frame, inflated by the displacements since then where
+/// rays first read them.
+template <class S>
+class DriftRays {
+ public:
+  DriftRays(const SceneView<S>& scene, const SampledMotion<S>& motion)
+      : rays_(scene, motion), motion_(motion) {}
+
+  /// Registers that bodies may have moved, or boxes were made.
+  void moved() { ++moment_; }
+
+  /// Sets hits[i] to the answer to rays[i] at the time of the motion. `stored_boxes` says what the boxes of
+  /// hierarchies[body] are; unknown ones are computed from positions where a ray enters the body. The other
+  /// parameters are those of WideRays.
+  void find(std::vector<WideHierarchy<S>>& hierarchies, const std::vector<DriftBody<S>>& bodies, bool listed,
+            RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, TriangleTestStats& stats,
+            std::uint64_t& tests, RayBodies* counts) {
+    if (moving_.empty()) make_room(hierarchies);
+    const auto side_of = [&](std::uint32_t body) {
+      WideHierarchy<S>& hierarchy = hierarchies[body];
+      WideRaySide<S> side(&hierarchy, nullptr);
+      if (hierarchy.empty()) return side;
+      Moving& moving = moving_[body];
+      moving.boxes = stored_boxes(bodies[body], listed);
+      if (moving.boxes == StoredBoxes::current) return side;
+      prepare(moving, bodies[body]);
+      side.stale = moving.stale.data();
+      side.root = rounded_outwards(bodies[body].box);
+      if (moving.boxes == StoredBoxes::old) side.child_bounds = moving.child_bounds.data();
+      return side;
+    };
+    const auto make = [&](std::uint32_t body, std::uint32_t node) {
+      Moving& moving = moving_[body];
+      WideHierarchy<S>& hierarchy = hierarchies[body];
+      if (moving.boxes == StoredBoxes::unknown) {
+        hierarchy.positions_changed();
+        hierarchy.refit(motion_.positions(body));
+        std::fill(moving.stale.begin(), moving.stale.end(), 0);
+        return;
+      }
+      const std::size_t width = hierarchy.width(), begin = node * lane_scalars(hierarchy.width());
+      const S* from = hierarchy.arrays().child_bounds + begin;
+      S* to = moving.child_bounds.data() + begin;
+      for (std::size_t row = 0; row < 6; ++row)
+        for (std::size_t lane = 0; lane < width; ++lane)
+          to[row * width + lane] = from[row * width + lane] + moving.by[row];
+      moving.stale[node] = 0;
+    };
+    rays_.find(query, rays, hits, side_of, make, stats, tests, counts);
+  }
+
+  std::size_t bytes() const {
+    std::size_t total = rays_.bytes() + moving_.capacity() * sizeof(Moving);
+    for (const Moving& one : moving_) total += one.child_bounds.size() * sizeof(S) + one.stale.size();
+    return total;
+  }
+
+ private:
+  /// The boxes of one body at the last call at which its stored ones did not serve.
+  struct Moving {
+    StoredBoxes boxes = StoredBoxes::current;
+    std::uint64_t moment = 0;
+    AlignedArray<S> child_bounds;     ///< as in WideArrays
+    std::vector<std::uint8_t> stale;  ///< [wide node]
+    S by[6] = {};                     ///< added to each row
+  };
+
+  void make_room(const std::vector<WideHierarchy<S>>& hierarchies) {
+    moving_.resize(hierarchies.size());
+    for (std::size_t body = 0; body < hierarchies.size(); ++body) {
+      const std::size_t nodes = hierarchies[body].node_count();
+      moving_[body].stale.assign(nodes, 1);
+      moving_[body].child_bounds.assign(nodes * lane_scalars(hierarchies[body].width()), S(0));
+    }
+  }
+  void prepare(Moving& moving, const DriftBody<S>& body) {
+    if (moving.moment == moment_) return;
+    moving.moment = moment_;
+    std::fill(moving.stale.begin(), moving.stale.end(), 1);
+    if (moving.boxes != StoredBoxes::old) return;
+    // A sum has two roundings of half an ulp: of the displacement and of the result, whose magnitudes are
+    // below those of the coordinates, margins and displacements together.
+    double largest = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      largest = std::max({largest, std::abs(body.box_then.lower[axis]) + double(body.margin[axis]),
+                          std::abs(body.box_then.upper[axis]) + double(body.margin[axis + 3])});
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto slack = [&](double way) {
+        return 4 * DriftBody<S>::eps * (largest + std::abs(way)) + 4 * double(std::numeric_limits<S>::min());
+      };
+      moving.by[axis] = S(body.low[axis] - slack(body.low[axis]));
+      moving.by[axis + 3] = S(-body.high[axis] - slack(body.high[axis]));
+    }
+  }
+
+  static Box<S> rounded_outwards(const Box<double>& box) {
+    constexpr S infinity = std::numeric_limits<S>::infinity();
+    Box<S> rounded;
+    for (int axis = 0; axis < 3; ++axis) {
+      rounded.lower[axis] = S(box.lower[axis]);
+      rounded.upper[axis] = S(box.upper[axis]);
+      if (double(rounded.lower[axis]) > box.lower[axis])
+        rounded.lower[axis] = std::nextafter(rounded.lower[axis], -infinity);
+      if (double(rounded.upper[axis]) < box.upper[axis])
+        rounded.upper[axis] = std::nextafter(rounded.upper[axis], infinity);
+    }
+    return rounded;
+  }
+
+  WideRays<S> rays_;
+  SampledMotion<S> motion_;
+  std::vector<Moving> moving_;  ///< [body], from the first call on
+  std::uint64_t moment_ = 1;
+};
+
+}  // namespace kbvh

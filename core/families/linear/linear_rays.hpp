@@ -1,0 +1,73 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "core/families/linear/linear_bounds.hpp"
+#include "core/families/wide/wide_rays.hpp"
+
+namespace kbvh {
+
+/// Answers rays at a time of a segment whose boxes are linear in time: the boxes that rays read are
+/// interpolated where they are first read. A body that is apart from all others has only one box in the
+/// segment: its boxes are computed from its positions when a ray enters it.
+template <class S>
+class LinearRays {
+ public:
+  LinearRays(const SceneView<S>& scene, const SampledMotion<S>& motion)
+      : rays_(scene, motion), motion_(motion) {}
+
+  /// Sets hits[i] to the answer to rays[i] at t, the time of the motion. stale[body][wide node] is not 0
+  /// unless the boxes of the node's children in the body's hierarchy are those at t. The other parameters are
+  /// those of WideRays.
+  void find(LinearBounds<S>& bounds, double t, std::vector<std::vector<std::uint8_t>>& stale, RayQuery query,
+            std::span<const Ray<S>> rays, std::span<RayHit> hits, TriangleTestStats& stats,
+            std::uint64_t& tests, RayBodies* bodies) {
+    moments_.clear();
+    for (std::uint32_t body = 0; body < bounds.body_count(); ++body)
+      moments_.push_back({bounds.hierarchy(body).arrays(), bounds.side(body).ends(), stale[body].data(),
+                          bounds.fraction(t)});
+    const auto side_of = [&](std::uint32_t body) {
+      WideRaySide<S> side(&bounds.hierarchy(body), stale[body].data());
+      if (!side.hierarchy->empty()) side.root = root_at(bounds.side(body), moments_[body].fraction);
+      return side;
+    };
+    const auto make = [&](std::uint32_t body, std::uint32_t node) {
+      auto& hierarchy = bounds.hierarchy(body);
+      if (bounds.side(body).apart) {
+        hierarchy.refit(motion_.positions(body));
+        std::fill(stale[body].begin(), stale[body].end(), 0);
+        return;
+      }
+      wide_linear_kernels<S>(hierarchy.kernels()).make(hierarchy.width())(moments_[body], node);
+      stale[body][node] = 0;
+    };
+    rays_.find(query, rays, hits, side_of, make, stats, tests, bodies);
+  }
+
+  std::size_t bytes() const { return rays_.bytes() + moments_.capacity() * sizeof(WideMoment<S>); }
+
+ private:
+  /// Interpolates the box of a body. The margin exceeds all roundings but the last.
+  static Box<S> root_at(const BodySegmentBounds<S>& side, S fraction) {
+    constexpr S infinity = std::numeric_limits<S>::infinity();
+    Box<S> box;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto between = [&](int bound) {
+        const double first = double(side.at[0].node_bounds[bound]);
+        return first + double(fraction) * (double(side.at[1].node_bounds[bound]) - first);
+      };
+      const double margin = double(side.margin);
+      box.lower[axis] = std::nextafter(S(between(axis) - margin), -infinity);
+      box.upper[axis] = std::nextafter(S(between(axis + 4) + margin), infinity);
+    }
+    return box;
+  }
+
+  WideRays<S> rays_;
+  SampledMotion<S> motion_;
+  std::vector<WideMoment<S>> moments_;  ///< [body], of the current call
+};
+
+}  // namespace kbvh
