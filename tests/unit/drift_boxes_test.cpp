@@ -5,10 +5,14 @@
 
 #include <random>
 
+#include "core/families/drift/drift_rays.hpp"
 #include "core/families/drift/near_pairs.hpp"
+#include "core/judge/ray_oracle.hpp"
 #include "core/judge/verify.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "tests/support/moving_grids.hpp"
+#include "tests/support/ray_sets.hpp"
+#include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
 namespace {
@@ -108,6 +112,102 @@ TEST(DriftBoxes, ABodyThatRestsAgainAfterAResetIsWhereItWas) {
     const Verification again = verify(session, std::span<const double>(frames), without);
     EXPECT_EQ(again.first_violation, "") << id << ": moved, though it has been reset";
     EXPECT_GT(again.pairs, 0u) << id;
+  }
+}
+
+/// Asks for pairs and rays at every frame, and compares the hits with brute force. Returns the number of
+/// frames that made no boxes.
+int check_rays(const Scene<float>& scene, const char* id) {
+  Session<float> session(scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred},
+                         CountingPolicy::counting);
+  session.reset(0);
+  session.playback().evaluate_all();
+  const std::vector<Ray<float>> rays = rays_at(session.scene(), session.playback(), 12, 1);
+  std::vector<RayHit> hits(rays.size());
+  std::uint64_t visited = 0, found = 0;
+  int kept = 0;
+  PairBuffer pairs;
+  PhaseTimes ignored;
+  for (int f = 1; f <= 40; ++f) {
+    const double t = 0.01 * f;
+    session.advance(t, ignored);
+    const std::uint64_t before =
+        std::exchange(visited, session.strategy().counters()[Counter::nodes_visited]);
+    kept += visited == before ? 1 : 0;
+    if (f % 4 != 0) session.strategy().pairs_at(t, pairs);
+    session.hits(RayQuery::closest, rays, std::span<RayHit>(hits), ignored);
+    session.playback().evaluate_all();
+    const RayCheck check = check_hits<float>(session.scene(), session.playback(), RayQuery::closest,
+                                             std::span<const Ray<float>>(rays), hits);
+    EXPECT_TRUE(check.holds()) << id << ", frame " << f << ": " << check.first_violation;
+    found += check.hits;
+  }
+  EXPECT_GT(found, 100U);
+  return kept;
+}
+
+/// Rays in boxes without a margin that were made at the first frame, at later ones.
+template <class S>
+void check_old_boxes(const char* name, std::uint64_t& found) {
+  const auto test = synthetic_scene<S>(name);
+  const auto frames = test.frames.empty() ? frame_times(test.scene, 3) : test.frames;
+  Playback<S> playback(test.scene);
+  playback.seek(frames[0]);
+  playback.evaluate_all();
+  const SceneView<S> view(test.scene);
+  std::vector<WideHierarchy<S>> trees(test.scene.bodies.size());
+  std::vector<DriftBody<S>> bodies(trees.size());
+  for (std::uint32_t body = 0; body < trees.size(); ++body) {
+    const S* const positions = playback.positions(body);
+    trees[body].assign(build_topology<S>(primitive_boxes(view.primitives(body), positions),
+                                         {.method = BuildMethod::median, .width = 4, .leaf_size = 2}),
+                       view.primitives(body), active_kernel_set());
+    trees[body].refit(positions);
+    bodies[body].before.assign(positions, positions + std::size_t(3) * view.vertex_count(body));
+    bodies[body].box = bodies[body].box_then = to_double(trees[body].box(0));
+    bodies[body].watch = DriftBody<S>::Watch::drift;
+    bodies[body].stand();
+  }
+  DriftRays<S> drift(view, SampledMotion<S>(playback));
+  const std::size_t stride = 1 + frames.size() / 6;
+  for (std::size_t f = 1; f < frames.size(); f += stride) {
+    playback.seek(frames[f]);
+    playback.evaluate_all();
+    drift.moved();
+    for (std::uint32_t body = 0; body < trees.size(); ++body) {
+      S interval[8];
+      near_kernels<S>(active_kernel_set())
+          .drift(playback.positions(body), bodies[body].before.data(), view.vertex_count(body), interval);
+      bodies[body].drifted_by(interval, 1);
+      bodies[body].near = f + stride < frames.size();  // the last time, only the body's box is known
+    }
+    const std::vector<Ray<S>> rays = rays_at(test.scene, playback, 12, std::uint32_t(f));
+    std::vector<RayHit> hits(rays.size());
+    TriangleTestStats stats;
+    std::uint64_t tests = 0;
+    drift.find(trees, bodies, true, RayQuery::closest, std::span<const Ray<S>>(rays), std::span<RayHit>(hits),
+               stats, tests, nullptr);
+    const RayCheck check =
+        check_hits<S>(test.scene, playback, RayQuery::closest, std::span<const Ray<S>>(rays), hits);
+    EXPECT_TRUE(check.holds()) << name << ", frame " << f << ": " << check.first_violation;
+    found += check.hits;
+  }
+}
+
+TEST(DriftRays, ReadOldBoxesAsFarAsVerticesMoved) {
+  std::uint64_t found = 0;
+  for (const char* name : {"soups", "sheets"}) {
+    check_old_boxes<float>(name, found);
+    check_old_boxes<double>(name, found);
+  }
+  EXPECT_GT(found, 300U);
+}
+
+TEST(DriftBoxes, OldBoxesMoveWithTheRaysThatReadThem) {
+  // Near each other, so that lists are kept; and far apart, so that there is only one box.
+  for (const char* id : {"drift_boxes", "drift_boxes_bounded"}) {
+    EXPECT_GT(check_rays(grids<float>(20, 0.5, left_side), id), 20);
+    EXPECT_GT(check_rays(grids<float>(20, 50, lifted), id), 20);
   }
 }
 
