@@ -362,7 +362,15 @@ def on_slurm(study: Study) -> int:
     with slurm.Cluster(study.folder / "cluster", slots) as cluster:
         study.environment |= {name: cluster.environment[name] for name in ("SLURM_CONF", "PATH")}
         out = study.folder / "vanished"
-        slow = study.program("slow", '[[ $* == *--job* ]] && sleep 2; exec "$KBVH" "$@"')
+        # From the fourth job on, jobs last until the node has vanished: one of them is running then.
+        slow = study.program(
+            "slow",
+            """
+if [[ $* == *--job* ]]; then
+  while [[ $(ls "$HERE"/vanished/jobs/*/done 2>/dev/null | wc -l) -ge 3 && ! -e "$HERE"/lost ]]; do sleep 0.1; done
+fi
+exec "$KBVH" "$@" """,
+        )
         sweep = subprocess.Popen(
             study.call("--slurm", out=out, kbvh=slow), env=study.environment, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True,
@@ -375,6 +383,7 @@ def on_slurm(study: Study) -> int:
         require(sweep.poll() is None, "the sweep has ended too early")
         kept = {file: file.read_bytes() for file in out.rglob("*.jsonl")}
         cluster.vanish_node()
+        (study.folder / "lost").touch()
         cluster.wait_for("down")
         cluster.start_node()
         text = sweep.communicate(timeout=600)[0]
