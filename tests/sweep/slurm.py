@@ -49,11 +49,14 @@ class Cluster:
 
     def vanish_node(self) -> None:
         """As if the node lost its power: slurmd and everything that it has started is killed at once."""
-        for process in self.below(self.processes["slurmd"].pid):
-            try:
-                os.kill(process, signal.SIGKILL)
-            except ProcessLookupError:
-                pass
+        # All are stopped before one is killed: a worker whose parent dies would have time to write that its job has ended.
+        below = self.below(self.processes["slurmd"].pid)
+        for number in (signal.SIGSTOP, signal.SIGKILL):
+            for process in below:
+                try:
+                    os.kill(process, number)
+                except ProcessLookupError:
+                    pass
         self.processes.pop("slurmd").wait()
 
     def below(self, root: int) -> list[int]:

@@ -362,12 +362,13 @@ def on_slurm(study: Study) -> int:
     with slurm.Cluster(study.folder / "cluster", slots) as cluster:
         study.environment |= {name: cluster.environment[name] for name in ("SLURM_CONF", "PATH")}
         out = study.folder / "vanished"
-        # From the fourth job on, jobs last until the node has vanished: one of them is running then.
+        # From the fourth job on, jobs last until the node has vanished.
         slow = study.program(
             "slow",
             """
-if [[ $* == *--job* ]]; then
-  while [[ $(ls "$HERE"/vanished/jobs/*/done 2>/dev/null | wc -l) -ge 3 && ! -e "$HERE"/lost ]]; do sleep 0.1; done
+if [[ $* == *--job* && $(ls "$HERE"/vanished/jobs/*/done 2>/dev/null | wc -l) -ge 3 ]]; then
+  echo $$ >> "$HERE"/held
+  until [[ -e "$HERE"/lost ]]; do sleep 0.1; done
 fi
 exec "$KBVH" "$@" """,
         )
@@ -375,9 +376,10 @@ exec "$KBVH" "$@" """,
             study.call("--slurm", out=out, kbvh=slow), env=study.environment, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
+        held = study.folder / "held"
         while sweep.poll() is None:
-            running = any("end" not in about and about["kind"] == "job" for about in attempts(out))
-            if running and len(list((out / "jobs").glob("*/done"))) >= 3:
+            pids = held.read_text().split() if held.exists() else []
+            if any("end" not in about and str(about["pid"]) in pids for about in attempts(out)):
                 break
             time.sleep(0.1)
         require(sweep.poll() is None, "the sweep has ended too early")
