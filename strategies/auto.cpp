@@ -1,8 +1,8 @@
 // A strategy that chooses among other strategies by observed properties of the scene: the number of frames
 // per segment of the flight plans, the vertex steps per frame, changes of plans, the number of candidates,
-// and the triangle tests that the interval join had to make at frames, by which a join that decides little
-// for spans of time is left after some frames. The choice depends on counts and plans only, never on a clock,
-// so that a run can be repeated.
+// the growth of boxes as trees age, with the box tests that new trees save, and the triangle tests that the
+// interval join had to make at frames, by which a join that decides little for spans of time is left after
+// some frames. The choice depends on counts and plans only, never on a clock, so that a run can be repeated.
 //
 // Each candidate has one instance from the first frame on, with its own hierarchies. This costs the memory of
 // all candidates and saves creating an instance at a change. Inactive instances do not advance.
@@ -11,63 +11,13 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/base/cost_constants.hpp"
 #include "core/contract/registry.hpp"
+#include "core/contract/tells_work.hpp"
+#include "core/families/choice/observed_ageing.hpp"
+#include "core/families/choice/predicted_costs.hpp"
 
 namespace kbvh {
 namespace {
-
-/// The inputs of a choice.
-struct Seen {
-  double frames_per_segment = 1;  // of the current segment; infinite if it has no end
-  double changes_per_frame = 0;   // frames with changes of plans, as a share of the last frames
-  double candidates = 0;          // in a frame, of leaf_slabs
-  bool near = false;              // bodies are not known to be apart
-  double reads = 0;               // vertices that a refit reads
-  double step = 0;           // mean step of a vertex per frame relative to another body, in mean leaf sides
-  double slide = 0;          // the same for primitives relative to their candidates
-  bool many_bodies = false;  // more pairs of bodies than a choice examines
-  double spread = 1;         // how different the steps are among a body's vertices; 0: all the same
-  /// Triangle tests of the join in a frame, over the candidates of leaf_slabs: pairs that it could not decide
-  /// for spans of time. Measured while it is active, and slowly forgotten at later choices.
-  double undecided = 0;
-};
-
-using Cost = costs::Choice;
-
-double refit_cost(const Seen& seen) {
-  return Cost::refit_read * seen.reads + Cost::refit_candidate * seen.candidates;
-}
-
-/// One search serves the frames in which a leaf moves by a part of its size. Where bodies deform, more pairs
-/// come near in these frames than a query takes to find.
-double drift_cost(const Seen& seen) {
-  const double watching = Cost::watch_read * seen.reads;
-  if (!seen.near) return seen.step < 0.2 ? 0.5 * watching : Cost::unfit * refit_cost(seen);
-  if (seen.spread > 0.02) return Cost::unfit * refit_cost(seen);
-  const double frames = seen.step > 0 ? std::min(0.4 / seen.step, 24.0) : 24;
-  if (frames < 3) return Cost::unfit * refit_cost(seen);
-  const double search = Cost::search_read * seen.reads + Cost::search_candidate * seen.candidates;
-  return watching + search / frames + Cost::kept_candidate * seen.candidates;
-}
-
-/// One join serves a segment. Its cost grows with the share of pairs that it cannot decide for spans of time,
-/// and with the distance that primitives move past each other within the segment. A translating body passes
-/// by others; the touching part of a deforming body stays in place.
-double join_cost(const Seen& seen) {
-  const double l = seen.frames_per_segment, moves = seen.slide * l;
-  if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
-  // Bodies apart: one box at each end, unless they come to meet; over a long distance they may pass through
-  // each other.
-  if (!seen.near) return Cost::join_apart / l * (1 + moves * moves) * refit_cost(seen);
-  const double alike = 1 - seen.spread;
-  // Small bodies that move past each other meet further bodies on their way, in addition to their current
-  // contacts.
-  const double others = seen.many_bodies ? 1 + moves : 1 + Cost::join_moves * moves;
-  return refit_cost(seen) * ((Cost::join_frame + Cost::join_segment / (l + Cost::join_frames) * others) *
-                                 (1 + Cost::join_undecided * seen.undecided) +
-                             Cost::join_slide * alike * alike * moves);
-}
 
 /// A strategy to choose, its explicitly set parameters, and its predicted cost. To add a candidate, add a
 /// line: any registered strategy that follows plan changes and needs no more foresight than the next keyframe
@@ -75,14 +25,13 @@ double join_cost(const Seen& seen) {
 struct Candidate {
   const char* id;
   std::map<std::string, std::string> params;
-  double (*cost)(const Seen&);
+  double (*cost)(const Observed&);
 };
 const std::vector<Candidate>& candidates() {
   static const std::vector<Candidate> list{
       {"leaf_slabs", {}, &refit_cost},  // first: it answers until observations exist
       {"bottom_up", {}, &refit_cost},   // in programs without the first
-      {"drift_boxes", {}, &drift_cost},
-      {"interval_join", {}, &join_cost},
+      {"lbvh_drift", {}, &rebuilt_cost}, {"drift_boxes", {}, &drift_cost}, {"interval_join", {}, &join_cost},
   };
   return list;
 }
@@ -111,6 +60,8 @@ class Auto final : public Strategy<S>,
       const Params own(found->info.id, found->info.parameters, candidate.params);
       runners_.push_back({&candidate, found->info.positions == PositionUse::all,
                           NestedStrategies<S>::create(*found, scene, motion, topologies, own, policy)});
+      Runner& runner = runners_.back();
+      runner.work = dynamic_cast<TellsWork*>(runner.strategy.get());
     }
     if (runners_.empty()) throw ConfigError("auto has nothing to choose from");
     velocities_.resize(scene.body_count());
@@ -138,6 +89,9 @@ class Auto final : public Strategy<S>,
     body_changed_.assign(this->scene_.body_count(), 0);
     seen_ = {};
     for (const double reads : reads_) seen_.reads += reads;
+    ageing_.start_over(runners_[0].work != nullptr ? runners_[0].work->surface() : 0);
+    chosen_tests_ = 0;
+    tried_ = false;
   }
 
   void advance_to(double t) override {
@@ -151,9 +105,14 @@ class Auto final : public Strategy<S>,
     const bool due = frame_ == 1 || stayed >= (t >= segment_end_ ? stay_ : longest_stay) ||
                      (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
                      seen_.near != chosen_near_ || seen_.candidates > 2 * chosen_candidates_ ||
-                     2 * seen_.candidates < chosen_candidates_;
+                     2 * seen_.candidates < chosen_candidates_ || tried_ ||
+                     (active_ == 0 && ageing_.tests() > 1.5 * chosen_tests_);
+    tried_ = false;
     if (step_ > 0 && due) choose(t);
-    if (active_ != last) ++switches_;
+    if (active_ != last) {
+      ++switches_;
+      tried_ = is_active(&rebuilt_cost);
+    }
     Runner& runner = runners_[active_];
     if (runner.all_positions) fetch_all();
     if (active_ == last || runner.fresh) {
@@ -270,8 +229,9 @@ class Auto final : public Strategy<S>,
     const Candidate* candidate;
     bool all_positions;
     std::unique_ptr<Strategy<S>> strategy;
-    bool fresh = false;  ///< in the state after `reset`
-    int frames = 0;      ///< number of frames that it answered
+    TellsWork* work = nullptr;  ///< the strategy, if it does
+    bool fresh = false;         ///< in the state after `reset`
+    int frames = 0;             ///< number of frames that it answered
   };
   /// The number of frames after which the choice is reviewed within one segment, and at the start of a new
   /// one; the latter doubles each time that the choice is confirmed.
@@ -315,15 +275,25 @@ class Auto final : public Strategy<S>,
     reads_.push_back(this->scene_.moving(body) ? reads : 0);
   }
 
-  bool is_active(double (*cost)(const Seen&)) const { return runners_[active_].candidate->cost == cost; }
+  bool is_active(double (*cost)(const Observed&)) const { return runners_[active_].candidate->cost == cost; }
   /// Strategies differ in the pairs that they leave out early: only drift_boxes reports all pairs of boxes,
   /// and shows that bodies are apart.
   void see_candidates(std::size_t count) {
     if (count != 0 || is_active(&drift_cost)) seen_.near = count != 0;
     if (active_ == 0 || !seen_.near) seen_.candidates = double(count);
+    if (runners_[active_].work == nullptr) return;
+    const double tests = double(runners_[active_].work->last_box_tests());
+    if (active_ == 0)
+      ageing_.refitted(tests);
+    else if (is_active(&rebuilt_cost))
+      ageing_.rebuilt(tests, double(count), std::max(1, frame_), seen_);
   }
   /// Measures the work of the active strategy since the last choice.
   void see_work() {
+    if (active_ == 0 && runners_[0].work != nullptr)
+      ageing_.look_at_refitted(runners_[0].work->surface(), frame_, seen_);
+    else if (is_active(&rebuilt_cost) && frame_ - chosen_at_ >= shortest_stay)
+      ageing_.look_at_rebuilt();
     const double tests = double(runners_[active_].strategy->counters()[Counter::triangle_tests]);
     const double frames = frame_ - chosen_at_;
     // From time to time drift_boxes may look whether bodies have parted.
@@ -346,6 +316,7 @@ class Auto final : public Strategy<S>,
     chosen_at_ = frame_;
     chosen_candidates_ = seen_.candidates;
     chosen_near_ = seen_.near;
+    chosen_tests_ = ageing_.tests();
     double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
     for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
       if (seen_.changes_per_frame == 0) {  // otherwise the observation takes too long and is unreliable
@@ -459,10 +430,13 @@ class Auto final : public Strategy<S>,
   std::size_t active_ = 0;
   std::uint64_t first_fetch_ = 0;
   int frame_ = 0, chosen_at_ = 0, stay_ = shortest_stay;
-  double step_ = 0, segment_end_ = 0;   ///< seconds
-  double chosen_candidates_ = 0;        ///< number of candidates at the time of the choice
-  bool chosen_near_ = false;            ///< whether bodies met then
-  double tests_before_ = 0;             ///< triangle tests of the active strategy until then
+  double step_ = 0, segment_end_ = 0;  ///< seconds
+  double chosen_candidates_ = 0;       ///< number of candidates at the time of the choice
+  bool chosen_near_ = false;           ///< whether bodies met then
+  double tests_before_ = 0;            ///< triangle tests of the active strategy until then
+  double chosen_tests_ = 0;            ///< box tests of the refitted trees in the frame before
+  bool tried_ = false;                 ///< rebuilt trees answer for the first time: their work decides
+  ObservedAgeing ageing_;
   bool changes_ = false;                ///< plans changed since the last frame
   std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first change of each body
   std::vector<std::uint8_t> body_changed_;
@@ -471,7 +445,7 @@ class Auto final : public Strategy<S>,
   int switches_ = 0;      ///< changes of the active strategy since `reset`
   PairBuffer now_, none_, before_;
   PairDifference difference_;
-  Seen seen_;
+  Observed seen_;
 };
 
 }  // namespace

@@ -6,7 +6,9 @@
 #include <algorithm>
 
 #include "core/contract/registry.hpp"
+#include "core/families/choice/observed_ageing.hpp"
 #include "tests/support/moving_grids.hpp"
+#include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
 namespace {
@@ -62,6 +64,97 @@ TEST(Auto, DoesNotJoinWherePlansChangeAtEveryFrame) {
               choice.find("interval_join for 1 frame,") == joined)
       << choice;
   EXPECT_NE(choice.find("plans changed at 1 of frames"), std::string::npos) << choice;
+}
+
+/// Two bodies of small triangles in a cube, each of which flies to a place of its own.
+Scene<float> flying_triangles(std::uint32_t count, std::uint32_t keyframes) {
+  Scene<float> scene;
+  Random random(7);
+  for (int body = 0; body < 2; ++body) {
+    Body<float> made;
+    std::vector<double> times, ways(6 * count);
+    for (double& x : ways) x = random.unit();
+    // Neighbours in space begin as neighbours in the list, in a row: a tree of the start is a good one.
+    for (std::uint32_t i = 0; i < count; ++i) {
+      ways[6 * i] = 2.0 * i / count - 1;
+      made.primitives.add(std::vector<std::uint32_t>{3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    std::vector<float> positions;
+    for (std::uint32_t k = 0; k < keyframes; ++k) {
+      times.push_back(k);
+      const double share = double(k) / (keyframes - 1);
+      for (std::uint32_t i = 0; i < count; ++i)
+        for (int corner = 0; corner < 3; ++corner)
+          for (int axis = 0; axis < 3; ++axis)
+            positions.push_back(float(ways[6 * i + axis] * (1 - share) + ways[6 * i + 3 + axis] * share +
+                                      (corner == axis ? 0.03 : 0)));
+    }
+    made.plans = FlightPlans<float>(3 * count, std::move(times), std::move(positions));
+    scene.bodies.push_back(std::move(made));
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  return scene;
+}
+
+/// Plays a clip of one frame for each keyframe interval, next to a refit.
+std::string chosen_at_keyframes(const Scene<float>& scene, int frames) {
+  Play<float> play(scene, "auto", {}), refit(scene, "bottom_up", {});
+  for (int f = 1; f <= frames; ++f) {
+    play.frame(f);
+    refit.frame(f);
+    std::sort(play.pairs.begin(), play.pairs.end());
+    std::sort(refit.pairs.begin(), refit.pairs.end());
+    EXPECT_EQ(play.pairs, refit.pairs) << "frame " << f;
+  }
+  return play.session.strategy().choice();
+}
+
+int frames_of(const std::string& choice, const std::string& id) {
+  const auto found = choice.find(id + " for ");
+  return found == std::string::npos ? 0 : std::stoi(choice.substr(found + id.size() + 5));
+}
+
+TEST(Auto, RebuildsTreesThatAge) {
+  const std::string choice = chosen_at_keyframes(flying_triangles(4000, 100), 99);
+  EXPECT_GT(frames_of(choice, "lbvh_drift"), 60) << choice;
+}
+
+TEST(Auto, DoesNotRebuildTreesThatStayYoung) {
+  const std::string choice = chosen_at_keyframes(grids<float>(40, 0.3, slow), 2);
+  EXPECT_EQ(frames_of(choice, "lbvh_drift"), 0) << choice;
+}
+
+TEST(ObservedAgeing, KeepsWhatTheFirstSearchInNewTreesTells) {
+  Observed seen;
+  seen.candidates = 1000;
+  ObservedAgeing ageing;
+  ageing.start_over(10);
+  ageing.refitted(9000);
+  ageing.look_at_refitted(30, 20, seen);  // boxes have grown by 3: up to two thirds of the tests may be saved
+  EXPECT_DOUBLE_EQ(seen.surplus, 6000);
+  EXPECT_DOUBLE_EQ(seen.ageing, 300);
+  ageing.rebuilt(6000, 1200, 21, seen);  // one third is
+  EXPECT_DOUBLE_EQ(seen.surplus, 3000);
+  EXPECT_DOUBLE_EQ(seen.boxed, 1.2);
+  EXPECT_DOUBLE_EQ(seen.candidates, 1000);
+  ageing.rebuilt(8000, 2400, 22, seen);  // the factor stays
+  EXPECT_DOUBLE_EQ(seen.surplus, 4000);
+  EXPECT_DOUBLE_EQ(seen.candidates, 2000);
+  ageing.look_at_refitted(30, 30, seen);  // back again, with as many tests as before
+  EXPECT_DOUBLE_EQ(seen.surplus, 3000);
+}
+
+TEST(ObservedAgeing, ForgetsWhileRebuiltTreesAnswer) {
+  Observed seen;
+  ObservedAgeing ageing;
+  ageing.start_over(10);
+  ageing.refitted(4000);
+  ageing.look_at_refitted(40, 10, seen);
+  ageing.rebuilt(1000, 0, 11, seen);
+  EXPECT_DOUBLE_EQ(seen.surplus, 3000);
+  for (int choice = 0; choice < 20; ++choice) ageing.look_at_rebuilt();
+  ageing.rebuilt(1000, 0, 400, seen);
+  EXPECT_LT(seen.surplus, 50);
 }
 
 TEST(Auto, StartsOverAndChoosesTheSameAgain) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <optional>
 
+#include "core/contract/tells_work.hpp"
 #include "core/families/build/built_each_frame.hpp"
 #include "core/families/build/built_tree.hpp"
 #include "core/families/build/curve_order.hpp"
@@ -15,7 +16,7 @@ namespace kbvh {
 ///   bytes()
 /// Of the given topologies, only the leaf size counts.
 template <class S, class Count, class Builder>
-class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public AnswersRays<S> {
+class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public AnswersRays<S>, public TellsWork {
   using Base = BuiltEachFrame<S, Count, BuiltTree<S>>;
 
  protected:
@@ -56,8 +57,10 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
       searched(pair, tests - tests_before, out.size() - pairs_before);
     }
     this->count_.add(Counter::box_tests, tests);
+    last_box_tests_ = tests;
     return status;
   }
+  std::uint64_t last_box_tests() const override { return last_box_tests_; }
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     AuditView view;
     view.topology = bodies_[body].topology(view.boxes);
@@ -103,6 +106,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
   CurveOrder<S> order_;
   WideQuery<S> query_{this->scene_, this->sampled_};
   WideRays<S> rays_{this->scene_, this->sampled_};
+  std::uint64_t last_box_tests_ = 0;
 };
 
 }  // namespace kbvh

@@ -1,0 +1,57 @@
+#pragma once
+#include <algorithm>
+
+#include "core/families/choice/predicted_costs.hpp"
+
+namespace kbvh {
+
+/// What a choice knows of the age of refitted trees. While these answer, the surfaces of their boxes tell how
+/// many of the box tests new trees may save; the first search in rebuilt trees tells how many they do save.
+/// What was learned so is slowly forgotten at later choices, so that a tree is tried again whose bodies may
+/// have returned to their first shape.
+class ObservedAgeing {
+ public:
+  /// `surface`: of the refitted trees, see TellsWork.
+  void start_over(double surface) {
+    *this = {};
+    new_surface_ = surface;
+  }
+  /// Registers the frame's search of the refitted trees.
+  void refitted(double tests) { tests_ = tests; }
+  /// Registers the frame's search of rebuilt trees; `frame` counts from the start.
+  void rebuilt(double tests, double candidates, int frame, Observed& seen) {
+    if (!known_ && tests > 0) {
+      known_ = true;
+      factor_ = std::max(1.0, tests_ / tests);
+      felt_ = possible() > 0 ? (factor_ - 1) * tests / possible() : 1;
+      seen.ageing = (factor_ - 1) * tests / frame;
+      if (seen.candidates > 0) seen.boxed = std::max(1.0, candidates / seen.candidates);
+    }
+    seen.surplus = (factor_ - 1) * tests;
+    seen.candidates = candidates / seen.boxed;
+  }
+  /// Updates the observations at a choice while the refitted trees answer. `frame` as above.
+  void look_at_refitted(double surface, int frame, Observed& seen) {
+    known_ = false;
+    growth_ = new_surface_ > 0 ? std::max(1.0, surface / new_surface_) : 1;
+    seen.surplus = felt_ * possible();
+    seen.ageing = seen.surplus / std::max(1, frame);
+  }
+  /// The same while the rebuilt ones do.
+  void look_at_rebuilt() { factor_ = 1 + 0.8 * (factor_ - 1); }
+  /// Returns the box tests of the last search of the refitted trees.
+  double tests() const { return tests_; }
+
+ private:
+  /// Returns the tests that new trees save if searches feel the whole growth of the boxes.
+  double possible() const { return tests_ * (1 - 1 / growth_); }
+
+  double new_surface_ = 0;
+  double growth_ = 1;   // of the surfaces, at the last choice
+  double tests_ = 0;    // of the last search of the refitted trees
+  double felt_ = 1;     // share of the possible saving that rebuilt trees have saved
+  double factor_ = 1;   // tests of refitted over those of rebuilt trees
+  bool known_ = false;  // the factor was measured since the refitted trees answered last
+};
+
+}  // namespace kbvh

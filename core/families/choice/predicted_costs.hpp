@@ -1,0 +1,40 @@
+#pragma once
+
+namespace kbvh {
+
+/// What a choice among strategies knows of a scene and of the work so far. Counts and plans, never times.
+struct Observed {
+  double frames_per_segment = 1;  ///< of the current segment; infinite if it has no end
+  double changes_per_frame = 0;   ///< frames with changes of plans, as a share of the last frames
+  double candidates = 0;          ///< in a frame, of leaf_slabs
+  double boxed =
+      1.3;  ///< candidates of boxes alone over these; measured where a rebuilding strategy was active
+  bool near = false;         ///< bodies are not known to be apart
+  double reads = 0;          ///< vertices that a refit reads
+  double step = 0;           ///< mean step of a vertex per frame relative to another body, in mean leaf sides
+  double slide = 0;          ///< the same for primitives relative to their candidates
+  bool many_bodies = false;  ///< more pairs of bodies than a choice examines
+  double spread = 1;         ///< how different the steps are among a body's vertices; 0: all the same
+  /// Triangle tests of the join in a frame, over the candidates of leaf_slabs: pairs that it could not decide
+  /// for spans of time. Measured while it is active, and slowly forgotten at later choices.
+  double undecided = 0;
+  double surplus = 0;  ///< box tests of the refitted trees in a frame, beyond those of new trees
+  double ageing = 0;   ///< growth of the surplus per frame
+};
+
+// The predicted costs of a frame, in nanoseconds of one machine; only their order matters.
+
+/// leaf_slabs: reads all vertices, and searches in trees that age.
+double refit_cost(const Observed& seen);
+/// lbvh_drift: refits trees of its own, and builds new ones when the surplus of tests has cost as much.
+double rebuilt_cost(const Observed& seen);
+/// drift_boxes: one search serves the frames in which a leaf moves by a part of its size. Where bodies
+/// deform, more pairs come near in these frames than a query takes to find.
+double drift_cost(const Observed& seen);
+/// interval_join: one join serves a segment. Its cost grows with the share of pairs that it cannot decide for
+/// spans of time, and with the distance that primitives move past each other within the segment. A
+/// translating body passes by others; the touching part of a deforming body stays in place. Infinite where
+/// plans change or segments have no end.
+double join_cost(const Observed& seen);
+
+}  // namespace kbvh
