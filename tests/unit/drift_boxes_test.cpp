@@ -122,7 +122,7 @@ int check_rays(const Scene<float>& scene, const char* id) {
                          CountingPolicy::counting);
   session.reset(0);
   session.playback().evaluate_all();
-  const std::vector<Ray<float>> rays = rays_at(session.scene(), session.playback(), 12, 1);
+  const std::vector<Ray<float>> rays = rays_at(session.scene(), session.playback(), 4, 1);
   std::vector<RayHit> hits(rays.size());
   std::uint64_t visited = 0, found = 0;
   int kept = 0;
@@ -136,14 +136,13 @@ int check_rays(const Scene<float>& scene, const char* id) {
     kept += visited == before ? 1 : 0;
     if (f % 4 != 0) session.strategy().pairs_at(t, pairs);
     session.hits(RayQuery::closest, rays, std::span<RayHit>(hits), ignored);
-    if (f % 3 != 0) continue;  // brute force takes long
     session.playback().evaluate_all();
     const RayCheck check = check_hits<float>(session.scene(), session.playback(), RayQuery::closest,
                                              std::span<const Ray<float>>(rays), hits);
     EXPECT_TRUE(check.holds()) << id << ", frame " << f << ": " << check.first_violation;
     found += check.hits;
   }
-  EXPECT_GT(found, 40U);
+  EXPECT_GT(found, 100U);
   return kept;
 }
 
@@ -207,7 +206,8 @@ TEST(DriftRays, ReadOldBoxesAsFarAsVerticesMoved) {
 TEST(DriftBoxes, OldBoxesMoveWithTheRaysThatReadThem) {
   // Near each other, so that lists are kept; and far apart, so that there is only one box.
   for (const char* id : {"drift_boxes", "drift_boxes_bounded"}) {
-    EXPECT_GT(check_rays(grids<float>(20, 0.5, left_side), id), 10);
+    // Lists for 8 of 25 frames: after each, the cost model refits for 17.
+    EXPECT_EQ(check_rays(grids<float>(20, 0.5, left_side), id), 16);
     EXPECT_GT(check_rays(grids<float>(20, 50, lifted), id), 20);
   }
 }
