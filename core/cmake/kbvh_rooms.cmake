@@ -13,26 +13,43 @@ set(kbvh_kernel_flags_avx512 -mavx2 -mfma -mavx512f -mavx512vl -mavx512dq -mavx5
   # GCC 12 warns about its own undefined registers.
   -Wno-uninitialized)
 set(kbvh_kernel_sets portable)
-set(kbvh_kernel_definitions "")
+option(KBVH_KERNELS_HERE "Of the vector kernels, compile only the widest that this processor runs" OFF)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   list(APPEND kbvh_kernel_sets sse avx2 avx512)
-  set(kbvh_kernel_definitions KBVH_X86_KERNELS)
-endif()
-option(KBVH_KERNELS_HERE "Leave out kernels for AVX-512 where this processor cannot run them" OFF)
-if(KBVH_KERNELS_HERE AND "avx512" IN_LIST kbvh_kernel_sets)
-  include(CheckCXXSourceCompiles)
-  set(CMAKE_REQUIRED_FLAGS -march=native)
-  check_cxx_source_compiles("
-    #if !defined(__AVX512F__) || !defined(__AVX512VL__) || !defined(__AVX512DQ__) || !defined(__AVX512BW__)
-    #error no
-    #endif
-    int main() {}" KBVH_RUNS_AVX512)
-  unset(CMAKE_REQUIRED_FLAGS)
-  if(NOT KBVH_RUNS_AVX512)
-    list(REMOVE_ITEM kbvh_kernel_sets avx512)
-    list(APPEND kbvh_kernel_definitions KBVH_WITHOUT_AVX512)
+  if(KBVH_KERNELS_HERE)
+    include(CheckCXXSourceCompiles)
+    set(CMAKE_REQUIRED_FLAGS -march=native)
+    check_cxx_source_compiles("
+      #if !defined(__AVX512F__) || !defined(__AVX512VL__) || !defined(__AVX512DQ__) || !defined(__AVX512BW__)
+      #error no
+      #endif
+      int main() {}" KBVH_RUNS_AVX512)
+    check_cxx_source_compiles("
+      #if !defined(__AVX2__) || !defined(__FMA__)
+      #error no
+      #endif
+      int main() {}" KBVH_RUNS_AVX2)
+    unset(CMAKE_REQUIRED_FLAGS)
+    if(KBVH_RUNS_AVX512)
+      list(REMOVE_ITEM kbvh_kernel_sets sse avx2)
+    elseif(KBVH_RUNS_AVX2)
+      list(REMOVE_ITEM kbvh_kernel_sets sse avx512)
+    else()
+      list(REMOVE_ITEM kbvh_kernel_sets avx2 avx512)
+    endif()
   endif()
 endif()
+# KBVH_HAS_KERNELS_SSE and so on.
+set(kbvh_kernel_definitions "")
+foreach(set IN LISTS kbvh_kernel_sets)
+  string(TOUPPER ${set} word)
+  list(APPEND kbvh_kernel_definitions KBVH_HAS_KERNELS_${word})
+endforeach()
+
+set(KBVH_OUTER_OPTIMISATION "" CACHE STRING
+  "optimisation level of adapters and of the program around the strategies, for builds that are not measured; empty: as all")
+# Rooms of the program that compute themselves.
+set(kbvh_computing_rooms scenes stress theory)
 
 # kbvh_room(NAME SOURCES file... [KERNELS file...] [USES room...] [NO_UNITY]): the folder that calls it is a room, the library
 # kbvh_NAME. Its headers are staged alone, under the path that #include spells, so that a file sees the rooms that its
@@ -63,6 +80,9 @@ function(kbvh_room name)
     set(visibility PUBLIC)
     target_link_libraries(kbvh_${name} PRIVATE $<BUILD_INTERFACE:kbvh_warnings>)
     target_compile_definitions(kbvh_${name} PRIVATE ${kbvh_kernel_definitions})
+    if(path MATCHES "^experiments/" AND NOT name IN_LIST kbvh_computing_rooms)
+      target_compile_options(kbvh_${name} PRIVATE ${KBVH_OUTER_OPTIMISATION})
+    endif()
   else()
     add_library(kbvh_${name} INTERFACE)
     set(visibility INTERFACE)

@@ -160,6 +160,15 @@ const std::vector<PrimitivePair>& Oracle<S>::pairs(Playback<S>& playback) {
   return entry->second;
 }
 
+template <class S>
+const std::vector<PrimitivePair>& Oracle<S>::pairs(Playback<S>& playback, const Scene<S>& scene,
+                                                   std::uint32_t changes) {
+  if (changes == 0) return pairs(playback);
+  const auto [entry, fresh] = changed_.try_emplace({changes, playback.time()});
+  if (fresh) entry->second = sweep_pairs(scene, playback);
+  return entry->second;
+}
+
 /// File format: magic, number of times, size in bytes; for each time t, number of pairs, pairs; hash of all
 /// preceding bytes.
 template <class S>

@@ -3,6 +3,8 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/scene/pairs.hpp"
 
@@ -32,6 +34,10 @@ class Oracle {
   /// Returns the sorted pairs at the playback's current time. The playback must follow the scene's own plans,
   /// and the script up to that time.
   const std::vector<PrimitivePair>& pairs(Playback<S>& playback);
+  /// The same after the first `changes` changes of geometry that the script makes; `scene` is as these have
+  /// left it. Without such changes, as above. With them, pairs are kept in memory only.
+  const std::vector<PrimitivePair>& pairs(Playback<S>& playback, const Scene<S>& scene,
+                                          std::uint32_t changes);
   /// Writes new entries to the cache, as the destructor does.
   void keep();
   /// Returns a sentence about a defect of the cache, or an empty text. Such a defect costs time but changes
@@ -45,6 +51,7 @@ class Oracle {
   std::uint64_t script_;
   std::filesystem::path file_;
   std::map<double, std::vector<PrimitivePair>> known_;
+  std::map<std::pair<std::uint32_t, double>, std::vector<PrimitivePair>> changed_;  ///< by changes and time
   bool grown_ = false;
   std::string problem_;
 };

@@ -162,9 +162,9 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
   PairBuffer pairs;
   PhaseTimes ignored;
   ScriptCursor<S> cursor(script);
-  // The oracle knows one truth per time, for the scene that it was made for.
-  const bool known_truth =
-      oracle.script() == (script ? hash(*script) : 0) && !(script && script->changes_geometry());
+  // The oracle knows the truth of one script.
+  const bool known_truth = oracle.script() == (script ? hash(*script) : 0);
+  std::uint32_t geometry_changes = 0;
   // Takes every n-th compared frame, so that there are no more samples than requested.
   const std::uint64_t compared_frames =
       (frames.size() + options.every_nth_frame - 1) / options.every_nth_frame + 1;
@@ -181,9 +181,9 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
     session.strategy().confirm(t, pairs);
     // Positions may be completed for the oracle and the audit only after the answer.
     session.playback().evaluate_all();
-    checker.check_pairs(
-        candidates, pairs,
-        known_truth ? oracle.pairs(session.playback()) : sweep_pairs(session.scene(), session.playback()));
+    checker.check_pairs(candidates, pairs,
+                        known_truth ? oracle.pairs(session.playback(), session.scene(), geometry_changes)
+                                    : sweep_pairs(session.scene(), session.playback()));
     checker.check_bounds(judged_every > 0 && compared_before++ % judged_every == 0);
   };
   for (std::size_t f = 0; f < frames.size(); ++f) {
@@ -199,6 +199,7 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
     if (step->geometry.empty()) continue;
     session.change_geometry(step->geometry, ignored);
     checker.geometry_changed();
+    ++geometry_changes;
     query(compared);  // bounds must be valid immediately after a change
   }
   return result;

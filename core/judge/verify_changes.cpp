@@ -61,7 +61,7 @@ class ChangesChecker {
     if (session_.info().guarantee == Guarantee::approximate) return;
     session_.playback().evaluate_all();
     const PairBuffer& truth = known_truth_
-                                  ? oracle_.pairs(session_.playback())
+                                  ? oracle_.pairs(session_.playback(), session_.scene(), geometry_changes_)
                                   : (found_ = sweep_pairs(session_.scene(), session_.playback()), found_);
     if (candidates)
       if (const PrimitivePair* lost = lacking(truth, replays_[0].pairs()))
@@ -73,6 +73,8 @@ class ChangesChecker {
       violate("added changes of pairs: pair " + text(*extra) + " does not intersect, and has not ended");
   }
 
+  void geometry_changed() { ++geometry_changes_; }
+
  private:
   double time() { return session_.playback().time(); }
   void violate(const std::string& what) {
@@ -82,6 +84,7 @@ class ChangesChecker {
   Session<S>& session_;
   Oracle<S>& oracle_;
   bool known_truth_;
+  std::uint32_t geometry_changes_ = 0;
   ChangesVerification& result_;
   ChangeReplay replays_[2];  ///< [Answer]
   bool asked_[2] = {false, false};
@@ -113,8 +116,7 @@ template <class S>
 ChangesVerification verify_changes(Session<S>& session, std::span<const double> frames, Oracle<S>& oracle,
                                    const PlanScript<S>* script, const VerifyChangesOptions& options) {
   ChangesVerification result;
-  const bool known_truth =
-      oracle.script() == (script ? hash(*script) : 0) && !(script && script->changes_geometry());
+  const bool known_truth = oracle.script() == (script ? hash(*script) : 0);
   ChangesChecker<S> checker(session, oracle, known_truth, result);
   ScriptCursor<S> cursor(script);
   PhaseTimes ignored;
@@ -144,6 +146,7 @@ ChangesVerification verify_changes(Session<S>& session, std::span<const double> 
     if (!step->changes.empty()) session.change_plans(step->changes, ignored);
     if (step->geometry.empty()) continue;
     session.change_geometry(step->geometry, ignored);
+    checker.geometry_changed();
     query(f % options.every_nth_frame == 0 || last, last);
   }
   return result;

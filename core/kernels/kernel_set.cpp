@@ -12,29 +12,36 @@ namespace {
 
 constexpr KernelSet all_sets[] = {KernelSet::portable, KernelSet::sse, KernelSet::avx2, KernelSet::avx512};
 
+/// Whether this binary contains a set and this processor can run it.
 bool runs_here(KernelSet set) {
-#if defined(KBVH_X86_KERNELS)
+#if defined(__x86_64__)
   __builtin_cpu_init();
+#endif
   switch (set) {
     case KernelSet::portable:
       return true;
     case KernelSet::sse:
+#if defined(KBVH_HAS_KERNELS_SSE)
       return __builtin_cpu_supports("sse4.2") != 0;
-    case KernelSet::avx2:
-      return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
-    case KernelSet::avx512:
-#if defined(KBVH_WITHOUT_AVX512)
-      return false;
 #else
+      return false;
+#endif
+    case KernelSet::avx2:
+#if defined(KBVH_HAS_KERNELS_AVX2)
+      return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+#else
+      return false;
+#endif
+    case KernelSet::avx512:
+#if defined(KBVH_HAS_KERNELS_AVX512)
       return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
              __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
              __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+#else
+      return false;
 #endif
   }
   return false;
-#else
-  return set == KernelSet::portable;
-#endif
 }
 
 KernelSet checked(KernelSet set) {

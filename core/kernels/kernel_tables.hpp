@@ -2,7 +2,6 @@
 // Internal: tables of kernels, one per instruction set (kernel_set.hpp). Kernel files include this header and
 // no standard headers with inline functions.
 
-#if defined(KBVH_X86_KERNELS)
 /// Declares `table`, of type `const Type`, in the namespaces of all instruction sets; use it inside namespace
 /// kbvh.
 #define KBVH_DECLARE_KERNELS(Type, table) \
@@ -18,24 +17,29 @@
   namespace kernels::avx512 {             \
   extern const Type table;                \
   }
-#if defined(KBVH_WITHOUT_AVX512)
-// Never chosen: it is not among supported_kernel_sets().
-#define KBVH_AVX512_TABLE(table) static_cast<decltype(&kbvh::kernels::portable::table)>(nullptr)
+
+// The table of a set that this binary lacks is never chosen: the set is not among supported_kernel_sets().
+#define KBVH_NO_KERNELS(table) static_cast<decltype(&kbvh::kernels::portable::table)>(nullptr)
+#if defined(KBVH_HAS_KERNELS_SSE)
+#define KBVH_SSE_TABLE(table) &kbvh::kernels::sse::table
 #else
+#define KBVH_SSE_TABLE(table) KBVH_NO_KERNELS(table)
+#endif
+#if defined(KBVH_HAS_KERNELS_AVX2)
+#define KBVH_AVX2_TABLE(table) &kbvh::kernels::avx2::table
+#else
+#define KBVH_AVX2_TABLE(table) KBVH_NO_KERNELS(table)
+#endif
+#if defined(KBVH_HAS_KERNELS_AVX512)
 #define KBVH_AVX512_TABLE(table) &kbvh::kernels::avx512::table
+#else
+#define KBVH_AVX512_TABLE(table) KBVH_NO_KERNELS(table)
 #endif
 /// Selects the table of a KernelSet.
-#define KBVH_SELECT_KERNELS(set, table)                                                 \
-  (*kbvh::kernels::choose({&kbvh::kernels::portable::table, &kbvh::kernels::sse::table, \
-                           &kbvh::kernels::avx2::table, KBVH_AVX512_TABLE(table)},      \
+#define KBVH_SELECT_KERNELS(set, table)                                                                    \
+  (*kbvh::kernels::choose({&kbvh::kernels::portable::table, KBVH_SSE_TABLE(table), KBVH_AVX2_TABLE(table), \
+                           KBVH_AVX512_TABLE(table)},                                                      \
                           static_cast<int>(set)))
-#else
-#define KBVH_DECLARE_KERNELS(Type, table) \
-  namespace kernels::portable {           \
-  extern const Type table;                \
-  }
-#define KBVH_SELECT_KERNELS(set, table) (static_cast<void>(set), kbvh::kernels::portable::table)
-#endif
 
 /// Inside namespace kbvh: defines `function<S>(KernelSet)` for both scalars, which returns `table_float` or
 /// `table_double`.

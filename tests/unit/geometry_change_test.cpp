@@ -9,6 +9,8 @@
 
 #include "core/contract/registry.hpp"
 #include "core/families/events/kinetic_forest.hpp"
+#include "core/judge/oracle.hpp"
+#include "core/judge/plan_script.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
@@ -123,6 +125,37 @@ TEST(GeometryChange, NewVerticesFollowTheirPlans) {
       EXPECT_EQ(playback.position(body, old)[2], z) << t;
       EXPECT_GE(playback.plans(body).speed_bound(t), t < 2.25 ? 3.0 : 4.0);
     }
+  }
+}
+
+TEST(GeometryChange, TheOracleKnowsWhatHoldsAfterEach) {
+  for (const char* name : {"geometry_changes", "geometry_changes_ties", "self_geometry_changes"}) {
+    const auto test = synthetic_scene<float>(name, 3);
+    const auto frames = test.frames.empty() ? frame_times(test.scene, 3) : test.frames;
+    Oracle<float> oracle(test.scene, {}, hash(test.script));
+    std::size_t made = 0, different = 0;
+    for (int round = 0; round < 2; ++round) {  // in the second one, all answers are remembered
+      Playback<float> playback(test.scene);
+      ChangingScene<float> changing(test.scene);
+      ScriptCursor<float> cursor(&test.script);
+      std::uint32_t changes = 0;
+      for (const double t : frames) {
+        playback.seek(t);
+        const auto before = brute_force_pairs(changing.scene(), playback);
+        EXPECT_EQ(oracle.pairs(playback, changing.scene(), changes), before) << name << " at " << t;
+        const auto* step = cursor.at(t);
+        if (step == nullptr) continue;
+        if (!step->changes.empty()) playback.change_plans(t, step->changes);
+        if (step->geometry.empty()) continue;
+        changing.apply(step->geometry, playback);
+        const auto after = brute_force_pairs(changing.scene(), playback);
+        EXPECT_EQ(oracle.pairs(playback, changing.scene(), ++changes), after) << name << " at " << t;
+        ++made;
+        different += before != after;
+      }
+    }
+    EXPECT_GT(made, 4u) << name;
+    EXPECT_GT(different, 0u) << name << ": no change begins or ends a pair at once";
   }
 }
 
