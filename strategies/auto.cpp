@@ -14,6 +14,7 @@
 #include "core/contract/registry.hpp"
 #include "core/contract/tells_work.hpp"
 #include "core/families/choice/observed_ageing.hpp"
+#include "core/families/choice/observed_slabs.hpp"
 #include "core/families/choice/predicted_costs.hpp"
 
 namespace kbvh {
@@ -30,8 +31,8 @@ struct Candidate {
 const std::vector<Candidate>& candidates() {
   static const std::vector<Candidate> list{
       {"leaf_slabs", {}, &refit_cost},  // first: it answers until observations exist
-      {"bottom_up", {}, &refit_cost},   // in programs without the first
-      {"lbvh_drift", {}, &rebuilt_cost}, {"drift_boxes", {}, &drift_cost}, {"interval_join", {}, &join_cost},
+      {"bottom_up", {}, &plain_cost},   {"lbvh_drift", {}, &rebuilt_cost},
+      {"drift_boxes", {}, &drift_cost}, {"interval_join", {}, &join_cost},
   };
   return list;
 }
@@ -55,8 +56,6 @@ class Auto final : public Strategy<S>,
         return entry.info.id == candidate.id;
       });
       if (found == registry().end() || !found->info.can.plan_changes || !found->info.can.rays) continue;
-      const auto does_the_same = [&](const Runner& other) { return other.candidate->cost == candidate.cost; };
-      if (std::any_of(runners_.begin(), runners_.end(), does_the_same)) continue;
       const Params own(found->info.id, found->info.parameters, candidate.params);
       runners_.push_back({&candidate, found->info.positions == PositionUse::all,
                           NestedStrategies<S>::create(*found, scene, motion, topologies, own, policy)});
@@ -92,6 +91,7 @@ class Auto final : public Strategy<S>,
     ageing_.start_over(runners_[0].work != nullptr ? runners_[0].work->surface() : 0);
     chosen_tests_ = 0;
     tried_ = false;
+    slabs_.start_over(runners_[0].candidate->cost == &refit_cost, seen_);
   }
 
   void advance_to(double t) override {
@@ -106,13 +106,10 @@ class Auto final : public Strategy<S>,
                      (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
                      seen_.near != chosen_near_ || seen_.candidates > 2 * chosen_candidates_ ||
                      2 * seen_.candidates < chosen_candidates_ || tried_ ||
-                     (active_ == 0 && ageing_.tests() > 1.5 * chosen_tests_);
-    tried_ = false;
+                     (refits() && ageing_.tests() > 1.5 * chosen_tests_);
     if (step_ > 0 && due) choose(t);
-    if (active_ != last) {
-      ++switches_;
-      tried_ = is_active(&rebuilt_cost);
-    }
+    if (active_ != last) ++switches_;
+    tried_ = active_ != last && (is_active(&rebuilt_cost) || is_active(&plain_cost));
     Runner& runner = runners_[active_];
     if (runner.all_positions) fetch_all();
     if (active_ == last || runner.fresh) {
@@ -132,7 +129,7 @@ class Auto final : public Strategy<S>,
     const std::size_t before = out.size();
     // Not all candidates honour a budget.
     const QueryStatus status = runners_[active_].strategy->candidates_at(t, out, {});
-    see_candidates(out.size() - before);
+    see_candidates(out.size() - before, true);
     const std::size_t count = out.size() - before, stride = std::max<std::size_t>(1, count / samples);
     touching_.clear();
     for (std::size_t i = 0; i < count && touching_.size() < samples; i += stride)
@@ -161,7 +158,7 @@ class Auto final : public Strategy<S>,
     for (const PrimitivePair& pair : ended) reported.pairs.erase(pair);
     for (const PrimitivePair& pair : begun) reported.pairs.insert(pair);
     // Pairs that intersect stand for the candidates among which they are.
-    see_candidates(reported.pairs.size());
+    see_candidates(reported.pairs.size(), answer == Answer::candidates);
     touching_.clear();
     reported.pairs.sample(samples, touching_);
   }
@@ -275,33 +272,43 @@ class Auto final : public Strategy<S>,
     reads_.push_back(this->scene_.moving(body) ? reads : 0);
   }
 
+  /// Whether trees that are only refitted answer.
+  bool refits() const { return active_ == 0 || is_active(&plain_cost); }
   bool is_active(double (*cost)(const Observed&)) const { return runners_[active_].candidate->cost == cost; }
   /// Strategies differ in the pairs that they leave out early: only drift_boxes reports all pairs of boxes,
   /// and shows that bodies are apart.
-  void see_candidates(std::size_t count) {
+  void see_candidates(std::size_t count, bool all) {
     if (count != 0 || is_active(&drift_cost)) seen_.near = count != 0;
-    if (active_ == 0 || !seen_.near) seen_.candidates = double(count);
-    if (runners_[active_].work == nullptr) return;
-    const double tests = double(runners_[active_].work->last_box_tests());
-    if (active_ == 0)
-      ageing_.refitted(tests);
+    if (!seen_.near) seen_.candidates = double(count);
+    const TellsWork* work = runners_[active_].work;
+    if (is_active(&refit_cost))
+      slabs_.slabs(double(count), work ? double(work->last_slab_pairs()) : 0, all, frame_, seen_);
+    else if (is_active(&plain_cost))
+      slabs_.plain(double(count), all, frame_, seen_);
+    if (work == nullptr) return;
+    if (refits())
+      ageing_.refitted(double(work->last_box_tests()));
     else if (is_active(&rebuilt_cost))
-      ageing_.rebuilt(tests, double(count), std::max(1, frame_), seen_);
+      ageing_.rebuilt(double(work->last_box_tests()), double(count), std::max(1, frame_), seen_);
   }
   /// Measures the work of the active strategy since the last choice.
   void see_work() {
-    if (active_ == 0 && runners_[0].work != nullptr)
-      ageing_.look_at_refitted(runners_[0].work->surface(), frame_, seen_);
+    if (refits() && runners_[active_].work != nullptr)
+      ageing_.look_at_refitted(runners_[active_].work->surface(), frame_, seen_);
     else if (is_active(&rebuilt_cost) && frame_ - chosen_at_ >= shortest_stay)
       ageing_.look_at_rebuilt();
     const double tests = double(runners_[active_].strategy->counters()[Counter::triangle_tests]);
     const double frames = frame_ - chosen_at_;
     // From time to time drift_boxes may look whether bodies have parted.
     if (frames >= longest_stay && seen_.candidates == 0) seen_.near = false;
-    if (!is_active(&join_cost))
+    if (!is_active(&join_cost)) {
       seen_.undecided *= 0.8;
-    else if (frames > 0 && seen_.candidates > 0)
-      seen_.undecided = (tests - tests_before_) / frames / seen_.candidates;
+      seen_.join_tests *= 0.8;
+    } else if (frames > 0) {
+      if (seen_.candidates > 0) seen_.undecided = (tests - tests_before_) / frames / seen_.candidates;
+      if (const TellsWork* work = runners_[active_].work; work != nullptr)
+        seen_.join_tests = double(work->last_box_tests()) / seen_.frames_per_segment;
+    }
     tests_before_ = tests;
   }
 
@@ -342,11 +349,13 @@ class Auto final : public Strategy<S>,
       seen_.frames_per_segment = std::max(1.0, (end - begin) / step_);
     else if (frame_ == 1 || seen_.changes_per_frame > 0)
       seen_.frames_per_segment = std::numeric_limits<double>::infinity();
+    slabs_.prepare_choice(frame_ - 1, seen_);
+    const double gain = tried_ ? 1 : gain_;
     std::size_t best = active_;
     double least = runners_[active_].candidate->cost(seen_);
     for (std::size_t i = 0; i < runners_.size(); ++i) {
       const double cost = runners_[i].candidate->cost(seen_);
-      if (cost < least && cost * gain_ < runners_[active_].candidate->cost(seen_)) {
+      if (cost < least && cost * gain < runners_[active_].candidate->cost(seen_)) {
         least = cost;
         best = i;
       }
@@ -435,8 +444,9 @@ class Auto final : public Strategy<S>,
   bool chosen_near_ = false;           ///< whether bodies met then
   double tests_before_ = 0;            ///< triangle tests of the active strategy until then
   double chosen_tests_ = 0;            ///< box tests of the refitted trees in the frame before
-  bool tried_ = false;                 ///< rebuilt trees answer for the first time: their work decides
+  bool tried_ = false;  ///< a strategy answers for the first time whose work decides whether it stays
   ObservedAgeing ageing_;
+  ObservedSlabs slabs_;
   bool changes_ = false;                ///< plans changed since the last frame
   std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first change of each body
   std::vector<std::uint8_t> body_changed_;

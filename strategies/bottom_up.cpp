@@ -59,6 +59,7 @@ class BottomUp final : public StoredHierarchyStrategy<S, Count>,
     });
     shared_query_.run(workers, out, tests);
     this->count_.add(Counter::box_tests, tests);
+    this->last_box_tests_ = tests;
     return {};
   }
 

@@ -18,6 +18,7 @@
 #include "core/base/cost_constants.hpp"
 #include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
+#include "core/contract/tells_work.hpp"
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/join_changes.hpp"
 #include "core/families/linear/linear_bounds.hpp"
@@ -63,7 +64,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
                                    public AnswersChanges<S>,
                                    public AnswersSweeps<S>,
                                    public AnswersRays<S>,
-                                   public TakesPlanChanges<S> {
+                                   public TakesPlanChanges<S>,
+                                   public TellsWork {
   static constexpr bool works_ahead = F == Foresight::whole_clip;
   using Motion = MotionView<F, S>;
 
@@ -231,6 +233,13 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     return bounds_.audit_view(body, this->time());
+  }
+
+  /// Of the joins of the current segment, for all its frames.
+  std::uint64_t last_box_tests() const override {
+    std::uint64_t tests = 0;
+    for (const IntervalJoin<S>& one : now_.joins) tests += joined_ ? one.tests() : 0;
+    return tests;
   }
 
   std::size_t bytes() const override {

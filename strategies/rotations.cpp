@@ -8,8 +8,8 @@
 
 #include "core/contract/registry.hpp"
 #include "core/families/restructure/cousins.hpp"
-#include "core/families/restructure/surface_sums.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
+#include "core/families/wide/surface_sums.hpp"
 #include "core/topology/subtree_swap.hpp"
 
 namespace kbvh {

@@ -9,7 +9,7 @@
 
 #include "core/contract/registry.hpp"
 #include "core/families/restructure/leaf_strategy.hpp"
-#include "core/families/restructure/surface_sums.hpp"
+#include "core/families/wide/surface_sums.hpp"
 
 namespace kbvh {
 namespace {

@@ -8,8 +8,8 @@
 #include <numeric>
 
 #include "core/families/restructure/leaf_contents.hpp"
-#include "core/families/restructure/surface_sums.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
+#include "core/families/wide/surface_sums.hpp"
 #include "core/topology/builders.hpp"
 #include "tests/conformance/check.hpp"
 #include "tests/support/polygon_soups.hpp"

@@ -7,6 +7,7 @@
 
 #include "core/contract/registry.hpp"
 #include "core/families/choice/observed_ageing.hpp"
+#include "core/families/choice/observed_slabs.hpp"
 #include "tests/support/moving_grids.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
@@ -66,19 +67,30 @@ TEST(Auto, DoesNotJoinWherePlansChangeAtEveryFrame) {
   EXPECT_NE(choice.find("plans changed at 1 of frames"), std::string::npos) << choice;
 }
 
-/// Two bodies of small triangles in a cube. They fly side by side, or each flies to a place of its own.
-Scene<float> flying_triangles(std::uint32_t count, std::uint32_t keyframes, bool side_by_side) {
+enum class Flight {
+  anywhere,      ///< each triangle to a place of its own
+  side_by_side,  ///< all the same way
+  outwards,      ///< the body grows
+};
+
+/// Two bodies of triangles of all directions in a cube.
+Scene<float> flying_triangles(std::uint32_t count, std::uint32_t keyframes, Flight flight,
+                              double size = 0.03) {
   Scene<float> scene;
   Random random(7);
   for (int body = 0; body < 2; ++body) {
     Body<float> made;
-    std::vector<double> times, ways(6 * count);
+    std::vector<double> times, ways(6 * count), shapes(9 * count);
     for (double& x : ways) x = random.unit();
+    for (double& x : shapes) x = size * random.unit();
     // Neighbours in space begin as neighbours in the list, in a row: a tree of the start is a good one.
     for (std::uint32_t i = 0; i < count; ++i) {
       ways[6 * i] = 2.0 * i / count - 1;
-      if (side_by_side)
-        for (int axis = 0; axis < 3; ++axis) ways[6 * i + 3 + axis] = ways[6 * i + axis] + 0.1 * (body + 1);
+      for (int axis = 0; axis < 3; ++axis) {
+        const double begin = ways[6 * i + axis];
+        if (flight == Flight::side_by_side) ways[6 * i + 3 + axis] = begin + 0.1 * (body + 1);
+        if (flight == Flight::outwards) ways[6 * i + 3 + axis] = 1.2 * begin;
+      }
       made.primitives.add(std::vector<std::uint32_t>{3 * i, 3 * i + 1, 3 * i + 2});
     }
     std::vector<float> positions;
@@ -89,7 +101,7 @@ Scene<float> flying_triangles(std::uint32_t count, std::uint32_t keyframes, bool
         for (int corner = 0; corner < 3; ++corner)
           for (int axis = 0; axis < 3; ++axis)
             positions.push_back(float(ways[6 * i + axis] * (1 - share) + ways[6 * i + 3 + axis] * share +
-                                      (corner == axis ? 0.03 : 0)));
+                                      shapes[9 * i + 3 * corner + axis]));
     }
     made.plans = FlightPlans<float>(3 * count, std::move(times), std::move(positions));
     scene.bodies.push_back(std::move(made));
@@ -98,12 +110,12 @@ Scene<float> flying_triangles(std::uint32_t count, std::uint32_t keyframes, bool
   return scene;
 }
 
-/// Plays a clip of one frame for each keyframe interval, next to a refit.
-std::string chosen_at_keyframes(const Scene<float>& scene, int frames) {
+/// Plays a clip of `l` frames for each keyframe interval, next to a refit.
+std::string chosen_at_keyframes(const Scene<float>& scene, int frames, int l = 1) {
   Play<float> play(scene, "auto", {}), refit(scene, "bottom_up", {});
   for (int f = 1; f <= frames; ++f) {
-    play.frame(f);
-    refit.frame(f);
+    play.frame(double(f) / l);
+    refit.frame(double(f) / l);
     std::sort(play.pairs.begin(), play.pairs.end());
     std::sort(refit.pairs.begin(), refit.pairs.end());
     EXPECT_EQ(play.pairs, refit.pairs) << "frame " << f;
@@ -117,13 +129,64 @@ int frames_of(const std::string& choice, const std::string& id) {
 }
 
 TEST(Auto, RebuildsTreesThatAge) {
-  const std::string choice = chosen_at_keyframes(flying_triangles(4000, 100, false), 99);
+  const std::string choice = chosen_at_keyframes(flying_triangles(4000, 100, Flight::anywhere), 99);
   EXPECT_GT(frames_of(choice, "lbvh_drift"), 60) << choice;
 }
 
+TEST(Auto, LeavesAJoinWhoseTreesHaveAged) {
+  const std::string choice = chosen_at_keyframes(flying_triangles(4000, 40, Flight::anywhere), 390, 10);
+  EXPECT_GT(frames_of(choice, "interval_join"), 0) << choice;  // in trees that are young
+  EXPECT_GT(frames_of(choice, "lbvh_drift"), 200) << choice;
+}
+
 TEST(Auto, DoesNotRebuildTreesThatStayYoung) {
-  const std::string choice = chosen_at_keyframes(flying_triangles(4000, 100, true), 99);
+  const std::string choice = chosen_at_keyframes(flying_triangles(4000, 100, Flight::side_by_side), 99);
   EXPECT_EQ(frames_of(choice, "lbvh_drift"), 0) << choice;
+}
+
+TEST(Auto, LeavesSlabsThatDoNotPay) {
+  // Where nothing is connected, a pair of leaves holds few candidates that a slab could leave out.
+  const std::string choice = chosen_at_keyframes(flying_triangles(2000, 50, Flight::outwards, 0.1), 49);
+  EXPECT_LE(frames_of(choice, "leaf_slabs"), 1) << choice;
+  EXPECT_GE(frames_of(choice, "bottom_up"), 48) << choice;
+}
+
+TEST(ObservedSlabs, CompareTwoFramesInARow) {
+  Observed seen;
+  seen.reads = 1000;
+  ObservedSlabs slabs;
+  slabs.start_over(true, seen);
+  slabs.prepare_choice(0, seen);
+  EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity()) << "nothing is known";
+  // 300 pairs of leaves for 100 candidates: without slabs it may be faster, and is tried.
+  slabs.slabs(100, 300, true, 1, seen);
+  slabs.prepare_choice(1, seen);
+  EXPECT_LT(plain_cost(seen), refit_cost(seen));
+  // It finds that slabs leave out 30 times as many.
+  slabs.plain(3000, true, 2, seen);
+  EXPECT_EQ(seen.candidates, 100);
+  EXPECT_EQ(seen.boxed, 30);
+  slabs.prepare_choice(2, seen);
+  EXPECT_GT(plain_cost(seen), refit_cost(seen));
+  // Half of the candidates: half of the pairs of leaves.
+  slabs.plain(1500, true, 3, seen);
+  EXPECT_EQ(seen.candidates, 50);
+  EXPECT_EQ(seen.slab_pairs, 150);
+  // The comparison goes out of date, and a frame of leaf_slabs allows the next one.
+  for (int choice = 0; choice < 20; ++choice) slabs.prepare_choice(100 + choice, seen);
+  EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
+  slabs.slabs(100, 300, true, 200, seen);
+  slabs.prepare_choice(200, seen);
+  EXPECT_LT(plain_cost(seen), refit_cost(seen));
+}
+
+TEST(ObservedSlabs, PairsThatIntersectAreNotCompared) {
+  Observed seen;
+  ObservedSlabs slabs;
+  slabs.start_over(true, seen);
+  slabs.slabs(100, 300, false, 1, seen);
+  slabs.prepare_choice(1, seen);
+  EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
 }
 
 TEST(ObservedAgeing, KeepsWhatTheFirstSearchInNewTreesTells) {

@@ -15,6 +15,13 @@ double refit_cost(const Observed& seen) {
          Cost::box_test * seen.surplus;
 }
 
+double plain_cost(const Observed& seen) {
+  if (!std::isfinite(seen.plain_boxed)) return std::numeric_limits<double>::infinity();
+  return std::max(Cost::refit_read * seen.reads,
+                  refit_cost(seen) + Cost::plain_candidate * (seen.plain_boxed - 1) * seen.candidates -
+                      Cost::slab_pair * seen.slab_pairs);
+}
+
 double rebuilt_cost(const Observed& seen) {
   const double build = Cost::build_read * seen.reads;
   // The period at which builds and surplus tests cost the least together, for a surplus that grows linearly.
@@ -35,16 +42,18 @@ double drift_cost(const Observed& seen) {
 double join_cost(const Observed& seen) {
   const double l = seen.frames_per_segment, moves = seen.slide * l;
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
+  const double least = Cost::join_box_test * seen.join_tests;
   // Bodies apart: one box at each end, unless they come to meet; over a long distance they may pass through
   // each other.
-  if (!seen.near) return Cost::join_apart / l * (1 + moves * moves) * refit_cost(seen);
+  if (!seen.near) return std::max(least, Cost::join_apart / l * (1 + moves * moves) * refit_cost(seen));
   const double alike = 1 - seen.spread;
   // Small bodies that move past each other meet further bodies on their way, in addition to their current
   // contacts.
   const double others = seen.many_bodies ? 1 + moves : 1 + Cost::join_moves * moves;
-  return refit_cost(seen) * ((Cost::join_frame + Cost::join_segment / (l + Cost::join_frames) * others) *
-                                 (1 + Cost::join_undecided * seen.undecided) +
-                             Cost::join_slide * alike * alike * moves);
+  return std::max(
+      least, refit_cost(seen) * ((Cost::join_frame + Cost::join_segment / (l + Cost::join_frames) * others) *
+                                     (1 + Cost::join_undecided * seen.undecided) +
+                                 Cost::join_slide * alike * alike * moves));
 }
 
 }  // namespace kbvh

@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 
 namespace kbvh {
 
@@ -7,8 +8,12 @@ struct Observed {
   double frames_per_segment = 1;  ///< of the current segment; infinite if it has no end
   double changes_per_frame = 0;   ///< frames with changes of plans, as a share of the last frames
   double candidates = 0;          ///< in a frame, of leaf_slabs
-  double boxed =
-      1.3;  ///< candidates of boxes alone over these; measured where a rebuilding strategy was active
+  /// Candidates of boxes alone over these; measured where another strategy was active.
+  double boxed = 1.3;
+  double slab_pairs = 0;  ///< in a frame, pairs of leaves that leaf_slabs compares by slabs
+  /// `boxed` where leaf_slabs and bottom_up searched two frames in a row; 1 before bottom_up is tried, which
+  /// is the best that can be hoped for; infinite where it is not to be tried.
+  double plain_boxed = std::numeric_limits<double>::infinity();
   bool near = false;         ///< bodies are not known to be apart
   double reads = 0;          ///< vertices that a refit reads
   double step = 0;           ///< mean step of a vertex per frame relative to another body, in mean leaf sides
@@ -18,6 +23,8 @@ struct Observed {
   /// Triangle tests of the join in a frame, over the candidates of leaf_slabs: pairs that it could not decide
   /// for spans of time. Measured while it is active, and slowly forgotten at later choices.
   double undecided = 0;
+  /// Box tests of the join in a frame. Measured and forgotten in the same way.
+  double join_tests = 0;
   double surplus = 0;  ///< box tests of the refitted trees in a frame, beyond those of new trees
   double ageing = 0;   ///< growth of the surplus per frame
 };
@@ -26,6 +33,8 @@ struct Observed {
 
 /// leaf_slabs: reads all vertices, and searches in trees that age.
 double refit_cost(const Observed& seen);
+/// bottom_up: the same trees without slabs. It has more candidates, and less work on pairs of leaves.
+double plain_cost(const Observed& seen);
 /// lbvh_drift: refits trees of its own, and builds new ones when the surplus of tests has cost as much.
 double rebuilt_cost(const Observed& seen);
 /// drift_boxes: one search serves the frames in which a leaf moves by a part of its size. Where bodies
@@ -33,8 +42,8 @@ double rebuilt_cost(const Observed& seen);
 double drift_cost(const Observed& seen);
 /// interval_join: one join serves a segment. Its cost grows with the share of pairs that it cannot decide for
 /// spans of time, and with the distance that primitives move past each other within the segment. A
-/// translating body passes by others; the touching part of a deforming body stays in place. Infinite where
-/// plans change or segments have no end.
+/// translating body passes by others; the touching part of a deforming body stays in place. In trees that
+/// have aged, what counts is the box tests that it made. Infinite where plans change or segments have no end.
 double join_cost(const Observed& seen);
 
 }  // namespace kbvh

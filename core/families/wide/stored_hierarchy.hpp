@@ -2,7 +2,9 @@
 #include <optional>
 
 #include "core/contract/strategy.hpp"
+#include "core/contract/tells_work.hpp"
 #include "core/families/wide/near_bodies.hpp"
+#include "core/families/wide/surface_sums.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
 #include "core/families/wide/wide_query.hpp"
 #include "core/families/wide/wide_rays.hpp"
@@ -21,7 +23,9 @@ inline Box<S> leaf_box(std::span<const std::uint32_t> vertices, const S* positio
 /// `update(body)`. Bodies that cannot move are updated at `reset` only. Most strategies derive from
 /// StoredHierarchyStrategy, which also accepts changes of plans.
 template <class S, class Count>
-class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>, public AnswersRays<S> {
+class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>,
+                                    public AnswersRays<S>,
+                                    public TellsWork {
  public:
   FixedPlansHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion,
                               Topologies topologies, const Params& /*params*/,
@@ -64,7 +68,15 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>, public Ans
               : query_.run(side(pair.first), side(pair.second), out, tests, rest_of(budget, tests)).pending;
     });
     this->count_.add(Counter::box_tests, tests);
+    last_box_tests_ = tests;
     return status;
+  }
+  std::uint64_t last_box_tests() const override { return last_box_tests_; }
+  double surface() override {
+    double sum = 0;
+    for (std::uint32_t body = 0; body < hierarchies_.size(); ++body)
+      if (this->scene_.moving(body)) sum += surface_ratio(hierarchies_[body]);
+    return sum;
   }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
@@ -165,6 +177,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>, public Ans
   WideQuery<S> query_{this->scene_, this->sampled_};
   WideRays<S> rays_{this->scene_, this->sampled_};
   bool plans_changed_ = false;
+  std::uint64_t last_box_tests_ = 0;
   std::optional<SweptHierarchies<S>> swept_;  ///< made at the first request for contacts
 };
 

@@ -1,0 +1,54 @@
+#pragma once
+#include <algorithm>
+#include <limits>
+
+#include "core/families/choice/predicted_costs.hpp"
+
+namespace kbvh {
+
+/// What a choice knows of the use of slabs at the leaves. leaf_slabs tells how many pairs of leaves it
+/// compares, and bottom_up, in the frame after, how many candidates slabs leave out. After some choices the
+/// comparison is out of date, so that bottom_up is tried again where it may be faster.
+class ObservedSlabs {
+ public:
+  /// `slabs`: whether there is a strategy with slabs; without, candidates are those of boxes.
+  void start_over(bool slabs, Observed& seen) {
+    *this = {};
+    slabs_ = slabs;
+    if (!slabs) seen.boxed = seen.plain_boxed = 1;
+  }
+  /// Registers a frame of leaf_slabs. `all`: the count is of all candidates, not only of pairs that
+  /// intersect.
+  void slabs(double candidates, double slab_pairs, bool all, int frame, Observed& seen) {
+    frame_ = all ? frame : never;
+    seen.candidates = candidates;
+    seen.slab_pairs = slab_pairs;
+  }
+  /// Registers a frame of bottom_up.
+  void plain(double candidates, bool all, int frame, Observed& seen) {
+    if (slabs_ && all && frame_ == frame - 1 && seen.candidates > 0) {
+      seen.boxed = seen.plain_boxed = std::max(1.0, candidates / seen.candidates);
+      choices_ = 0;
+      return;
+    }
+    const double fewer = candidates / seen.boxed;
+    if (seen.candidates > 0) seen.slab_pairs *= fewer / seen.candidates;
+    seen.candidates = fewer;
+  }
+  /// Prepares a choice in the frame after `frame`.
+  void prepare_choice(int frame, Observed& seen) {
+    if (!slabs_) return;
+    if (choices_ < most_choices)
+      ++choices_;
+    else
+      seen.plain_boxed = frame_ == frame ? 1 : std::numeric_limits<double>::infinity();
+  }
+
+ private:
+  static constexpr int never = -1, most_choices = 16;
+  bool slabs_ = true;
+  int frame_ = never;           // the last one of leaf_slabs that can be compared
+  int choices_ = most_choices;  // since the comparison
+};
+
+}  // namespace kbvh
