@@ -281,8 +281,8 @@ class Auto final : public Strategy<S>,
     if (count != 0 || is_active(&drift_cost)) seen_.near = count != 0;
     if (!seen_.near) seen_.candidates = double(count);
     const TellsWork* work = runners_[active_].work;
-    if (is_active(&refit_cost))
-      slabs_.slabs(double(count), work ? double(work->last_slab_pairs()) : 0, all, frame_, seen_);
+    if (is_active(&refit_cost) && work != nullptr)
+      slabs_.slabs(double(count), *work, all, frame_, seen_);
     else if (is_active(&plain_cost))
       slabs_.plain(double(count), all, frame_, seen_);
     if (work == nullptr) return;

@@ -38,14 +38,16 @@ struct JoinAhead {
 /// are fitted on six captured or animated figures, a skirt and a tablecloth (experiments/plans/motion.json)
 /// at l = 1, 3, 7 and 30; drift_boxes, `join_slide` and `join_apart` on the scenes "tuned on" of
 /// experiments/plans/auto.json, in c6e0cf1, 167e5b8 and ef3f1d8, with counts of candidates that are larger
-/// than those of leaf_slabs. `slab_pair` and `plain_candidate` are fitted on the same scenes, the last three
+/// than those of leaf_slabs. Those of slabs are fitted on the same scenes, the last three
 /// lines on the mixing swarms, unrolling yarns, tablecloth and random soups of that plan at l = 1
 /// (`join_box_test`: swarms and yarns at l = 10 and 1), on another machine (Intel Xeon), and divided by 1.7:
 /// what leaf_slabs takes there, over its prediction.
 struct Choice {
   static constexpr double refit_read = 0.27, refit_candidate = 37;  ///< per vertex read; per candidate
-  static constexpr double slab_pair = 26.6;                         ///< comparing two leaves by slabs
-  static constexpr double plain_candidate = 9.7;  ///< a candidate that slabs would have left out
+  static constexpr double slab_candidate = 18;    ///< a candidate of leaf_slabs, without the search
+  static constexpr double slabs_leave = 32.8;     ///< lost by slabs that do not separate a pair of leaves
+  static constexpr double slabs_separate = 3.9;   ///< won where they do
+  static constexpr double plain_candidate = 6.8;  ///< a candidate that slabs would have left out
   static constexpr double watch_read = 0.1;       ///< per vertex whose drift is read
   static constexpr double search_read = 0.35, search_candidate = 90;  ///< one search of drift_boxes
   static constexpr double kept_candidate = 45;                        ///< a frame of drift_boxes

@@ -151,6 +151,14 @@ TEST(Auto, LeavesSlabsThatDoNotPay) {
   EXPECT_GE(frames_of(choice, "bottom_up"), 48) << choice;
 }
 
+/// A search with 10,000 box tests that compares pairs of leaves by slabs and separates none.
+struct Told final : TellsWork {
+  explicit Told(std::uint64_t pairs) : open(pairs) {}
+  std::uint64_t last_box_tests() const override { return 10000; }
+  SlabPairs last_slab_pairs() const override { return {0, open}; }
+  std::uint64_t open;
+};
+
 TEST(ObservedSlabs, CompareTwoFramesInARow) {
   Observed seen;
   seen.reads = 1000;
@@ -159,7 +167,7 @@ TEST(ObservedSlabs, CompareTwoFramesInARow) {
   slabs.prepare_choice(0, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity()) << "nothing is known";
   // 300 pairs of leaves for 100 candidates: without slabs it may be faster, and is tried.
-  slabs.slabs(100, 300, true, 1, seen);
+  slabs.slabs(100, Told(300), true, 1, seen);
   slabs.prepare_choice(1, seen);
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
   // It finds that slabs leave out 30 times as many.
@@ -168,23 +176,44 @@ TEST(ObservedSlabs, CompareTwoFramesInARow) {
   EXPECT_EQ(seen.boxed, 30);
   slabs.prepare_choice(2, seen);
   EXPECT_GT(plain_cost(seen), refit_cost(seen));
-  // Half of the candidates: half of the pairs of leaves.
+  // Half of the candidates: half of the pairs of leaves, and of the box tests.
   slabs.plain(1500, true, 3, seen);
   EXPECT_EQ(seen.candidates, 50);
-  EXPECT_EQ(seen.slab_pairs, 150);
+  EXPECT_EQ(seen.slabs_leave, 150);
+  EXPECT_EQ(seen.slab_tests, 5000);
   // The comparison goes out of date, and a frame of leaf_slabs allows the next one.
   for (int choice = 0; choice < 20; ++choice) slabs.prepare_choice(100 + choice, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
-  slabs.slabs(100, 300, true, 200, seen);
+  slabs.slabs(100, Told(300), true, 200, seen);
   slabs.prepare_choice(200, seen);
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
+  // So it does where candidates become many.
+  slabs.plain(150, true, 201, seen);
+  slabs.prepare_choice(201, seen);
+  EXPECT_LT(plain_cost(seen), refit_cost(seen));
+  slabs.plain(400, true, 202, seen);
+  slabs.prepare_choice(202, seen);
+  EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
+}
+
+TEST(ObservedSlabs, LeaveOutAllCandidates) {
+  Observed seen;
+  seen.reads = 1000;
+  ObservedSlabs slabs;
+  slabs.start_over(true, seen);
+  slabs.slabs(0, Told(300), true, 1, seen);
+  slabs.prepare_choice(1, seen);
+  EXPECT_LT(plain_cost(seen), refit_cost(seen));
+  slabs.plain(3000, true, 2, seen);
+  slabs.prepare_choice(2, seen);
+  EXPECT_GT(plain_cost(seen), refit_cost(seen));
 }
 
 TEST(ObservedSlabs, PairsThatIntersectAreNotCompared) {
   Observed seen;
   ObservedSlabs slabs;
   slabs.start_over(true, seen);
-  slabs.slabs(100, 300, false, 1, seen);
+  slabs.slabs(100, Told(300), false, 1, seen);
   slabs.prepare_choice(1, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
 }

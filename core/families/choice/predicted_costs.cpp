@@ -17,9 +17,14 @@ double refit_cost(const Observed& seen) {
 
 double plain_cost(const Observed& seen) {
   if (!std::isfinite(seen.plain_boxed)) return std::numeric_limits<double>::infinity();
-  return std::max(Cost::refit_read * seen.reads,
-                  refit_cost(seen) + Cost::plain_candidate * (seen.plain_boxed - 1) * seen.candidates -
-                      Cost::slab_pair * seen.slab_pairs);
+  // What slabs cost and save, as a share of the frame; the sum is closer to measured times than refit_cost,
+  // to which the other predictions are fitted.
+  const double candidates = std::max(1.0, seen.candidates);
+  const double slabs = Cost::slabs_leave * seen.slabs_leave - Cost::slabs_separate * seen.slabs_separate;
+  const double frame = Cost::refit_read * seen.reads + Cost::box_test * seen.slab_tests +
+                       Cost::slab_candidate * candidates + Cost::slabs_leave * seen.slabs_leave;
+  const double gain = slabs - Cost::plain_candidate * (seen.plain_boxed - 1) * candidates;
+  return frame > 0 ? refit_cost(seen) * (1 - gain / frame) : refit_cost(seen);
 }
 
 double rebuilt_cost(const Observed& seen) {

@@ -10,7 +10,9 @@ struct Observed {
   double candidates = 0;          ///< in a frame, of leaf_slabs
   /// Candidates of boxes alone over these; measured where another strategy was active.
   double boxed = 1.3;
-  double slab_pairs = 0;  ///< in a frame, pairs of leaves that leaf_slabs compares by slabs
+  /// In a frame, pairs of leaves that leaf_slabs compares by slabs: those that these separate, and others.
+  double slabs_separate = 0, slabs_leave = 0;
+  double slab_tests = 0;  ///< box tests of its search
   /// `boxed` where leaf_slabs and bottom_up searched two frames in a row; 1 before bottom_up is tried, which
   /// is the best that can be hoped for; infinite where it is not to be tried.
   double plain_boxed = std::numeric_limits<double>::infinity();
