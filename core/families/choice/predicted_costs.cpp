@@ -47,7 +47,8 @@ double drift_cost(const Observed& seen) {
 double join_cost(const Observed& seen) {
   const double l = seen.frames_per_segment, moves = seen.slide * l;
   if (seen.changes_per_frame > 0.02 || !(l < 1e6)) return std::numeric_limits<double>::infinity();
-  const double least = Cost::join_box_test * seen.join_tests;
+  // In young trees a join makes fewer tests than a refit reads vertices.
+  const double least = seen.join_tests > seen.reads ? Cost::join_box_test * seen.join_tests : 0;
   // Bodies apart: one box at each end, unless they come to meet; over a long distance they may pass through
   // each other.
   if (!seen.near) return std::max(least, Cost::join_apart / l * (1 + moves * moves) * refit_cost(seen));
