@@ -1,8 +1,9 @@
 // A strategy that chooses among other strategies by observed properties of the scene: the number of frames
-// per segment of the flight plans, the vertex steps per frame, changes of plans, the number of candidates,
-// the growth of boxes as trees age, with the box tests that new trees save, and the triangle tests that the
-// interval join had to make at frames, by which a join that decides little for spans of time is left after
-// some frames. The choice depends on counts and plans only, never on a clock, so that a run can be repeated.
+// per segment of the flight plans, the vertex steps per frame, changes of plans, and the number of
+// candidates; the growth of boxes as trees age, with the box tests that new trees save; the triangle and box
+// tests of the interval join, by which a join that decides little for spans of time, or whose trees have
+// aged, is left after some frames; and the candidates that slabs at the leaves leave out. The choice depends
+// on counts and plans only, never on a clock, so that a run can be repeated.
 //
 // Each candidate has one instance from the first frame on, with its own hierarchies. This costs the memory of
 // all candidates and saves creating an instance at a change. Inactive instances do not advance.

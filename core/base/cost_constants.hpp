@@ -34,14 +34,15 @@ struct JoinAhead {
   static constexpr double answer = 5;  ///< sorting in an answer
 };
 
-/// auto, in nanoseconds per frame (Zen 5, float); only their order matters. leaf_slabs (`refit`) and the join
-/// are fitted on six captured or animated figures, a skirt and a tablecloth (experiments/plans/motion.json)
-/// at l = 1, 3, 7 and 30; drift_boxes, `join_slide` and `join_apart` on the scenes "tuned on" of
-/// experiments/plans/auto.json, in c6e0cf1, 167e5b8 and ef3f1d8, with counts of candidates that are larger
-/// than those of leaf_slabs. Those of slabs are fitted on the same scenes, the last three
-/// lines on the mixing swarms, unrolling yarns, tablecloth and random soups of that plan at l = 1
-/// (`join_box_test`: swarms and yarns at l = 10 and 1), on another machine (Intel Xeon), and divided by 1.7:
-/// what leaf_slabs takes there, over its prediction.
+/// auto, in nanoseconds per frame (Zen 5, float); only their order matters. Fitted:
+/// - leaf_slabs (`refit`) and the join on six captured or animated figures, a skirt and a tablecloth
+///   (experiments/plans/motion.json) at l = 1, 3, 7 and 30, but for `join_slide` and `join_apart`;
+/// - these two and drift_boxes on the scenes "tuned on" of experiments/plans/auto.json, in c6e0cf1, 167e5b8
+///   and ef3f1d8, with counts of candidates that are larger than those of leaf_slabs;
+/// - slabs (from `slab_candidate` to `plain_candidate`) on the same scenes and those "tuned on, ageing", in
+///   c80e232, and the last three lines on the mixing swarms, unrolling yarns, tablecloth and random soups at
+///   l = 1 and 10, in 869ab66, on an Intel Xeon, and divided by 1.7: what leaf_slabs takes there, over its
+///   prediction.
 struct Choice {
   static constexpr double refit_read = 0.27, refit_candidate = 37;  ///< per vertex read; per candidate
   static constexpr double slab_candidate = 18;    ///< a candidate of leaf_slabs, without the search
