@@ -15,7 +15,6 @@
 #include "core/contract/registry.hpp"
 #include "core/families/slabs/slab_query.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
-#include "core/families/wide/surface_sums.hpp"
 
 namespace kbvh {
 namespace {

@@ -28,7 +28,8 @@ class ObservedSlabs {
     seen.slabs_leave = double(work.last_slab_pairs().open);
     seen.slab_tests = double(work.last_box_tests());
   }
-  /// Registers a frame of bottom_up.
+  /// Registers a frame of bottom_up: the first after one of leaf_slabs is a comparison, and others scale what
+  /// was known of leaf_slabs by the number of candidates.
   void plain(double candidates, bool all, int frame, Observed& seen) {
     if (slabs_ && all && frame_ == frame - 1) {
       seen.boxed = seen.plain_boxed = std::max(1.0, candidates / std::max(1.0, seen.candidates));
