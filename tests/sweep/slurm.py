@@ -44,15 +44,24 @@ class Cluster:
             [name, *words], env=self.environment, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
         )
 
+    def refuse_next(self) -> None:
+        """The node fails to start its next job, and takes no further ones until it is resumed."""
+        (self.folder / "refuse").touch()
+
+    def resume_node(self) -> None:
+        self.wait_for("drained")
+        self.ask("scontrol", "update", f"nodename={self.node}", "state=resume")
+
     def start_node(self) -> None:
         self.start("slurmd", "-D", "-f", str(self.folder / "slurm.conf"), "-N", self.node)
 
     def vanish_node(self) -> None:
         """As if the node lost its power: slurmd and everything that it has started is killed at once."""
-        # All are stopped before one is killed: a worker whose parent dies would have time to write that its job has ended.
+        # All are stopped first: a worker whose child dies would write that its job has ended. Then children are killed before
+        # their parents: the kernel continues a stopped process group, by SIGHUP and SIGCONT, that loses the last parent of its session.
         below = self.below(self.processes["slurmd"].pid)
-        for number in (signal.SIGSTOP, signal.SIGKILL):
-            for process in below:
+        for number, processes in ((signal.SIGSTOP, below), (signal.SIGKILL, below[::-1])):
+            for process in processes:
                 try:
                     os.kill(process, number)
                 except ProcessLookupError:
@@ -114,7 +123,8 @@ SlurmctldPort={free_port()}
 SlurmdPort={free_port()}
 SlurmUser=root
 AuthType=auth/munge
-AuthInfo=socket={munge}/socket
+AuthInfo=socket={munge}/socket,cred_expire=10
+Prolog={folder}/prolog
 CredType=cred/munge
 StateSaveLocation={folder}/state
 SlurmdSpoolDir={folder}/spool
@@ -138,6 +148,8 @@ MpiDefault=none
 NodeName={self.node} NodeAddr=127.0.0.1 CPUs={self.slots} State=UNKNOWN
 PartitionName=all Nodes={self.node} Default=YES MaxTime=INFINITE State=UP OverSubscribe=NO
 """)
+        (folder / "prolog").write_text(f"#!/bin/sh\n! rm '{folder}/refuse' 2>/dev/null\n")
+        (folder / "prolog").chmod(0o755)
         (folder / "cgroup.conf").write_text("CgroupAutomount=no\nIgnoreSystemd=yes\n")
         self.start(
             "munged", "--foreground", "--force", f"--key-file={key}", f"--socket={munge}/socket", f"--pid-file={munge}/pid",

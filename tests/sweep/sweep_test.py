@@ -354,7 +354,7 @@ def disk(study: Study) -> int:
 
 
 def on_slurm(study: Study) -> int:
-    """The same records by Slurm; a node that vanishes costs its jobs some time and nothing else."""
+    """The same records by Slurm; a job that cannot be started or whose node vanishes costs time and nothing else."""
     if why := slurm.why_not():
         print(f"skipped: {why}")
         return SKIPPED
@@ -372,15 +372,20 @@ if [[ $* == *--job* && $(ls "$HERE"/vanished/jobs/*/done 2>/dev/null | wc -l) -g
 fi
 exec "$KBVH" "$@" """,
         )
+        cluster.refuse_next()
         sweep = subprocess.Popen(
             study.call("--slurm", out=out, kbvh=slow), env=study.environment, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
+        cluster.resume_node()
         held = study.folder / "held"
-        while sweep.poll() is None:
+
+        def jobs_held() -> int:
             pids = held.read_text().split() if held.exists() else []
-            if any("end" not in about and str(about["pid"]) in pids for about in attempts(out)):
-                break
+            return sum("end" not in about and str(about.get("pid")) in pids for about in attempts(out))
+
+        # On every slot one: a job that is about to start when the node vanishes may survive it.
+        while sweep.poll() is None and jobs_held() < slots:
             time.sleep(0.1)
         require(sweep.poll() is None, "the sweep has ended too early")
         kept = {file: file.read_bytes() for file in out.rglob("*.jsonl")}
@@ -388,7 +393,12 @@ exec "$KBVH" "$@" """,
         (study.folder / "lost").touch()
         cluster.wait_for("down")
         cluster.start_node()
-        text = sweep.communicate(timeout=600)[0]
+        try:
+            text = sweep.communicate(timeout=600)[0]
+        except subprocess.TimeoutExpired:
+            sweep.kill()
+            jobs = cluster.ask("scontrol", "--oneliner", "show", "job")
+            raise SystemExit(f"FAILED: the sweep does not end:\n{sweep.communicate()[0]}\n{jobs}\n{cluster.logs()}") from None
         require(sweep.returncode == 0, f"after the node was lost:\n{text}\n{cluster.logs()}")
         study.check(out)
         check_cores(out)
@@ -396,8 +406,10 @@ exec "$KBVH" "$@" """,
         for file, content in kept.items():
             require(file.read_bytes().startswith(content), f"{file} has lost lines")
         lost = [about for about in attempts(out) if "end" not in about]
-        require(len(lost) > 0, "a job was running when the node vanished")
-        print(f"a node vanished with {len(lost)} running jobs; the records are those of kbvh run")
+        require(len(lost) == slots, f"{slots} jobs were running when the node vanished, and {len(lost)} are lost")
+        refused = cluster.ask("scontrol", "--oneliner", "show", "job").count("JobState=CANCELLED")
+        require(refused == 1, f"the job that could not be started is cancelled and submitted again: {refused}")
+        print(f"a job refused, a node vanished with {len(lost)} running jobs; the records are those of kbvh run")
     return 0
 
 
