@@ -98,6 +98,12 @@ bool measures(const Study& study, const Target& target) {
          target.changes == (study.changes ? answer_word(*study.changes) : "");
 }
 
+/// Returns the name that targets and tables know a scene by in a study; empty if it has none.
+std::string name_in(const Study& study, const SceneSpec& spec) {
+  const std::string name = given_name(spec);
+  return !name.empty() && study.rays ? name + suffix_of(*study.rays) : name;
+}
+
 std::string conditions(const Target& target) {
   const std::string as = target.changes.empty() ? "" : " as changes of " + target.changes;
   return fmt::format("in {} at l = {}{}", target.scalar, target.per_keyframe, as);
@@ -127,8 +133,7 @@ void check_target_scenes(const Plan& plan) {
       for (const Study& study : plan.studies) {
         if (!measures(study, target)) continue;
         for (const SceneSpec& spec : study.scenes) {
-          std::string name = given_name(spec);
-          if (!name.empty() && study.rays) name += suffix_of(*study.rays);
+          const std::string name = name_in(study, spec);
           if (!name.empty() && !has(known, name)) known.push_back(name);
           if (name == scene) meanings.insert(spec.said);
         }
@@ -227,7 +232,7 @@ void check_target_contestants(const Plan& plan, const std::vector<std::vector<Co
       for (std::size_t s = 0; s < plan.studies.size(); ++s) {
         const Study& study = plan.studies[s];
         const bool has_scene = std::any_of(study.scenes.begin(), study.scenes.end(),
-                                           [&](const SceneSpec& spec) { return given_name(spec) == scene; });
+                                           [&](const SceneSpec& spec) { return name_in(study, spec) == scene; });
         if (has_scene && measures(study, target) &&
             std::all_of(wanted.begin(), wanted.end(), [&](const TargetSelector* side) {
               return std::any_of(

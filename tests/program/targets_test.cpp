@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "complaint.hpp"
 #include "experiments/common/json_reader.hpp"
@@ -34,16 +35,17 @@ Plan read(const json& plan) {
   return read_plan(plan, "p.json", {});
 }
 
+void check_targets(const Plan& plan) {
+  std::vector<std::string> notes;
+  std::vector<std::vector<ContestantSpec>> contestants;
+  for (const Study& study : plan.studies)
+    contestants.push_back(expand(study.strategies, study.params, study.builder, notes));
+  check_target_contestants(plan, contestants);
+}
+
 /// What is said of the plan when the program starts.
 std::string start_complaint(const json& value) {
-  return complaint([&] {
-    const Plan plan = read(value);
-    std::vector<std::string> notes;
-    std::vector<std::vector<ContestantSpec>> contestants;
-    for (const Study& study : plan.studies)
-      contestants.push_back(expand(study.strategies, study.params, study.builder, notes));
-    check_target_contestants(plan, contestants);
-  });
+  return complaint([&] { check_targets(read(value)); });
 }
 
 std::string with(const std::string& key, const json& value) {
@@ -65,6 +67,17 @@ TEST(Targets, ARightPlanIsAccepted) {
   EXPECT_EQ(with("/scenes", "sheet-shuffled"), "nothing was thrown");
   EXPECT_EQ(with("/denominator/builder", {{"leaf_size", {4, 8}}}), "nothing was thrown");
   EXPECT_EQ(with("/numerator/strategy", "peer"), "nothing was thrown") << "optional, may be away";
+}
+
+TEST(Targets, ThoseOfShippedPlansAreMeasured) {
+  std::size_t targets = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(KBVH_PLANS)) {
+    if (entry.path().extension() != ".json") continue;
+    const Plan plan = load_plan(entry.path());
+    EXPECT_NO_THROW(check_targets(plan)) << entry.path();
+    targets += plan.targets.size();
+  }
+  EXPECT_GT(targets, 0u);
 }
 
 TEST(Targets, ErrorsNameFileTargetAndKey) {
