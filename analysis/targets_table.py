@@ -1,6 +1,7 @@
 """The targets of a plan and the measurements, from targets.json, as Markdown tables.
 
 usage: targets_table.py DIR/targets.json [--write analysis/guides/results.md]
+A page has the tables of several plans, between `<!-- targets of PLAN -->` and `<!-- /targets of PLAN -->`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ from load import ResultError
 
 SCHEMA = 1
 FILE_NAME = "targets.json"
-BEGIN, END = "<!-- targets -->", "<!-- /targets -->"
 VERDICTS = {"reached_aim": "aim reached", "reached": "reached", "missed": "missed", "unmeasured": "not measured"}
 
 
@@ -200,13 +200,19 @@ def _row(cells: list[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
 
 
-def rewrite(page: str, table: str) -> str:
-    """Returns the page with the table between its markers, each on a line of its own. Raises ValueError without them."""
-    if page.count(BEGIN) != 1 or page.count(END) != 1 or page.index(BEGIN) > page.index(END):
-        raise ValueError(f"{BEGIN} and {END} should be there once, in this order")
-    before, rest = page.split(BEGIN)
-    after = rest.split(END)[1]
-    return f"{before}{BEGIN}\n{table}{END}{after}"
+def markers(plan: str) -> tuple[str, str]:
+    """Returns the lines of a page between which the tables of a plan stand."""
+    return f"<!-- targets of {plan} -->", f"<!-- /targets of {plan} -->"
+
+
+def rewrite(page: str, plan: str, table: str) -> str:
+    """Returns the page with the plan's table between its markers, each on a line of its own. Raises ValueError without them."""
+    begin, end = markers(plan)
+    if page.count(begin) != 1 or page.count(end) != 1 or page.index(begin) > page.index(end):
+        raise ValueError(f"{begin} and {end} should be there once, in this order")
+    before, rest = page.split(begin)
+    after = rest.split(end)[1]
+    return f"{before}{begin}\n{table}{end}{after}"
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
@@ -217,18 +223,19 @@ def main(arguments: Optional[list[str]] = None) -> int:
         epilog="example: targets_table.py results/targets.json --write analysis/guides/results.md",
     )
     parser.add_argument("file", metavar="targets.json", type=Path, help="written by `kbvh bench --plan PLAN --out DIR`")
-    parser.add_argument("--write", metavar="PAGE", type=Path, help=f"write the tables between {BEGIN} and {END} of this file")
+    parser.add_argument("--write", metavar="PAGE", type=Path, help="write the tables between the plan's markers in this file")
     options = parser.parse_args(arguments)
     try:
-        table = markdown(load_targets(options.file))
+        targets = load_targets(options.file)
     except ResultError as error:
         print(f"targets_table: {error}", file=sys.stderr)
         return 2
+    table = markdown(targets)
     if options.write is None:
         print(table, end="")
         return 0
     try:
-        page = rewrite(options.write.read_text(encoding="utf-8"), table)
+        page = rewrite(options.write.read_text(encoding="utf-8"), targets[0].plan if targets else "", table)
         files.write_whole(options.write, page)
     except OSError as error:
         print(f"targets_table: {error.filename}: {error.strerror}.", file=sys.stderr)

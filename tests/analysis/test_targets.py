@@ -97,18 +97,18 @@ class TestMarkdown(TargetsCase):
 class TestWrite(TargetsCase):
     def test_only_what_is_between_the_markers_changes(self) -> None:
         page = self.folder / "README.md"
-        page.write_text("before\n<!-- targets -->\nold\n<!-- /targets -->\nafter ü\n", encoding="utf-8")
+        other = "<!-- targets of field -->\nkept\n<!-- /targets of field -->\n"
+        content = f"before\n{other}<!-- targets of baseline -->\nold\n<!-- /targets of baseline -->\nafter ü\n"
+        page.write_text(content, encoding="utf-8")
         table = self.run_main(rows())[1]
         for _ in range(2):
             code, out, _ = self.run_main(rows(), "--write", str(page))
             self.assertEqual((code, out), (0, ""))
-            self.assertEqual(
-                page.read_text(encoding="utf-8"), f"before\n<!-- targets -->\n{table}<!-- /targets -->\nafter ü\n"
-            )
+            self.assertEqual(page.read_text(encoding="utf-8"), content.replace("old\n", table))
 
     def test_pages_without_markers_stay_as_they_are(self) -> None:
         page = self.folder / "README.md"
-        for content in ("text\n", "<!-- /targets -->\n<!-- targets -->\n", "<!-- targets -->\n"):
+        for content in ("text\n", "<!-- /targets of baseline -->\n<!-- targets of baseline -->\n", "<!-- targets of baseline -->\n"):
             page.write_text(content, encoding="utf-8")
             code, _, err = self.run_main(rows(), "--write", str(page))
             self.assertEqual(code, 2)
@@ -117,7 +117,8 @@ class TestWrite(TargetsCase):
 
     def test_the_page_of_results_has_the_markers(self) -> None:
         page = (Path(__file__).resolve().parents[2] / "analysis" / "guides" / "results.md").read_text(encoding="utf-8")
-        self.assertIn("| refit over FCL |", targets_table.rewrite(page, self.run_main(rows())[1]))
+        for plan in ("baseline", "field", "motion", "spacetime"):
+            self.assertIn("| refit over FCL |", targets_table.rewrite(page, plan, self.run_main(rows())[1]))
 
 
 class TestRefusals(TargetsCase):
