@@ -52,6 +52,9 @@ class LbvhDrift final : public BuiltStrategy<S, Count, DriftBuilder<S>> {
     trees_[pair.first].age.add(tests, found);
     if (pair.second != pair.first) trees_[pair.second].age.add(tests, found);
   }
+  void followed(std::uint32_t body, const RayWork& work) override {
+    trees_[body].age.add_rays(work.tests, work.rays);
+  }
   void counts_cleared() override { builds_ = 0; }
   void add_counts(Counters& table) const override { table.add("rebuilds", builds_); }
 

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+#include <random>
+
 #include "tests/conformance/check.hpp"
+#include "tests/support/flying_triangles.hpp"
 
 namespace kbvh::test {
 namespace {
@@ -75,6 +79,40 @@ TEST_P(Restructuring, HappensAndIsTakenBackByReset) {
   EXPECT_GT(counted[0], 0u);
   EXPECT_EQ(counted[0], counted[1]);
   EXPECT_EQ(found[0], found[1]);
+}
+
+/// Plays a clip in which nothing is asked but rays; returns the box tests of the last frame.
+std::uint64_t last_tests_of_rays(const Scene<float>& scene, const std::string& id, std::vector<RayHit>& hits) {
+  Session<float> session(scene, {&find_strategy(id), {}, {}}, CountingPolicy::counting);
+  session.reset(0);
+  std::mt19937 random(5);
+  std::vector<Ray<float>> rays(1000);
+  for (Ray<float>& ray : rays) {
+    ray.length = std::numeric_limits<float>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+      ray.origin[axis] = float(random() % 2001) / 1000 - 1;
+      ray.direction[axis] = float(random() % 2001) / 1000 - 1;
+    }
+  }
+  hits.resize(rays.size());
+  PhaseTimes times;
+  std::uint64_t before = 0;
+  for (int frame = 1; frame <= 30; ++frame) {
+    before = session.strategy().counters()[Counter::box_tests];
+    session.advance(frame, times);
+    session.hits(RayQuery::closest, rays, hits, times);
+  }
+  return session.strategy().counters()[Counter::box_tests] - before;
+}
+
+TEST(Restructuring, TreesAgeByRaysAlone) {
+  const Scene<float> scene = flying_triangles(4000, 31, Flight::anywhere);
+  std::vector<RayHit> expected, hits;
+  const std::uint64_t refitted = last_tests_of_rays(scene, "bottom_up", expected);
+  for (const char* id : {"drift_rebuild", "partial_rebuild", "lbvh_drift"}) {
+    EXPECT_LT(last_tests_of_rays(scene, id, hits), refitted / 3) << id;
+    EXPECT_EQ(hits, expected) << id;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Eager, Restructuring, testing::Range(std::size_t(0), eager().size()),

@@ -82,6 +82,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
     const auto side_of = [&](std::uint32_t body) -> WideSide<S> { return {&bodies_[body], body}; };
     rays_.find(query, rays, hits, side_of, this->triangle_stats_, tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) followed(body, rays_.work()[body]);
   }
   /// Computes the boxes of a tree that keeps its shape.
   void refit(std::uint32_t body) {
@@ -91,6 +92,8 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
   }
   /// Learns what the search of two bodies took: box tests made, and pairs of primitives found.
   virtual void searched(const BodyPair& /*pair*/, std::uint64_t /*tests*/, std::uint64_t /*found*/) {}
+  /// Learns what the rays of a call did with a body.
+  virtual void followed(std::uint32_t /*body*/, const RayWork& /*work*/) {}
 
  private:
   void take_boxes(std::uint32_t body) {

@@ -7,48 +7,60 @@ namespace kbvh {
 /// The age of a tree as queries feel it: the box tests that they made beyond those of the tree when it was
 /// new.
 ///
-/// The number of pairs of primitives whose boxes overlap does not depend on the tree. A new tree is therefore
-/// expected to need as many tests per such pair, and per frame, as in its first frame. When the surplus
-/// summed over frames has cost as much as a rebuild, a rebuild is due: for a surplus that grows linearly this
-/// is the period of least total cost.
+/// The number of pairs of primitives whose boxes overlap does not depend on the tree, nor does the number of
+/// rays that enter the body's box. A new tree is therefore expected to need as many tests per such pair or
+/// ray, and per frame, as in its first frame. When the surplus summed over frames has cost as much as a
+/// rebuild, a rebuild is due: for a surplus that grows linearly this is the period of least total cost.
 class TreeAge {
  public:
   /// Registers a new tree: the next frame says what it needs.
   void renew() {
     surplus_ = 0;
-    new_ = true;
+    pairs_.is_new = rays_.is_new = true;
   }
   /// Registers a tree that was improved, but not made anew. What it needs is still known, and forgotten
   /// slowly.
   void repair() {
     surplus_ = 0;
-    per_pair_ *= 1.05;
+    pairs_.per_found *= 1.05;
+    rays_.per_found *= 1.05;
   }
   /// Adds the box tests of a query of the current frame, and the pairs of primitives that it found.
-  void add(std::uint64_t tests, std::uint64_t found) {
-    tests_ += double(tests);
-    found_ += double(found);
-  }
+  void add(std::uint64_t tests, std::uint64_t found) { pairs_.add(tests, found); }
+  /// Adds the box tests of rays of the current frame, and the number of those that entered the body's box.
+  void add_rays(std::uint64_t tests, std::uint64_t rays) { rays_.add(tests, rays); }
   /// Ends the current frame and returns the surplus since the tree was new, in box tests.
   double end_frame() {
-    if (new_ && tests_ > 0) {
-      new_ = false;
-      per_pair_ = tests_ / (found_ + quiet);
-    } else if (!new_) {
-      // A tree whose first frame was a bad one is measured against its best.
-      per_pair_ = std::min(per_pair_, std::max(tests_, 1.0) / (found_ + quiet));
-      surplus_ += std::max(0.0, tests_ - per_pair_ * (found_ + quiet));
-    }
-    tests_ = found_ = 0;
+    // 1000 pairs stand for the traversal of bodies without contact; a ray that meets no box makes no tests.
+    surplus_ += pairs_.end_frame(1000) + rays_.end_frame(1);
     return surplus_;
   }
 
  private:
-  static constexpr double quiet = 1000;  // pairs that stand for the traversal of bodies without contact
-  double tests_ = 0, found_ = 0;         // of the current frame
-  double per_pair_ = 0;                  // of the new tree
+  /// The work of one kind of query.
+  struct Work {
+    double tests = 0, found = 0;  // of the current frame
+    double per_found = 0;         // of the new tree
+    bool is_new = true;           // its first frame with a query has not ended
+
+    void add(std::uint64_t more_tests, std::uint64_t more_found) {
+      tests += double(more_tests);
+      found += double(more_found);
+    }
+    /// Ends the frame and returns its surplus. `quiet` is added to what was found.
+    double end_frame(double quiet) {
+      if (tests == 0) return 0;  // no query came to the body
+      const double needed = tests / (found + quiet);
+      // A tree whose first frame was a bad one is measured against its best.
+      per_found = is_new ? needed : std::min(per_found, needed);
+      is_new = false;
+      const double surplus = tests - per_found * (found + quiet);
+      tests = found = 0;
+      return std::max(0.0, surplus);
+    }
+  };
+  Work pairs_, rays_;
   double surplus_ = 0;
-  bool new_ = true;
 };
 
 }  // namespace kbvh

@@ -125,6 +125,8 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>,
         this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
+  /// Returns what the rays of the last call did with each body.
+  std::span<const RayWork> ray_work() const { return rays_.work(); }
   /// Returns what rays read of a body; lazy strategies add the marks of stale nodes, for which `make_row` is
   /// called then.
   virtual WideSide<S> ray_side(std::uint32_t body) { return side(body); }

@@ -126,7 +126,6 @@ bool WideRays<S>::enter(std::uint32_t body) {
   const WideRaySide<S>& side = sides_[body];
   const Primitives& primitives = scene_.primitives(body);
   motion_.fetch_all(body);
-  entered_[body] = 1;
   body_ = body;
   WideRayJob<S> job{};
   job.tree = side.hierarchy->arrays();
@@ -148,7 +147,10 @@ bool WideRays<S>::enter(std::uint32_t body) {
     if (rays.search_->limit() != limit) rays.ray_.limit = at_least<S>(rays.search_->limit());
     return over;
   };
+  const std::uint64_t tests_before = tests_;
   follow(*side.hierarchy, job, stack_);
+  work_[body].tests += tests_ - tests_before;
+  ++work_[body].rays;
   return job.over;
 }
 
@@ -156,7 +158,7 @@ template <class S>
 void WideRays<S>::run(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits,
                       TriangleTestStats& stats, std::uint64_t& tests) {
   refit_bodies();
-  entered_.assign(sides_.size(), 0);
+  work_.assign(sides_.size(), {});
   stats_ = &stats;
   tests_ = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -183,7 +185,7 @@ void WideRays<S>::run(RayQuery query, std::span<const Ray<S>> rays, std::span<Ra
 template <class S>
 void WideRays<S>::count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) const {
   for (std::size_t i = 0; i < ids_.size(); ++i) {
-    if (entered_[ids_[i]] != 0) {
+    if (work_[ids_[i]].rays != 0) {
       ++bodies.entered;
       continue;
     }
@@ -201,7 +203,7 @@ std::size_t WideRays<S>::bytes() const {
   return bodies_.bytes() +
          (primitives_.offsets.capacity() + primitives_.vertices.capacity() + ids_.capacity()) *
              sizeof(std::uint32_t) +
-         corners_.capacity() * sizeof(S) + sides_.capacity() * sizeof(WideRaySide<S>) + entered_.capacity() +
+         corners_.capacity() * sizeof(S) + sides_.capacity() * sizeof(WideRaySide<S>) + work_.capacity() * sizeof(RayWork) +
          (body_stack_.capacity() + stack_.capacity()) * sizeof(WideRayItem<S>);
 }
 

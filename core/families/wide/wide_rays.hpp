@@ -27,6 +27,12 @@ struct WideRaySide {
   Box<S> root_box() const { return root ? *root : hierarchy->root_box(); }
 };
 
+/// What the rays of one call did with a body.
+struct RayWork {
+  std::uint64_t tests = 0;  ///< box tests in its hierarchy
+  std::uint64_t rays = 0;   ///< that entered it
+};
+
 /// Answers rays over the wide hierarchies of all bodies of a scene; keeps its buffers from call to call. A
 /// tree over the bodies' boxes, refitted at each call and built anew when the bodies have mixed, leads to the
 /// bodies, which are searched nearest first. This is occlusion culling: a body that lies behind the hits of
@@ -64,6 +70,9 @@ class WideRays {
   /// before.
   void start_over() { built_area_ = -1; }
 
+  /// Returns the work of the last call for each body.
+  std::span<const RayWork> work() const { return work_; }
+
   std::size_t bytes() const;
 
  private:
@@ -78,7 +87,7 @@ class WideRays {
   SceneView<S> scene_;
   SampledMotion<S> motion_;
   std::vector<WideRaySide<S>> sides_;
-  std::vector<std::uint8_t> entered_;  ///< [body], by this call
+  std::vector<RayWork> work_;  ///< [body], by this call
   void* make_context_ = nullptr;
   void (*make_)(void* context, std::uint32_t body, std::uint32_t node) = nullptr;
   // The tree over bodies: one primitive of two corners for each body that rays can meet.
