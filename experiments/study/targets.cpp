@@ -231,8 +231,9 @@ void check_target_contestants(const Plan& plan, const std::vector<std::vector<Co
     const auto measured_on = [&](const std::string& scene, const std::vector<const TargetSelector*>& wanted) {
       for (std::size_t s = 0; s < plan.studies.size(); ++s) {
         const Study& study = plan.studies[s];
-        const bool has_scene = std::any_of(study.scenes.begin(), study.scenes.end(),
-                                           [&](const SceneSpec& spec) { return name_in(study, spec) == scene; });
+        const bool has_scene =
+            std::any_of(study.scenes.begin(), study.scenes.end(),
+                        [&](const SceneSpec& spec) { return name_in(study, spec) == scene; });
         if (has_scene && measures(study, target) &&
             std::all_of(wanted.begin(), wanted.end(), [&](const TargetSelector* side) {
               return std::any_of(

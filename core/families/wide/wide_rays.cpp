@@ -203,7 +203,8 @@ std::size_t WideRays<S>::bytes() const {
   return bodies_.bytes() +
          (primitives_.offsets.capacity() + primitives_.vertices.capacity() + ids_.capacity()) *
              sizeof(std::uint32_t) +
-         corners_.capacity() * sizeof(S) + sides_.capacity() * sizeof(WideRaySide<S>) + work_.capacity() * sizeof(RayWork) +
+         corners_.capacity() * sizeof(S) + sides_.capacity() * sizeof(WideRaySide<S>) +
+         work_.capacity() * sizeof(RayWork) +
          (body_stack_.capacity() + stack_.capacity()) * sizeof(WideRayItem<S>);
 }
 
