@@ -82,7 +82,8 @@ TEST_P(Restructuring, HappensAndIsTakenBackByReset) {
 }
 
 /// Plays a clip in which nothing is asked but rays; returns the box tests of the last frame.
-std::uint64_t last_tests_of_rays(const Scene<float>& scene, const std::string& id, std::vector<RayHit>& hits) {
+std::uint64_t last_tests_of_rays(const Scene<float>& scene, const std::string& id,
+                                 std::vector<RayHit>& hits) {
   Session<float> session(scene, {&find_strategy(id), {}, {}}, CountingPolicy::counting);
   session.reset(0);
   std::mt19937 random(5);

@@ -18,7 +18,7 @@ enum class Flight {
 
 /// Two bodies of triangles of all directions in a cube.
 inline Scene<float> flying_triangles(std::uint32_t count, std::uint32_t keyframes, Flight flight,
-                              double size = 0.03) {
+                                     double size = 0.03) {
   Scene<float> scene;
   Random random(7);
   for (int body = 0; body < 2; ++body) {
