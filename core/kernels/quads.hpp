@@ -27,6 +27,8 @@ struct Points {
   using Pack = PlainPoint<S>;
   /// Loads the point at `a` and, if a pack holds two, the point at `b`.
   [[gnu::always_inline]] static Pack load(const S* a, const S* /*b*/) { return {{a[0], a[1], a[2]}}; }
+  /// Returns a pack whose points have all coordinates a, and if it holds two, the second ones b.
+  [[gnu::always_inline]] static Pack all(S a, S /*b*/) { return {{a, a, a}}; }
   /// Writes four packs as rows: rows[axis * stride + i] for the points i < many, each number negated if
   /// `turned`.
   template <bool turned>
@@ -69,6 +71,14 @@ struct Points<S, wanted_points, true> {
       return load_lanes<Point>(a);
     } else {
       return joined(load_lanes<Point>(a), load_lanes<Point>(b));
+    }
+  }
+  [[gnu::always_inline]] static Pack all(S a, S b) {
+    if constexpr (points == 1) {
+      (void)b;
+      return Point{a, a, a, a};
+    } else {
+      return joined(Point{a, a, a, a}, Point{b, b, b, b});
     }
   }
   template <bool turned>

@@ -1,11 +1,33 @@
 #pragma once
 // Internal to kernels: the boxes of one wide node, from the vertices of its leaves and the boxes
 // of its children.
+#include <array>
+
 #include "core/families/wide/kernels/wide_layout.hpp"
 #include "core/kernels/quads.hpp"
 
 namespace kbvh {
 namespace {
+
+template <class S>
+constexpr S infinity = S(__builtin_inf());
+/// The box of an empty lane.
+template <class S>
+constexpr S empty_box[8] = {infinity<S>,  infinity<S>,  infinity<S>,  infinity<S>,
+                            -infinity<S>, -infinity<S>, -infinity<S>, -infinity<S>};
+
+/// `width` lanes of minus infinity, then `width` of infinity.
+template <class S, std::uint32_t width>
+constexpr std::array<S, 2 * width> make_infinite_from() {
+  std::array<S, 2 * width> lanes{};
+  for (std::uint32_t lane = 0; lane < width; ++lane) {
+    lanes[lane] = -infinity<S>;
+    lanes[width + lane] = infinity<S>;
+  }
+  return lanes;
+}
+template <class S, std::uint32_t width>
+constexpr std::array<S, 2 * width> infinite_from = make_infinite_from<S, width>();
 
 /// Computes the boxes of the `width` children of a node, from one point each (lower and upper corners, 8
 /// numbers from one child to the next) or from a list of vertices, into the node's rows and its own box.
@@ -51,22 +73,59 @@ struct NodeFit {
     }
   }
 
+  /// Computes the boxes of the lanes of one pass from their lists.
+  [[gnu::always_inline]] static void gather(const std::uint32_t* vertices, std::uint32_t length,
+                                            const S* positions, std::uint32_t first, Pack (&lower)[4],
+                                            Pack (&upper)[4]) {
+    const std::uint32_t* row = vertices;
+    for (std::uint32_t j = 0; j < packs; ++j) lower[j] = upper[j] = listed(row, first, j, positions);
+    for (std::uint32_t i = 1; i < length; ++i) {
+      row += width;
+      for (std::uint32_t j = 0; j < packs; ++j) {
+        const Pack p = listed(row, first, j, positions);
+        lower[j] = smaller(lower[j], p);
+        upper[j] = larger(upper[j], p);
+      }
+    }
+  }
+
   [[gnu::always_inline]] inline void from_lists(const std::uint32_t* vertices, std::uint32_t length,
                                                 const S* positions, S* rows) {
     for (std::uint32_t first = 0; first < width; first += per_pass) {
       Pack lower[4], upper[4];
-      const std::uint32_t* row = vertices;
-      for (std::uint32_t j = 0; j < packs; ++j) lower[j] = upper[j] = listed(row, first, j, positions);
-      for (std::uint32_t i = 1; i < length; ++i) {
-        row += width;
-        for (std::uint32_t j = 0; j < packs; ++j) {
-          const Pack p = listed(row, first, j, positions);
-          lower[j] = smaller(lower[j], p);
-          upper[j] = larger(upper[j], p);
-        }
+      gather(vertices, length, positions, first, lower, upper);
+      take(lower, upper, rows, first);
+    }
+  }
+
+  /// Takes the lists of a node's leaves, the boxes of its nodes, and empty boxes for the other lanes. In
+  /// registers: stores to single lanes of rows that were just written took half the time of a SAH tree's
+  /// refit.
+  [[gnu::always_inline]] inline void from_lists_and_boxes(const WideArrays<S>& h, const WideNode& node,
+                                                          const S* positions, S* rows) {
+    // Of lanes from `leaf_count` on, the lower bound becomes infinite, and the upper one minus that.
+    const S* const least = infinite_from<S, width>.data() + width - node.leaf_count;
+    for (std::uint32_t first = 0; first < width; first += per_pass) {
+      Pack lower[4], upper[4];
+      gather(h.vertices + node.list, node.length, positions, first, lower, upper);
+      for (std::uint32_t j = 0; j < packs; ++j) {
+        const std::uint32_t one = first + j, other = (first + j + 4) % width;
+        lower[j] = larger(lower[j], P::all(least[one], least[other]));
+        upper[j] = smaller(upper[j], P::all(-least[one], -least[other]));
+        if (node.leaf_count == node.count) continue;
+        const S *box = child_box(h, node, one), *other_box = child_box(h, node, other);
+        lower[j] = smaller(lower[j], P::load(box, other_box));
+        upper[j] = larger(upper[j], P::load(box + 4, other_box + 4));
       }
       take(lower, upper, rows, first);
     }
+  }
+  /// Returns the box of a child that is a node, an empty one for any other lane.
+  [[gnu::always_inline]] static const S* child_box(const WideArrays<S>& h, const WideNode& node,
+                                                   std::uint32_t lane) {
+    const bool is_node = lane >= node.leaf_count && lane < node.count;
+    return is_node ? h.node_bounds + std::size_t(8) * (node.first_child + lane - node.leaf_count)
+                   : empty_box<S>;
   }
 
   /// Takes the child boxes boxes[lane], 8 numbers each.
@@ -87,13 +146,6 @@ struct NodeFit {
     P::store_largest(node_bounds + 4, largest);
   }
 };
-
-template <class S>
-constexpr S infinity = S(__builtin_inf());
-/// The box of an empty lane.
-template <class S>
-constexpr S empty_box[8] = {infinity<S>,  infinity<S>,  infinity<S>,  infinity<S>,
-                            -infinity<S>, -infinity<S>, -infinity<S>, -infinity<S>};
 
 /// Few leaves next to nodes (SAH trees; the last nodes of a level): one box at a time.
 template <class S, std::uint32_t width>
@@ -125,30 +177,16 @@ template <class S, std::uint32_t width>
   fit.store_own(node_bounds);
 }
 
-/// Many leaves, whose lists fill all lanes: afterwards the lanes of nodes and the empty lanes are corrected.
-template <class S, std::uint32_t width>
-[[gnu::noinline]] void put_right(const WideArrays<S>& h, const WideNode& node, S* rows, S* node_bounds) {
-  for (std::uint32_t lane = node.leaf_count; lane < width; ++lane) {
-    const S* box = lane < node.count
-                       ? h.node_bounds + std::size_t(8) * (node.first_child + lane - node.leaf_count)
-                       : empty_box<S>;
-    for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      rows[axis * width + lane] = box[axis];
-      rows[(axis + 3) * width + lane] = -box[axis + 4];
-      node_bounds[axis] = smaller(node_bounds[axis], box[axis]);
-      node_bounds[axis + 4] = larger(node_bounds[axis + 4], box[axis + 4]);
-    }
-  }
-}
-
 /// Fits a node whose children are all leaves.
 template <class S, std::uint32_t width>
 [[gnu::always_inline]] inline void fit_leaves(const WideArrays<S>& h, const WideNode& node,
                                               const S* positions, S* rows, S* node_bounds) {
   NodeFit<S, width> fit;
-  fit.from_lists(h.vertices + node.list, node.length, positions, rows);
+  if (node.leaf_count == width)
+    fit.from_lists(h.vertices + node.list, node.length, positions, rows);
+  else
+    fit.from_lists_and_boxes(h, node, positions, rows);
   fit.store_own(node_bounds);
-  if (node.leaf_count != width) put_right<S, width>(h, node, rows, node_bounds);
 }
 
 /// Fits any other node; the own boxes of children that are nodes must be current.
@@ -157,9 +195,8 @@ template <class S, std::uint32_t width>
                                              S* rows, S* node_bounds) {
   NodeFit<S, width> fit;
   if (2 * node.leaf_count >= width) {
-    fit.from_lists(h.vertices + node.list, node.length, positions, rows);
+    fit.from_lists_and_boxes(h, node, positions, rows);
     fit.store_own(node_bounds);
-    put_right<S, width>(h, node, rows, node_bounds);
   } else if (node.leaf_count == 0) {
     const S* boxes[width];
     for (std::uint32_t lane = 0; lane < width; ++lane)

@@ -47,6 +47,22 @@ template <class S>
   return changed;
 }
 
+/// Corrects the lanes of nodes and the empty lanes of rows that hold the boxes of the leaves.
+template <class S, std::uint32_t width>
+[[gnu::noinline]] void put_right(const WideArrays<S>& h, const WideNode& node, S* rows, S* node_bounds) {
+  for (std::uint32_t lane = node.leaf_count; lane < width; ++lane) {
+    const S* box = lane < node.count
+                       ? h.node_bounds + std::size_t(8) * (node.first_child + lane - node.leaf_count)
+                       : empty_box<S>;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      rows[axis * width + lane] = box[axis];
+      rows[(axis + 3) * width + lane] = -box[axis + 4];
+      node_bounds[axis] = smaller(node_bounds[axis], box[axis]);
+      node_bounds[axis + 4] = larger(node_bounds[axis + 4], box[axis + 4]);
+    }
+  }
+}
+
 template <class S, std::uint32_t width>
 void check_margins(MarginCheck<S>& shared) {
   constexpr std::size_t row_scalars = std::size_t(6) * width;
@@ -67,9 +83,11 @@ void check_margins(MarginCheck<S>& shared) {
     if (node.leaf_count != node.count) continue;
     S* rows = h.child_bounds + i * row_scalars;
     NodeFit<S, width> fit;
-    fit.from_lists(h.vertices + node.list, node.length, state.positions, fresh);
+    if (node.leaf_count == width)
+      fit.from_lists(h.vertices + node.list, node.length, state.positions, fresh);
+    else
+      fit.from_lists_and_boxes(h, node, state.positions, fresh);
     fit.store_own(box);
-    if (node.leaf_count != width) put_right<S, width>(h, node, fresh, box);
     const Room<S> found = room_of<S, width>(rows, fresh);
     room_before = smaller(found.least, room_before);
     state.remade[i] = 0;
