@@ -34,14 +34,20 @@ struct JoinAhead {
   static constexpr double answer = 5;  ///< sorting in an answer
 };
 
+/// Trees that age (drift_rebuild, partial_rebuild, lbvh_drift), in box tests of a search for pairs. Fitted in
+/// d2994f5 (plan field, AVX-512): a test takes 0.6 to 1.4 ns for pairs, 8 to 18 ns for rays, the triangle
+/// tests that follow included.
+struct Ageing {
+  static constexpr double ray_test = 12;
+};
+
 /// auto, in nanoseconds per frame (Zen 5, float); only their order matters. Fitted:
 /// - leaf_slabs (`refit`) and the join on six captured or animated figures, a skirt and a tablecloth
 ///   (experiments/plans/motion.json) at l = 1, 3, 7 and 30, but for `join_slide` and `join_apart`;
 /// - these two and drift_boxes on the scenes "tuned on" of experiments/plans/auto.json, in c6e0cf1, 167e5b8
 ///   and ef3f1d8, with counts of candidates that are larger than those of leaf_slabs;
 /// - slabs (from `slab_candidate` to `plain_candidate`) on measurements of 869ab66 of the same scenes and
-/// those
-///   "tuned on, ageing"; the last three lines on the mixing swarms, unrolling yarns, tablecloth and random
+///   those "tuned on, ageing"; the last three lines on the mixing swarms, unrolling yarns, tablecloth and random
 ///   soups at l = 1, in 460de91, and `join_box_test` also on the swarms at l = 10, in 869ab66. All of these
 ///   on an Intel Xeon, and divided by 1.7: what leaf_slabs takes there, over its prediction.
 struct Choice {

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "core/base/cost_constants.hpp"
+
 namespace kbvh {
 
 /// The age of a tree as queries feel it: the box tests that they made beyond those of the tree when it was
@@ -32,7 +34,7 @@ class TreeAge {
   /// Ends the current frame and returns the surplus since the tree was new, in box tests.
   double end_frame() {
     // 1000 pairs stand for the traversal of bodies without contact; a ray that meets no box makes no tests.
-    surplus_ += pairs_.end_frame(1000) + rays_.end_frame(1);
+    surplus_ += pairs_.end_frame(1000) + costs::Ageing::ray_test * rays_.end_frame(1);
     return surplus_;
   }
 
