@@ -164,7 +164,7 @@ def facts(targets: list[Target]) -> str:
     first = targets[0]
     where = ", ".join(value for value in (first.cpu, first.compiler) if value) or "an unknown machine"
     state = " with uncommitted changes" if first.dirty else ""
-    sentence = f"Plan {first.plan} on {where}, one thread, commit {first.commit[:12] or 'unknown'}{state}, {first.when or 'undated'}."
+    sentence = f"Plan {first.plan} on {where}, one thread unless a row names more, commit {first.commit[:12] or 'unknown'}{state}, {first.when or 'undated'}."
     if any(target.runs > 1 for target in targets):
         sentence += " Not all of it in one run."
     return sentence
@@ -185,7 +185,8 @@ def markdown(targets: list[Target]) -> str:
         verdict = VERDICTS[target.verdict] + (f": {target.reason}" if target.reason else "")
         lines.append(_row([target.what, measured, wanted(target.at_least), wanted(target.aim), verdict]))
     names = columns(targets)
-    lines += ["", facts(targets) + " Each number is the factor by which the other side is slower, on the scenes that count; "
+    lines += ["", facts(targets) + " A number is the speed of the side named first over that of the other, on the scenes that count: their "
+              "geometric mean or the least of them, as the plan says. The verdict compares this number, not its interval; "
               "the table below has every scene, in bold if it counts.", ""]  # fmt: skip
     lines += [_row(["what", *names]), _row(["---"] * (1 + len(names)))]
     for target in targets:
