@@ -164,7 +164,8 @@ def facts(targets: list[Target]) -> str:
     first = targets[0]
     where = ", ".join(value for value in (first.cpu, first.compiler) if value) or "an unknown machine"
     state = " with uncommitted changes" if first.dirty else ""
-    sentence = f"Plan {first.plan} on {where}, one thread unless a row names more, commit {first.commit[:12] or 'unknown'}{state}, {first.when or 'undated'}."
+    made = f"commit {first.commit[:12] or 'unknown'}{state}, {first.when or 'undated'}"
+    sentence = f"Plan {first.plan} on {where}, one thread unless a row names more, {made}."
     if any(target.runs > 1 for target in targets):
         sentence += " Not all of it in one run."
     return sentence
@@ -185,9 +186,12 @@ def markdown(targets: list[Target]) -> str:
         verdict = VERDICTS[target.verdict] + (f": {target.reason}" if target.reason else "")
         lines.append(_row([target.what, measured, wanted(target.at_least), wanted(target.aim), verdict]))
     names = columns(targets)
-    lines += ["", facts(targets) + " A number is the speed of the side named first over that of the other, on the scenes that count: their "
-              "geometric mean or the least of them, as the plan says. The verdict compares this number, not its interval; "
-              "the table below has every scene, in bold if it counts.", ""]  # fmt: skip
+    meaning = (
+        "A number is the speed of the side named first over that of the other, on the scenes that count: their geometric mean "
+        "or the least of them, as the plan says. The verdict compares this number, not its interval; the table below has "
+        "every scene, in bold if it counts."
+    )
+    lines += ["", f"{facts(targets)} {meaning}", ""]
     lines += [_row(["what", *names]), _row(["---"] * (1 + len(names)))]
     for target in targets:
         cells = {scene.name: times(scene.ratio) for scene in target.scenes}

@@ -47,9 +47,10 @@ struct Ageing {
 /// - these two and drift_boxes on the scenes "tuned on" of experiments/plans/auto.json, in c6e0cf1, 167e5b8
 ///   and ef3f1d8, with counts of candidates that are larger than those of leaf_slabs;
 /// - slabs (from `slab_candidate` to `plain_candidate`) on measurements of 869ab66 of the same scenes and
-///   those "tuned on, ageing"; the last three lines on the mixing swarms, unrolling yarns, tablecloth and random
-///   soups at l = 1, in 460de91, and `join_box_test` also on the swarms at l = 10, in 869ab66. All of these
-///   on an Intel Xeon, and divided by 1.7: what leaf_slabs takes there, over its prediction.
+///   those "tuned on, ageing";
+/// - the last three lines on the mixing swarms, unrolling yarns, tablecloth and random soups at l = 1, in
+///   460de91, and `join_box_test` also on the swarms at l = 10, in 869ab66. The last two points were
+///   measured on an Intel Xeon, and divided by 1.7: what leaf_slabs takes there, over its prediction.
 struct Choice {
   static constexpr double refit_read = 0.27, refit_candidate = 37;  ///< per vertex read; per candidate
   static constexpr double slab_candidate = 18;    ///< a candidate of leaf_slabs, without the search

@@ -108,7 +108,8 @@ class TestWrite(TargetsCase):
 
     def test_pages_without_markers_stay_as_they_are(self) -> None:
         page = self.folder / "README.md"
-        for content in ("text\n", "<!-- /targets of baseline -->\n<!-- targets of baseline -->\n", "<!-- targets of baseline -->\n"):
+        begin, end = targets_table.markers("baseline")
+        for content in ("text\n", f"{end}\n{begin}\n", f"{begin}\n"):
             page.write_text(content, encoding="utf-8")
             code, _, err = self.run_main(rows(), "--write", str(page))
             self.assertEqual(code, 2)

@@ -57,8 +57,8 @@ class Cluster:
 
     def vanish_node(self) -> None:
         """As if the node lost its power: slurmd and everything that it has started is killed at once."""
-        # All are stopped first: a worker whose child dies would write that its job has ended. Then children are killed before
-        # their parents: the kernel continues a stopped process group, by SIGHUP and SIGCONT, that loses the last parent of its session.
+        # All are stopped first: a worker whose child dies would write that its job has ended. Then children are killed
+        # before their parents: the kernel continues a stopped process group (SIGHUP, SIGCONT) whose last parent dies.
         below = self.below(self.processes["slurmd"].pid)
         for number, processes in ((signal.SIGSTOP, below), (signal.SIGKILL, below[::-1])):
             for process in processes:
