@@ -12,7 +12,8 @@ namespace kbvh {
 /// The number of pairs of primitives whose boxes overlap does not depend on the tree, nor does the number of
 /// rays that enter the body's box. A new tree is therefore expected to need as many tests per such pair or
 /// ray, and per frame, as in its first frame. When the surplus summed over frames has cost as much as a
-/// rebuild, a rebuild is due: for a surplus that grows linearly this is the period of least total cost.
+/// rebuild, a rebuild is due: for a surplus that grows linearly this is the period of least total cost. The
+/// unit of all work is a box test of a search for pairs; one of a ray counts as costs::Ageing::ray_test.
 class TreeAge {
  public:
   /// Registers a new tree: the next frame says what it needs.
@@ -51,14 +52,16 @@ class TreeAge {
     }
     /// Ends the frame and returns its surplus. `quiet` is added to what was found.
     double end_frame(double quiet) {
-      if (tests == 0) return 0;  // no query came to the body
-      const double needed = tests / (found + quiet);
-      // A tree whose first frame was a bad one is measured against its best.
-      per_found = is_new ? needed : std::min(per_found, needed);
-      is_new = false;
-      const double surplus = tests - per_found * (found + quiet);
+      double surplus = 0;
+      if (tests > 0) {  // otherwise no query came to the body
+        const double needed = tests / (found + quiet);
+        // A tree whose first frame was a bad one is measured against its best.
+        per_found = is_new ? needed : std::min(per_found, needed);
+        is_new = false;
+        surplus = std::max(0.0, tests - per_found * (found + quiet));
+      }
       tests = found = 0;
-      return std::max(0.0, surplus);
+      return surplus;
     }
   };
   Work pairs_, rays_;

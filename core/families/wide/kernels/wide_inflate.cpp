@@ -51,9 +51,7 @@ template <class S>
 template <class S, std::uint32_t width>
 [[gnu::noinline]] void put_right(const WideArrays<S>& h, const WideNode& node, S* rows, S* node_bounds) {
   for (std::uint32_t lane = node.leaf_count; lane < width; ++lane) {
-    const S* box = lane < node.count
-                       ? h.node_bounds + std::size_t(8) * (node.first_child + lane - node.leaf_count)
-                       : empty_box<S>;
+    const S* box = NodeFit<S, width>::child_box(h, node, lane);
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       rows[axis * width + lane] = box[axis];
       rows[(axis + 3) * width + lane] = -box[axis + 4];
