@@ -39,12 +39,7 @@ void MovingTree<S>::assign(const Topology& topology, const Primitives& primitive
     throw std::length_error("a leaf has " + std::to_string(list_room_) + " vertices; 65535 are possible");
 
   this->primitives_ = topology.primitives;
-  this->first_corner_.assign(1, 0);
-  this->corners_.clear();
-  for (const std::uint32_t primitive : this->primitives_) {
-    for (const std::uint32_t vertex : primitives[primitive]) this->corners_.push_back(3 * vertex);
-    this->first_corner_.push_back(std::uint32_t(this->corners_.size()));
-  }
+  this->list_corners(primitives);
 
   // A root that is a leaf still needs a node to lie in.
   new_block(none);

@@ -167,19 +167,15 @@ void WideHierarchy<S>::list_leaves(const Primitives& primitives) {
   for (std::uint32_t i = 0; i < topology_.size(); ++i)
     if (topology_.nodes[i].is_leaf()) source[nodes_[places_[i].node].first_leaf + places_[i].lane] = i;
   first_entry_.assign(1, 0);
-  first_corner_.assign(1, 0);
-  corners_.clear();
   primitives_.clear();
   for (const std::uint32_t i : source) {
     const TopologyNode node = topology_.nodes[i];
     for (std::uint32_t k = node.first(); k < node.first() + node.count(); ++k) {
-      const std::uint32_t primitive = topology_.primitives[k];
-      primitives_.push_back(primitive);
-      for (const std::uint32_t v : primitives[primitive]) corners_.push_back(3 * v);
-      first_corner_.push_back(std::uint32_t(corners_.size()));
+      primitives_.push_back(topology_.primitives[k]);
     }
     first_entry_.push_back(std::uint32_t(primitives_.size()));
   }
+  this->list_corners(primitives);
   stamps_.assign(leaves, 0);
   fetched_.assign(leaves, 0);
   stamp_ = 1;

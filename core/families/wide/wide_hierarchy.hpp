@@ -144,7 +144,6 @@ class WideHierarchy : public WideTree<S> {
   void write_lists(std::uint32_t wide, const LeafLists& lists);
   void begin_refills(const Primitives& primitives);
   void list_refilled(std::uint32_t wide, const Primitives& primitives);
-  void list_corners(const Primitives& primitives);
   void begin_edits();
   void follow_edit();
   void refit_all(const WideArrays<S>& arrays, const S* positions) const {

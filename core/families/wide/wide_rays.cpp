@@ -1,6 +1,7 @@
 #include "core/families/wide/wide_rays.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/geometry/ray_box.hpp"
@@ -132,6 +133,7 @@ bool WideRays<S>::enter(std::uint32_t body) {
   if (side.child_bounds != nullptr) job.tree.child_bounds = side.child_bounds;
   job.offsets = primitives.offsets.data();
   job.vertices = primitives.vertices.data();
+  job.triangle_corners = side.hierarchy->triangle_corners();
   job.positions = motion_.positions(body);
   job.stale = side.stale;
   job.make = [](void* context, std::uint32_t node) {
@@ -155,28 +157,53 @@ bool WideRays<S>::enter(std::uint32_t body) {
 }
 
 template <class S>
+std::uint64_t WideRays<S>::screen(std::span<const Ray<S>> rays) {
+  if (ids_.empty()) return 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      block_.origin[axis][i] = rays[i].origin[axis];
+      block_.direction[axis][i] = rays[i].direction[axis];
+    }
+    block_.length[i] = rays[i].length;
+  }
+  const WideArrays<S> bodies = bodies_.arrays();
+  const std::uint64_t asked = ~std::uint64_t(0) >> (WideRayBlock<S>::size - rays.size());
+  const std::uint64_t met =
+      asked &
+      wide_ray_kernels<S>(bodies_.kernels()).screen(block_, bodies.child_bounds, bodies.nodes[0].count);
+  tests_ += std::uint64_t(std::popcount(asked & ~met)) * bodies.nodes[0].count;
+  return met;
+}
+
+template <class S>
 void WideRays<S>::run(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits,
                       TriangleTestStats& stats, std::uint64_t& tests) {
   refit_bodies();
   work_.assign(sides_.size(), {});
   stats_ = &stats;
   tests_ = 0;
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    RaySearch<S> search(rays[i], query);
-    search_ = &search;
-    ray_ = wide_ray(rays[i]);
-    if (ids_.size() == 1) {
-      enter(ids_[0]);
-    } else if (!ids_.empty()) {
-      WideRayJob<S> job{};
-      job.tree = bodies_.arrays();
-      job.decide = [](void* context, std::uint32_t primitive) {
-        auto& all = *static_cast<WideRays*>(context);
-        return all.enter(all.ids_[primitive]);
-      };
-      follow(bodies_, job, body_stack_);
+  for (std::size_t begin = 0; begin < rays.size(); begin += WideRayBlock<S>::size) {
+    const std::size_t count = std::min(rays.size() - begin, WideRayBlock<S>::size);
+    std::uint64_t met = screen(rays.subspan(begin, count));
+    std::fill_n(hits.begin() + std::ptrdiff_t(begin), count, RayHit{});
+    for (; met != 0; met &= met - 1) {
+      const std::size_t i = begin + std::size_t(std::countr_zero(met));
+      RaySearch<S> search(rays[i], query);
+      search_ = &search;
+      ray_ = wide_ray(rays[i]);
+      if (ids_.size() == 1) {
+        enter(ids_[0]);
+      } else {
+        WideRayJob<S> job{};
+        job.tree = bodies_.arrays();
+        job.decide = [](void* context, std::uint32_t primitive) {
+          auto& all = *static_cast<WideRays*>(context);
+          return all.enter(all.ids_[primitive]);
+        };
+        follow(bodies_, job, body_stack_);
+      }
+      hits[i] = search.hit();
     }
-    hits[i] = search.hit();
   }
   search_ = nullptr;
   tests += tests_;

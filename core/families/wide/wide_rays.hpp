@@ -80,6 +80,8 @@ class WideRays {
            std::uint64_t& tests);
   void refit_bodies();
   void count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) const;
+  /// Returns bit i unless rays[i] certainly misses all bodies; of at most as many rays as a block has.
+  std::uint64_t screen(std::span<const Ray<S>> rays);
   void follow(const WideTree<S>& tree, WideRayJob<S>& job, std::vector<WideRayItem<S>>& stack);
   /// Follows the current ray through one body. Returns whether the search is over.
   bool enter(std::uint32_t body);
@@ -97,6 +99,7 @@ class WideRays {
   std::vector<S> corners_;          ///< [primitive][lower, upper][3], one scalar past the end
   double built_area_ = -1;          ///< sum over its nodes when it was built; negative: to be built
   std::vector<WideRayItem<S>> body_stack_, stack_;
+  WideRayBlock<S> block_{};
   // The current ray.
   WideRay<S> ray_{};
   RaySearch<S>* search_ = nullptr;

@@ -57,7 +57,7 @@ std::uint32_t WideHierarchy<S>::refill(std::span<const std::uint32_t> order, con
     ++changed;
     list_refilled(wide, primitives);
   }
-  if (changed != 0 && refill_.corners == 0) list_corners(primitives);
+  if (changed != 0 && refill_.corners == 0) this->list_corners(primitives);
   return changed;
 }
 
@@ -103,23 +103,11 @@ void WideHierarchy<S>::list_refilled(std::uint32_t wide, const Primitives& primi
   write_lists(wide, lists);
 }
 
-template <class S>
-void WideHierarchy<S>::list_corners(const Primitives& primitives) {
-  first_corner_.assign(1, 0);
-  corners_.clear();
-  for (const std::uint32_t primitive : primitives_) {
-    for (const std::uint32_t vertex : primitives[primitive]) corners_.push_back(3 * vertex);
-    first_corner_.push_back(std::uint32_t(corners_.size()));
-  }
-}
-
 template void WideHierarchy<float>::begin_refills(const Primitives&);
 template void WideHierarchy<double>::begin_refills(const Primitives&);
 template std::uint32_t WideHierarchy<float>::refill(std::span<const std::uint32_t>, const Primitives&);
 template std::uint32_t WideHierarchy<double>::refill(std::span<const std::uint32_t>, const Primitives&);
 template void WideHierarchy<float>::list_refilled(std::uint32_t, const Primitives&);
 template void WideHierarchy<double>::list_refilled(std::uint32_t, const Primitives&);
-template void WideHierarchy<float>::list_corners(const Primitives&);
-template void WideHierarchy<double>::list_corners(const Primitives&);
 
 }  // namespace kbvh

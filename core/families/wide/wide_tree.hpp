@@ -8,6 +8,7 @@
 #include "core/families/wide/kernels/wide_overlap.hpp"
 #include "core/geometry/box.hpp"
 #include "core/kernels/kernel_set.hpp"
+#include "core/scene/scene.hpp"
 
 namespace kbvh {
 
@@ -53,6 +54,9 @@ class WideTree {
   WideLeafLists leaf_lists() const {
     return {first_entry_.data(), end_entries(), first_corner_.data(), corners_.data(), primitives_.data()};
   }
+  /// Returns the corners of the leaves' entries, [entry][3], times 3, if they are listed and all primitives
+  /// are triangles; else null.
+  const std::uint32_t* triangle_corners() const { return only_triangles_ ? corners_.data() : nullptr; }
   std::uint32_t leaf_count() const { return std::uint32_t(stamps_.size()); }
   /// Returns true at the first call since `positions_changed` for a leaf, numbered as by
   /// `WideNode::first_leaf`.
@@ -86,6 +90,18 @@ class WideTree {
             fetched_.capacity()) *
                sizeof(std::uint32_t);
   }
+  /// Lists the corners of the leaves' entries, in their order.
+  void list_corners(const Primitives& primitives) {
+    first_corner_.assign(1, 0);
+    corners_.clear();
+    only_triangles_ = true;
+    for (const std::uint32_t primitive : primitives_) {
+      const std::span<const std::uint32_t> vertices = primitives[primitive];
+      only_triangles_ = only_triangles_ && vertices.size() == 3;
+      for (const std::uint32_t vertex : vertices) corners_.push_back(3 * vertex);
+      first_corner_.push_back(std::uint32_t(corners_.size()));
+    }
+  }
   const std::uint32_t* end_entries() const {
     if (!end_entry_.empty()) return end_entry_.data();
     return first_entry_.empty() ? nullptr : first_entry_.data() + 1;
@@ -101,6 +117,7 @@ class WideTree {
   std::vector<std::uint32_t> first_corner_, corners_, primitives_, stamps_, fetched_;
   AlignedArray<S> rows_;
   std::uint32_t stamp_ = 1;
+  bool only_triangles_ = false;  ///< and corners are listed
 };
 
 }  // namespace kbvh

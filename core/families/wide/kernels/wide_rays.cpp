@@ -53,6 +53,35 @@ KBVH_INLINE unsigned entered(const S* rows, const WideRay<S>& ray, S* near) {
   return bits;
 }
 
+template <class S>
+std::uint64_t screen(const WideRayBlock<S>& rays, const S* child_bounds, std::uint32_t count) {
+  using V = Values<S>;
+  std::uint64_t met = 0;
+  for (std::size_t i = 0; i < rays.size; i += lanes<S>) {
+    V origin[3], inverse[3];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const V direction = load_lanes<V>(rays.direction[axis] + i), exact = 1 / direction;
+      origin[axis] = load_lanes<V>(rays.origin[axis] + i);
+      // Too small to be inverted, but not zero: not a number.
+      inverse[axis] = direction == 0 ? exact : exact + (exact - exact);
+    }
+    const V limit = load_lanes<V>(rays.length + i);
+    for (std::uint32_t child = 0; child < count; ++child) {
+      V first{}, last = limit;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const V lower = V{} + child_bounds[axis * 8 + child] - origin[axis];
+        const V upper = V{} - child_bounds[(axis + 3) * 8 + child] - origin[axis];
+        const V to_lower = lower * inverse[axis], to_upper = upper * inverse[axis];
+        first = larger(inverse[axis] < 0 ? to_upper : to_lower, first);
+        last = smaller(inverse[axis] < 0 ? to_lower : to_upper, last);
+      }
+      first = smaller(first, V{} + Slack<S>::largest);
+      met |= std::uint64_t(mask_bits(first <= last * Slack<S>::grow + Slack<S>::least)) << i;
+    }
+  }
+  return met;
+}
+
 // ---- Filter of triangles ----------------------------------------------------------------------------------
 
 template <class S>
@@ -119,13 +148,20 @@ KBVH_INLINE bool decide_leaf(WideRayJob<S>& job, std::uint32_t begin, std::uint3
     const std::uint32_t count = end - begin < lanes<S> ? end - begin : lanes<S>;
     const S* rows[3][lanes<S>];
     unsigned unusual = 0;
-    for (std::uint32_t k = 0; k < lanes<S>; ++k) {
-      const std::uint32_t primitive = job.entries[begin + (k < count ? k : 0)];
-      const std::uint32_t corner = job.offsets[primitive];
-      const bool triangle = job.offsets[primitive + 1] - corner == 3;
-      unusual |= unsigned(!triangle) << k;
-      for (std::uint32_t c = 0; c < 3; ++c)
-        rows[c][k] = job.positions + std::size_t(3) * job.vertices[corner + (triangle ? c : 0)];
+    if (job.triangle_corners != nullptr) {
+      const std::uint32_t* const corners = job.triangle_corners + std::size_t(3) * begin;
+      for (std::uint32_t k = 0; k < lanes<S>; ++k)
+        for (std::uint32_t c = 0; c < 3; ++c)
+          rows[c][k] = job.positions + corners[3 * (k < count ? k : 0) + c];
+    } else {
+      for (std::uint32_t k = 0; k < lanes<S>; ++k) {
+        const std::uint32_t primitive = job.entries[begin + (k < count ? k : 0)];
+        const std::uint32_t corner = job.offsets[primitive];
+        const bool triangle = job.offsets[primitive + 1] - corner == 3;
+        unusual |= unsigned(!triangle) << k;
+        for (std::uint32_t c = 0; c < 3; ++c)
+          rows[c][k] = job.positions + std::size_t(3) * job.vertices[corner + (triangle ? c : 0)];
+      }
     }
     unsigned open = (may_meet<S>(*job.ray, rows) | unusual) & ((2U << (count - 1)) - 1);
     for (; open != 0; open &= open - 1)
@@ -141,34 +177,58 @@ void follow(WideRayJob<S>& job) {
   while (job.depth > 0 && job.depth + max_items_per_step <= job.room) {
     const WideRayItem<S> top = job.stack[--job.depth];
     if (!(top.near <= reach)) continue;
-    if ((top.item & WidePair::leaf_bit) != 0) {
-      const LeafSlot slot{top.item & ~WidePair::leaf_bit};
-      const std::uint32_t leaf = job.tree.nodes[slot.node()].first_leaf + slot.lane();
-      job.over = decide_leaf(job, job.first_entry[leaf], job.end_entry[leaf]);
-      if (job.over) return;
-      reach = reach_of(ray);
-      continue;
-    }
-    if (job.stale != nullptr && job.stale[top.item] != 0) job.make(job.context, top.item);
-    const WideNode node = job.tree.nodes[top.item];
-    alignas(64) S near[width];
-    unsigned hit = entered<S, width>(job.tree.child_bounds + top.item * std::size_t(6) * width, ray, near) &
-                   ((1U << node.count) - 1);
-    job.tests += node.count;
-    WideRayItem<S>* const bottom = job.stack + job.depth;
-    for (; hit != 0; hit &= hit - 1) {
-      const auto lane = std::uint32_t(__builtin_ctz(hit));
-      const std::uint32_t item = lane < node.leaf_count ? WidePair::leaf_bit | LeafSlot::of(top.item, lane)
-                                                        : node.first_child + lane - node.leaf_count;
-      WideRayItem<S>* place = job.stack + job.depth++;
-      for (; place > bottom && place[-1].near < near[lane]; --place) *place = place[-1];
-      *place = {near[lane], item};
+    std::uint32_t item = top.item;
+    for (;;) {  // down, as long as there is one child that is nearest
+      if ((item & WidePair::leaf_bit) != 0) {
+        const LeafSlot slot{item & ~WidePair::leaf_bit};
+        const std::uint32_t leaf = job.tree.nodes[slot.node()].first_leaf + slot.lane();
+        job.over = decide_leaf(job, job.first_entry[leaf], job.end_entry[leaf]);
+        if (job.over) return;
+        reach = reach_of(ray);
+        break;
+      }
+      if (job.stale != nullptr && job.stale[item] != 0) job.make(job.context, item);
+      const WideNode node = job.tree.nodes[item];
+      alignas(64) S near[width];
+      unsigned hit = entered<S, width>(job.tree.child_bounds + item * std::size_t(6) * width, ray, near) &
+                     ((1U << node.count) - 1);
+      job.tests += node.count;
+      const auto child = [&](std::uint32_t lane) {
+        return lane < node.leaf_count ? WidePair::leaf_bit | LeafSlot::of(item, lane)
+                                      : node.first_child + lane - node.leaf_count;
+      };
+      if (hit == 0) break;
+      const auto first = std::uint32_t(__builtin_ctz(hit));
+      hit &= hit - 1;
+      if (hit == 0) {
+        item = child(first);
+        continue;
+      }
+      const auto second = std::uint32_t(__builtin_ctz(hit));
+      hit &= hit - 1;
+      if (hit == 0 && job.depth + 2 * max_items_per_step <= job.room) {
+        const bool swap = near[second] < near[first];
+        const std::uint32_t far = swap ? first : second;
+        job.stack[job.depth++] = {near[far], child(far)};
+        item = child(swap ? second : first);
+        continue;
+      }
+      WideRayItem<S>* const bottom = job.stack + job.depth;
+      const auto push = [&](std::uint32_t lane) {
+        WideRayItem<S>* place = job.stack + job.depth++;
+        for (; place > bottom && place[-1].near < near[lane]; --place) *place = place[-1];
+        *place = {near[lane], child(lane)};
+      };
+      push(first);
+      push(second);
+      for (; hit != 0; hit &= hit - 1) push(std::uint32_t(__builtin_ctz(hit)));
+      break;
     }
   }
 }
 
 template <class S>
-constexpr WideRayKernels<S> table{&follow<S, 2>, &follow<S, 4>, &follow<S, 8>};
+constexpr WideRayKernels<S> table{&follow<S, 2>, &follow<S, 4>, &follow<S, 8>, &screen<S>};
 
 }  // namespace
 

@@ -37,6 +37,8 @@ struct WideRayJob {
   /// filter.
   const std::uint32_t* offsets;
   const std::uint32_t* vertices;
+  /// [entry][3]: corners of the entries' primitives, times 3; null: found by offsets and vertices.
+  const std::uint32_t* triangle_corners;
   const S* positions;         ///< [vertex][3], one scalar past the end
   const std::uint8_t* stale;  ///< [node]: not 0 while its children's boxes must be made; null: none
   WideRayItem<S>* stack;
@@ -50,6 +52,13 @@ struct WideRayJob {
 /// The largest number of items that one step may push.
 inline constexpr std::size_t max_items_per_step = 8;
 
+/// Rays side by side, for a test without branches of many against few boxes.
+template <class S>
+struct WideRayBlock {
+  static constexpr std::size_t size = 64;
+  alignas(64) S origin[3][size], direction[3][size], length[size];
+};
+
 /// Follows rays, nearer children first. Boxes are closed and tested conservatively: an item is left out only
 /// if the ray certainly misses its box within the limit. A filter leaves out primitives of three corners that
 /// the ray certainly misses; all others are decided by the caller.
@@ -58,6 +67,10 @@ struct WideRayKernels {
   /// Continues until the stack is empty, the search is over, or a step might exceed the free space.
   using Follow = void (*)(WideRayJob<S>& job);
   Follow width2, width4, width8;
+  /// Returns bit i unless ray i of a block certainly misses all of the first `count` boxes of a node of
+  /// width 8.
+  using Screen = std::uint64_t (*)(const WideRayBlock<S>& rays, const S* child_bounds, std::uint32_t count);
+  Screen screen;
   Follow follow(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
 };
 KBVH_DECLARE_KERNELS(WideRayKernels<float>, wide_rays_float)
