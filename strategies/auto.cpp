@@ -1,9 +1,9 @@
 // A strategy that chooses among other strategies by observed properties of the scene: the number of frames
 // per segment of the flight plans, the vertex steps per frame, changes of plans, and the number of
-// candidates; the growth of boxes as trees age, with the box tests that new trees save; the triangle and box
-// tests of the interval join, by which a join that decides little for spans of time, or whose trees have
-// aged, is left after some frames; and the candidates that slabs at the leaves leave out. The choice depends
-// on counts and plans only, never on a clock, so that a run can be repeated.
+// candidates; the growth of boxes as trees age, with the box tests that new trees save; the work that the
+// interval join does for whole segments, beside that of a refit, by which a join is kept or left after a
+// trial; and the candidates that slabs at the leaves leave out. The choice depends on counts and plans only,
+// never on a clock, so that a run can be repeated.
 //
 // Each candidate has one instance from the first frame on, with its own hierarchies. This costs the memory of
 // all candidates and saves creating an instance at a change. Inactive instances do not advance.
@@ -15,6 +15,8 @@
 #include "core/contract/registry.hpp"
 #include "core/contract/tells_work.hpp"
 #include "core/families/choice/observed_ageing.hpp"
+#include "core/families/choice/observed_join.hpp"
+#include "core/families/choice/observed_motion.hpp"
 #include "core/families/choice/observed_slabs.hpp"
 #include "core/families/choice/predicted_costs.hpp"
 
@@ -49,8 +51,10 @@ class Auto final : public Strategy<S>,
   static constexpr Foresight foresight = Foresight::next_keyframe;
 
   Auto(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params& params)
-      : Strategy<S>(scene, motion), motion_(motion), gain_(params.number("gain")) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) measure(topologies[body], body);
+      : Strategy<S>(scene, motion),
+        motion_(motion),
+        steps_(scene, motion, topologies),
+        gain_(params.number("gain")) {
     constexpr auto policy = Count::enabled ? CountingPolicy::counting : CountingPolicy::silent;
     for (const Candidate& candidate : candidates()) {
       const auto found = std::find_if(registry().begin(), registry().end(), [&](const StrategyEntry& entry) {
@@ -64,7 +68,6 @@ class Auto final : public Strategy<S>,
       runner.work = dynamic_cast<TellsWork*>(runner.strategy.get());
     }
     if (runners_.empty()) throw ConfigError("auto has nothing to choose from");
-    velocities_.resize(scene.body_count());
   }
 
   void reset_to(double t) override {
@@ -80,24 +83,28 @@ class Auto final : public Strategy<S>,
     step_ = 0;
     segment_end_ = t;
     changes_ = false;
-    chosen_candidates_ = tests_before_ = 0;
+    chosen_candidates_ = 0;
     chosen_near_ = false;
     touching_.clear();
     for (Reported& one : reported_) one.start_over();
     switches_ = 0;
+    pairs_asked_ = pairs_in_frame_ = rays_asked_ = false;
+    window_ = {};
     changed_.clear();
     body_changed_.assign(this->scene_.body_count(), 0);
     seen_ = {};
-    for (const double reads : reads_) seen_.reads += reads;
+    seen_.reads = steps_.reads();
     ageing_.start_over(runners_[0].work != nullptr ? runners_[0].work->surface() : 0);
     chosen_tests_ = 0;
-    tried_ = false;
+    tried_ = waits_ = false;
+    join_.start_over(seen_);
     slabs_.start_over(runners_[0].candidate->cost == &refit_cost, seen_);
   }
 
   void advance_to(double t) override {
     const double before = this->previous_time();
     ++frame_;
+    pairs_in_frame_ = false;
     seen_.changes_per_frame += ((changes_ ? 1.0 : 0.0) - seen_.changes_per_frame) / std::min(frame_, 16);
     changes_ = false;
     if (t > before) step_ = t - before;
@@ -106,14 +113,16 @@ class Auto final : public Strategy<S>,
     const bool due = frame_ == 1 || stayed >= (t >= segment_end_ ? stay_ : longest_stay) ||
                      (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
                      seen_.near != chosen_near_ || seen_.candidates > 2 * chosen_candidates_ ||
-                     2 * seen_.candidates < chosen_candidates_ || tried_ ||
+                     2 * seen_.candidates < chosen_candidates_ || tried_ || waits_ ||
+                     (is_active(&join_cost) && seen_.near && !join_.known()) ||
                      (refits() && ageing_.tests() > 1.5 * chosen_tests_);
     if (step_ > 0 && due) choose(t);
     if (active_ != last) ++switches_;
-    tried_ = active_ != last && (is_active(&rebuilt_cost) || is_active(&plain_cost));
+    tried_ = active_ != last && (is_active(&rebuilt_cost) || is_active(&plain_cost) || join_.outdated());
     Runner& runner = runners_[active_];
     if (runner.all_positions) fetch_all();
     if (active_ == last || runner.fresh) {
+      if (window_.begins) begin_window();
       runner.strategy->advance(t);
     } else {
       add(retired_, runner.strategy->counters());
@@ -121,6 +130,7 @@ class Auto final : public Strategy<S>,
       runner.strategy->reset(t);
       // The instance sees the current plans, but not which bodies no longer rest.
       if (!changed_.empty()) runner.strategy->flight_plans_changed(t, changed_);
+      if (window_.begins) begin_window();
     }
     for (Runner& other : runners_) other.fresh = false;
     ++runner.frames;
@@ -131,9 +141,10 @@ class Auto final : public Strategy<S>,
     // Not all candidates honour a budget.
     const QueryStatus status = runners_[active_].strategy->candidates_at(t, out, {});
     see_candidates(out.size() - before, true);
-    const std::size_t count = out.size() - before, stride = std::max<std::size_t>(1, count / samples);
+    const std::size_t count = out.size() - before,
+                      stride = std::max<std::size_t>(1, count / ObservedMotion<S>::samples);
     touching_.clear();
-    for (std::size_t i = 0; i < count && touching_.size() < samples; i += stride)
+    for (std::size_t i = 0; i < count && touching_.size() < ObservedMotion<S>::samples; i += stride)
       touching_.push_back(out[before + i]);
     return status;
   }
@@ -161,11 +172,18 @@ class Auto final : public Strategy<S>,
     // Pairs that intersect stand for the candidates among which they are.
     see_candidates(reported.pairs.size(), answer == Answer::candidates);
     touching_.clear();
-    reported.pairs.sample(samples, touching_);
+    reported.pairs.sample(ObservedMotion<S>::samples, touching_);
   }
 
   void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
-    runners_[active_].strategy->hits_at(t, query, rays, hits);
+    const Runner& runner = runners_[active_];
+    runner.strategy->hits_at(t, query, rays, hits);
+    rays_asked_ = true;
+    // Where pairs are asked, too, these tell how trees age.
+    if (pairs_in_frame_ || runner.work == nullptr) return;
+    const double tests = costs::Ageing::ray_test * double(runner.work->last_ray_tests());
+    if (refits()) seen_.slab_tests = seen_.plain_tests = tests;
+    see_tests(tests, 0);
   }
 
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
@@ -208,7 +226,7 @@ class Auto final : public Strategy<S>,
     std::size_t total =
         (touching_.capacity() + now_.capacity() + before_.capacity()) * sizeof(PrimitivePair) +
         changed_.capacity() * sizeof(PlanChange<S>) + difference_.bytes() + reported_[0].pairs.bytes() +
-        reported_[1].pairs.bytes();
+        reported_[1].pairs.bytes() + steps_.bytes();
     for (const Runner& runner : runners_) total += runner.strategy->bytes();
     return total;
   }
@@ -234,8 +252,6 @@ class Auto final : public Strategy<S>,
   /// The number of frames after which the choice is reviewed within one segment, and at the start of a new
   /// one; the latter doubles each time that the choice is confirmed.
   static constexpr int longest_stay = 64, shortest_stay = 8;
-  static constexpr std::uint32_t samples = 24;
-  static constexpr std::size_t most_pairs = 1024;  ///< pairs of bodies that a choice examines
 
   static void add(Counters& sum, const Counters& other) {
     for (const Counter peak : {Counter::list_peak, Counter::queue_peak}) {
@@ -249,68 +265,77 @@ class Auto final : public Strategy<S>,
     for (const Counters::Named& counter : other.named) sum.add(counter.name, counter.value);
   }
 
-  /// Measures a body's hierarchy: the current mean side of leaf boxes, and the number of vertices in its
-  /// leaves.
-  void measure(const Topology& topology, std::uint32_t body) {
-    const Primitives& primitives = this->scene_.primitives(body);
-    double sum = 0, leaves = 0, reads = 0;
-    std::vector<std::uint32_t> unique;
-    for (const TopologyNode& node : topology.nodes) {
-      if (!node.is_leaf()) continue;
-      Box<S> box;
-      unique.clear();
-      for (std::uint32_t k = node.first(); k < node.first() + node.count(); ++k)
-        for (const std::uint32_t v : primitives[topology.primitives[k]]) {
-          box.extend(motion_.position(body, v));
-          unique.push_back(v);
-        }
-      std::sort(unique.begin(), unique.end());
-      reads += double(std::unique(unique.begin(), unique.end()) - unique.begin());
-      for (int axis = 0; axis < 3; ++axis) sum += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
-      ++leaves;
-    }
-    leaf_size_.push_back(leaves == 0 ? 0 : sum / leaves);
-    reads_.push_back(this->scene_.moving(body) ? reads : 0);
-  }
-
   /// Whether trees that are only refitted answer.
   bool refits() const { return active_ == 0 || is_active(&plain_cost); }
   bool is_active(double (*cost)(const Observed&)) const { return runners_[active_].candidate->cost == cost; }
+  /// Returns what answers a frame that a join is compared with: in trees that have aged, a refit would take
+  /// long.
+  std::size_t refit_to_compare() const {
+    for (std::size_t i = 0; i < runners_.size(); ++i)
+      if (seen_.aged > 0.5 && runners_[i].candidate->cost == &rebuilt_cost) return i;
+    return 0;
+  }
   /// Strategies differ in the pairs that they leave out early: only drift_boxes reports all pairs of boxes,
   /// and shows that bodies are apart.
   void see_candidates(std::size_t count, bool all) {
+    pairs_asked_ = pairs_in_frame_ = true;
     if (count != 0 || is_active(&drift_cost)) seen_.near = count != 0;
     if (!seen_.near) seen_.candidates = double(count);
+    if (is_active(&join_cost)) joined_candidates_ = double(count);
     const TellsWork* work = runners_[active_].work;
     if (is_active(&refit_cost) && work != nullptr)
       slabs_.slabs(double(count), *work, all, frame_, seen_);
-    else if (is_active(&plain_cost))
-      slabs_.plain(double(count), all, frame_, seen_);
-    if (work == nullptr) return;
-    if (refits())
-      ageing_.refitted(double(work->last_box_tests()));
-    else if (is_active(&rebuilt_cost))
-      ageing_.rebuilt(double(work->last_box_tests()), double(count), std::max(1, frame_), seen_);
+    else if (is_active(&plain_cost) && work != nullptr)
+      slabs_.plain(double(count), *work, all, frame_, seen_);
+    if (work != nullptr) see_tests(double(work->last_box_tests()), double(count));
   }
-  /// Measures the work of the active strategy since the last choice.
-  void see_work() {
-    if (refits() && runners_[active_].work != nullptr)
-      ageing_.look_at_refitted(runners_[active_].work->surface(), frame_, seen_);
-    else if (is_active(&rebuilt_cost) && frame_ - chosen_at_ >= shortest_stay)
-      ageing_.look_at_rebuilt();
-    const double tests = double(runners_[active_].strategy->counters()[Counter::triangle_tests]);
+  void see_tests(double tests, double count) {
+    if (refits())
+      ageing_.refitted(tests, frame_);
+    else if (is_active(&rebuilt_cost))
+      ageing_.rebuilt(tests, count, std::max(1, frame_), seen_);
+  }
+  /// Measures the work of the active strategy since the last choice, or since its window began. `whole`: a
+  /// segment ends here.
+  void see_work(bool whole) {
+    const Runner& runner = runners_[active_];
+    const Counters counters = runner.strategy->counters();
     const double frames = frame_ - chosen_at_;
+    if (refits() && runner.work != nullptr) {
+      ageing_.look_at_refitted(runner.work->surface(), frame_, seen_);
+      join_.refitted(seen_);
+    } else if (is_active(&rebuilt_cost) && frames >= shortest_stay) {
+      ageing_.look_at_rebuilt();
+    }
+    if (is_active(&rebuilt_cost)) join_.refitted(seen_);
     // From time to time drift_boxes may look whether bodies have parted.
     if (frames >= longest_stay && seen_.candidates == 0) seen_.near = false;
     if (!is_active(&join_cost)) {
-      seen_.undecided *= 0.8;
-      seen_.join_tests *= 0.8;
-    } else if (frames > 0) {
-      if (seen_.candidates > 0) seen_.undecided = (tests - tests_before_) / frames / seen_.candidates;
-      if (const TellsWork* work = runners_[active_].work; work != nullptr)
-        seen_.join_tests = double(work->last_box_tests()) / seen_.frames_per_segment;
+      if (frames >= shortest_stay) join_.forget(seen_);
+    } else if (whole && window_.frame != none && frame_ > window_.frame) {
+      join_.joined(joined_work(counters), joined_candidates_, seen_);
     }
-    tests_before_ = tests;
+  }
+  /// Returns the work of the join in a frame of its window, which is of whole segments.
+  double joined_work(const Counters& counters) const {
+    using Work = costs::Work;
+    const double frames = frame_ - window_.frame;
+    const TellsWork* work = runners_[active_].work;
+    const double boxes = work != nullptr ? double(work->last_box_tests()) : 0;
+    const double in_frames =
+        Work::span_test * double(span_tests() - window_.span_tests) +
+        Work::join_triangle_test * double(counters[Counter::triangle_tests] - window_.triangle_tests) +
+        Work::join_fetch * double(this->sampled_.fetched() - window_.fetched);
+    return (Work::join_read * seen_.reads + Work::join_box_test * boxes) / seen_.frames_per_segment +
+           in_frames / frames;
+  }
+  void begin_window() {
+    const Counters counters = runners_[active_].strategy->counters();
+    window_ = {false, frame_, span_tests(), counters[Counter::triangle_tests], this->sampled_.fetched()};
+  }
+  std::uint64_t span_tests() const {
+    const TellsWork* work = runners_[active_].work;
+    return work != nullptr ? work->span_tests() : 0;
   }
 
   void fetch_all() {
@@ -320,38 +345,33 @@ class Auto final : public Strategy<S>,
   /// Reads the plans, and switches to a strategy that is predicted to be faster than the active one by at
   /// least `gain_`.
   void choose(double t) {
-    see_work();
+    double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
+    if (seen_.changes_per_frame == 0)  // otherwise the observation takes too long and is unreliable
+      for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
+        begin = std::max(begin, motion_.lines_begin(body));
+        end = std::min(end, motion_.lines_end(body));
+      }
+    const bool bounded =
+        begin > -std::numeric_limits<double>::infinity() && end < std::numeric_limits<double>::infinity();
+    // The work of a segment is done when it begins: a join is not left within one, unless it is long.
+    const bool whole = bounded && begin > this->previous_time();
+    if (is_active(&join_cost) && bounded && !whole && frame_ - chosen_at_ < 2 * longest_stay) return;
+    const bool known = join_.known();
+    see_work(whole);
     chosen_at_ = frame_;
     chosen_candidates_ = seen_.candidates;
     chosen_near_ = seen_.near;
     chosen_tests_ = ageing_.tests();
-    double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
-    for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
-      if (seen_.changes_per_frame == 0) {  // otherwise the observation takes too long and is unreliable
-        begin = std::max(begin, motion_.lines_begin(body));
-        end = std::min(end, motion_.lines_end(body));
-      }
-      sample(body);
-    }
-    seen_.step = seen_.spread = 0;
-    // Samples some of many pairs of bodies: similar bodies show similar largest steps.
-    const auto pairs = this->scene_.pairs();
-    seen_.many_bodies = pairs.size() > most_pairs;
-    const std::size_t apart = (pairs.size() + most_pairs - 1) / most_pairs;
-    for (std::size_t i = 0; i < pairs.size(); i += apart) {
-      pass(pairs[i].first, pairs[i].second);
-      pass(pairs[i].second, pairs[i].first);
-    }
-    seen_.slide = slide();
+    seen_.rays_only = rays_asked_ && !pairs_asked_;
+    rays_asked_ = pairs_asked_ = false;
+    steps_.look(step_, touching_, seen_);
     segment_end_ = end > t ? end : t;
-    const bool known =
-        begin > -std::numeric_limits<double>::infinity() && end < std::numeric_limits<double>::infinity();
-    if (known)
+    if (bounded)
       seen_.frames_per_segment = std::max(1.0, (end - begin) / step_);
     else if (frame_ == 1 || seen_.changes_per_frame > 0)
       seen_.frames_per_segment = std::numeric_limits<double>::infinity();
     slabs_.prepare_choice(frame_ - 1, seen_);
-    const double gain = tried_ ? 1 : gain_;
+    const double gain = tried_ || known != join_.known() ? 1 : gain_;
     std::size_t best = active_;
     double least = runners_[active_].candidate->cost(seen_);
     for (std::size_t i = 0; i < runners_.size(); ++i) {
@@ -361,61 +381,18 @@ class Auto final : public Strategy<S>,
         best = i;
       }
     }
+    // This is found at the end of a segment, where a frame of a refit costs no second join.
+    if (join_.outdated()) best = refit_to_compare();
+    // A join of a segment's last frames costs as much as that of the whole.
+    waits_ = best != active_ && runners_[best].candidate->cost == &join_cost && bounded && !whole &&
+             end - t < costs::Choice::join_segment * step_;
+    if (waits_) return;
     stay_ = best == active_ ? std::min(2 * stay_, longest_stay) : shortest_stay;
-    if (best != active_) tests_before_ = 0;  // it starts over
     active_ = best;
-  }
-
-  /// Samples the current velocities of some of a body's vertices.
-  void sample(std::uint32_t body) {
-    Velocities& seen = velocities_[body];
-    const std::uint32_t count = this->scene_.vertex_count(body);
-    seen = {};
-    if (count == 0 || (!this->scene_.moving(body) && seen_.changes_per_frame == 0)) return;
-    seen.count = std::min(samples, count);
-    for (std::uint32_t i = 0; i < seen.count; ++i) {
-      // Spreads the samples by the golden ratio: even steps may hit the same place in every row of a grid.
-      const std::uint32_t share = 0x9e3779b9u * i;  // of 2^32
-      const auto vertex = std::uint32_t(std::uint64_t(share) * count >> 32);
-      for (int axis = 0; axis < 3; ++axis) {
-        seen.of[i][axis] = velocity(body, vertex, axis);
-        seen.mean[axis] += seen.of[i][axis] / seen.count;
-      }
-    }
-  }
-  double velocity(std::uint32_t body, std::uint32_t vertex, int axis) const {
-    if (!this->scene_.moving(body) && seen_.changes_per_frame == 0) return 0;
-    const Piece<S> piece = motion_.piece(body, vertex, axis);
-    return piece.kind == PieceKind::ray ? double(piece.x1)
-                                        : (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
-  }
-  /// Returns the step of primitives relative to their candidates in the last frame.
-  double slide() const {
-    double sum = 0;
-    for (const PrimitivePair& pair : touching_) {
-      const std::uint32_t a = this->scene_.primitives(pair.body_a)[pair.primitive_a][0];
-      const std::uint32_t b = this->scene_.primitives(pair.body_b)[pair.primitive_b][0];
-      double way[3];
-      for (int axis = 0; axis < 3; ++axis)
-        way[axis] = velocity(pair.body_a, a, axis) - velocity(pair.body_b, b, axis);
-      const double leaf = std::max(leaf_size_[pair.body_a], leaf_size_[pair.body_b]);
-      if (leaf > 0) sum += std::hypot(way[0], way[1], way[2]) * step_ / leaf;
-    }
-    return touching_.empty() ? seen_.step : sum / double(touching_.size());
-  }
-  /// Measures how a body's vertices move relative to another body as a whole. Common motion does not count:
-  /// bounds that move contain it.
-  void pass(std::uint32_t body, std::uint32_t other) {
-    const Velocities &own = velocities_[body], &others = velocities_[other];
-    if (own.count == 0 || leaf_size_[body] <= 0) return;
-    double sum = 0;
-    for (std::uint32_t i = 0; i < own.count; ++i)
-      sum += std::hypot(own.of[i][0] - others.mean[0], own.of[i][1] - others.mean[1],
-                        own.of[i][2] - others.mean[2]);
-    const double common = own.count * std::hypot(own.mean[0] - others.mean[0], own.mean[1] - others.mean[1],
-                                                 own.mean[2] - others.mean[2]);
-    seen_.step = std::max(seen_.step, sum / own.count * step_ / leaf_size_[body]);
-    if (sum > 0) seen_.spread = std::max(seen_.spread, 1 - common / sum);
+    if (!is_active(&join_cost))
+      window_ = {};
+    else if (whole)
+      window_.begins = true;
   }
 
   /// What answers as changes add up to.
@@ -427,27 +404,35 @@ class Auto final : public Strategy<S>,
       switches = 0;
     }
   };
-  struct Velocities {
-    std::uint32_t count = 0;  ///< none: the body rests
-    double of[samples][3] = {}, mean[3] = {};
+  static constexpr int none = -1;
+  /// Frames over which the work of the join is measured: from the beginning of one segment to that of
+  /// another.
+  struct Window {
+    bool begins = false;  ///< before the strategy advances
+    int frame = none;
+    std::uint64_t span_tests = 0, triangle_tests = 0, fetched = 0;  ///< until then
   };
   SegmentMotion<S> motion_;
+  ObservedMotion<S> steps_;
   double gain_;
   std::vector<Runner> runners_;
-  std::vector<double> leaf_size_, reads_;  ///< by body
-  std::vector<Velocities> velocities_;     ///< by body, per second
-  Counters retired_;                       ///< counts of instances before their restart
+  Counters retired_;  ///< counts of instances before their restart
   std::size_t active_ = 0;
   std::uint64_t first_fetch_ = 0;
   int frame_ = 0, chosen_at_ = 0, stay_ = shortest_stay;
   double step_ = 0, segment_end_ = 0;  ///< seconds
   double chosen_candidates_ = 0;       ///< number of candidates at the time of the choice
   bool chosen_near_ = false;           ///< whether bodies met then
-  double tests_before_ = 0;            ///< triangle tests of the active strategy until then
   double chosen_tests_ = 0;            ///< box tests of the refitted trees in the frame before
   bool tried_ = false;  ///< a strategy answers for the first time whose work decides whether it stays
   ObservedAgeing ageing_;
+  bool waits_ = false;  ///< for the next segment, to join it
+  ObservedJoin join_;
+  double joined_candidates_ = 0;  ///< of the join's last frame
+  Window window_;
   ObservedSlabs slabs_;
+  bool pairs_asked_ = false, rays_asked_ = false;  ///< since the last choice
+  bool pairs_in_frame_ = false;
   bool changes_ = false;                ///< plans changed since the last frame
   std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first change of each body
   std::vector<std::uint8_t> body_changed_;

@@ -242,6 +242,13 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     return tests;
   }
 
+  std::uint64_t span_tests() const override {
+    std::uint64_t tests = 0;
+    for (const Joins<S>* one : {&now_, &next_})
+      for (const auto& answers : one->answers) tests += answers.attempts();
+    return tests;
+  }
+
   std::size_t bytes() const override {
     std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes() + query_.bytes() + changes_.bytes() +
                         rays_.bytes() + shared_confirmation_.bytes() + parts_.capacity() * sizeof(parts_[0]) +
@@ -254,11 +261,9 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
  protected:
   void add_counts(Counters& table) const override {
+    table[Counter::span_tests] += span_tests();
     for (const Joins<S>* one : {&now_, &next_})
-      for (const auto& answers : one->answers) {
-        table[Counter::span_tests] += answers.attempts();
-        table[Counter::span_verdicts] += answers.decided();
-      }
+      for (const auto& answers : one->answers) table[Counter::span_verdicts] += answers.decided();
     const auto& repairs = bounds_.repairs();
     if (repairs.kept + repairs.restarted == 0) return;
     table.add("segments_kept", repairs.kept);

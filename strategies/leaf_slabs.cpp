@@ -56,7 +56,6 @@ class LeafSlabs final : public StoredHierarchyStrategy<S, Count>,
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
-    const std::uint64_t pairs_before = slabs_.leaf_pairs(), separated_before = slabs_.separated();
     const S reach = largest_coordinate();
     this->for_near_bodies(tests, [&](const BodyPair& pair) {
       if (tests >= budget.box_tests) {
@@ -75,11 +74,8 @@ class LeafSlabs final : public StoredHierarchyStrategy<S, Count>,
     });
     this->count_.add(Counter::box_tests, tests);
     this->last_box_tests_ = tests;
-    const std::uint64_t separated = slabs_.separated() - separated_before;
-    last_slab_pairs_ = {separated, slabs_.leaf_pairs() - pairs_before - separated};
     return status;
   }
-  TellsWork::SlabPairs last_slab_pairs() const override { return last_slab_pairs_; }
 
   std::size_t bytes() const override {
     std::size_t total = Base::bytes() + slabs_.bytes();
@@ -119,7 +115,6 @@ class LeafSlabs final : public StoredHierarchyStrategy<S, Count>,
   std::vector<SlabBlocks<S>> blocks_;   ///< [body]
   std::vector<std::uint8_t> accepted_;  ///< [body]
   SlabQuery<S> slabs_;
-  TellsWork::SlabPairs last_slab_pairs_;
 };
 
 }  // namespace

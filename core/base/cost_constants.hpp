@@ -41,32 +41,46 @@ struct Ageing {
   static constexpr double ray_test = 12;
 };
 
+/// The work of a frame that a choice has seen, in nanoseconds by counts. Fitted to the runs of 19 scenes at l
+/// = 1, 3, 10 and 30 (experiments/plans/auto.json, c80e232, Intel Xeon with AVX-512; update, search and
+/// triangle tests). Measured times differ from these sums by 9 % (join, bottom_up) and 16 % (leaf_slabs),
+/// root mean square.
+struct Work {
+  /// A frame of a refit.
+  struct Refit {
+    double read, box_test, triangle_test;
+    constexpr double of(double reads, double box_tests, double triangle_tests) const {
+      return read * reads + box_test * box_tests + triangle_test * triangle_tests;
+    }
+  };
+  static constexpr Refit slabs{1.09, 0.88, 32}, plain{0.82, 0.65, 21};
+  static constexpr double rebuilt_read = 3.5;  ///< of lbvh_drift without its builds
+  /// interval_join: the reads of a refit once a segment, box tests of its search, and what its frames do.
+  static constexpr double join_read = 3.05, join_box_test = 2.42, span_test = 92, join_triangle_test = 64,
+                          join_fetch = 3.3;
+  static constexpr double hope = 0.55;  ///< of a predicted cost, before the first trial
+};
+
 /// auto, in nanoseconds per frame (Zen 5, float); only their order matters. Fitted:
 /// - leaf_slabs (`refit`) and the join on six captured or animated figures, a skirt and a tablecloth
 ///   (experiments/plans/motion.json) at l = 1, 3, 7 and 30, but for `join_slide` and `join_apart`;
 /// - these two and drift_boxes on the scenes "tuned on" of experiments/plans/auto.json, in c6e0cf1, 167e5b8
 ///   and ef3f1d8, with counts of candidates that are larger than those of leaf_slabs;
-/// - slabs (from `slab_candidate` to `plain_candidate`) on measurements of 869ab66 of the same scenes and
-///   those "tuned on, ageing";
-/// - the last three lines on the mixing swarms, unrolling yarns, tablecloth and random soups at l = 1, in
-///   460de91, and `join_box_test` also on the swarms at l = 10, in 869ab66. The last two points were
-///   measured on an Intel Xeon, and divided by 1.7: what leaf_slabs takes there, over its prediction.
+/// - slabs (`slab_test` to `plain_candidate`) on the same runs as Work: what leaf_slabs takes beyond
+/// bottom_up;
+/// - the last two lines on the mixing swarms, unrolling yarns, tablecloth and random soups at l = 1, in
+///   460de91.
 struct Choice {
-  static constexpr double refit_read = 0.27, refit_candidate = 37;  ///< per vertex read; per candidate
-  static constexpr double slab_candidate = 18;    ///< a candidate of leaf_slabs, without the search
-  static constexpr double slabs_leave = 32.8;     ///< lost by slabs that do not separate a pair of leaves
-  static constexpr double slabs_separate = 3.9;   ///< won where they do
-  static constexpr double plain_candidate = 6.8;  ///< a candidate that slabs would have left out
-  static constexpr double watch_read = 0.1;       ///< per vertex whose drift is read
-  static constexpr double search_read = 0.35, search_candidate = 90;  ///< one search of drift_boxes
-  static constexpr double kept_candidate = 45;                        ///< a frame of drift_boxes
+  static constexpr double slab_test = 0.58, plain_test = 0.36;  ///< box tests of leaf_slabs and bottom_up
+  static constexpr double plain_candidate = 9;  ///< a candidate that slabs would have left out
+  static constexpr double watch_read = 0.3;     ///< per vertex whose drift is read
+  static constexpr double search_read = 0.6, search_candidate = 153;  ///< one search of drift_boxes
+  static constexpr double kept_candidate = 76;                        ///< a frame of drift_boxes
   static constexpr double unfit = 1.2;  ///< drift_boxes that fall back, over a refit
   static constexpr double join_frame = 0.12, join_segment = 4.2, join_frames = 1;  ///< of a refit
-  static constexpr double join_moves = 0.25, join_undecided = 2;                   ///< of a join
+  static constexpr double join_moves = 0.25;                                       ///< of a join
   static constexpr double join_slide = 0.2, join_apart = 1.5;                      ///< of a refit
-  static constexpr double box_test = 0.5;                        ///< in trees that have aged
-  static constexpr double join_box_test = 1.5;                   ///< the same, of a join
-  static constexpr double rebuilt_read = 2.5, build_read = 1.7;  ///< lbvh_drift: a refit, a build
+  static constexpr double build_read = 2.4;                                        ///< a build of lbvh_drift
 };
 
 }  // namespace kbvh::costs

@@ -12,12 +12,10 @@ class TellsWork {
   /// Returns the surfaces of all boxes of moving bodies, each over that of its root: what grows as trees age.
   /// 0 if the trees do not age. O(nodes).
   virtual double surface() { return 0; }
-  /// Pairs of leaves that slabs separate, and those that they leave open.
-  struct SlabPairs {
-    std::uint64_t separated = 0, open = 0;
-  };
-  /// Returns the pairs of leaves that the last search compared by slabs; none without slabs.
-  virtual SlabPairs last_slab_pairs() const { return {}; }
+  /// Returns the box tests of the last call for rays; 0 if it does not tell.
+  virtual std::uint64_t last_ray_tests() const { return 0; }
+  /// Returns the attempts to decide a pair of triangles for a span of time, since the last reset.
+  virtual std::uint64_t span_tests() const { return 0; }
 };
 
 }  // namespace kbvh

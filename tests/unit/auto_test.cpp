@@ -7,6 +7,7 @@
 
 #include "core/contract/registry.hpp"
 #include "core/families/choice/observed_ageing.hpp"
+#include "core/families/choice/observed_join.hpp"
 #include "core/families/choice/observed_slabs.hpp"
 #include "tests/support/flying_triangles.hpp"
 #include "tests/support/moving_grids.hpp"
@@ -91,6 +92,27 @@ TEST(Auto, RebuildsTreesThatAge) {
   EXPECT_GT(frames_of(choice, "lbvh_drift"), 60) << choice;
 }
 
+TEST(Auto, RebuildsTreesThatAgeByRaysAlone) {
+  const Scene<float> scene = flying_triangles(4000, 100, Flight::anywhere);
+  Play<float> play(scene, "auto", {});
+  Random random(3);
+  std::vector<Ray<float>> rays(200);
+  for (Ray<float>& ray : rays)
+    for (int axis = 0; axis < 3; ++axis) {
+      ray.origin[axis] = float(3 * random.unit());
+      ray.direction[axis] = float(random.unit()) - ray.origin[axis];
+    }
+  std::vector<RayHit> hits(rays.size());
+  play.session.reset(0);
+  for (int f = 0; f < 100; ++f) {
+    if (f > 0) play.session.advance(f, play.times);
+    play.session.hits(RayQuery::closest, rays, hits, play.times);
+  }
+  const std::string choice = play.session.strategy().choice();
+  EXPECT_GT(frames_of(choice, "lbvh_drift"), 60) << choice;
+  EXPECT_EQ(frames_of(choice, "drift_boxes") + frames_of(choice, "interval_join"), 0) << choice;
+}
+
 TEST(Auto, LeavesAJoinWhoseTreesHaveAged) {
   const std::string choice = chosen_at_keyframes(flying_triangles(4000, 40, Flight::anywhere), 390, 10);
   EXPECT_GT(frames_of(choice, "interval_join"), 0) << choice;  // in trees that are young
@@ -111,12 +133,11 @@ TEST(Auto, LeavesSlabsThatDoNotPay) {
   EXPECT_GE(frames_of(choice, "bottom_up"), 48) << choice;
 }
 
-/// A search with 10,000 box tests that compares pairs of leaves by slabs and separates none.
+/// A search with some box tests.
 struct Told final : TellsWork {
-  explicit Told(std::uint64_t pairs) : open(pairs) {}
-  std::uint64_t last_box_tests() const override { return 10000; }
-  SlabPairs last_slab_pairs() const override { return {0, open}; }
-  std::uint64_t open;
+  explicit Told(std::uint64_t box_tests) : tests(box_tests) {}
+  std::uint64_t last_box_tests() const override { return tests; }
+  std::uint64_t tests;
 };
 
 TEST(ObservedSlabs, CompareTwoFramesInARow) {
@@ -126,32 +147,34 @@ TEST(ObservedSlabs, CompareTwoFramesInARow) {
   slabs.start_over(true, seen);
   slabs.prepare_choice(0, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity()) << "nothing is known";
-  // 300 pairs of leaves for 100 candidates: without slabs it may be faster, and is tried.
-  slabs.slabs(100, Told(300), true, 1, seen);
+  // Without slabs it may be faster, and is tried.
+  slabs.slabs(100, Told(10000), true, 1, seen);
   slabs.prepare_choice(1, seen);
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
-  // It finds that slabs leave out 30 times as many.
-  slabs.plain(3000, true, 2, seen);
+  // It finds that slabs leave out 29 of 30 candidates.
+  slabs.plain(3000, Told(9000), true, 2, seen);
   EXPECT_EQ(seen.candidates, 100);
   EXPECT_EQ(seen.boxed, 30);
   slabs.prepare_choice(2, seen);
   EXPECT_GT(plain_cost(seen), refit_cost(seen));
-  // Half of the candidates: half of the pairs of leaves, and of the box tests.
-  slabs.plain(1500, true, 3, seen);
+  EXPECT_GT(seen.plain_ratio, 1);
+  // Half of the candidates and of the box tests, also with slabs.
+  slabs.plain(1500, Told(4500), true, 3, seen);
   EXPECT_EQ(seen.candidates, 50);
-  EXPECT_EQ(seen.slabs_leave, 150);
+  EXPECT_EQ(seen.plain_tests, 4500);
   EXPECT_EQ(seen.slab_tests, 5000);
   // The comparison goes out of date, and a frame of leaf_slabs allows the next one.
   for (int choice = 0; choice < 20; ++choice) slabs.prepare_choice(100 + choice, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
-  slabs.slabs(100, Told(300), true, 200, seen);
+  slabs.slabs(100, Told(10000), true, 200, seen);
   slabs.prepare_choice(200, seen);
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
   // So it does where candidates become many.
-  slabs.plain(150, true, 201, seen);
+  slabs.plain(150, Told(9000), true, 201, seen);
   slabs.prepare_choice(201, seen);
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
-  slabs.plain(400, true, 202, seen);
+  EXPECT_LT(seen.plain_ratio, 1);
+  slabs.plain(400, Told(20000), true, 202, seen);
   slabs.prepare_choice(202, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
 }
@@ -161,10 +184,11 @@ TEST(ObservedSlabs, LeaveOutAllCandidates) {
   seen.reads = 1000;
   ObservedSlabs slabs;
   slabs.start_over(true, seen);
-  slabs.slabs(0, Told(300), true, 1, seen);
+  slabs.slabs(0, Told(10000), true, 1, seen);
   slabs.prepare_choice(1, seen);
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
-  slabs.plain(3000, true, 2, seen);
+  // Of no candidates, thousands are infinitely many: all that counts is that slabs save tests of triangles.
+  slabs.plain(3000, Told(15000), true, 2, seen);
   slabs.prepare_choice(2, seen);
   EXPECT_GT(plain_cost(seen), refit_cost(seen));
 }
@@ -173,7 +197,7 @@ TEST(ObservedSlabs, PairsThatIntersectAreNotCompared) {
   Observed seen;
   ObservedSlabs slabs;
   slabs.start_over(true, seen);
-  slabs.slabs(100, Told(300), false, 1, seen);
+  slabs.slabs(100, Told(10000), false, 1, seen);
   slabs.prepare_choice(1, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
 }
@@ -181,34 +205,109 @@ TEST(ObservedSlabs, PairsThatIntersectAreNotCompared) {
 TEST(ObservedAgeing, KeepsWhatTheFirstSearchInNewTreesTells) {
   Observed seen;
   seen.candidates = 1000;
+  seen.slab_tests = 9000;
   ObservedAgeing ageing;
   ageing.start_over(10);
-  ageing.refitted(9000);
+  ageing.refitted(9000, 20);
   ageing.look_at_refitted(30, 20, seen);  // boxes have grown by 3: up to two thirds of the tests may be saved
-  EXPECT_DOUBLE_EQ(seen.surplus, 6000);
+  EXPECT_DOUBLE_EQ(seen.aged, 2.0 / 3);
   EXPECT_DOUBLE_EQ(seen.ageing, 300);
   ageing.rebuilt(6000, 1200, 21, seen);  // one third is
-  EXPECT_DOUBLE_EQ(seen.surplus, 3000);
+  EXPECT_DOUBLE_EQ(seen.aged, 1.0 / 3);
   EXPECT_DOUBLE_EQ(seen.boxed, 1.2);
   EXPECT_DOUBLE_EQ(seen.candidates, 1000);
+  EXPECT_DOUBLE_EQ(seen.slab_tests, 9000);
   ageing.rebuilt(8000, 2400, 22, seen);  // the factor stays
-  EXPECT_DOUBLE_EQ(seen.surplus, 4000);
+  EXPECT_DOUBLE_EQ(seen.aged, 1.0 / 3);
   EXPECT_DOUBLE_EQ(seen.candidates, 2000);
-  ageing.look_at_refitted(30, 30, seen);  // back again, with as many tests as before
-  EXPECT_DOUBLE_EQ(seen.surplus, 3000);
+  EXPECT_DOUBLE_EQ(seen.slab_tests, 12000);
+  ageing.refitted(9000, 30);  // back again, with as many tests as before
+  ageing.look_at_refitted(30, 30, seen);
+  EXPECT_DOUBLE_EQ(seen.aged, 1.0 / 3);
+}
+
+TEST(ObservedAgeing, DoesNotCompareWithAnOldFrame) {
+  Observed seen;
+  seen.candidates = 10;
+  ObservedAgeing ageing;
+  ageing.start_over(10);
+  ageing.refitted(9000, 20);
+  ageing.look_at_refitted(20, 20, seen);
+  ageing.rebuilt(100000, 5000, 60, seen);  // thousands of contacts have begun since
+  EXPECT_DOUBLE_EQ(seen.aged, 0.5);
+  EXPECT_DOUBLE_EQ(seen.boxed, 1.3);
 }
 
 TEST(ObservedAgeing, ForgetsWhileRebuiltTreesAnswer) {
   Observed seen;
   ObservedAgeing ageing;
   ageing.start_over(10);
-  ageing.refitted(4000);
+  ageing.refitted(4000, 10);
   ageing.look_at_refitted(40, 10, seen);
   ageing.rebuilt(1000, 0, 11, seen);
-  EXPECT_DOUBLE_EQ(seen.surplus, 3000);
-  for (int choice = 0; choice < 20; ++choice) ageing.look_at_rebuilt();
+  EXPECT_DOUBLE_EQ(seen.aged, 0.75);
+  for (int choice = 0; choice < 60; ++choice) ageing.look_at_rebuilt();
   ageing.rebuilt(1000, 0, 400, seen);
-  EXPECT_LT(seen.surplus, 50);
+  EXPECT_LT(seen.aged, 0.05);
+}
+
+/// Segments of ten frames, with contacts.
+Observed meeting() {
+  Observed seen;
+  seen.reads = 10000;
+  seen.candidates = 1000;
+  seen.slab_tests = 20000;
+  seen.frames_per_segment = 10;
+  seen.near = true;
+  return seen;
+}
+
+TEST(ObservedJoin, IsTriedAndJudgedByItsWork) {
+  Observed seen = meeting();
+  const double predicted = join_cost(seen);
+  ObservedJoin join;
+  join.start_over(seen);
+  EXPECT_LT(join_cost(seen), predicted) << "it may be faster";
+  join.refitted(seen);
+  join.joined(3 * predicted, 500, seen);
+  EXPECT_TRUE(join.known());
+  EXPECT_DOUBLE_EQ(join_cost(seen), 3 * predicted);
+  for (int choice = 0; choice < 100; ++choice) join.forget(seen);
+  EXPECT_NEAR(join_cost(seen), predicted, 0.01 * predicted);
+}
+
+TEST(ObservedJoin, IsComparedAgainWhereContactsChange) {
+  Observed seen = meeting();
+  ObservedJoin join;
+  join.start_over(seen);
+  join.refitted(seen);
+  join.joined(20000, 500, seen);
+  join.joined(70000, 520, seen);  // the same contacts, more work: its boxes have aged
+  EXPECT_FALSE(join.outdated());
+  EXPECT_DOUBLE_EQ(join_cost(seen), 70000);
+  join.joined(90000, 1500, seen);  // more contacts, not yet twice the work
+  EXPECT_FALSE(join.outdated());
+  EXPECT_DOUBLE_EQ(join_cost(seen), 70000);
+  join.joined(150000, 1600, seen);
+  EXPECT_TRUE(join.outdated());
+  seen.candidates = 5000;  // a refit has answered, and found more of them, too
+  join.refitted(seen);
+  EXPECT_FALSE(join.outdated());
+  EXPECT_DOUBLE_EQ(join_cost(seen), 150000);
+}
+
+TEST(ObservedJoin, IsNotComparedWithARefitOfBodiesThatWereApart) {
+  Observed seen = meeting();
+  ObservedJoin join;
+  join.start_over(seen);
+  seen.near = false;
+  join.refitted(seen);
+  join.joined(100, 0, seen);  // apart: nothing is learned
+  EXPECT_FALSE(join.known());
+  seen.near = true;
+  join.joined(50000, 500, seen);
+  EXPECT_TRUE(join.outdated());
+  EXPECT_FALSE(join.known());
 }
 
 TEST(Auto, StartsOverAndChoosesTheSameAgain) {

@@ -61,6 +61,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
     return status;
   }
   std::uint64_t last_box_tests() const override { return last_box_tests_; }
+  std::uint64_t last_ray_tests() const override { return last_ray_tests_; }
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     AuditView view;
     view.topology = bodies_[body].topology(view.boxes);
@@ -82,6 +83,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
     const auto side_of = [&](std::uint32_t body) -> WideSide<S> { return {&bodies_[body], body}; };
     rays_.find(query, rays, hits, side_of, this->triangle_stats_, tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
+    last_ray_tests_ = tests;
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) followed(body, rays_.work()[body]);
   }
   /// Computes the boxes of a tree that keeps its shape.
@@ -109,7 +111,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
   CurveOrder<S> order_;
   WideQuery<S> query_{this->scene_, this->sampled_};
   WideRays<S> rays_{this->scene_, this->sampled_};
-  std::uint64_t last_box_tests_ = 0;
+  std::uint64_t last_box_tests_ = 0, last_ray_tests_ = 0;
 };
 
 }  // namespace kbvh

@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <cmath>
 
 #include "core/families/choice/predicted_costs.hpp"
 
@@ -17,28 +18,39 @@ class ObservedAgeing {
     new_surface_ = surface;
   }
   /// Registers the frame's search of the refitted trees.
-  void refitted(double tests) { tests_ = tests; }
+  void refitted(double tests, int frame) {
+    tests_ = estimate_ = tests;
+    frame_ = frame;
+  }
   /// Registers the frame's search of rebuilt trees; `frame` counts from the start.
   void rebuilt(double tests, double candidates, int frame, Observed& seen) {
-    if (!known_ && tests > 0) {
+    if (!known_ && tests > 0 && frame_ != frame - 1) {  // too long ago to be compared with
+      known_ = true;
+      factor_ = 1 / (1 - std::min(seen.aged, 0.99));
+    } else if (!known_ && tests > 0) {
       known_ = true;
       factor_ = std::max(1.0, tests_ / tests);
+      if (factor_ > 1.5) kept_ = std::sqrt(kept_);
       felt_ = possible() > 0 ? (factor_ - 1) * tests / possible() : 1;
       seen.ageing = (factor_ - 1) * tests / frame;
       if (seen.candidates > 0) seen.boxed = std::max(1.0, candidates / seen.candidates);
     }
-    seen.surplus = (factor_ - 1) * tests;
+    seen.aged = 1 - 1 / factor_;
+    if (estimate_ > 0)
+      for (double* refitted : {&seen.slab_tests, &seen.plain_tests}) *refitted *= factor_ * tests / estimate_;
+    estimate_ = factor_ * tests;
     seen.candidates = candidates / seen.boxed;
   }
   /// Updates the observations at a choice while the refitted trees answer. `frame` as above.
   void look_at_refitted(double surface, int frame, Observed& seen) {
     known_ = false;
     growth_ = new_surface_ > 0 ? std::max(1.0, surface / new_surface_) : 1;
-    seen.surplus = felt_ * possible();
-    seen.ageing = seen.surplus / std::max(1, frame);
+    const double surplus = felt_ * possible();
+    seen.aged = tests_ > 0 ? surplus / tests_ : 0;
+    seen.ageing = surplus / std::max(1, frame);
   }
   /// The same while the rebuilt ones do.
-  void look_at_rebuilt() { factor_ = 1 + 0.8 * (factor_ - 1); }
+  void look_at_rebuilt() { factor_ = 1 + kept_ * (factor_ - 1); }
   /// Returns the box tests of the last search of the refitted trees.
   double tests() const { return tests_; }
 
@@ -47,11 +59,14 @@ class ObservedAgeing {
   double possible() const { return tests_ * (1 - 1 / growth_); }
 
   double new_surface_ = 0;
-  double growth_ = 1;   // of the surfaces, at the last choice
-  double tests_ = 0;    // of the last search of the refitted trees
-  double felt_ = 1;     // share of the possible saving that rebuilt trees have saved
-  double factor_ = 1;   // tests of refitted over those of rebuilt trees
-  bool known_ = false;  // the factor was measured since the refitted trees answered last
+  double growth_ = 1;    // of the surfaces, at the last choice
+  double tests_ = 0;     // of the last search of the refitted trees
+  int frame_ = 0;        // in which they answered it
+  double kept_ = 0.8;    // of the factor at a further choice; closer to 1 with each trial that new trees won
+  double estimate_ = 0;  // of the tests of the refitted trees in this frame
+  double felt_ = 1;      // share of the possible saving that rebuilt trees have saved
+  double factor_ = 1;    // tests of refitted over those of rebuilt trees
+  bool known_ = false;   // the factor was measured since the refitted trees answered last
 };
 
 }  // namespace kbvh

@@ -7,10 +7,10 @@
 
 namespace kbvh {
 
-/// What a choice knows of the use of slabs at the leaves. leaf_slabs tells how many pairs of leaves it
-/// compares, and bottom_up, in the frame after, how many candidates slabs leave out. After some choices, or
-/// where candidates become twice or half as many, the comparison is out of date, and bottom_up is tried again
-/// where it may be faster.
+/// What a choice knows of the use of slabs at the leaves. leaf_slabs tells how many box tests it makes, and
+/// bottom_up, in the frame after, how many it makes and how many candidates slabs leave out. After some
+/// choices, or where candidates become twice or half as many, the comparison is out of date, and bottom_up is
+/// tried again where it may be faster.
 class ObservedSlabs {
  public:
   /// `slabs`: whether there is a strategy with slabs; without, candidates are those of boxes.
@@ -24,33 +24,37 @@ class ObservedSlabs {
   void slabs(double candidates, const TellsWork& work, bool all, int frame, Observed& seen) {
     frame_ = all ? frame : never;
     seen.candidates = candidates;
-    seen.slabs_separate = double(work.last_slab_pairs().separated);
-    seen.slabs_leave = double(work.last_slab_pairs().open);
-    seen.slab_tests = double(work.last_box_tests());
+    const double tests = double(work.last_box_tests());
+    if (seen.slab_tests > 0) seen.plain_tests *= tests / seen.slab_tests;
+    seen.slab_tests = tests;
   }
   /// Registers a frame of bottom_up: the first after one of leaf_slabs is a comparison, and others scale what
   /// was known of leaf_slabs by the number of candidates.
-  void plain(double candidates, bool all, int frame, Observed& seen) {
+  void plain(double candidates, const TellsWork& work, bool all, int frame, Observed& seen) {
     if (slabs_ && all && frame_ == frame - 1) {
       seen.boxed = seen.plain_boxed = std::max(1.0, candidates / std::max(1.0, seen.candidates));
       choices_ = 0;
       compared_ = seen.candidates;
+      seen.plain_tests = double(work.last_box_tests());
+      seen.plain_ratio = plain_cost(seen) / std::max(1.0, refit_cost(seen));
       return;
     }
-    const double fewer = candidates / seen.boxed;
-    if (seen.candidates > 0)
-      for (double* count : {&seen.slabs_separate, &seen.slabs_leave, &seen.slab_tests})
-        *count *= fewer / seen.candidates;
-    seen.candidates = fewer;
+    const double tests = double(work.last_box_tests());
+    if (seen.plain_tests > 0) seen.slab_tests *= tests / seen.plain_tests;
+    seen.plain_tests = tests;
+    seen.candidates = candidates / seen.boxed;
   }
   /// Prepares a choice in the frame after `frame`.
   void prepare_choice(int frame, Observed& seen) {
     if (!slabs_) return;
     const bool alike = seen.candidates <= 2 * compared_ && 2 * seen.candidates >= compared_;
-    if (choices_ < most_choices && alike)
+    if (choices_ < most_choices && alike) {
       ++choices_;
-    else
-      seen.plain_boxed = frame_ == frame ? 1 : std::numeric_limits<double>::infinity();
+      return;
+    }
+    // The best that was ever seen: no more candidates, and half of the tests.
+    seen.plain_boxed = frame_ == frame ? 1 : std::numeric_limits<double>::infinity();
+    seen.plain_tests = 0.5 * seen.slab_tests;
   }
 
  private:

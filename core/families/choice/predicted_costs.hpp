@@ -10,9 +10,9 @@ struct Observed {
   double candidates = 0;          ///< in a frame, of leaf_slabs
   /// Candidates of boxes alone over these; measured where another strategy was active.
   double boxed = 1.3;
-  /// In a frame, pairs of leaves that leaf_slabs compares by slabs: those that these separate, and others.
-  double slabs_separate = 0, slabs_leave = 0;
-  double slab_tests = 0;  ///< box tests of its search
+  /// Box tests in a frame of leaf_slabs, which counts comparisons of slabs as such, and of bottom_up.
+  double slab_tests = 0, plain_tests = 0;  // estimated while others answer
+  double plain_ratio = 1;                  ///< plain_cost over refit_cost when they were compared
   /// `boxed` where leaf_slabs and bottom_up searched two frames in a row; 1 before bottom_up is tried, which
   /// is the best that can be hoped for; infinite where it is not to be tried.
   double plain_boxed = std::numeric_limits<double>::infinity();
@@ -22,13 +22,10 @@ struct Observed {
   double slide = 0;          ///< the same for primitives relative to their candidates
   bool many_bodies = false;  ///< more pairs of bodies than a choice examines
   double spread = 1;         ///< how different the steps are among a body's vertices; 0: all the same
-  /// Triangle tests of the join in a frame, over the candidates of leaf_slabs: pairs that it could not decide
-  /// for spans of time. Measured while it is active, and slowly forgotten at later choices.
-  double undecided = 0;
-  /// Box tests of the join in a frame. Measured and forgotten in the same way.
-  double join_tests = 0;
-  double surplus = 0;  ///< box tests of the refitted trees in a frame, beyond those of new trees
-  double ageing = 0;   ///< growth of the surplus per frame
+  double join_factor = 1;    ///< cost of the join by its work, over its prediction (ObservedJoin)
+  bool rays_only = false;    ///< no pairs are asked
+  double aged = 0;           ///< share of box tests in refitted trees that new ones would save
+  double ageing = 0;         ///< growth of the surplus per frame
 };
 
 // The predicted costs of a frame, in nanoseconds of one machine; only their order matters.
@@ -39,13 +36,13 @@ double refit_cost(const Observed& seen);
 double plain_cost(const Observed& seen);
 /// lbvh_drift: refits trees of its own, and builds new ones when the surplus of tests has cost as much.
 double rebuilt_cost(const Observed& seen);
-/// drift_boxes: one search serves the frames in which a leaf moves by a part of its size. Where bodies
-/// deform, more pairs come near in these frames than a query takes to find.
+/// drift_boxes, infinite where only rays are asked: these do not tell of the age of its trees. One search
+/// serves the frames in which a leaf moves by a part of its size. Where bodies deform, more pairs come near
+/// in these frames than a query takes to find.
 double drift_cost(const Observed& seen);
-/// interval_join: one join serves a segment. Its cost grows with the share of pairs that it cannot decide for
-/// spans of time, and with the distance that primitives move past each other within the segment. A
-/// translating body passes by others; the touching part of a deforming body stays in place. In trees that
-/// have aged, what counts is the box tests that it made. Infinite where plans change or segments have no end.
+/// interval_join: one join serves a segment. Its cost grows with the distance that primitives move past each
+/// other within the segment. A translating body passes by others; the touching part of a deforming body stays
+/// in place. Infinite where plans change, segments have no end, or only rays are asked.
 double join_cost(const Observed& seen);
 
 }  // namespace kbvh

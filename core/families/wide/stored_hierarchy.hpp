@@ -72,6 +72,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>,
     return status;
   }
   std::uint64_t last_box_tests() const override { return last_box_tests_; }
+  std::uint64_t last_ray_tests() const override { return last_ray_tests_; }
   double surface() override {
     double sum = 0;
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body)
@@ -124,6 +125,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>,
         [&](std::uint32_t body, std::uint32_t node) { make_row(body, node); }, this->triangle_stats_, tests,
         this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
+    last_ray_tests_ = tests;
   }
   /// Returns what the rays of the last call did with each body.
   std::span<const RayWork> ray_work() const { return rays_.work(); }
@@ -179,7 +181,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>,
   WideQuery<S> query_{this->scene_, this->sampled_};
   WideRays<S> rays_{this->scene_, this->sampled_};
   bool plans_changed_ = false;
-  std::uint64_t last_box_tests_ = 0;
+  std::uint64_t last_box_tests_ = 0, last_ray_tests_ = 0;
   std::optional<SweptHierarchies<S>> swept_;  ///< made at the first request for contacts
 };
 

@@ -1,0 +1,71 @@
+#pragma once
+#include <cmath>
+
+#include "core/base/cost_constants.hpp"
+#include "core/families/choice/predicted_costs.hpp"
+
+namespace kbvh {
+
+/// What a choice knows of an interval join by the work that it does, where bodies meet. Its cost is predicted
+/// from the plans and the work of a refit. How wrong this is, is known when a segment was joined after a
+/// refit had answered. Before that the prediction is taken as if it might be too high by `hope`, so that a
+/// join is tried where it may pay. When its work has doubled or halved since, a refit must answer a frame to
+/// be compared with. What was learned is slowly forgotten while other strategies answer.
+class ObservedJoin {
+ public:
+  void start_over(Observed& seen) {
+    *this = {};
+    seen.join_factor = costs::Work::hope;
+  }
+  /// Registers that a strategy that refits has answered, whose work is in `seen`.
+  void refitted(Observed& seen) {
+    met_ = seen.near;
+    if (outdated_) compare(seen);
+    outdated_ = false;
+    compared_ = 0;
+  }
+  /// Registers the work of the join in a mean frame over whole segments, in nanoseconds by its counts, and
+  /// the candidates of its last frame.
+  void joined(double work, double candidates, Observed& seen) {
+    if (!seen.near) return;
+    work_ = work;
+    candidates_ = candidates;
+    if (!met_)
+      outdated_ = true;
+    else if (compared_ == 0)
+      compare(seen);
+    else if (std::abs(candidates - compared_candidates_) <= 0.2 * compared_candidates_)
+      compare(seen);  // the same contacts, for which a refit would take as long as then
+    else
+      outdated_ = work > 2 * compared_ || 2 * work < compared_;
+  }
+  /// Prepares a choice while another strategy answers.
+  void forget(Observed& seen) const {
+    if (known_) seen.join_factor = std::pow(seen.join_factor, kept_);
+  }
+  /// Whether a join was compared with a refit.
+  bool known() const { return known_; }
+  /// Whether a refit must answer next.
+  bool outdated() const { return outdated_; }
+
+ private:
+  void compare(Observed& seen) {
+    seen.join_factor = 1;
+    const double predicted = join_cost(seen);
+    if (work_ > 0 && predicted > 0 && std::isfinite(predicted)) seen.join_factor = work_ / predicted;
+    if (!known_ || seen.join_factor > 1.1) kept_ = std::sqrt(kept_);
+    compared_ = work_;
+    compared_candidates_ = candidates_;
+    known_ = true;
+  }
+
+  double kept_ =
+      0.64;          // exponent of the factor at a further choice; closer to 1 with each trial that it lost
+  double work_ = 0;  // of the join in a frame, at last
+  double candidates_ = 0, compared_candidates_ = 0;
+  double compared_ = 0;  // when it was compared; 0: a refit has answered since
+  bool met_ = false;     // bodies did when a refit answered
+  bool known_ = false, outdated_ = false;
+};
+
+}  // namespace kbvh
