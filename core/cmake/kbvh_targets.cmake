@@ -1,19 +1,24 @@
 # Shared by the build in the tree and, installed, by projects that add strategies of their own.
 
-# kbvh_add_strategy(NAME SOURCE TARGET [SCALARS_APART]): compiles SOURCE into TARGET (a static library) and lists NAME,
-# the word in its KBVH_STRATEGY(NAME), in the manifest.
+# kbvh_add_strategy(NAME SOURCE TARGET [SCALARS_APART | TOGETHER]): compiles SOURCE into TARGET (a static library) and
+# lists NAME, the word in its KBVH_STRATEGY(NAME), in the manifest.
 # SCALARS_APART: compiles a SOURCE with one entry or several, all in both scalars, once a scalar and side by side.
+# TOGETHER: SOURCE may be compiled in one unit with others (KBVH_UNITY_STRATEGIES), whose names it does not use.
 # KBVH_STRATEGIES, a list of such words, leaves out all others.
 function(kbvh_add_strategy name source target)
   if(KBVH_STRATEGIES AND NOT name IN_LIST KBVH_STRATEGIES)
     return()
   endif()
   target_sources(${target} PRIVATE ${source})
+  if(NOT "TOGETHER" IN_LIST ARGN)
+    set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  endif()
   if("SCALARS_APART" IN_LIST ARGN)
     cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} OUTPUT_VARIABLE file)
     set(in_double ${CMAKE_CURRENT_BINARY_DIR}/in_double/${name}.cpp)
     file(CONFIGURE OUTPUT ${in_double} CONTENT "#define KBVH_SCALARS_HERE double_only\n#include \"@file@\"\n" @ONLY)
     target_sources(${target} PRIVATE ${in_double})
+    set_source_files_properties(${in_double} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     set_source_files_properties(${source} PROPERTIES
       COMPILE_DEFINITIONS "KBVH_SCALARS_HERE=float_only;KBVH_JOINS_SCALARS")
   endif()

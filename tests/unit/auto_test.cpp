@@ -328,6 +328,24 @@ TEST(Auto, StartsOverAndChoosesTheSameAgain) {
   EXPECT_EQ(play.session.strategy().choice(), first);
 }
 
+TEST(Auto, ChoosesTheSameWhereNothingIsCounted) {
+  const Scene<float> scene = flying_triangles(2000, 30, Flight::anywhere);
+  std::string choices[2];
+  for (const CountingPolicy policy : {CountingPolicy::counting, CountingPolicy::silent}) {
+    Session<float> session(scene, {&find_strategy("auto"), {}, {}}, policy);
+    session.reset(0);
+    PhaseTimes times;
+    PairBuffer pairs;
+    for (int f = 1; f <= 87; ++f) {
+      session.advance(f / 3.0, times);
+      session.query(pairs, times);
+    }
+    choices[policy == CountingPolicy::silent] = session.strategy().choice();
+  }
+  EXPECT_EQ(choices[0], choices[1]);
+  EXPECT_NE(choices[0].find("interval_join"), std::string::npos) << choices[0];
+}
+
 TEST(NestedStrategies, KnowNoMoreOfTheFutureThanTheirOwner) {
   const Scene<float> scene = grids<float>(4, 0.3, slow);
   Playback<float> playback(scene);
