@@ -86,6 +86,8 @@ class Auto final : public Strategy<S>,
     chosen_candidates_ = 0;
     chosen_near_ = false;
     touching_.clear();
+    touching_of_ = nullptr;
+    joined_candidates_ = 0;
     for (Reported& one : reported_) one.start_over();
     switches_ = 0;
     pairs_asked_ = pairs_in_frame_ = rays_asked_ = false;
@@ -144,6 +146,7 @@ class Auto final : public Strategy<S>,
     const std::size_t count = out.size() - before,
                       stride = std::max<std::size_t>(1, count / ObservedMotion<S>::samples);
     touching_.clear();
+    touching_of_ = nullptr;
     for (std::size_t i = 0; i < count && touching_.size() < ObservedMotion<S>::samples; i += stride)
       touching_.push_back(out[before + i]);
     return status;
@@ -171,8 +174,7 @@ class Auto final : public Strategy<S>,
     for (const PrimitivePair& pair : begun) reported.pairs.insert(pair);
     // Pairs that intersect stand for the candidates among which they are.
     see_candidates(reported.pairs.size(), answer == Answer::candidates);
-    touching_.clear();
-    reported.pairs.sample(ObservedMotion<S>::samples, touching_);
+    touching_of_ = &reported.pairs;
   }
 
   void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
@@ -364,6 +366,10 @@ class Auto final : public Strategy<S>,
     chosen_tests_ = ageing_.tests();
     seen_.rays_only = rays_asked_ && !pairs_asked_;
     rays_asked_ = pairs_asked_ = false;
+    if (touching_of_ != nullptr) {
+      touching_.clear();
+      touching_of_->sample(ObservedMotion<S>::samples, touching_);
+    }
     steps_.look(step_, touching_, seen_);
     segment_end_ = end > t ? end : t;
     if (bounded)
@@ -436,9 +442,10 @@ class Auto final : public Strategy<S>,
   bool changes_ = false;                ///< plans changed since the last frame
   std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first change of each body
   std::vector<std::uint8_t> body_changed_;
-  PairBuffer touching_;   ///< sample of the candidates of the last frame
-  Reported reported_[2];  ///< [Answer]
-  int switches_ = 0;      ///< changes of the active strategy since `reset`
+  PairBuffer touching_;                   ///< sample of the candidates of the last frame
+  const PairSet* touching_of_ = nullptr;  ///< where a choice samples them; null: they are sampled
+  Reported reported_[2];                  ///< [Answer]
+  int switches_ = 0;                      ///< changes of the active strategy since `reset`
   PairBuffer now_, none_, before_;
   PairDifference difference_;
   Observed seen_;

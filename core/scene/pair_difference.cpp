@@ -187,9 +187,17 @@ void PairSet::grow() {
 }
 
 void PairSet::sample(std::size_t most, PairBuffer& out) const {
-  const std::size_t stride = std::max<std::size_t>(1, slots_.size() / (4 * most)), end = out.size() + most;
-  for (std::size_t slot = 0; slot < slots_.size() && out.size() < end; slot += stride)
-    if (!(slots_[slot] == free_slot)) out.push_back(slots_[slot]);
+  // Those with the smallest hashes, of twice as many as are wanted.
+  const double share = 2 * double(most) / double(std::max<std::size_t>(1, size_));
+  const std::uint64_t limit = share < 1 ? std::uint64_t(share * 0x1p64) : ~std::uint64_t(0);
+  const auto begin = std::ptrdiff_t(out.size());
+  for (const PrimitivePair& pair : slots_)
+    if (!(pair == free_slot) && hash_of(pair) <= limit) out.push_back(pair);
+  std::sort(out.begin() + begin, out.end(), [](const PrimitivePair& a, const PrimitivePair& b) {
+    const std::uint64_t hash_a = hash_of(a), hash_b = hash_of(b);
+    return hash_a != hash_b ? hash_a < hash_b : a < b;
+  });
+  out.resize(std::min(out.size(), std::size_t(begin) + most));
 }
 
 void PairSet::append_to(PairBuffer& out) const {

@@ -66,7 +66,8 @@ class PairSet {
   std::size_t size() const { return size_; }
   /// Appends all pairs, in no particular order. O(largest size so far).
   void append_to(PairBuffer& out) const;
-  /// Appends some pairs, at most `most`, spread over the set. O(most).
+  /// Appends some pairs, at most `most`, spread over the set; they depend on the pairs of the set alone.
+  /// O(largest size so far).
   void sample(std::size_t most, PairBuffer& out) const;
   std::size_t bytes() const { return slots_.capacity() * sizeof(PrimitivePair); }
 

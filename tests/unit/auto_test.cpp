@@ -328,6 +328,22 @@ TEST(Auto, StartsOverAndChoosesTheSameAgain) {
   EXPECT_EQ(play.session.strategy().choice(), first);
 }
 
+TEST(Auto, ChoosesTheSameAgainWhereChangesAreAsked) {
+  const Scene<float> scene = grids<float>(30, 0.3, slow);
+  Play<float> play(scene, "auto", {});
+  std::string first;
+  PairBuffer ended;
+  for (int round = 0; round < 2; ++round) {
+    play.session.reset(0);
+    for (int f = 0; f <= 60; ++f) {
+      if (f > 0) play.session.advance(f / 30.0, play.times);
+      play.session.changes(Answer::pairs, play.pairs, ended, play.times);
+    }
+    if (round == 0) first = play.session.strategy().choice();
+  }
+  EXPECT_EQ(play.session.strategy().choice(), first);
+}
+
 TEST(Auto, ChoosesTheSameWhereNothingIsCounted) {
   const Scene<float> scene = flying_triangles(2000, 30, Flight::anywhere);
   std::string choices[2];

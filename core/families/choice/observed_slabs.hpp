@@ -40,7 +40,10 @@ class ObservedSlabs {
       return;
     }
     const double tests = double(work.last_box_tests());
-    if (seen.plain_tests > 0) seen.slab_tests *= tests / seen.plain_tests;
+    if (!slabs_)
+      seen.slab_tests = tests;
+    else if (seen.plain_tests > 0)
+      seen.slab_tests *= tests / seen.plain_tests;
     seen.plain_tests = tests;
     seen.candidates = candidates / seen.boxed;
   }
