@@ -80,7 +80,7 @@ struct Choice {
   static constexpr double unfit = 1.2;  ///< drift_boxes that fall back, over a refit
   static constexpr double join_frame = 0.12, join_segment = 4.2, join_frames = 1;  ///< of a refit
   static constexpr double join_moves = 0.25;                                       ///< of a join
-  static constexpr double join_slide = 0.2, join_apart = 1.5;                      ///< of a refit
+  static constexpr double join_slide = 0.2, join_apart = 0.33;                     ///< of a refit
   static constexpr double build_read = 2.4;                                        ///< a build of lbvh_drift
 };
 
