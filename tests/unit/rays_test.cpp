@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <optional>
 #include <random>
@@ -459,6 +460,52 @@ TEST(BodiesBehindOthers, AreEnteredIfOneRayReachesThem) {
   EXPECT_EQ(asked.bodies.entered, 2U);
   EXPECT_EQ(asked.bodies.hidden, 0U);
   EXPECT_EQ(hits.back().body, 1U);
+}
+
+/// Boxes and rays of small integers, on some axes in units so small that directions cannot be inverted: each
+/// ray passes through a point of the box of its block, and others pass it by.
+template <class S>
+void screen_keeps_rays_that_meet() {
+  std::mt19937 random(11);
+  const auto between = [&](int low, int high) { return low + int(random() % unsigned(high - low + 1)); };
+  const S small = std::numeric_limits<S>::denorm_min() * 16;
+  for (const KernelSet set : supported_kernel_sets()) {
+    std::size_t rejected = 0;
+    for (int round = 0; round < 2000; ++round) {
+      S unit[3];
+      int lower[3], upper[3];
+      std::vector<S> rows(48, std::numeric_limits<S>::infinity());
+      for (int axis = 0; axis < 3; ++axis) {
+        unit[axis] = between(0, 2) == 0 ? small : S(1);
+        lower[axis] = between(-8, 8);
+        upper[axis] = lower[axis] + between(0, 3);
+        rows[std::size_t(axis) * 8] = S(lower[axis]) * unit[axis];
+        rows[std::size_t(axis + 3) * 8] = -S(upper[axis]) * unit[axis];
+      }
+      WideRayBlock<S> rays{};
+      std::uint64_t through = 0;
+      for (std::size_t i = 0; i < rays.size; ++i) {
+        const int steps = between(0, 5), aside = between(0, 3) == 0 ? 7 : 0;
+        if (aside == 0) through |= std::uint64_t(1) << i;
+        rays.length[i] = between(0, 1) == 0 ? std::numeric_limits<S>::infinity() : S(steps);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const int direction = between(-2, 2), point = between(lower[axis], upper[axis]) + aside;
+          rays.direction[axis][i] = S(direction) * unit[axis];
+          rays.origin[axis][i] = S(point - steps * direction) * unit[axis];
+        }
+      }
+      const std::uint64_t met = wide_ray_kernels<S>(set).screen(rays, rows.data(), 1);
+      ASSERT_EQ(through & ~met, 0u) << name(set) << ", round " << round;
+      rejected += std::size_t(std::popcount(~met));
+    }
+    EXPECT_GT(rejected, 10000u) << name(set);
+  }
+}
+TEST(WideRays, BlocksKeepRaysThatMeetABoxInFloat) {
+  screen_keeps_rays_that_meet<float>();
+}
+TEST(WideRays, BlocksKeepRaysThatMeetABoxInDouble) {
+  screen_keeps_rays_that_meet<double>();
 }
 
 }  // namespace
