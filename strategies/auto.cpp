@@ -301,7 +301,6 @@ class Auto final : public Strategy<S>,
   /// segment ends here.
   void see_work(bool whole) {
     const Runner& runner = runners_[active_];
-    const Counters counters = runner.strategy->counters();
     const double frames = frame_ - chosen_at_;
     if (refits() && runner.work != nullptr) {
       ageing_.look_at_refitted(runner.work->surface(), frame_, seen_);
@@ -315,12 +314,13 @@ class Auto final : public Strategy<S>,
     if (!is_active(&join_cost)) {
       if (frames >= shortest_stay) join_.forget(seen_);
     } else if (whole && window_.frame != none && frame_ > window_.frame) {
-      join_.joined(joined_work(counters), joined_candidates_, seen_);
+      join_.joined(joined_work(), joined_candidates_, seen_);
     }
   }
   /// Returns the work of the join in a frame of its window, which is of whole segments.
-  double joined_work(const Counters& counters) const {
+  double joined_work() const {
     using Work = costs::Work;
+    const Counters counters = runners_[active_].strategy->counters();
     const double frames = frame_ - window_.frame;
     const TellsWork* work = runners_[active_].work;
     const double boxes = work != nullptr ? double(work->last_box_tests()) : 0;

@@ -61,15 +61,18 @@ struct Work {
   static constexpr double hope = 0.55;  ///< of a predicted cost, before the first trial
 };
 
-/// auto, in nanoseconds per frame (Zen 5, float); only their order matters. Fitted:
-/// - leaf_slabs (`refit`) and the join on six captured or animated figures, a skirt and a tablecloth
-///   (experiments/plans/motion.json) at l = 1, 3, 7 and 30, but for `join_slide` and `join_apart`;
-/// - these two and drift_boxes on the scenes "tuned on" of experiments/plans/auto.json, in c6e0cf1, 167e5b8
-///   and ef3f1d8, with counts of candidates that are larger than those of leaf_slabs;
-/// - slabs (`slab_test` to `plain_candidate`) on the same runs as Work: what leaf_slabs takes beyond
-/// bottom_up;
-/// - the last two lines on the mixing swarms, unrolling yarns, tablecloth and random soups at l = 1, in
-///   460de91.
+/// auto, in the same nanoseconds; only their order matters.
+/// - `slab_test` to `plain_candidate`: what leaf_slabs takes beyond bottom_up, fitted to the same runs.
+/// - `watch_read` to `unfit`: drift_boxes, fitted in c6e0cf1, 167e5b8 and ef3f1d8 to the scenes "tuned on" on
+///   Zen 5, times 1.7, which is what leaf_slabs takes longer on the Xeon; but `watch_read` is 0.3 in place of
+///   0.17, set by hand.
+/// - `join_frame` to `join_apart`: the join before it has worked, as shares of a refit. Fitted on Zen 5 to
+/// six
+///   figures, a skirt and a tablecloth (experiments/plans/motion.json) at l = 1, 3, 7 and 30, but for
+///   `join_slide` and `join_apart`; not fitted anew since refits are predicted by Work.
+/// - `build_read`, and Work::rebuilt_read: set by hand; with a build in 0.6 of the frames they add up to the
+/// 5
+///   a vertex read that were fitted to lbvh_drift.
 struct Choice {
   static constexpr double slab_test = 0.58, plain_test = 0.36;  ///< box tests of leaf_slabs and bottom_up
   static constexpr double plain_candidate = 9;  ///< a candidate that slabs would have left out

@@ -187,7 +187,7 @@ void PairSet::grow() {
 }
 
 void PairSet::sample(std::size_t most, PairBuffer& out) const {
-  // Those with the smallest hashes, of twice as many as are wanted.
+  // Those with the smallest hashes. About twice as many have one below the limit, and are sorted.
   const double share = 2 * double(most) / double(std::max<std::size_t>(1, size_));
   const std::uint64_t limit = share < 1 ? std::uint64_t(share * 0x1p64) : ~std::uint64_t(0);
   const auto begin = std::ptrdiff_t(out.size());

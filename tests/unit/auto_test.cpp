@@ -187,7 +187,7 @@ TEST(ObservedSlabs, LeaveOutAllCandidates) {
   slabs.slabs(0, Told(10000), true, 1, seen);
   slabs.prepare_choice(1, seen);
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
-  // Of no candidates, thousands are infinitely many: all that counts is that slabs save tests of triangles.
+  // Slabs leave out all candidates, and save thousands of tests of triangles.
   slabs.plain(3000, Told(15000), true, 2, seen);
   slabs.prepare_choice(2, seen);
   EXPECT_GT(plain_cost(seen), refit_cost(seen));

@@ -29,7 +29,7 @@ class ObservedSlabs {
     seen.slab_tests = tests;
   }
   /// Registers a frame of bottom_up: the first after one of leaf_slabs is a comparison, and others scale what
-  /// was known of leaf_slabs by the number of candidates.
+  /// was known of leaf_slabs by their box tests.
   void plain(double candidates, const TellsWork& work, bool all, int frame, Observed& seen) {
     if (slabs_ && all && frame_ == frame - 1) {
       seen.boxed = seen.plain_boxed = std::max(1.0, candidates / std::max(1.0, seen.candidates));

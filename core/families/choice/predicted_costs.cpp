@@ -21,6 +21,7 @@ double plain_cost(const Observed& seen) {
   const double frame = costs::Work::plain.of(seen.reads, seen.plain_tests, seen.plain_boxed * candidates);
   const double slabs = Cost::slab_test * seen.slab_tests - Cost::plain_test * seen.plain_tests -
                        Cost::plain_candidate * (seen.plain_boxed - 1) * candidates;
+  // Never more than four refits, whatever the counts.
   return frame > 0 ? refit_cost(seen) / std::max(0.25, 1 + slabs / frame) : refit_cost(seen);
 }
 

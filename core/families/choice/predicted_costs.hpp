@@ -25,7 +25,7 @@ struct Observed {
   double join_factor = 1;    ///< cost of the join by its work, over its prediction (ObservedJoin)
   bool rays_only = false;    ///< no pairs are asked
   double aged = 0;           ///< share of box tests in refitted trees that new ones would save
-  double ageing = 0;         ///< growth of the surplus per frame
+  double ageing = 0;         ///< growth of these tests per frame
 };
 
 // The predicted costs of a frame, in nanoseconds of one machine; only their order matters.

@@ -67,11 +67,11 @@ struct WideRayKernels {
   /// Continues until the stack is empty, the search is over, or a step might exceed the free space.
   using Follow = void (*)(WideRayJob<S>& job);
   Follow width2, width4, width8;
+  Follow follow(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
   /// Returns bit i unless ray i of a block certainly misses all of the first `count` boxes of a node of
   /// width 8.
   using Screen = std::uint64_t (*)(const WideRayBlock<S>& rays, const S* child_bounds, std::uint32_t count);
   Screen screen;
-  Follow follow(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
 };
 KBVH_DECLARE_KERNELS(WideRayKernels<float>, wide_rays_float)
 KBVH_DECLARE_KERNELS(WideRayKernels<double>, wide_rays_double)
