@@ -34,8 +34,11 @@ struct Candidate {
 const std::vector<Candidate>& candidates() {
   static const std::vector<Candidate> list{
       {"leaf_slabs", {}, &refit_cost},  // first: it answers until observations exist
-      {"bottom_up", {}, &plain_cost},   {"lbvh_drift", {}, &rebuilt_cost},
-      {"drift_boxes", {}, &drift_cost}, {"interval_join", {}, &join_cost},
+      {"bottom_up", {}, &plain_cost},
+      {"lbvh_drift", {}, &rebuilt_cost},
+      {"drift_rebuild", {{"start", "sorted"}}, &sorted_cost},
+      {"drift_boxes", {}, &drift_cost},
+      {"interval_join", {}, &join_cost},
   };
   return list;
 }
@@ -96,9 +99,10 @@ class Auto final : public Strategy<S>,
     body_changed_.assign(this->scene_.body_count(), 0);
     seen_ = {};
     seen_.reads = steps_.reads();
+    seen_.primitives = steps_.primitives();
     ageing_.start_over(runners_[0].work != nullptr ? runners_[0].work->surface() : 0);
     chosen_tests_ = 0;
-    tried_ = waits_ = false;
+    tried_ = waits_ = refits_first_ = false;
     join_.start_over(seen_);
     slabs_.start_over(runners_[0].candidate->cost == &refit_cost, seen_);
   }
@@ -116,11 +120,12 @@ class Auto final : public Strategy<S>,
                      (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
                      seen_.near != chosen_near_ || seen_.candidates > 2 * chosen_candidates_ ||
                      2 * seen_.candidates < chosen_candidates_ || tried_ || waits_ ||
-                     (is_active(&join_cost) && seen_.near && !join_.known()) ||
+                     (is_active(&join_cost) && seen_.near && !join_.judged()) ||
                      (refits() && ageing_.tests() > 1.5 * chosen_tests_);
     if (step_ > 0 && due) choose(t);
     if (active_ != last) ++switches_;
-    tried_ = active_ != last && (is_active(&rebuilt_cost) || is_active(&plain_cost) || join_.outdated());
+    tried_ = active_ != last &&
+             ((rebuilds() && !rebuilds(last)) || is_active(&plain_cost) || join_.outdated() || refits_first_);
     Runner& runner = runners_[active_];
     if (runner.all_positions) fetch_all();
     if (active_ == last || runner.fresh) {
@@ -270,12 +275,31 @@ class Auto final : public Strategy<S>,
   /// Whether trees that are only refitted answer.
   bool refits() const { return active_ == 0 || is_active(&plain_cost); }
   bool is_active(double (*cost)(const Observed&)) const { return runners_[active_].candidate->cost == cost; }
+  bool is_join(std::size_t runner) const { return runners_[runner].candidate->cost == &join_cost; }
+  bool rebuilds(std::size_t runner) const {
+    const auto cost = runners_[runner].candidate->cost;
+    return cost == &rebuilt_cost || cost == &sorted_cost;
+  }
+  /// Whether a strategy that builds new trees answers.
+  bool rebuilds() const { return rebuilds(active_); }
   /// Returns what answers a frame that a join is compared with: in trees that have aged, a refit would take
   /// long.
-  std::size_t refit_to_compare() const {
+  std::size_t refit_to_compare() const { return seen_.aged > 0.5 ? builder() : 0; }
+  /// Returns lbvh_drift, or the first strategy without it.
+  std::size_t builder() const {
     for (std::size_t i = 0; i < runners_.size(); ++i)
-      if (seen_.aged > 0.5 && runners_[i].candidate->cost == &rebuilt_cost) return i;
+      if (runners_[i].candidate->cost == &rebuilt_cost) return i;
     return 0;
+  }
+  /// Prepares the first comparison of new trees with refitted ones: in the frame after one of a refit, and by
+  /// the cheapest build. Boxes that have grown are a reason for it, even where a join is predicted to be
+  /// faster than either.
+  void try_new_trees(std::size_t& best) {
+    refits_first_ = rebuilds(best) && !refits() && seen_.aged <= 0.5;
+    if (refits_first_)
+      best = 0;
+    else if (rebuilds(best) || (is_join(best) && refits() && seen_.aged > 0.5))
+      best = builder();
   }
   /// Strategies differ in the pairs that they leave out early: only drift_boxes reports all pairs of boxes,
   /// and shows that bodies are apart.
@@ -294,8 +318,9 @@ class Auto final : public Strategy<S>,
   void see_tests(double tests, double count) {
     if (refits())
       ageing_.refitted(tests, frame_);
-    else if (is_active(&rebuilt_cost))
-      ageing_.rebuilt(tests, count, std::max(1, frame_), seen_);
+    else if (rebuilds())
+      ageing_.rebuilt(tests / (is_active(&sorted_cost) ? 1 : costs::Choice::built_tests), count,
+                      std::max(1, frame_), seen_);
   }
   /// Measures the work of the active strategy since the last choice, or since its window began. `whole`: a
   /// segment ends here.
@@ -305,10 +330,10 @@ class Auto final : public Strategy<S>,
     if (refits() && runner.work != nullptr) {
       ageing_.look_at_refitted(runner.work->surface(), frame_, seen_);
       join_.refitted(seen_);
-    } else if (is_active(&rebuilt_cost) && frames >= shortest_stay) {
-      ageing_.look_at_rebuilt();
+    } else if (rebuilds() && runner.work != nullptr && frames >= shortest_stay) {
+      ageing_.look_at_rebuilt(runner.work->growth(), is_active(&sorted_cost), seen_);
     }
-    if (is_active(&rebuilt_cost)) join_.refitted(seen_);
+    if (rebuilds()) join_.refitted(seen_);
     // From time to time drift_boxes may look whether bodies have parted.
     if (frames >= longest_stay && seen_.candidates == 0) seen_.near = false;
     if (!is_active(&join_cost)) {
@@ -389,9 +414,11 @@ class Auto final : public Strategy<S>,
     }
     // This is found at the end of a segment, where a frame of a refit costs no second join.
     if (join_.outdated()) best = refit_to_compare();
+    if (!ageing_.compared()) try_new_trees(best);
     // A join of a segment's last frames costs as much as that of the whole.
-    waits_ = best != active_ && runners_[best].candidate->cost == &join_cost && bounded && !whole &&
-             end - t < costs::Choice::join_segment * step_;
+    waits_ = best != active_ && is_join(best) && bounded && !whole &&
+             runners_[active_].candidate->cost(seen_) * (end - t) <
+                 join_cost(seen_) * seen_.frames_per_segment * step_;
     if (waits_) return;
     stay_ = best == active_ ? std::min(2 * stay_, longest_stay) : shortest_stay;
     active_ = best;
@@ -432,7 +459,8 @@ class Auto final : public Strategy<S>,
   double chosen_tests_ = 0;            ///< box tests of the refitted trees in the frame before
   bool tried_ = false;  ///< a strategy answers for the first time whose work decides whether it stays
   ObservedAgeing ageing_;
-  bool waits_ = false;  ///< for the next segment, to join it
+  bool waits_ = false;         ///< for the next segment, to join it
+  bool refits_first_ = false;  ///< before new trees are tried
   ObservedJoin join_;
   double joined_candidates_ = 0;  ///< of the join's last frame
   Window window_;

@@ -27,6 +27,11 @@ class LbvhDrift final : public BuiltStrategy<S, Count, DriftBuilder<S>> {
             const Params& params)
       : Base(scene, motion, topologies, params), price_(params.number("price")), trees_(scene.body_count()) {}
 
+  double growth() const override {
+    double sum = 0;
+    for (const Tree& tree : trees_) sum += tree.age.growth();
+    return sum;
+  }
   std::size_t bytes() const override { return Base::bytes() + trees_.capacity() * sizeof(Tree); }
 
  private:

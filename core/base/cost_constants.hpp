@@ -54,7 +54,7 @@ struct Work {
     }
   };
   static constexpr Refit slabs{1.09, 0.88, 32}, plain{0.82, 0.65, 21};
-  static constexpr double rebuilt_read = 3.5;  ///< of lbvh_drift without its builds
+  static constexpr double rebuilt_primitive = 5;  ///< of lbvh_drift without its builds
   /// interval_join: the reads of a refit once a segment, box tests of its search, and what its frames do.
   static constexpr double join_read = 3.05, join_box_test = 2.42, span_test = 92, join_triangle_test = 64,
                           join_fetch = 3.3;
@@ -63,27 +63,27 @@ struct Work {
 
 /// auto, in the same nanoseconds; only their order matters.
 /// - `slab_test` to `plain_candidate`: what leaf_slabs takes beyond bottom_up, fitted to the same runs.
-/// - `watch_read` to `unfit`: drift_boxes, fitted in c6e0cf1, 167e5b8 and ef3f1d8 to the scenes "tuned on" on
-///   Zen 5, times 1.7, which is what leaf_slabs takes longer on the Xeon; but `watch_read` is 0.3 in place of
-///   0.17, set by hand.
+/// - `watch_read` to `unfit`: drift_boxes, fitted in c6e0cf1, 167e5b8 and ef3f1d8 to scenes "tuned on" on Zen
+///   5, times 1.7, which is what leaf_slabs takes longer on the Xeon; but `watch_read` is 0.3 in place of
+///   0.17, set by hand, and `kept_candidate` is as measured on the Xeon (passing spheres, l = 30).
 /// - `join_frame` to `join_apart`: the join before it has worked, as shares of a refit. Fitted on Zen 5 to
-/// six
 ///   figures, a skirt and a tablecloth (experiments/plans/motion.json) at l = 1, 3, 7 and 30, but for
 ///   `join_slide` and `join_apart`; not fitted anew since refits are predicted by Work.
-/// - `build_read`, and Work::rebuilt_read: set by hand; with a build in 0.6 of the frames they add up to the
-/// 5
-///   a vertex read that were fitted to lbvh_drift.
+/// - `build_primitive` to `built_tests`, and Work::rebuilt_primitive: from the updates, builds and box tests
+///   of lbvh_drift and drift_rebuild on the five scenes of plan `auto` that age, l = 1 and 10, at 42dc54a.
 struct Choice {
   static constexpr double slab_test = 0.58, plain_test = 0.36;  ///< box tests of leaf_slabs and bottom_up
   static constexpr double plain_candidate = 9;  ///< a candidate that slabs would have left out
   static constexpr double watch_read = 0.3;     ///< per vertex whose drift is read
   static constexpr double search_read = 0.6, search_candidate = 153;  ///< one search of drift_boxes
-  static constexpr double kept_candidate = 76;                        ///< a frame of drift_boxes
+  static constexpr double kept_candidate = 48;                        ///< a frame of drift_boxes
   static constexpr double unfit = 1.2;  ///< drift_boxes that fall back, over a refit
   static constexpr double join_frame = 0.12, join_segment = 4.2, join_frames = 1;  ///< of a refit
   static constexpr double join_moves = 0.25;                                       ///< of a join
   static constexpr double join_slide = 0.2, join_apart = 1.5;                      ///< of a refit
-  static constexpr double build_read = 2.4;                                        ///< a build of lbvh_drift
+  static constexpr double build_primitive = 9, sort_primitive = 70;  ///< a build of lbvh_drift, drift_rebuild
+  static constexpr double sorts = 1.05;       ///< drift_rebuild where nothing ages, over a refit: set by hand
+  static constexpr double built_tests = 1.3;  ///< of lbvh_drift's new trees, over those of drift_rebuild
 };
 
 }  // namespace kbvh::costs

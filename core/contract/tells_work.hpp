@@ -12,6 +12,9 @@ class TellsWork {
   /// Returns the surfaces of all boxes of moving bodies, each over that of its root: what grows as trees age.
   /// 0 if the trees do not age. O(nodes).
   virtual double surface() { return 0; }
+  /// Returns by how many box tests the surplus of a frame over new trees grows from frame to frame, summed
+  /// over bodies, of a strategy that builds new ones.
+  virtual double growth() const { return 0; }
   /// Returns the box tests of the last call for rays; 0 if it does not tell.
   virtual std::uint64_t last_ray_tests() const { return 0; }
   /// Returns the attempts to decide a pair of triangles for a span of time, since the last reset.

@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <random>
 
+#include "core/families/restructure/tree_age.hpp"
 #include "tests/conformance/check.hpp"
 #include "tests/support/flying_triangles.hpp"
 
@@ -114,6 +116,41 @@ TEST(Restructuring, TreesAgeByRaysAlone) {
     EXPECT_LT(last_tests_of_rays(scene, id, hits), refitted / 3) << id;
     EXPECT_EQ(hits, expected) << id;
   }
+}
+
+TEST(Restructuring, SortsTheTreesOfTheFirstFrame) {
+  const Scene<float> scene = flying_triangles(4000, 31, Flight::anywhere);
+  std::uint64_t tests[2];
+  PairBuffer found[2];
+  for (const bool sorted : {false, true}) {
+    const std::map<std::string, std::string> params{{"start", sorted ? "sorted" : "given"}};
+    Session<float> session(scene, {&find_strategy("drift_rebuild"), params, {}}, CountingPolicy::counting);
+    PhaseTimes times;
+    session.reset(30);
+    session.query(found[sorted], times);
+    std::sort(found[sorted].begin(), found[sorted].end());
+    tests[sorted] = session.strategy().counters()[Counter::box_tests];
+  }
+  EXPECT_EQ(found[0], found[1]);
+  EXPECT_LT(tests[1], tests[0] / 3);
+}
+
+TEST(TreeAge, TellsHowTheSurplusOfAFrameGrows) {
+  TreeAge age;
+  EXPECT_EQ(age.growth(), 0);
+  const auto play = [&](int frames, int growth) {
+    age.renew();
+    for (int frame = 0; frame < frames; ++frame) {
+      age.add(5000 + std::uint64_t(growth * frame), 0);
+      age.end_frame();
+    }
+  };
+  play(100, 30);
+  EXPECT_NEAR(age.growth(), 30, 1);
+  play(50, 90);
+  EXPECT_NEAR(age.growth(), 30, 1) << "of the tree before";
+  play(51, 10);
+  EXPECT_NEAR(age.growth(), 10, 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Eager, Restructuring, testing::Range(std::size_t(0), eager().size()),

@@ -86,10 +86,13 @@ int frames_of(const std::string& choice, const std::string& id) {
   const auto found = choice.find(id + " for ");
   return found == std::string::npos ? 0 : std::stoi(choice.substr(found + id.size() + 5));
 }
+int frames_in_new_trees(const std::string& choice) {
+  return frames_of(choice, "lbvh_drift") + frames_of(choice, "drift_rebuild");
+}
 
 TEST(Auto, RebuildsTreesThatAge) {
   const std::string choice = chosen_at_keyframes(flying_triangles(4000, 100, Flight::anywhere), 99);
-  EXPECT_GT(frames_of(choice, "lbvh_drift"), 60) << choice;
+  EXPECT_GT(frames_in_new_trees(choice), 60) << choice;
 }
 
 TEST(Auto, RebuildsTreesThatAgeByRaysAlone) {
@@ -109,20 +112,25 @@ TEST(Auto, RebuildsTreesThatAgeByRaysAlone) {
     play.session.hits(RayQuery::closest, rays, hits, play.times);
   }
   const std::string choice = play.session.strategy().choice();
-  EXPECT_GT(frames_of(choice, "lbvh_drift"), 60) << choice;
+  EXPECT_GT(frames_in_new_trees(choice), 60) << choice;
   EXPECT_EQ(frames_of(choice, "drift_boxes") + frames_of(choice, "interval_join"), 0) << choice;
 }
 
 TEST(Auto, LeavesAJoinWhoseTreesHaveAged) {
   const std::string choice = chosen_at_keyframes(flying_triangles(4000, 40, Flight::anywhere), 390, 10);
   EXPECT_GT(frames_of(choice, "interval_join"), 0) << choice;  // in trees that are young
-  EXPECT_GT(frames_of(choice, "lbvh_drift"), 200) << choice;
+  EXPECT_GT(frames_in_new_trees(choice), 200) << choice;
+}
+
+TEST(Auto, SortsTreesThatLast) {
+  const std::string choice = chosen_at_keyframes(flying_triangles(4000, 40, Flight::anywhere), 1170, 30);
+  EXPECT_GT(frames_of(choice, "drift_rebuild"), 100) << choice;
 }
 
 TEST(Auto, DoesNotRebuildTreesThatStayYoung) {
   for (const Flight flight : {Flight::side_by_side, Flight::outwards}) {
     const std::string choice = chosen_at_keyframes(flying_triangles(4000, 100, flight, 0.1), 99);
-    EXPECT_EQ(frames_of(choice, "lbvh_drift"), 0) << choice;
+    EXPECT_EQ(frames_in_new_trees(choice), 0) << choice;
   }
 }
 
@@ -157,7 +165,8 @@ TEST(ObservedSlabs, CompareTwoFramesInARow) {
   EXPECT_EQ(seen.boxed, 30);
   slabs.prepare_choice(2, seen);
   EXPECT_GT(plain_cost(seen), refit_cost(seen));
-  EXPECT_GT(seen.plain_ratio, 1);
+  EXPECT_TRUE(seen.plain_known);
+  EXPECT_GT(sorted_cost(seen), plain_cost(seen)) << "new trees have no slabs";
   // Half of the candidates and of the box tests, also with slabs.
   slabs.plain(1500, Told(4500), true, 3, seen);
   EXPECT_EQ(seen.candidates, 50);
@@ -166,14 +175,15 @@ TEST(ObservedSlabs, CompareTwoFramesInARow) {
   // The comparison goes out of date, and a frame of leaf_slabs allows the next one.
   for (int choice = 0; choice < 20; ++choice) slabs.prepare_choice(100 + choice, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(seen.plain_known);
   slabs.slabs(100, Told(10000), true, 200, seen);
   slabs.prepare_choice(200, seen);
+  EXPECT_FALSE(seen.plain_known) << "hoped";
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
   // So it does where candidates become many.
   slabs.plain(150, Told(9000), true, 201, seen);
   slabs.prepare_choice(201, seen);
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
-  EXPECT_LT(seen.plain_ratio, 1);
   slabs.plain(400, Told(20000), true, 202, seen);
   slabs.prepare_choice(202, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
@@ -246,9 +256,36 @@ TEST(ObservedAgeing, ForgetsWhileRebuiltTreesAnswer) {
   ageing.look_at_refitted(40, 10, seen);
   ageing.rebuilt(1000, 0, 11, seen);
   EXPECT_DOUBLE_EQ(seen.aged, 0.75);
-  for (int choice = 0; choice < 60; ++choice) ageing.look_at_rebuilt();
+  for (int choice = 0; choice < 60; ++choice) ageing.look_at_rebuilt(7, false, seen);
   ageing.rebuilt(1000, 0, 400, seen);
   EXPECT_LT(seen.aged, 0.05);
+  EXPECT_EQ(seen.ageing, 7);
+}
+
+TEST(ObservedAgeing, KnowsHowMuchFasterTheSurplusOfTreesThatLastGrows) {
+  Observed seen;
+  ObservedAgeing ageing;
+  ageing.start_over(10);
+  ageing.look_at_rebuilt(10, false, seen);
+  EXPECT_GT(seen.sorted_ageing, 10);
+  ageing.look_at_rebuilt(60, true, seen);
+  EXPECT_DOUBLE_EQ(seen.sorted_ageing, 60);
+  EXPECT_DOUBLE_EQ(seen.ageing, 10);
+  ageing.look_at_rebuilt(90, true, seen);
+  EXPECT_DOUBLE_EQ(seen.ageing, 15);
+  ageing.look_at_rebuilt(20, false, seen);
+  EXPECT_DOUBLE_EQ(seen.sorted_ageing, 120);
+}
+
+TEST(PredictedCosts, SortTreesThatLastAndBuildThoseThatAgeAtOnce) {
+  Observed seen;
+  seen.reads = seen.primitives = 10000;
+  seen.slab_tests = 2e6;
+  seen.aged = 0.95;
+  seen.ageing = seen.sorted_ageing = 100;
+  EXPECT_LT(sorted_cost(seen), rebuilt_cost(seen));
+  seen.ageing = seen.sorted_ageing = 50000;
+  EXPECT_LT(rebuilt_cost(seen), sorted_cost(seen));
 }
 
 /// Segments of ten frames, with contacts.

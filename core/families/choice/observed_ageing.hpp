@@ -31,8 +31,9 @@ class ObservedAgeing {
       known_ = true;
       factor_ = std::max(1.0, tests_ / tests);
       if (factor_ > 1.5) kept_ = std::sqrt(kept_);
+      compared_ = true;
       felt_ = possible() > 0 ? (factor_ - 1) * tests / possible() : 1;
-      seen.ageing = (factor_ - 1) * tests / frame;
+      seen.ageing = seen.sorted_ageing = (factor_ - 1) * tests / frame;
       if (seen.candidates > 0) seen.boxed = std::max(1.0, candidates / seen.candidates);
     }
     seen.aged = 1 - 1 / factor_;
@@ -47,10 +48,24 @@ class ObservedAgeing {
     growth_ = new_surface_ > 0 ? std::max(1.0, surface / new_surface_) : 1;
     const double surplus = felt_ * possible();
     seen.aged = tests_ > 0 ? surplus / tests_ : 0;
-    seen.ageing = surplus / std::max(1, frame);
+    seen.ageing = seen.sorted_ageing = surplus / std::max(1, frame);
   }
-  /// The same while the rebuilt ones do.
-  void look_at_rebuilt() { factor_ = 1 + kept_ * (factor_ - 1); }
+  /// The same while the rebuilt ones do. `growth`: of their surplus, see TellsWork. `sorted`: they are those
+  /// of drift_rebuild, which last longer and whose surplus grows the faster for it.
+  void look_at_rebuilt(double growth, bool sorted, Observed& seen) {
+    factor_ = 1 + kept_ * (factor_ - 1);
+    if (!sorted) {
+      built_growth_ = seen.ageing = growth;
+      seen.sorted_ageing = longer_ * growth;
+      return;
+    }
+    if (built_growth_ > 0) longer_ = std::max(1.0, growth / built_growth_);
+    built_growth_ = 0;
+    seen.sorted_ageing = growth;
+    seen.ageing = growth / longer_;
+  }
+  /// Whether rebuilt trees were ever compared with refitted ones.
+  bool compared() const { return compared_; }
   /// Returns the box tests of the last search of the refitted trees.
   double tests() const { return tests_; }
 
@@ -66,7 +81,10 @@ class ObservedAgeing {
   double estimate_ = 0;  // of the tests of the refitted trees in this frame
   double felt_ = 1;      // share of the possible saving that rebuilt trees have saved
   double factor_ = 1;    // tests of refitted over those of rebuilt trees
-  bool known_ = false;   // the factor was measured since the refitted trees answered last
+  double longer_ = 2.5;  // growth of drift_rebuild's surplus over that of lbvh_drift
+  double built_growth_ = 0;  // of lbvh_drift's, not yet compared with the other
+  bool compared_ = false;
+  bool known_ = false;  // the factor was measured since the refitted trees answered last
 };
 
 }  // namespace kbvh

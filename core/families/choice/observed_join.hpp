@@ -45,6 +45,8 @@ class ObservedJoin {
   }
   /// Whether a join was compared with a refit.
   bool known() const { return known_; }
+  /// Whether it was since another strategy has answered.
+  bool judged() const { return compared_ > 0; }
   /// Whether a refit must answer next.
   bool outdated() const { return outdated_; }
 

@@ -24,6 +24,8 @@ class ObservedMotion {
 
   /// Returns the vertices that a refit reads in a frame.
   double reads() const { return reads_; }
+  /// Returns the number of primitives of moving bodies.
+  double primitives() const { return primitives_; }
 
   /// Looks at the plans. `step`: the length of a frame, in seconds. `touching`: some candidates of the last
   /// frame.
@@ -72,7 +74,9 @@ class ObservedMotion {
       ++leaves;
     }
     leaf_size_.push_back(leaves == 0 ? 0 : sum / leaves);
-    if (scene_.moving(body)) reads_ += reads;
+    if (!scene_.moving(body)) return;
+    reads_ += reads;
+    primitives_ += double(topology.primitives.size());
   }
 
   /// Samples the current velocities of some of a body's vertices.
@@ -131,7 +135,7 @@ class ObservedMotion {
   SceneView<S> scene_;
   SegmentMotion<S> motion_;
   std::vector<double> leaf_size_;  ///< [body]
-  double reads_ = 0;
+  double reads_ = 0, primitives_ = 0;
   std::vector<Velocities> velocities_;  ///< [body], per second
 };
 

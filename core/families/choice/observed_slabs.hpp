@@ -18,6 +18,7 @@ class ObservedSlabs {
     *this = {};
     slabs_ = slabs;
     if (!slabs) seen.boxed = seen.plain_boxed = 1;
+    seen.plain_known = !slabs;
   }
   /// Registers a frame of leaf_slabs. `all`: the count is of all candidates, not only of pairs that
   /// intersect.
@@ -36,7 +37,7 @@ class ObservedSlabs {
       choices_ = 0;
       compared_ = seen.candidates;
       seen.plain_tests = double(work.last_box_tests());
-      seen.plain_ratio = plain_cost(seen) / std::max(1.0, refit_cost(seen));
+      seen.plain_known = true;
       return;
     }
     const double tests = double(work.last_box_tests());
@@ -55,6 +56,7 @@ class ObservedSlabs {
       ++choices_;
       return;
     }
+    seen.plain_known = false;
     // The best that was ever seen: no more candidates, and half of the tests.
     seen.plain_boxed = frame_ == frame ? 1 : std::numeric_limits<double>::infinity();
     seen.plain_tests = 0.5 * seen.slab_tests;

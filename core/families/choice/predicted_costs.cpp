@@ -10,6 +10,25 @@ namespace kbvh {
 
 using Cost = costs::Choice;
 
+namespace {
+
+/// Returns what new trees and those that are no longer new cost in a frame, built at the period at which both
+/// together cost the least, for a surplus of box tests that grows linearly. `build`: the cost of one.
+double upkeep(double build, double ageing) {
+  return std::min(build, std::sqrt(2 * build * costs::Work::plain.box_test * ageing));
+}
+/// Returns the cost of a frame in refitted trees without slabs.
+double without_slabs(const Observed& seen) {
+  return seen.plain_known ? plain_cost(seen) : refit_cost(seen);
+}
+/// Returns the cost of its search in new trees.
+double new_search(const Observed& seen) {
+  const double read = seen.plain_known ? costs::Work::plain.read : costs::Work::slabs.read;
+  return (1 - seen.aged) * (without_slabs(seen) - read * seen.reads);
+}
+
+}  // namespace
+
 double refit_cost(const Observed& seen) {
   return costs::Work::slabs.of(seen.reads, seen.slab_tests, seen.candidates);
 }
@@ -26,13 +45,14 @@ double plain_cost(const Observed& seen) {
 }
 
 double rebuilt_cost(const Observed& seen) {
-  const double build = Cost::build_read * seen.reads;
-  // The period at which builds and surplus tests cost the least together, for a surplus that grows linearly.
-  const double upkeep = std::min(build, std::sqrt(2 * build * costs::Work::plain.box_test * seen.ageing));
-  // The search as in the refitted trees, by slabs or boxes alone, but for the tests that new ones save.
-  const double plain = std::isfinite(seen.plain_boxed) ? std::min(1.0, seen.plain_ratio) : 1;
-  const double search = plain * (refit_cost(seen) - costs::Work::slabs.read * seen.reads);
-  return costs::Work::rebuilt_read * seen.reads + upkeep + (1 - seen.aged) * search;
+  return costs::Work::rebuilt_primitive * seen.primitives +
+         upkeep(Cost::build_primitive * seen.primitives, seen.ageing) + Cost::built_tests * new_search(seen);
+}
+
+double sorted_cost(const Observed& seen) {
+  const double read = seen.plain_known ? costs::Work::plain.read : costs::Work::slabs.read;
+  const double frame = read * seen.reads + new_search(seen);
+  return Cost::sorts * frame + upkeep(Cost::sort_primitive * seen.primitives, seen.sorted_ageing);
 }
 
 double drift_cost(const Observed& seen) {

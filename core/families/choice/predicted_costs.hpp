@@ -12,12 +12,13 @@ struct Observed {
   double boxed = 1.3;
   /// Box tests in a frame of leaf_slabs, which counts comparisons of slabs as such, and of bottom_up.
   double slab_tests = 0, plain_tests = 0;  // estimated while others answer
-  double plain_ratio = 1;                  ///< plain_cost over refit_cost when they were compared
   /// `boxed` where leaf_slabs and bottom_up searched two frames in a row; 1 before bottom_up is tried, which
   /// is the best that can be hoped for; infinite where it is not to be tried.
   double plain_boxed = std::numeric_limits<double>::infinity();
+  bool plain_known = false;  ///< what bottom_up takes is known, and not hoped
   bool near = false;         ///< bodies are not known to be apart
   double reads = 0;          ///< vertices that a refit reads
+  double primitives = 0;     ///< of moving bodies
   double step = 0;           ///< mean step of a vertex per frame relative to another body, in mean leaf sides
   double slide = 0;          ///< the same for primitives relative to their candidates
   bool many_bodies = false;  ///< more pairs of bodies than a choice examines
@@ -25,7 +26,9 @@ struct Observed {
   double join_factor = 1;    ///< cost of the join by its work, over its prediction (ObservedJoin)
   bool rays_only = false;    ///< no pairs are asked
   double aged = 0;           ///< share of box tests in refitted trees that new ones would save
-  double ageing = 0;         ///< growth of these tests per frame
+  /// Growth of a frame's tests beyond those of new trees from frame to frame, in lbvh_drift and
+  /// drift_rebuild.
+  double ageing = 0, sorted_ageing = 0;
 };
 
 // The predicted costs of a frame, in nanoseconds of one machine; only their order matters.
@@ -36,6 +39,8 @@ double refit_cost(const Observed& seen);
 double plain_cost(const Observed& seen);
 /// lbvh_drift: refits trees of its own, and builds new ones when the surplus of tests has cost as much.
 double rebuilt_cost(const Observed& seen);
+/// drift_rebuild: the same with the trees of a refit, whose builds cost more, and which are better.
+double sorted_cost(const Observed& seen);
 /// drift_boxes, infinite where only rays are asked: these do not tell of the age of its trees. One search
 /// serves the frames in which a leaf moves by a part of its size. Where bodies deform, more pairs come near
 /// in these frames than a query takes to find.

@@ -48,6 +48,7 @@ class LeafStrategy : public StoredHierarchyStrategy<S, Count>,
         bodies_[pair.second].age.add(tests - tests_before, out.size() - found_before);
     });
     this->count_.add(Counter::box_tests, tests);
+    this->last_box_tests_ = tests;
     return status;
   }
 
@@ -55,6 +56,11 @@ class LeafStrategy : public StoredHierarchyStrategy<S, Count>,
     this->edit_geometry(change);
   }
 
+  double growth() const override {
+    double sum = 0;
+    for (const Body& body : bodies_) sum += body.age.growth();
+    return sum;
+  }
   std::size_t bytes() const override {
     std::size_t total = Base::bytes() + bodies_.capacity() * sizeof(Body);
     for (const Body& body : bodies_) total += body.contents.bytes();

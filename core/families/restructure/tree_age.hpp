@@ -18,13 +18,15 @@ class TreeAge {
  public:
   /// Registers a new tree: the next frame says what it needs.
   void renew() {
-    surplus_ = 0;
+    growth_ = growth_now();
+    lasted_ = frames_;
+    surplus_ = frames_ = 0;
     pairs_.is_new = rays_.is_new = true;
   }
   /// Registers a tree that was improved, but not made anew. What it needs is still known, and forgotten
   /// slowly.
   void repair() {
-    surplus_ = 0;
+    surplus_ = frames_ = 0;
     pairs_.per_found *= 1.05;
     rays_.per_found *= 1.05;
   }
@@ -36,8 +38,12 @@ class TreeAge {
   double end_frame() {
     // 1000 pairs stand for the traversal of bodies without contact; a ray that meets no box makes no tests.
     surplus_ += pairs_.end_frame(1000) + costs::Ageing::ray_test * rays_.end_frame(1);
+    ++frames_;
     return surplus_;
   }
+  /// Returns by how many box tests the surplus of a frame grows from frame to frame: of this tree, or, while
+  /// it is younger than the one before was, of that one.
+  double growth() const { return frames_ < lasted_ ? growth_ : growth_now(); }
 
  private:
   /// The work of one kind of query.
@@ -64,8 +70,12 @@ class TreeAge {
       return surplus;
     }
   };
+  /// A surplus that grows by this at each frame adds up to `surplus_`.
+  double growth_now() const { return frames_ > 0 ? 2 * surplus_ / (frames_ * frames_) : 0; }
+
   Work pairs_, rays_;
-  double surplus_ = 0;
+  double surplus_ = 0, frames_ = 0;  // since the tree was new
+  double growth_ = 0, lasted_ = 0;   // of the tree before: its growth, and the number of its frames
 };
 
 }  // namespace kbvh
