@@ -100,8 +100,11 @@ class Auto final : public Strategy<S>,
     seen_ = {};
     seen_.reads = steps_.reads();
     seen_.primitives = steps_.primitives();
+    seen_.bodies = steps_.moving_bodies();
     ageing_.start_over(runners_[0].work != nullptr ? runners_[0].work->surface() : 0);
     chosen_tests_ = 0;
+    lost_ = 0;
+    looked_at_ = 0;
     tried_ = waits_ = refits_first_ = false;
     join_.start_over(seen_);
     slabs_.start_over(runners_[0].candidate->cost == &refit_cost, seen_);
@@ -123,7 +126,11 @@ class Auto final : public Strategy<S>,
                      (is_active(&join_cost) && seen_.near && !join_.judged()) ||
                      (refits() && ageing_.tests() > 1.5 * chosen_tests_);
     if (step_ > 0 && due) choose(t);
-    if (active_ != last) ++switches_;
+    if (active_ != last) {
+      ++switches_;
+      lost_ = 0;
+      looked_at_ = frame_;
+    }
     tried_ = active_ != last &&
              ((rebuilds() && !rebuilds(last)) || is_active(&plain_cost) || join_.outdated() || refits_first_);
     Runner& runner = runners_[active_];
@@ -301,6 +308,30 @@ class Auto final : public Strategy<S>,
     else if (rebuilds(best) || (is_join(best) && refits() && seen_.aged > 0.5))
       best = builder();
   }
+  /// Returns the strategy of least predicted cost among those that are `allowed`, or the active one where
+  /// none is cheaper by `gain`.
+  template <class Allowed>
+  std::size_t cheapest(double gain, Allowed&& allowed) const {
+    std::size_t best = active_;
+    const double active = runners_[active_].candidate->cost(seen_);
+    double least = active;
+    for (std::size_t i = 0; i < runners_.size(); ++i) {
+      const double cost = runners_[i].candidate->cost(seen_);
+      if (allowed(i) && cost < least && cost * gain < active) {
+        least = cost;
+        best = i;
+      }
+    }
+    return best;
+  }
+  /// Whether the frames since the last change of strategy would have saved, with `best`, what its first frame
+  /// costs. A strategy that is changed for another when this has been lost loses no more than twice as much.
+  bool worth_a_start(std::size_t best) {
+    const double saved = runners_[active_].candidate->cost(seen_) - runners_[best].candidate->cost(seen_);
+    lost_ += std::max(0.0, saved) * (frame_ - looked_at_);
+    looked_at_ = frame_;
+    return lost_ > costs::Choice::start_primitive * seen_.primitives;
+  }
   /// Strategies differ in the pairs that they leave out early: only drift_boxes reports all pairs of boxes,
   /// and shows that bodies are apart.
   void see_candidates(std::size_t count, bool all) {
@@ -317,7 +348,7 @@ class Auto final : public Strategy<S>,
   }
   void see_tests(double tests, double count) {
     if (refits())
-      ageing_.refitted(tests, frame_);
+      ageing_.refitted(tests, count, frame_, seen_);
     else if (rebuilds())
       ageing_.rebuilt(tests / (is_active(&sorted_cost) ? 1 : costs::Choice::built_tests), count,
                       std::max(1, frame_), seen_);
@@ -329,17 +360,17 @@ class Auto final : public Strategy<S>,
     const double frames = frame_ - chosen_at_;
     if (refits() && runner.work != nullptr) {
       ageing_.look_at_refitted(runner.work->surface(), frame_, seen_);
-      join_.refitted(seen_);
+      join_.refitted(frame_, seen_);
     } else if (rebuilds() && runner.work != nullptr && frames >= shortest_stay) {
       ageing_.look_at_rebuilt(runner.work->growth(), is_active(&sorted_cost), seen_);
     }
-    if (rebuilds()) join_.refitted(seen_);
+    if (rebuilds()) join_.refitted(frame_, seen_);
     // From time to time drift_boxes may look whether bodies have parted.
     if (frames >= longest_stay && seen_.candidates == 0) seen_.near = false;
     if (!is_active(&join_cost)) {
       if (frames >= shortest_stay) join_.forget(seen_);
     } else if (whole && window_.frame != none && frame_ > window_.frame) {
-      join_.joined(joined_work(), joined_candidates_, seen_);
+      join_.joined(joined_work(), joined_candidates_, frame_, seen_);
     }
   }
   /// Returns the work of the join in a frame of its window, which is of whole segments.
@@ -403,18 +434,12 @@ class Auto final : public Strategy<S>,
       seen_.frames_per_segment = std::numeric_limits<double>::infinity();
     slabs_.prepare_choice(frame_ - 1, seen_);
     const double gain = tried_ || known != join_.known() ? 1 : gain_;
-    std::size_t best = active_;
-    double least = runners_[active_].candidate->cost(seen_);
-    for (std::size_t i = 0; i < runners_.size(); ++i) {
-      const double cost = runners_[i].candidate->cost(seen_);
-      if (cost < least && cost * gain < runners_[active_].candidate->cost(seen_)) {
-        least = cost;
-        best = i;
-      }
-    }
+    std::size_t best = cheapest(gain, [](std::size_t) { return true; });
     // This is found at the end of a segment, where a frame of a refit costs no second join.
     if (join_.outdated()) best = refit_to_compare();
     if (!ageing_.compared()) try_new_trees(best);
+    if (rebuilds(best) && !rebuilds() && !worth_a_start(best))
+      best = cheapest(gain, [&](std::size_t runner) { return !rebuilds(runner); });
     // A join of a segment's last frames costs as much as that of the whole.
     waits_ = best != active_ && is_join(best) && bounded && !whole &&
              runners_[active_].candidate->cost(seen_) * (end - t) <
@@ -457,6 +482,8 @@ class Auto final : public Strategy<S>,
   double chosen_candidates_ = 0;       ///< number of candidates at the time of the choice
   bool chosen_near_ = false;           ///< whether bodies met then
   double chosen_tests_ = 0;            ///< box tests of the refitted trees in the frame before
+  double lost_ = 0;                    ///< since the last change of strategy, see worth_a_start
+  int looked_at_ = 0;                  ///< the frame until which
   bool tried_ = false;  ///< a strategy answers for the first time whose work decides whether it stays
   ObservedAgeing ageing_;
   bool waits_ = false;         ///< for the next segment, to join it

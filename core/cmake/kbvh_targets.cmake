@@ -2,7 +2,8 @@
 
 # kbvh_add_strategy(NAME SOURCE TARGET [SCALARS_APART | TOGETHER]): compiles SOURCE into TARGET (a static library) and
 # lists NAME, the word in its KBVH_STRATEGY(NAME), in the manifest.
-# SCALARS_APART: compiles a SOURCE with one entry or several, all in both scalars, once a scalar and side by side.
+# SCALARS_APART: compiles a SOURCE with one entry or several, all in both scalars, once a scalar and side by side. It is
+# for those that take long, and KBVH_OUTER_OPTIMISATION applies to them.
 # TOGETHER: SOURCE may be compiled in one unit with others (KBVH_UNITY_STRATEGIES), whose names it does not use.
 # KBVH_STRATEGIES, a list of such words, leaves out all others.
 function(kbvh_add_strategy name source target)
@@ -21,6 +22,7 @@ function(kbvh_add_strategy name source target)
     set_source_files_properties(${in_double} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     set_source_files_properties(${source} PROPERTIES
       COMPILE_DEFINITIONS "KBVH_SCALARS_HERE=float_only;KBVH_JOINS_SCALARS")
+    set_source_files_properties(${source} ${in_double} PROPERTIES COMPILE_OPTIONS "${KBVH_OUTER_OPTIMISATION}")
   endif()
   kbvh_add_about(${name} ${source} ${target})
   set_property(GLOBAL APPEND PROPERTY KBVH_STRATEGY_NAMES ${name})

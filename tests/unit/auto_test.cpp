@@ -186,6 +186,8 @@ TEST(ObservedSlabs, CompareTwoFramesInARow) {
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
   slabs.plain(400, Told(20000), true, 202, seen);
   slabs.prepare_choice(202, seen);
+  EXPECT_TRUE(seen.plain_known) << "a comparison lasts for some frames";
+  slabs.prepare_choice(210, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
 }
 
@@ -218,22 +220,35 @@ TEST(ObservedAgeing, KeepsWhatTheFirstSearchInNewTreesTells) {
   seen.slab_tests = 9000;
   ObservedAgeing ageing;
   ageing.start_over(10);
-  ageing.refitted(9000, 20);
+  ageing.refitted(9000, 1000, 20, seen);
   ageing.look_at_refitted(30, 20, seen);  // boxes have grown by 3: up to two thirds of the tests may be saved
   EXPECT_DOUBLE_EQ(seen.aged, 2.0 / 3);
   EXPECT_DOUBLE_EQ(seen.ageing, 300);
-  ageing.rebuilt(6000, 1200, 21, seen);  // one third is
+  ageing.rebuilt(6000, 1300, 21, seen);  // one third is
   EXPECT_DOUBLE_EQ(seen.aged, 1.0 / 3);
-  EXPECT_DOUBLE_EQ(seen.boxed, 1.2);
+  EXPECT_DOUBLE_EQ(seen.boxed, 1.3);
   EXPECT_DOUBLE_EQ(seen.candidates, 1000);
   EXPECT_DOUBLE_EQ(seen.slab_tests, 9000);
-  ageing.rebuilt(8000, 2400, 22, seen);  // the factor stays
+  ageing.rebuilt(8000, 2600, 22, seen);  // the factor stays
   EXPECT_DOUBLE_EQ(seen.aged, 1.0 / 3);
   EXPECT_DOUBLE_EQ(seen.candidates, 2000);
   EXPECT_DOUBLE_EQ(seen.slab_tests, 12000);
-  ageing.refitted(9000, 30);  // back again, with as many tests as before
+  ageing.refitted(9000, 0, 30, seen);  // back again, with as many tests as before
   ageing.look_at_refitted(30, 30, seen);
   EXPECT_DOUBLE_EQ(seen.aged, 1.0 / 3);
+}
+
+TEST(ObservedAgeing, ComparesTheTestsPerCandidate) {
+  Observed seen;
+  seen.candidates = seen.boxed = 1;
+  ObservedAgeing ageing;
+  ageing.start_over(10);
+  seen.candidates = 4000;
+  ageing.refitted(50000, 4000, 20, seen);
+  ageing.look_at_refitted(20, 20, seen);
+  ageing.rebuilt(20000, 1000, 21,
+                 seen);  // bodies have parted: two of five tests, two of five of what is found
+  EXPECT_DOUBLE_EQ(seen.aged, 0);
 }
 
 TEST(ObservedAgeing, DoesNotCompareWithAnOldFrame) {
@@ -241,7 +256,7 @@ TEST(ObservedAgeing, DoesNotCompareWithAnOldFrame) {
   seen.candidates = 10;
   ObservedAgeing ageing;
   ageing.start_over(10);
-  ageing.refitted(9000, 20);
+  ageing.refitted(9000, 0, 20, seen);
   ageing.look_at_refitted(20, 20, seen);
   ageing.rebuilt(100000, 5000, 60, seen);  // thousands of contacts have begun since
   EXPECT_DOUBLE_EQ(seen.aged, 0.5);
@@ -252,7 +267,7 @@ TEST(ObservedAgeing, ForgetsWhileRebuiltTreesAnswer) {
   Observed seen;
   ObservedAgeing ageing;
   ageing.start_over(10);
-  ageing.refitted(4000, 10);
+  ageing.refitted(4000, 0, 10, seen);
   ageing.look_at_refitted(40, 10, seen);
   ageing.rebuilt(1000, 0, 11, seen);
   EXPECT_DOUBLE_EQ(seen.aged, 0.75);
@@ -305,8 +320,8 @@ TEST(ObservedJoin, IsTriedAndJudgedByItsWork) {
   ObservedJoin join;
   join.start_over(seen);
   EXPECT_LT(join_cost(seen), predicted) << "it may be faster";
-  join.refitted(seen);
-  join.joined(3 * predicted, 500, seen);
+  join.refitted(1, seen);
+  join.joined(3 * predicted, 500, 10, seen);
   EXPECT_TRUE(join.known());
   EXPECT_DOUBLE_EQ(join_cost(seen), 3 * predicted);
   for (int choice = 0; choice < 100; ++choice) join.forget(seen);
@@ -317,20 +332,42 @@ TEST(ObservedJoin, IsComparedAgainWhereContactsChange) {
   Observed seen = meeting();
   ObservedJoin join;
   join.start_over(seen);
-  join.refitted(seen);
-  join.joined(20000, 500, seen);
-  join.joined(70000, 520, seen);  // the same contacts, more work: its boxes have aged
+  join.refitted(1, seen);
+  join.joined(20000, 500, 10, seen);
+  join.joined(70000, 520, 10, seen);  // the same contacts, more work: its boxes have aged
   EXPECT_FALSE(join.outdated());
   EXPECT_DOUBLE_EQ(join_cost(seen), 70000);
-  join.joined(90000, 1500, seen);  // more contacts, not yet twice the work
+  join.joined(90000, 1500, 10, seen);  // more contacts, not yet twice the work
   EXPECT_FALSE(join.outdated());
   EXPECT_DOUBLE_EQ(join_cost(seen), 70000);
-  join.joined(150000, 1600, seen);
+  join.joined(150000, 1600, 10, seen);
   EXPECT_TRUE(join.outdated());
   seen.candidates = 5000;  // a refit has answered, and found more of them, too
-  join.refitted(seen);
+  join.refitted(1, seen);
   EXPECT_FALSE(join.outdated());
   EXPECT_DOUBLE_EQ(join_cost(seen), 150000);
+}
+
+TEST(ObservedJoin, IsComparedAgainAfterAWhile) {
+  Observed seen = meeting();
+  ObservedJoin join;
+  join.start_over(seen);
+  join.refitted(1, seen);
+  const double refit = refit_cost(seen);
+  int frames[3];
+  for (int& frame : frames) {
+    join.refitted(0, seen);
+    for (frame = 1; !join.outdated() && frame < 10000; ++frame) join.joined(refit, 500, frame, seen);
+  }
+  EXPECT_GT(frames[0], 20);
+  EXPECT_GT(frames[1], 1.5 * frames[0]) << "ever more seldom";
+  EXPECT_GT(frames[2], 1.5 * frames[1]);
+  ObservedJoin fast;
+  fast.start_over(seen);
+  fast.refitted(0, seen);
+  int frame = 1;
+  for (; !fast.outdated(); ++frame) fast.joined(refit / 10, 500, frame, seen);
+  EXPECT_GT(frame, 5 * frames[0]) << "where a refit costs many frames of the join";
 }
 
 TEST(ObservedJoin, IsNotComparedWithARefitOfBodiesThatWereApart) {
@@ -338,11 +375,11 @@ TEST(ObservedJoin, IsNotComparedWithARefitOfBodiesThatWereApart) {
   ObservedJoin join;
   join.start_over(seen);
   seen.near = false;
-  join.refitted(seen);
-  join.joined(100, 0, seen);  // apart: nothing is learned
+  join.refitted(1, seen);
+  join.joined(100, 0, 10, seen);  // apart: nothing is learned
   EXPECT_FALSE(join.known());
   seen.near = true;
-  join.joined(50000, 500, seen);
+  join.joined(50000, 500, 10, seen);
   EXPECT_TRUE(join.outdated());
   EXPECT_FALSE(join.known());
 }

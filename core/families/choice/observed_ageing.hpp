@@ -17,9 +17,10 @@ class ObservedAgeing {
     *this = {};
     new_surface_ = surface;
   }
-  /// Registers the frame's search of the refitted trees.
-  void refitted(double tests, int frame) {
+  /// Registers the frame's search of the refitted trees, by slabs or boxes alone as in `seen`.
+  void refitted(double tests, double candidates, int frame, const Observed& seen) {
     tests_ = estimate_ = tests;
+    found_ = candidates == seen.candidates ? seen.boxed * candidates : candidates;
     frame_ = frame;
   }
   /// Registers the frame's search of rebuilt trees; `frame` counts from the start.
@@ -29,7 +30,8 @@ class ObservedAgeing {
       factor_ = 1 / (1 - std::min(seen.aged, 0.99));
     } else if (!known_ && tests > 0) {
       known_ = true;
-      factor_ = std::max(1.0, tests_ / tests);
+      // Both searches per candidate; some stand for the traversal of bodies without contact.
+      factor_ = std::max(1.0, tests_ / tests * (candidates + quiet) / (found_ + quiet));
       if (factor_ > 1.5) kept_ = std::sqrt(kept_);
       compared_ = true;
       felt_ = possible() > 0 ? (factor_ - 1) * tests / possible() : 1;
@@ -47,7 +49,7 @@ class ObservedAgeing {
     known_ = false;
     growth_ = new_surface_ > 0 ? std::max(1.0, surface / new_surface_) : 1;
     const double surplus = felt_ * possible();
-    seen.aged = tests_ > 0 ? surplus / tests_ : 0;
+    seen.aged = tests_ > 0 ? std::min(0.99, surplus / tests_) : 0;
     seen.ageing = seen.sorted_ageing = surplus / std::max(1, frame);
   }
   /// The same while the rebuilt ones do. `growth`: of their surplus, see TellsWork. `sorted`: they are those
@@ -73,9 +75,12 @@ class ObservedAgeing {
   /// Returns the tests that new trees save if searches feel the whole growth of the boxes.
   double possible() const { return tests_ * (1 - 1 / growth_); }
 
+  static constexpr double quiet = 1000;
+
   double new_surface_ = 0;
   double growth_ = 1;    // of the surfaces, at the last choice
   double tests_ = 0;     // of the last search of the refitted trees
+  double found_ = 0;     // candidates of boxes alone then
   int frame_ = 0;        // in which they answered it
   double kept_ = 0.8;    // of the factor at a further choice; closer to 1 with each trial that new trees won
   double estimate_ = 0;  // of the tests of the refitted trees in this frame

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cmath>
 
 #include "core/base/cost_constants.hpp"
@@ -17,16 +18,17 @@ class ObservedJoin {
     *this = {};
     seen.join_factor = costs::Work::hope;
   }
-  /// Registers that a strategy that refits has answered, whose work is in `seen`.
-  void refitted(Observed& seen) {
+  /// Registers that a strategy that refits has answered `frame`, whose work is in `seen`.
+  void refitted(int frame, Observed& seen) {
+    frame_ = frame;
     met_ = seen.near;
     if (outdated_) compare(seen);
     outdated_ = false;
     compared_ = 0;
   }
-  /// Registers the work of the join in a mean frame over whole segments, in nanoseconds by its counts, and
-  /// the candidates of its last frame.
-  void joined(double work, double candidates, Observed& seen) {
+  /// Registers the work of the join in a mean frame over whole segments until `frame`, in nanoseconds by its
+  /// counts, and the candidates of the last one.
+  void joined(double work, double candidates, int frame, Observed& seen) {
     if (!seen.near) return;
     work_ = work;
     candidates_ = candidates;
@@ -38,6 +40,11 @@ class ObservedJoin {
       compare(seen);  // the same contacts, for which a refit would take as long as then
     else
       outdated_ = work > 2 * compared_ || 2 * work < compared_;
+    // A frame of a refit costs as many frames of the join as the join is faster.
+    if (frame - frame_ > patience_ * std::max(1.0, refit_cost(seen) / join_cost(seen))) {
+      outdated_ = true;
+      patience_ *= 2;
+    }
   }
   /// Prepares a choice while another strategy answers.
   void forget(Observed& seen) const {
@@ -51,10 +58,14 @@ class ObservedJoin {
   bool outdated() const { return outdated_; }
 
  private:
+  /// One segment that took long does not tell that all will.
+  static constexpr double most = 4;
+
   void compare(Observed& seen) {
     seen.join_factor = 1;
     const double predicted = join_cost(seen);
-    if (work_ > 0 && predicted > 0 && std::isfinite(predicted)) seen.join_factor = work_ / predicted;
+    if (work_ > 0 && predicted > 0 && std::isfinite(predicted))
+      seen.join_factor = std::min(most, work_ / predicted);
     if (!known_ || seen.join_factor > 1.1) kept_ = std::sqrt(kept_);
     compared_ = work_;
     compared_candidates_ = candidates_;
@@ -65,8 +76,10 @@ class ObservedJoin {
       0.64;          // exponent of the factor at a further choice; closer to 1 with each trial that it lost
   double work_ = 0;  // of the join in a frame, at last
   double candidates_ = 0, compared_candidates_ = 0;
-  double compared_ = 0;  // when it was compared; 0: a refit has answered since
-  bool met_ = false;     // bodies did when a refit answered
+  double compared_ = 0;   // when it was compared; 0: a refit has answered since
+  int frame_ = 0;         // the last one that a refit has answered
+  double patience_ = 32;  // frames until a refit must answer again, as long as the join is as slow
+  bool met_ = false;      // bodies did when a refit answered
   bool known_ = false, outdated_ = false;
 };
 

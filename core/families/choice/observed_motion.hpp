@@ -14,33 +14,38 @@ namespace kbvh {
 template <class S>
 class ObservedMotion {
  public:
-  static constexpr std::uint32_t samples = 24;  ///< vertices of a body, or pairs, that are looked at
+  static constexpr std::uint32_t samples = 24;       ///< vertices of a body, or pairs, that are looked at
+  static constexpr std::uint32_t all_samples = 256;  ///< of all moving bodies, but for some of each
 
   /// Measures the hierarchies: the mean side of leaf boxes, and the number of vertices in leaves.
   ObservedMotion(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies)
       : scene_(scene), motion_(motion), velocities_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) measure(topologies[body], body);
+    if (moving_ > 0) of_body_ = std::clamp(all_samples / moving_, 3u, samples);
   }
 
   /// Returns the vertices that a refit reads in a frame.
   double reads() const { return reads_; }
   /// Returns the number of primitives of moving bodies.
   double primitives() const { return primitives_; }
+  std::uint32_t moving_bodies() const { return moving_; }
 
   /// Looks at the plans. `step`: the length of a frame, in seconds. `touching`: some candidates of the last
   /// frame.
   void look(double step, std::span<const PrimitivePair> touching, Observed& seen) {
     const bool plans_change = seen.changes_per_frame != 0;
     for (std::uint32_t body = 0; body < scene_.body_count(); ++body) sample(body, plans_change);
+    const double spread = seen.spread;
     seen.step = seen.spread = 0;
     // Some of many pairs of bodies: similar bodies show similar largest steps.
     const auto pairs = scene_.pairs();
-    seen.many_bodies = pairs.size() > most_pairs;
+    seen.many_bodies = pairs.size() > many_pairs;
     const std::size_t apart = (pairs.size() + most_pairs - 1) / most_pairs;
     for (std::size_t i = 0; i < pairs.size(); i += apart) {
       pass(pairs[i].first, pairs[i].second, step, seen);
       pass(pairs[i].second, pairs[i].first, step, seen);
     }
+    if (seen.step == 0) seen.spread = spread;  // a body that rests now, or whose moving part was not sampled
     seen.slide = touching.empty() ? seen.step : slide(touching, plans_change) * step;
   }
 
@@ -49,7 +54,7 @@ class ObservedMotion {
   }
 
  private:
-  static constexpr std::size_t most_pairs = 1024;  ///< pairs of bodies that are looked at
+  static constexpr std::size_t many_pairs = 1024, most_pairs = 128;  ///< of bodies; that are looked at
   struct Velocities {
     std::uint32_t count = 0;  ///< none: the body rests
     double of[samples][3] = {}, mean[3] = {};
@@ -75,6 +80,7 @@ class ObservedMotion {
     }
     leaf_size_.push_back(leaves == 0 ? 0 : sum / leaves);
     if (!scene_.moving(body)) return;
+    ++moving_;
     reads_ += reads;
     primitives_ += double(topology.primitives.size());
   }
@@ -85,7 +91,7 @@ class ObservedMotion {
     const std::uint32_t count = scene_.vertex_count(body);
     seen = {};
     if (count == 0 || (!scene_.moving(body) && !plans_change)) return;
-    seen.count = std::min(samples, count);
+    seen.count = std::min(of_body_, count);
     for (std::uint32_t i = 0; i < seen.count; ++i) {
       // Spreads the samples by the golden ratio: even steps may hit the same place in every row of a grid.
       const std::uint32_t share = 0x9e3779b9u * i;  // of 2^32
@@ -122,20 +128,24 @@ class ObservedMotion {
   void pass(std::uint32_t body, std::uint32_t other, double step, Observed& seen) const {
     const Velocities &own = velocities_[body], &others = velocities_[other];
     if (own.count == 0 || leaf_size_[body] <= 0) return;
-    double sum = 0;
-    for (std::uint32_t i = 0; i < own.count; ++i)
-      sum += std::hypot(own.of[i][0] - others.mean[0], own.of[i][1] - others.mean[1],
-                        own.of[i][2] - others.mean[2]);
-    const double common = own.count * std::hypot(own.mean[0] - others.mean[0], own.mean[1] - others.mean[1],
-                                                 own.mean[2] - others.mean[2]);
+    double sum = 0, differences = 0;
+    for (std::uint32_t i = 0; i < own.count; ++i) {
+      sum += length(own.of[i], others.mean);
+      differences += length(own.of[i], own.mean);
+    }
     seen.step = std::max(seen.step, sum / own.count * step / leaf_size_[body]);
-    if (sum > 0) seen.spread = std::max(seen.spread, 1 - common / sum);
+    if (sum > 0) seen.spread = std::max(seen.spread, std::min(1.0, differences * differences / (sum * sum)));
+  }
+  static double length(const double (&a)[3], const double (&b)[3]) {
+    return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
   }
 
   SceneView<S> scene_;
   SegmentMotion<S> motion_;
   std::vector<double> leaf_size_;  ///< [body]
   double reads_ = 0, primitives_ = 0;
+  std::uint32_t moving_ = 0;            ///< number of moving bodies
+  std::uint32_t of_body_ = samples;     ///< vertices of a body that are looked at
   std::vector<Velocities> velocities_;  ///< [body], per second
 };
 

@@ -36,6 +36,8 @@ class ObservedSlabs {
       seen.boxed = seen.plain_boxed = std::max(1.0, candidates / std::max(1.0, seen.candidates));
       choices_ = 0;
       compared_ = seen.candidates;
+      since_ = frame;
+      wait_ = std::min(2 * wait_, most_wait);
       seen.plain_tests = double(work.last_box_tests());
       seen.plain_known = true;
       return;
@@ -52,7 +54,7 @@ class ObservedSlabs {
   void prepare_choice(int frame, Observed& seen) {
     if (!slabs_) return;
     const bool alike = seen.candidates <= 2 * compared_ && 2 * seen.candidates >= compared_;
-    if (choices_ < most_choices && alike) {
+    if ((choices_ < most_choices && alike) || frame - since_ < wait_) {
       ++choices_;
       return;
     }
@@ -63,11 +65,13 @@ class ObservedSlabs {
   }
 
  private:
-  static constexpr int never = -1, most_choices = 8;
+  static constexpr int never = -1, most_choices = 8, most_wait = 64;
   bool slabs_ = true;
   int frame_ = never;           // the last one of leaf_slabs that can be compared
   int choices_ = most_choices;  // since the comparison
   double compared_ = 0;         // candidates of leaf_slabs then
+  int since_ = never,
+      wait_ = 1;  // the frame of the comparison; frames before the next, twice as many each time
 };
 
 }  // namespace kbvh

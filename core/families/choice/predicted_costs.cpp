@@ -15,33 +15,32 @@ namespace {
 /// Returns what new trees and those that are no longer new cost in a frame, built at the period at which both
 /// together cost the least, for a surplus of box tests that grows linearly. `build`: the cost of one.
 double upkeep(double build, double ageing) {
-  return std::min(build, std::sqrt(2 * build * costs::Work::plain.box_test * ageing));
+  return std::min(build, std::sqrt(2 * build * Cost::surplus_test * ageing));
 }
 /// Returns the cost of a frame in refitted trees without slabs.
 double without_slabs(const Observed& seen) {
   return seen.plain_known ? plain_cost(seen) : refit_cost(seen);
 }
-/// Returns the cost of its search in new trees.
+/// Returns the cost of its update, and of its search in new trees.
+double refit_update(const Observed& seen) {
+  return costs::Work::plain.read * seen.reads + costs::Work::body * seen.bodies;
+}
 double new_search(const Observed& seen) {
-  const double read = seen.plain_known ? costs::Work::plain.read : costs::Work::slabs.read;
-  return (1 - seen.aged) * (without_slabs(seen) - read * seen.reads);
+  return (1 - seen.aged) * (without_slabs(seen) - refit_update(seen));
 }
 
 }  // namespace
 
 double refit_cost(const Observed& seen) {
-  return costs::Work::slabs.of(seen.reads, seen.slab_tests, seen.candidates);
+  return costs::Work::body * seen.bodies +
+         costs::Work::slabs.of(seen.reads, seen.slab_tests, seen.candidates);
 }
 
 double plain_cost(const Observed& seen) {
   if (!std::isfinite(seen.plain_boxed)) return std::numeric_limits<double>::infinity();
-  // What slabs cost and save, as a share of a frame.
-  const double candidates = std::max(1.0, seen.candidates);
-  const double frame = costs::Work::plain.of(seen.reads, seen.plain_tests, seen.plain_boxed * candidates);
-  const double slabs = Cost::slab_test * seen.slab_tests - Cost::plain_test * seen.plain_tests -
-                       Cost::plain_candidate * (seen.plain_boxed - 1) * candidates;
-  // Never more than four refits, whatever the counts.
-  return frame > 0 ? refit_cost(seen) / std::max(0.25, 1 + slabs / frame) : refit_cost(seen);
+  return costs::Work::body * seen.bodies +
+         costs::Work::plain.of(seen.reads, seen.plain_tests, seen.candidates) +
+         costs::Work::plain_candidate * (seen.plain_boxed - 1) * std::max(1.0, seen.candidates);
 }
 
 double rebuilt_cost(const Observed& seen) {
@@ -50,20 +49,20 @@ double rebuilt_cost(const Observed& seen) {
 }
 
 double sorted_cost(const Observed& seen) {
-  const double read = seen.plain_known ? costs::Work::plain.read : costs::Work::slabs.read;
-  const double frame = read * seen.reads + new_search(seen);
-  return Cost::sorts * frame + upkeep(Cost::sort_primitive * seen.primitives, seen.sorted_ageing);
+  return Cost::sorts * (refit_update(seen) + new_search(seen)) +
+         upkeep(Cost::sort_primitive * seen.primitives, seen.sorted_ageing);
 }
 
 double drift_cost(const Observed& seen) {
   if (seen.rays_only) return std::numeric_limits<double>::infinity();
-  const double watching = Cost::watch_read * seen.reads;
-  if (!seen.near) return seen.step < 0.2 ? 0.5 * watching : Cost::unfit * refit_cost(seen);
+  const double watching = Cost::watch_read * seen.reads + Cost::watch_body * seen.bodies;
+  if (!seen.near)
+    return seen.step < 0.2 ? (1 + Cost::watch_step * seen.step) * watching : Cost::unfit * refit_cost(seen);
   if (seen.spread > 0.02) return Cost::unfit * refit_cost(seen);
   const double frames = seen.step > 0 ? std::min(0.4 / seen.step, 24.0) : 24;
   if (frames < 3) return Cost::unfit * refit_cost(seen);
   const double search = Cost::search_read * seen.reads + Cost::search_candidate * seen.candidates;
-  return watching + search / frames + Cost::kept_candidate * seen.candidates;
+  return watching + search / frames + Cost::kept_candidate * seen.boxed * seen.candidates;
 }
 
 double join_cost(const Observed& seen) {
