@@ -11,8 +11,6 @@ namespace kbvh::theory {
 
 namespace {
 
-using boost::multiprecision::cpp_int;
-
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double smallest = std::numeric_limits<double>::min();
 
@@ -42,7 +40,7 @@ struct Integers {
       if (mantissas[i] != 0) values[i] <<= exponents[i] - unit;
     }
   }
-  cpp_int values[4];
+  Integer values[4];
 };
 
 /// Returns the position of one vertex on its plan.
@@ -77,7 +75,7 @@ Rational exact(double x) {
   int exponent = 0;
   const auto mantissa = static_cast<long long>(std::ldexp(std::frexp(x, &exponent), 53));
   exponent -= 53;
-  boost::multiprecision::cpp_int numerator = mantissa, denominator = 1;
+  Integer numerator = mantissa, denominator = 1;
   if (exponent >= 0)
     numerator <<= exponent;
   else
@@ -87,10 +85,10 @@ Rational exact(double x) {
 
 Rational meeting_fraction(double a0, double a1, double b0, double b1) {
   const Integers n(a0, a1, b0, b1);
-  const cpp_int p = n.values[0] - n.values[2], q = n.values[3] - n.values[1];
+  const Integer p = n.values[0] - n.values[2], q = n.values[3] - n.values[1];
   if (p.sign() * q.sign() < 0 || p + q == 0) throw std::invalid_argument("coordinates do not meet");
-  const cpp_int whole = p + q;
-  return whole.sign() > 0 ? Rational(p, whole) : Rational(cpp_int(-p), cpp_int(-whole));
+  const Integer whole = p + q;
+  return whole.sign() > 0 ? Rational(p, whole) : Rational(Integer(-p), Integer(-whole));
 }
 
 Rational meeting_time(const ExactLine& a, const ExactLine& b) {
@@ -173,8 +171,8 @@ int ExactMotion::compare(const When& when, int axis, std::uint32_t a, std::uint3
   if (rows_[row].values.empty() && rows_[row + 1].values.empty()) {
     const double *r0 = rows_[row].rounded.data() + first, *r1 = rows_[row + 1].rounded.data() + first;
     const Integers n(r0[a], r0[b], r1[a], r1[b]);
-    const cpp_int &part = numerator(when.u), &whole = denominator(when.u);
-    return cpp_int((whole - part) * (n.values[0] - n.values[1]) + part * (n.values[2] - n.values[3])).sign();
+    const Integer &part = numerator(when.u), &whole = denominator(when.u);
+    return Integer((whole - part) * (n.values[0] - n.values[1]) + part * (n.values[2] - n.values[3])).sign();
   }
   const Rational exact0 = value(row, first + a) - value(row, first + b);
   const Rational exact1 = value(row + 1, first + a) - value(row + 1, first + b);

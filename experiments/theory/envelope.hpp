@@ -1,5 +1,9 @@
 #pragma once
+#ifdef KBVH_THEORY_GMP
+#include <boost/multiprecision/gmp.hpp>
+#else
 #include <boost/multiprecision/cpp_int.hpp>
+#endif
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -11,7 +15,14 @@ namespace kbvh::theory {
 
 /// Exact envelopes of flight plans, computed independently of the kinetic tree under test: from the stored
 /// numbers, in rationals, without code of core/families/events or core/motion.
+#ifdef KBVH_THEORY_GMP
+using Integer = boost::multiprecision::number<boost::multiprecision::gmp_int, boost::multiprecision::et_off>;
+using Rational =
+    boost::multiprecision::number<boost::multiprecision::gmp_rational, boost::multiprecision::et_off>;
+#else
+using Integer = boost::multiprecision::cpp_int;
 using Rational = boost::multiprecision::cpp_rational;
+#endif
 
 /// Converts a finite double to a rational.
 Rational exact(double x);
