@@ -10,10 +10,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "core/contract/registry.hpp"
 #include "core/contract/tells_work.hpp"
+#include "core/families/choice/changes_of_many.hpp"
 #include "core/families/choice/observed_ageing.hpp"
 #include "core/families/choice/observed_join.hpp"
 #include "core/families/choice/observed_motion.hpp"
@@ -91,8 +91,7 @@ class Auto final : public Strategy<S>,
     touching_.clear();
     touching_of_ = nullptr;
     joined_candidates_ = 0;
-    for (Reported& one : reported_) one.start_over();
-    switches_ = 0;
+    changes_of_many_.start_over();
     pairs_asked_ = pairs_in_frame_ = rays_asked_ = false;
     window_ = {};
     changed_.clear();
@@ -103,8 +102,8 @@ class Auto final : public Strategy<S>,
     seen_.bodies = steps_.moving_bodies();
     ageing_.start_over(runners_[0].work != nullptr ? runners_[0].work->surface() : 0);
     chosen_tests_ = 0;
-    lost_ = 0;
-    looked_at_ = 0;
+    saved_ = 0;
+    weighed_at_ = 0;
     tried_ = waits_ = refits_first_ = false;
     join_.start_over(seen_);
     slabs_.start_over(runners_[0].candidate->cost == &refit_cost, seen_);
@@ -122,14 +121,14 @@ class Auto final : public Strategy<S>,
     const bool due = frame_ == 1 || stayed >= (t >= segment_end_ ? stay_ : longest_stay) ||
                      (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
                      seen_.near != chosen_near_ || seen_.candidates > 2 * chosen_candidates_ ||
-                     2 * seen_.candidates < chosen_candidates_ || tried_ || waits_ ||
+                     2 * seen_.candidates < chosen_candidates_ || tried_ || (waits_ && t >= segment_end_) ||
                      (is_active(&join_cost) && seen_.near && !join_.judged()) ||
                      (refits() && ageing_.tests() > 1.5 * chosen_tests_);
     if (step_ > 0 && due) choose(t);
     if (active_ != last) {
-      ++switches_;
-      lost_ = 0;
-      looked_at_ = frame_;
+      changes_of_many_.switched();
+      saved_ = 0;
+      weighed_at_ = frame_;
     }
     tried_ = active_ != last &&
              ((rebuilds() && !rebuilds(last)) || is_active(&plain_cost) || join_.outdated() || refits_first_);
@@ -168,25 +167,12 @@ class Auto final : public Strategy<S>,
     runners_[active_].strategy->confirm(t, pairs);
   }
 
-  /// Forwards; a strategy that has become active since the last call begins all pairs, and is compared with
-  /// what the one before has reported.
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
-    Reported& reported = reported_[std::size_t(answer)];
-    Strategy<S>& strategy = *runners_[active_].strategy;
-    if (reported.switches == switches_) {
-      strategy.changes_at(t, answer, begun, ended);
-    } else {
-      reported.switches = switches_;
-      strategy.changes_at(t, answer, now_, none_);
-      before_.clear();
-      reported.pairs.append_to(before_);
-      difference_.find(before_, now_, begun, ended);
-    }
-    for (const PrimitivePair& pair : ended) reported.pairs.erase(pair);
-    for (const PrimitivePair& pair : begun) reported.pairs.insert(pair);
+    changes_of_many_.find(*runners_[active_].strategy, t, answer, begun, ended);
+    const PairSet& pairs = changes_of_many_.pairs(answer);
     // Pairs that intersect stand for the candidates among which they are.
-    see_candidates(reported.pairs.size(), answer == Answer::candidates);
-    touching_of_ = &reported.pairs;
+    see_candidates(pairs.size(), answer == Answer::candidates);
+    touching_of_ = &pairs;
   }
 
   void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
@@ -225,22 +211,13 @@ class Auto final : public Strategy<S>,
         text += (text.empty() ? "" : ", ") + std::string(runner.candidate->id) + " for " +
                 std::to_string(runner.frames) + (runner.frames == 1 ? " frame" : " frames");
     if (text.empty()) return text;
-    char segments[48] = "one segment", last[160];
-    if (std::isfinite(seen_.frames_per_segment))
-      std::snprintf(segments, sizeof segments, "%.3g frames per segment", seen_.frames_per_segment);
-    std::snprintf(
-        last, sizeof last,
-        " (last seen: %s, steps of %.2g leaves, %.2g between candidates, %.0f candidates, plans changed at "
-        "%.2g of frames)",
-        segments, seen_.step, seen_.slide, seen_.candidates, seen_.changes_per_frame);
-    return text + last;
+    return text + last_seen(seen_);
   }
 
   std::size_t bytes() const override {
-    std::size_t total =
-        (touching_.capacity() + now_.capacity() + before_.capacity()) * sizeof(PrimitivePair) +
-        changed_.capacity() * sizeof(PlanChange<S>) + difference_.bytes() + reported_[0].pairs.bytes() +
-        reported_[1].pairs.bytes() + steps_.bytes();
+    std::size_t total = touching_.capacity() * sizeof(PrimitivePair) +
+                        changed_.capacity() * sizeof(PlanChange<S>) + changes_of_many_.bytes() +
+                        steps_.bytes();
     for (const Runner& runner : runners_) total += runner.strategy->bytes();
     return total;
   }
@@ -289,14 +266,30 @@ class Auto final : public Strategy<S>,
   }
   /// Whether a strategy that builds new trees answers.
   bool rebuilds() const { return rebuilds(active_); }
-  /// Returns what answers a frame that a join is compared with: in trees that have aged, a refit would take
-  /// long.
+  /// Returns what a join is compared with: in trees that have aged, a refit would take long.
   std::size_t refit_to_compare() const { return seen_.aged > 0.5 ? builder() : 0; }
   /// Returns lbvh_drift, or the first strategy without it.
   std::size_t builder() const {
     for (std::size_t i = 0; i < runners_.size(); ++i)
-      if (runners_[i].candidate->cost == &rebuilt_cost) return i;
+      if (rebuilds(i)) return i;
     return 0;
+  }
+  static constexpr std::size_t none_of_them = ~std::size_t(0);
+  /// Returns the strategy of least predicted cost among those that are `allowed`.
+  template <class Allowed>
+  std::size_t least(Allowed&& allowed) const {
+    std::size_t best = none_of_them;
+    for (std::size_t i = 0; i < runners_.size(); ++i)
+      if (allowed(i) && (best == none_of_them || cost_of(i) < cost_of(best))) best = i;
+    return best;
+  }
+  double cost_of(std::size_t runner) const { return runners_[runner].candidate->cost(seen_); }
+  /// Returns the strategy of least predicted cost among those that are `allowed`, or the active one where
+  /// none is cheaper by `gain`.
+  template <class Allowed>
+  std::size_t cheapest(double gain, Allowed&& allowed) const {
+    const std::size_t best = least(allowed);
+    return best != none_of_them && cost_of(best) * gain < cost_of(active_) ? best : active_;
   }
   /// Prepares the first comparison of new trees with refitted ones: in the frame after one of a refit, and by
   /// the cheapest build. Boxes that have grown are a reason for it, even where a join is predicted to be
@@ -308,29 +301,16 @@ class Auto final : public Strategy<S>,
     else if (rebuilds(best) || (is_join(best) && refits() && seen_.aged > 0.5))
       best = builder();
   }
-  /// Returns the strategy of least predicted cost among those that are `allowed`, or the active one where
-  /// none is cheaper by `gain`.
-  template <class Allowed>
-  std::size_t cheapest(double gain, Allowed&& allowed) const {
-    std::size_t best = active_;
-    const double active = runners_[active_].candidate->cost(seen_);
-    double least = active;
-    for (std::size_t i = 0; i < runners_.size(); ++i) {
-      const double cost = runners_[i].candidate->cost(seen_);
-      if (allowed(i) && cost < least && cost * gain < active) {
-        least = cost;
-        best = i;
-      }
-    }
-    return best;
-  }
-  /// Whether the frames since the last change of strategy would have saved, with `best`, what its first frame
-  /// costs. A strategy that is changed for another when this has been lost loses no more than twice as much.
+  /// Whether new trees by `best` have paid for their first frame before the next review: by what they would
+  /// have saved in the frames since this was asked last, or since the last change of strategy, and will save
+  /// in the next. Each frame counts as if it were like this one.
   bool worth_a_start(std::size_t best) {
-    const double saved = runners_[active_].candidate->cost(seen_) - runners_[best].candidate->cost(seen_);
-    lost_ += std::max(0.0, saved) * (frame_ - looked_at_);
-    looked_at_ = frame_;
-    return lost_ > costs::Choice::start_primitive * seen_.primitives;
+    double now = cost_of(active_);
+    if (!std::isfinite(now)) now = cost_of(least([&](std::size_t runner) { return !rebuilds(runner); }));
+    const double saves = std::max(0.0, now - cost_of(best));
+    saved_ += saves * (frame_ - weighed_at_);
+    weighed_at_ = frame_;
+    return saved_ + saves * shortest_stay > costs::Choice::start_primitive * seen_.primitives;
   }
   /// Strategies differ in the pairs that they leave out early: only drift_boxes reports all pairs of boxes,
   /// and shows that bodies are apart.
@@ -436,14 +416,15 @@ class Auto final : public Strategy<S>,
     const double gain = tried_ || known != join_.known() ? 1 : gain_;
     std::size_t best = cheapest(gain, [](std::size_t) { return true; });
     // This is found at the end of a segment, where a frame of a refit costs no second join.
-    if (join_.outdated()) best = refit_to_compare();
-    if (!ageing_.compared()) try_new_trees(best);
-    if (rebuilds(best) && !rebuilds() && !worth_a_start(best))
+    if (join_.outdated())
+      best = refit_to_compare();
+    else if (!ageing_.compared() && !rebuilds())
+      try_new_trees(best);
+    if (!join_.outdated() && rebuilds(best) && !rebuilds() && !worth_a_start(best))
       best = cheapest(gain, [&](std::size_t runner) { return !rebuilds(runner); });
     // A join of a segment's last frames costs as much as that of the whole.
     waits_ = best != active_ && is_join(best) && bounded && !whole &&
-             runners_[active_].candidate->cost(seen_) * (end - t) <
-                 join_cost(seen_) * seen_.frames_per_segment * step_;
+             cost_of(active_) * (end - t) < join_cost(seen_) * seen_.frames_per_segment * step_;
     if (waits_) return;
     stay_ = best == active_ ? std::min(2 * stay_, longest_stay) : shortest_stay;
     active_ = best;
@@ -453,15 +434,6 @@ class Auto final : public Strategy<S>,
       window_.begins = true;
   }
 
-  /// What answers as changes add up to.
-  struct Reported {
-    PairSet pairs;
-    int switches = 0;  ///< of the active strategy, at the last answer
-    void start_over() {
-      pairs.clear();
-      switches = 0;
-    }
-  };
   static constexpr int none = -1;
   /// Frames over which the work of the join is measured: from the beginning of one segment to that of
   /// another.
@@ -482,8 +454,8 @@ class Auto final : public Strategy<S>,
   double chosen_candidates_ = 0;       ///< number of candidates at the time of the choice
   bool chosen_near_ = false;           ///< whether bodies met then
   double chosen_tests_ = 0;            ///< box tests of the refitted trees in the frame before
-  double lost_ = 0;                    ///< since the last change of strategy, see worth_a_start
-  int looked_at_ = 0;                  ///< the frame until which
+  double saved_ = 0;                   ///< nanoseconds, see worth_a_start
+  int weighed_at_ = 0;                 ///< the frame until which
   bool tried_ = false;  ///< a strategy answers for the first time whose work decides whether it stays
   ObservedAgeing ageing_;
   bool waits_ = false;         ///< for the next segment, to join it
@@ -499,10 +471,7 @@ class Auto final : public Strategy<S>,
   std::vector<std::uint8_t> body_changed_;
   PairBuffer touching_;                   ///< sample of the candidates of the last frame
   const PairSet* touching_of_ = nullptr;  ///< where a choice samples them; null: they are sampled
-  Reported reported_[2];                  ///< [Answer]
-  int switches_ = 0;                      ///< changes of the active strategy since `reset`
-  PairBuffer now_, none_, before_;
-  PairDifference difference_;
+  ChangesOfMany<S> changes_of_many_;
   Observed seen_;
 };
 

@@ -7,7 +7,7 @@
 // Where nothing ages it costs what a refit costs. A frame that rebuilds takes longest: `spread` divides
 // its sort among several frames, but queries meet the old tree meanwhile, and in scenes that age within a
 // few frames that costs more than it saves. Where a tree lasts longer, this is faster than
-// `lbvh_drift`, whose builds take a seventh of the time, but whose refits and searches take longer (plan
+// `lbvh_drift`, whose builds take an eighth of the time, but whose refits and searches take longer (plan
 // `auto`, l = 10).
 
 #include "core/contract/registry.hpp"

@@ -40,7 +40,7 @@ class LbvhDrift final : public BuiltStrategy<S, Count, DriftBuilder<S>> {
     bool wanted = true;  // there is no tree of the current primitives
   };
 
-  void list_changed(std::uint32_t body) override { trees_[body].wanted = true; }
+  void list_changed(std::uint32_t body) override { trees_[body] = {}; }
   void build(std::uint32_t body) override {
     Tree& tree = trees_[body];
     const double surplus = tree.age.end_frame();

@@ -41,14 +41,14 @@ struct Ageing {
   static constexpr double ray_test = 12;
 };
 
-/// The work of a frame that a choice has seen, in nanoseconds by counts (Intel Xeon with AVX-512). Refits:
-/// from the update, search and triangle tests of leaf_slabs and bottom_up on all scenes of
-/// experiments/plans/auto.json but those that age, each phase by its own count, l = 1, at 19cb3bc. There a
-/// vertex read takes 0.40 to 0.59 (hidden crowd 0.8), a box test 1.2 to 2.9 with slabs and 0.8 to 2.1
-/// without, a triangle test 15 to 31. Trees that have aged make millions of tests, of 0.6 to 0.8 each. The
-/// join: fitted to the runs of 19 scenes at l = 1, 3, 10 and 30 (c80e232); measured times differ by 9 % from
-/// these sums, root mean square, and by up to 26 % on the running figures, which were not among them (twofold
-/// where bodies are apart).
+/// The work of a frame that a choice has seen, in nanoseconds by counts (Intel Xeon with AVX-512).
+/// - Refits, a body and a candidate that slabs leave out: from the update, search and triangle tests of
+///   leaf_slabs and bottom_up, each phase by its own count, on all scenes of experiments/plans/auto.json but
+///   those that age and the seven left out, l = 1, at 19cb3bc. There a vertex read takes 0.40 to 0.59 (hidden
+///   crowd 0.8), a box test 1.2 to 2.9 with slabs and 0.8 to 2.1 without, a triangle test 15 to 31. Trees
+///   that have aged make millions of tests, of 0.6 to 0.8 each.
+/// - The join: fitted to the runs of 19 scenes at l = 1, 3, 10 and 30 (c80e232). Measured times differ by 9 %
+///   from these sums, root mean square, and by up to 26 % on the running figures, which were not among them.
 struct Work {
   /// A frame of a refit.
   struct Refit {
@@ -68,14 +68,14 @@ struct Work {
 };
 
 /// auto, in the same nanoseconds; only their order matters.
-/// - `watch_read` to `unfit`: drift_boxes. Reads, bodies and kept candidates from the same runs as Work's
-/// refits
-///   (l = 10 and 30), the search fitted in c6e0cf1, 167e5b8 and ef3f1d8 on Zen 5, times 1.7.
+/// - `watch_read` to `unfit`: drift_boxes. Reads, bodies, steps and kept candidates from the same runs as the
+///   refits (l = 1, 10 and 30), the search fitted in c6e0cf1, 167e5b8 and ef3f1d8 on Zen 5, times 1.7.
 /// - `join_frame` to `join_apart`: the join before it has worked, as shares of a refit. Fitted on Zen 5 to
 ///   figures, a skirt and a tablecloth (experiments/plans/motion.json) at l = 1, 3, 7 and 30, but for
 ///   `join_slide` and `join_apart`.
 /// - `build_primitive` to `surplus_test`, and Work::rebuilt_primitive: from the updates, builds and box tests
 ///   of lbvh_drift and drift_rebuild on the five scenes of plan `auto` that age, l = 1 and 10, at 42dc54a.
+/// - `start_primitive`: from the first frames of lbvh_drift (0.65 to 0.75 ms for 16k triangles, 19cb3bc).
 struct Choice {
   static constexpr double watch_read = 0.2, watch_body = 140;  ///< vertices and bodies whose drift is read
   static constexpr double watch_step = 4;                      ///< a step of a leaf, over resting

@@ -47,7 +47,7 @@ foreach(set IN LISTS kbvh_kernel_sets)
 endforeach()
 
 set(KBVH_OUTER_OPTIMISATION "" CACHE STRING
-  "optimisation level of adapters and of the program around the strategies, for builds that are not measured; empty: as all")
+  "optimisation level of adapters, of the program around the strategies and of strategies that take long to compile, for builds that are not measured; empty: as all")
 # Rooms of the program that compute themselves.
 set(kbvh_computing_rooms scenes stress theory)
 

@@ -1,4 +1,4 @@
-"""Prints the headers of some folders as chains: each header includes, by way of others, all those before it in its line.
+"""Prints the headers of each folder as chains: a header includes, by way of others, all those before it in its line.
 
     header_chains.py SOURCE FOLDER...
 
@@ -12,7 +12,6 @@ import re
 import sys
 
 source, folders = pathlib.Path(sys.argv[1]), sys.argv[2:]
-headers = sorted(str(path.relative_to(source)) for folder in folders for path in (source / folder).rglob("*.hpp"))
 included = {}
 
 
@@ -28,25 +27,30 @@ def below(header):
     return included[header]
 
 
-follower = {}  # of a header in its chain: a largest matching between headers and what they include
+def chains(headers):
+    """Returns the headers in few chains: a largest matching between headers and what they include."""
+    follower = {}
+
+    def match(header, tried):
+        for name in sorted(below(header) - {header}):
+            if name in tried or name not in headers:
+                continue
+            tried.add(name)
+            if name not in follower or match(follower[name], tried):
+                follower[name] = header
+                return True
+        return False
+
+    for header in headers:
+        match(header, set())
+    for header in headers:
+        if header not in follower.values():
+            chain = [header]
+            while chain[-1] in follower:
+                chain.append(follower[chain[-1]])
+            yield chain
 
 
-def match(header, tried):
-    for name in sorted(below(header) - {header}):
-        if name in tried or name not in headers:
-            continue
-        tried.add(name)
-        if name not in follower or match(follower[name], tried):
-            follower[name] = header
-            return True
-    return False
-
-
-for header in headers:
-    match(header, set())
-for header in headers:
-    if header not in follower.values():
-        chain = [header]
-        while chain[-1] in follower:
-            chain.append(follower[chain[-1]])
+for folder in folders:
+    for chain in chains(sorted(str(path.relative_to(source)) for path in (source / folder).rglob("*.hpp"))):
         print(*chain)

@@ -26,7 +26,7 @@ class ObservedAgeing {
   /// Registers the frame's search of rebuilt trees; `frame` counts from the start.
   void rebuilt(double tests, double candidates, int frame, Observed& seen) {
     if (!known_ && tests > 0 && frame_ != frame - 1) {  // too long ago to be compared with
-      known_ = true;
+      known_ = compared_ = true;
       factor_ = 1 / (1 - std::min(seen.aged, 0.99));
     } else if (!known_ && tests > 0) {
       known_ = true;
@@ -61,7 +61,7 @@ class ObservedAgeing {
       seen.sorted_ageing = longer_ * growth;
       return;
     }
-    if (built_growth_ > 0) longer_ = std::max(1.0, growth / built_growth_);
+    if (built_growth_ > 0) longer_ = std::clamp(growth / built_growth_, 1.0, 10.0);
     built_growth_ = 0;
     seen.sorted_ageing = growth;
     seen.ageing = growth / longer_;

@@ -10,23 +10,25 @@ namespace kbvh {
 /// What a choice knows of an interval join by the work that it does, where bodies meet. Its cost is predicted
 /// from the plans and the work of a refit. How wrong this is, is known when a segment was joined after a
 /// refit had answered. Before that the prediction is taken as if it might be too high by `hope`, so that a
-/// join is tried where it may pay. When its work has doubled or halved since, a refit must answer a frame to
-/// be compared with. What was learned is slowly forgotten while other strategies answer.
+/// join is tried where it may pay. When its work has doubled or halved since, or after a number of frames
+/// that doubles each time, a refit must answer a frame to be compared with. What was learned is slowly
+/// forgotten while other strategies answer.
 class ObservedJoin {
  public:
   void start_over(Observed& seen) {
     *this = {};
     seen.join_factor = costs::Work::hope;
   }
-  /// Registers that a strategy that refits has answered `frame`, whose work is in `seen`.
+  /// Registers that a strategy that refits has answered the frame before `frame`; its work is in `seen`.
   void refitted(int frame, Observed& seen) {
     frame_ = frame;
     met_ = seen.near;
     if (outdated_) compare(seen);
-    outdated_ = false;
+    if (late_) patience_ *= 2;
+    outdated_ = late_ = false;
     compared_ = 0;
   }
-  /// Registers the work of the join in a mean frame over whole segments until `frame`, in nanoseconds by its
+  /// Registers the work of the join in a mean frame over whole segments before `frame`, in nanoseconds by its
   /// counts, and the candidates of the last one.
   void joined(double work, double candidates, int frame, Observed& seen) {
     if (!seen.near) return;
@@ -41,10 +43,8 @@ class ObservedJoin {
     else
       outdated_ = work > 2 * compared_ || 2 * work < compared_;
     // A frame of a refit costs as many frames of the join as the join is faster.
-    if (frame - frame_ > patience_ * std::max(1.0, refit_cost(seen) / join_cost(seen))) {
-      outdated_ = true;
-      patience_ *= 2;
-    }
+    late_ = frame - frame_ > patience_ * std::max(1.0, refit_cost(seen) / join_cost(seen));
+    outdated_ = outdated_ || late_;
   }
   /// Prepares a choice while another strategy answers.
   void forget(Observed& seen) const {
@@ -81,6 +81,7 @@ class ObservedJoin {
   double patience_ = 32;  // frames until a refit must answer again, as long as the join is as slow
   bool met_ = false;      // bodies did when a refit answered
   bool known_ = false, outdated_ = false;
+  bool late_ = false;  // outdated by the number of frames
 };
 
 }  // namespace kbvh

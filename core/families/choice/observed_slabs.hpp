@@ -10,7 +10,7 @@ namespace kbvh {
 /// What a choice knows of the use of slabs at the leaves. leaf_slabs tells how many box tests it makes, and
 /// bottom_up, in the frame after, how many it makes and how many candidates slabs leave out. After some
 /// choices, or where candidates become twice or half as many, the comparison is out of date, and bottom_up is
-/// tried again where it may be faster.
+/// tried again where it may be faster; but not before a number of frames that doubles each time, up to 64.
 class ObservedSlabs {
  public:
   /// `slabs`: whether there is a strategy with slabs; without, candidates are those of boxes.

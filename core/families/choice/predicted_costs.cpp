@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "core/base/cost_constants.hpp"
@@ -30,6 +31,18 @@ double new_search(const Observed& seen) {
 }
 
 }  // namespace
+
+std::string last_seen(const Observed& seen) {
+  char segments[48] = "one segment", text[160];
+  if (std::isfinite(seen.frames_per_segment))
+    std::snprintf(segments, sizeof segments, "%.3g frames per segment", seen.frames_per_segment);
+  std::snprintf(
+      text, sizeof text,
+      " (last seen: %s, steps of %.2g leaves, %.2g between candidates, %.0f candidates, plans changed at "
+      "%.2g of frames)",
+      segments, seen.step, seen.slide, seen.candidates, seen.changes_per_frame);
+  return text;
+}
 
 double refit_cost(const Observed& seen) {
   return costs::Work::body * seen.bodies +

@@ -1,5 +1,6 @@
 #pragma once
 #include <limits>
+#include <string>
 
 namespace kbvh {
 
@@ -32,13 +33,16 @@ struct Observed {
   double ageing = 0, sorted_ageing = 0;
 };
 
+/// Says in words what was last seen.
+std::string last_seen(const Observed& seen);
+
 // The predicted costs of a frame, in nanoseconds of one machine; only their order matters.
 
 /// leaf_slabs: reads all vertices, and searches in trees that age.
 double refit_cost(const Observed& seen);
 /// bottom_up: the same trees without slabs. It has more candidates, and less work on pairs of leaves.
 double plain_cost(const Observed& seen);
-/// lbvh_drift: refits trees of its own, and builds new ones when the surplus of tests has cost as much.
+/// lbvh_drift: refits trees of its own, and builds new ones when the surplus of tests has grown.
 double rebuilt_cost(const Observed& seen);
 /// drift_rebuild: the same with the trees of a refit, whose builds cost more, and which are better.
 double sorted_cost(const Observed& seen);
