@@ -415,6 +415,7 @@ class Auto final : public Strategy<S>,
     slabs_.prepare_choice(frame_ - 1, seen_);
     const double gain = tried_ || known != join_.known() ? 1 : gain_;
     std::size_t best = cheapest(gain, [](std::size_t) { return true; });
+    refits_first_ = false;
     // This is found at the end of a segment, where a frame of a refit costs no second join.
     if (join_.outdated())
       best = refit_to_compare();

@@ -45,8 +45,8 @@ struct Ageing {
 /// - Refits, a body and a candidate that slabs leave out: from the update, search and triangle tests of
 ///   leaf_slabs and bottom_up, each phase by its own count, on all scenes of experiments/plans/auto.json but
 ///   those that age and the seven left out, l = 1, at 19cb3bc. There a vertex read takes 0.40 to 0.59 (hidden
-///   crowd 0.8), a box test 1.2 to 2.9 with slabs and 0.8 to 2.1 without, a triangle test 15 to 31. Trees
-///   that have aged make millions of tests, of 0.6 to 0.8 each.
+///   crowd 0.8), a box test 1.2 to 2.9 with slabs and 0.8 to 2.1 without, a triangle test 15 to 31
+///   (where there are more than ten). Trees that have aged make millions of tests, of 0.6 to 0.8 each.
 /// - The join: fitted to the runs of 19 scenes at l = 1, 3, 10 and 30 (c80e232). Measured times differ by 9 %
 ///   from these sums, root mean square, and by up to 26 % on the running figures, which were not among them.
 struct Work {

@@ -54,18 +54,13 @@ std::vector<std::string> all_scene_names() {
 }
 
 /// Every strategy on every scene in which it takes part; scene by scene, so that its truth is found once.
-/// With KBVH_EVERY_SECOND, like the white squares of a chessboard: every strategy on half of the scenes.
 std::vector<std::pair<std::string, std::string>> scenes_with_contestants() {
   std::vector<std::pair<std::string, std::string>> cases;
-  const bool half = std::getenv("KBVH_EVERY_SECOND") != nullptr;
-  std::size_t scene_index = 0;
   for (const std::string& scene : all_scene_names()) {
     const auto in_float = synthetic_scene<float>(scene);
     const auto in_double = synthetic_scene<double>(scene);
-    std::size_t square = scene_index++;
     for (const StrategyEntry& entry : registry())
-      if (!(half && ++square % 2 == 0) &&
-          (skipped(entry, in_float).empty() || skipped(entry, in_double).empty()))
+      if (skipped(entry, in_float).empty() || skipped(entry, in_double).empty())
         cases.emplace_back(scene, entry.info.id);
   }
   return cases;
@@ -76,30 +71,20 @@ INSTANTIATE_TEST_SUITE_P(Registry, Conformance, testing::ValuesIn(scenes_with_co
 
 class Configurations : public testing::TestWithParam<std::string> {};
 
-// Topologies of every admissible method, width and leaf size, each two of them together, and every word of
-// every parameter. The slow tests try all three together: three times as many topologies.
+// Every admissible topology (method x width x leaf size) and every word of every parameter.
 TEST_P(Configurations, AllConform) {
   const StrategyEntry& entry = find_strategy(GetParam());
-  const bool all = std::getenv("KBVH_SLOW") != nullptr;
   const auto sweep = [&](const std::string& scene_name, bool scripted, const auto& run) {
     if (entry.info.topology.own) return;
-    const auto& widths = entry.info.topology.widths;
-    std::size_t method_index = 0;
-    for (BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton}) {
-      for (std::size_t w = 0; w < widths.size(); ++w) {
-        std::size_t leaf_index = 0;
+    for (BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
+      for (std::uint32_t width : entry.info.topology.widths)
         for (std::uint32_t leaf = entry.info.topology.min_leaf_size;
              leaf <= entry.info.topology.max_leaf_size; leaf += scripted   ? 5
                                                                 : leaf < 4 ? 1
-                                                                           : 4) {
-          if (!all && (method_index + w + leaf_index++) % widths.size() != 0) continue;
-          run({.method = method, .width = widths[w], .leaf_size = leaf},
-              scene_name + ", " + name(method) + ", width " + std::to_string(widths[w]) + ", leaf " +
-                  std::to_string(leaf));
-        }
-      }
-      ++method_index;
-    }
+                                                                           : 4)
+          run({.method = method, .width = width, .leaf_size = leaf}, scene_name + ", " + name(method) +
+                                                                         ", width " + std::to_string(width) +
+                                                                         ", leaf " + std::to_string(leaf));
   };
   for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes", "geometry_changes",
                                        "self_rolled_cloth", "self_plan_changes"}) {
@@ -126,21 +111,16 @@ TEST_P(Configurations, AllConform) {
 INSTANTIATE_TEST_SUITE_P(Registry, Configurations, testing::ValuesIn(strategy_ids()),
                          [](const auto& test) { return test.param; });
 
-// Positions, refits, queries and triangle tests by every other set of kernels that this machine can run:
-// every strategy on half of the scenes, in the slow tests on all.
+// Positions, refits, queries and triangle tests by every other set of kernels that this machine can run.
 class Kernels : public testing::TestWithParam<KernelSet> {};
 
 TEST_P(Kernels, Conform) {
   const KernelSet before = active_kernel_set();
   use_kernel_set(GetParam());
-  const bool all = std::getenv("KBVH_SLOW") != nullptr;
-  std::size_t scene_index = std::size_t(GetParam());
   for (const std::string& scene_name : all_scene_names()) {
-    std::size_t square = scene_index++;
     const auto in_float = synthetic_scene<float>(scene_name, 3);
     const auto in_double = synthetic_scene<double>(scene_name, 3);
     for (const StrategyEntry& entry : registry()) {
-      if (!all && ++square % 2 == 0) continue;
       if (entry.info.topology.own || entry.info.max_primitive_pairs != 0) continue;
       const std::string where = entry.info.id + " on " + scene_name + " with " + name(GetParam());
       const BuilderConfig builder = entry.info.topology.preferred;

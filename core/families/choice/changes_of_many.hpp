@@ -11,6 +11,7 @@ namespace kbvh {
 template <class S>
 class ChangesOfMany {
  public:
+  /// Forgets all answers, as at a reset.
   void start_over() {
     for (Reported& one : reported_) {
       one.pairs.clear();

@@ -28,6 +28,7 @@ class ObservedMotion {
   double reads() const { return reads_; }
   /// Returns the number of primitives of moving bodies.
   double primitives() const { return primitives_; }
+  /// Returns the number of bodies that move.
   std::uint32_t moving_bodies() const { return moving_; }
 
   /// Looks at the plans. `step`: the length of a frame, in seconds. `touching`: some candidates of the last

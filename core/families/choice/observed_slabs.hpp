@@ -70,8 +70,8 @@ class ObservedSlabs {
   int frame_ = never;           // the last one of leaf_slabs that can be compared
   int choices_ = most_choices;  // since the comparison
   double compared_ = 0;         // candidates of leaf_slabs then
-  int since_ = never,
-      wait_ = 1;  // the frame of the comparison; frames before the next, twice as many each time
+  int since_ = never;           // the frame of the comparison
+  int wait_ = 1;                // frames before the next one, twice as many each time
 };
 
 }  // namespace kbvh
