@@ -19,8 +19,8 @@
 // Threads. A device that is made with a number of threads limits TBB in the whole process while it exists:
 // with one thread, every other contestant of a run would have one, too. The device is therefore made without
 // a number (threads=0), and every call is made within as many threads as the parameter asks for
-// (LibraryThreads). With one, rtcCollide calls back from the caller's thread, which takes no lock; calls from
-// other threads take one, and the order of the pairs differs from call to call.
+// (LibraryThreads). rtcCollide calls back from all of them. Each thread collects pairs in a list of its own,
+// so their order differs from call to call; triangles are tested on the same number of kbvh's threads.
 //
 // Candidates. rtcCollide compares node boxes, and therefore the boxes of primitives with a leaf of their own.
 // For larger leaves it reports all pairs: these come several at a time, and are filtered by their boxes.
@@ -43,9 +43,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
-#include <mutex>
 #include <span>
-#include <thread>
 #include <type_traits>
 #include <utility>
 
@@ -53,6 +51,7 @@
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/parallel/library_threads.hpp"
+#include "core/scene/pairs_by_thread.hpp"
 #include "core/topology/ray_traversal.hpp"
 #include "embree.hpp"
 
@@ -97,6 +96,10 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     threads_.call([&] { collide(out); });
     return {};
+  }
+
+  void confirm_candidates(double /*t*/, PairBuffer& pairs) override {
+    shared_confirmation_.confirm(this->scene_, this->sampled_, pairs, this->triangle_stats_);
   }
 
   void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
@@ -145,11 +148,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     BodyPair bodies{};
     const BodyState* a = nullptr;
     const BodyState* b = nullptr;
-    PairBuffer* out = nullptr;
-    std::uint64_t box_tests = 0;
-    std::thread::id thread;  // calls from this thread need no lock
-    std::mutex mutex;
-    std::vector<RTCCollision> from_others;
+    PairsByThread found;
   };
 
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
@@ -174,8 +173,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
         refit_boxes(state);
         KBVH_ASSERT(bounds_triangles(state));
       }
-    collected_.out = &out;
-    collected_.thread = std::this_thread::get_id();
+    collected_.found.start();
     std::uint64_t tests = 0;
     const auto box_of = [&](std::uint32_t body) { return to_double(bounds_of_scene(bodies_[body].boxes)); };
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
@@ -185,10 +183,9 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
       collected_.a = &bodies_[pair.first];
       collected_.b = &bodies_[pair.second];
       rtcCollide(collected_.a->boxes.scene.get(), collected_.b->boxes.scene.get(), &collect, &collected_);
-      append_overlapping(collected_, collected_.from_others);
-      collected_.from_others.clear();
+      tests += collected_.found.take(out);
     }
-    this->count_.add(Counter::box_tests, tests + std::exchange(collected_.box_tests, 0));
+    this->count_.add(Counter::box_tests, tests);
     check();
   }
 
@@ -408,13 +405,10 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
            within(boxes.lower_z, triangles.lower_z, triangles.upper_z, boxes.upper_z);
   }
 
-  static void append(const Collected& to, const RTCCollision& found) {
-    to.out->push_back({to.bodies.first, found.primID0, to.bodies.second, found.primID1});
-  }
-
   /// Appends the partners whose boxes overlap. All partners of a primitive come in a row.
-  static void append_overlapping(Collected& to, std::span<const RTCCollision> candidates) {
-    to.box_tests += candidates.size();
+  static void append_overlapping(const Collected& to, std::span<const RTCCollision> candidates,
+                                 PairsByThread::Found& found) {
+    found.box_tests += candidates.size();
     std::uint32_t current = none;
     Bounds box_a{Lanes::Zero(), Lanes::Zero()};
     for (const RTCCollision& candidate : candidates) {
@@ -424,20 +418,19 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
       for (Eigen::Index axis = 0; axis < 3; ++axis)
         overlap =
             overlap & (box_a.lower[axis] <= box_b.upper[axis]) & (box_b.lower[axis] <= box_a.upper[axis]);
-      if (overlap) append(to, candidate);
+      if (overlap)
+        found.pairs.push_back({to.bodies.first, candidate.primID0, to.bodies.second, candidate.primID1});
     }
   }
 
   static void collect(void* user, RTCCollision* collisions, unsigned count) {
     auto& collected = *static_cast<Collected*>(user);
-    if (std::this_thread::get_id() != collected.thread) {
-      const std::lock_guard<std::mutex> lock(collected.mutex);
-      collected.from_others.insert(collected.from_others.end(), collisions, collisions + count);
-    } else if (count == 1) {
-      append(collected, *collisions);
-    } else {
-      append_overlapping(collected, {collisions, count});
-    }
+    PairsByThread::Found& found = collected.found.mine();
+    const BodyPair& bodies = collected.bodies;
+    if (count == 1)
+      found.pairs.push_back({bodies.first, collisions->primID0, bodies.second, collisions->primID1});
+    else
+      append_overlapping(collected, {collisions, count}, found);
   }
 
   static bool count_memory(void* user, ssize_t bytes, bool /*after*/) {
@@ -464,6 +457,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   NearBodies near_bodies_;
   RayBodyOrder ray_order_;
   Collected collected_;
+  SharedConfirmation<S> shared_confirmation_;
 };
 
 }  // namespace
@@ -488,7 +482,7 @@ KBVH_STRATEGY(embree) {
                       "geometry that the update refits: user geometry, which the query collides; or triangle "
                       "geometry, Embree's fastest refit, which Embree cannot collide: the query then refits "
                       "user geometry first, and its time must not be quoted"},
-                     threads_parameter("positions, refit and query")};
+                     threads_parameter("positions, refit, query and triangle tests")};
   std::vector<StrategyEntry> entries;
   entries.push_back(make_entry<EmbreeRefit, Scalars::float_only>(std::move(info)));
   return entries;

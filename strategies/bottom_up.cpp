@@ -32,7 +32,13 @@ class BottomUp final : public StoredHierarchyStrategy<S, Count>,
   static constexpr Foresight foresight = Foresight::none;
   BottomUp(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
            const Params& params)
-      : Base(scene, motion, std::move(topologies), params, chosen_kernels(params)) {}
+      : Base(scene, motion, std::move(topologies), params, chosen_kernels(params)) {
+    if (!motion.workers().several()) return;
+    shared_refit_.start();
+    for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body)
+      shared_refit_.add(this->hierarchies_[body], nullptr);
+    shared_refit_.place(motion.workers(), this->hierarchies_);
+  }
 
   void advance_to(double t) override {
     Workers& workers = this->sampled_.workers();

@@ -264,7 +264,7 @@ class TypedWorld final : public detail::WorldImplementation {
     return kbvh::frame_times(scene_, per_keyframe);
   }
   void true_pairs(std::vector<WorldPair>& out) override {
-    const std::vector<PrimitivePair> pairs = brute_force_pairs(session().scene(), session().playback());
+    const PairBuffer pairs = brute_force_pairs(session().scene(), session().playback());
     replace(out, pairs);
   }
   bool audit(std::uint32_t body, WorldAudit& out) override {

@@ -30,9 +30,9 @@ bool truly_meet(const Body<S>& a, std::uint32_t primitive_a, const S* positions_
 }  // namespace
 
 template <class S>
-std::vector<PrimitivePair> brute_force_pairs(const Scene<S>& scene, Playback<S>& playback) {
+PairBuffer brute_force_pairs(const Scene<S>& scene, Playback<S>& playback) {
   playback.evaluate_all();
-  std::vector<PrimitivePair> result;
+  PairBuffer result;
   for (const BodyPair& pair : scene.pairs) {
     const Body<S>&a = scene.bodies[pair.first], &b = scene.bodies[pair.second];
     const bool within = pair.first == pair.second;
@@ -48,9 +48,9 @@ std::vector<PrimitivePair> brute_force_pairs(const Scene<S>& scene, Playback<S>&
 }
 
 template <class S>
-std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
+PairBuffer sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
   playback.evaluate_all();
-  std::vector<PrimitivePair> result;
+  PairBuffer result;
   struct Item {
     Box<S> box;
     std::uint32_t primitive;
@@ -151,7 +151,7 @@ void Oracle<S>::keep() {
 }
 
 template <class S>
-const std::vector<PrimitivePair>& Oracle<S>::pairs(Playback<S>& playback) {
+const PairBuffer& Oracle<S>::pairs(Playback<S>& playback) {
   const auto [entry, fresh] = known_.try_emplace(playback.time());
   if (fresh) {
     entry->second = sweep_pairs(*scene_, playback);
@@ -161,8 +161,7 @@ const std::vector<PrimitivePair>& Oracle<S>::pairs(Playback<S>& playback) {
 }
 
 template <class S>
-const std::vector<PrimitivePair>& Oracle<S>::pairs(Playback<S>& playback, const Scene<S>& scene,
-                                                   std::uint32_t changes) {
+const PairBuffer& Oracle<S>::pairs(Playback<S>& playback, const Scene<S>& scene, std::uint32_t changes) {
   if (changes == 0) return pairs(playback);
   const auto [entry, fresh] = changed_.try_emplace({changes, playback.time()});
   if (fresh) entry->second = sweep_pairs(scene, playback);
@@ -184,13 +183,13 @@ bool Oracle<S>::load() {
   };
   std::uint64_t head[3];
   if (!read(head, sizeof head) || head[0] != cache_magic || head[2] != size) return false;
-  std::map<double, std::vector<PrimitivePair>> known;
+  std::map<double, PairBuffer> known;
   for (std::uint64_t i = 0; i < head[1]; ++i) {
     double t = 0;
     std::uint64_t count = 0;
     if (!read(&t, sizeof t) || !read(&count, sizeof count) || count > size / sizeof(PrimitivePair))
       return false;
-    std::vector<PrimitivePair> pairs(count);
+    PairBuffer pairs(count);
     if (!read(pairs.data(), count * sizeof(PrimitivePair))) return false;
     known.emplace(t, std::move(pairs));
   }
@@ -235,9 +234,9 @@ bool Oracle<S>::save() const {
   return true;
 }
 
-#define KBVH_INSTANTIATE(S)                                                             \
-  template std::vector<PrimitivePair> brute_force_pairs(const Scene<S>&, Playback<S>&); \
-  template std::vector<PrimitivePair> sweep_pairs(const Scene<S>&, Playback<S>&);       \
+#define KBVH_INSTANTIATE(S)                                             \
+  template PairBuffer brute_force_pairs(const Scene<S>&, Playback<S>&); \
+  template PairBuffer sweep_pairs(const Scene<S>&, Playback<S>&);       \
   template class Oracle<S>;
 KBVH_INSTANTIATE(float)
 KBVH_INSTANTIATE(double)

@@ -14,12 +14,12 @@ namespace kbvh {
 /// by testing every pair exactly: no boxes, no sweep; it shares only the triangle test with strategies.
 /// O(primitives^2).
 template <class S>
-std::vector<PrimitivePair> brute_force_pairs(const Scene<S>& scene, Playback<S>& playback);
+PairBuffer brute_force_pairs(const Scene<S>& scene, Playback<S>& playback);
 
 /// Returns the same set by sort-and-sweep along the axis of largest extent and the exact test; itself
 /// verified against `brute_force_pairs`. O(n log n + overlaps on one axis).
 template <class S>
-std::vector<PrimitivePair> sweep_pairs(const Scene<S>& scene, Playback<S>& playback);
+PairBuffer sweep_pairs(const Scene<S>& scene, Playback<S>& playback);
 
 /// The true pairs of a scene at any time, computed once per (scene, script, scalar, t) and kept; optionally
 /// cached on disk for later runs of the same scene.
@@ -33,11 +33,10 @@ class Oracle {
   std::uint64_t script() const { return script_; }
   /// Returns the sorted pairs at the playback's current time. The playback must follow the scene's own plans,
   /// and the script up to that time.
-  const std::vector<PrimitivePair>& pairs(Playback<S>& playback);
+  const PairBuffer& pairs(Playback<S>& playback);
   /// The same after the first `changes` changes of geometry that the script makes; `scene` is as these have
   /// left it. Without such changes, as above. With them, pairs are kept in memory only.
-  const std::vector<PrimitivePair>& pairs(Playback<S>& playback, const Scene<S>& scene,
-                                          std::uint32_t changes);
+  const PairBuffer& pairs(Playback<S>& playback, const Scene<S>& scene, std::uint32_t changes);
   /// Writes new entries to the cache, as the destructor does.
   void keep();
   /// Returns a sentence about a defect of the cache, or an empty text. Such a defect costs time but changes
@@ -50,8 +49,8 @@ class Oracle {
   const Scene<S>* scene_;
   std::uint64_t script_;
   std::filesystem::path file_;
-  std::map<double, std::vector<PrimitivePair>> known_;
-  std::map<std::pair<std::uint32_t, double>, std::vector<PrimitivePair>> changed_;  ///< by changes and time
+  std::map<double, PairBuffer> known_;
+  std::map<std::pair<std::uint32_t, double>, PairBuffer> changed_;  ///< by changes and time
   bool grown_ = false;
   std::string problem_;
 };

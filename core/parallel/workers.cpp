@@ -8,6 +8,7 @@
 #include <string>
 #include <thread>
 
+#include "core/base/assert.hpp"
 #include "core/parallel/library_threads.hpp"
 #include "core/parallel/pool.hpp"
 
@@ -29,15 +30,19 @@ std::uint32_t checked(std::uint32_t threads) {
 class Workers::Jobs {
  public:
   explicit Jobs(std::uint32_t threads)
-      : pool_(threads), helpers_(threads - 1), taken_(std::make_unique<Slot[]>(threads - 1)) {}
+      : pool_(threads), helpers_(threads - 1), slots_(std::make_unique<Slot[]>(threads)) {}
 
   void run(std::size_t count, Call call, const void* context) {
-    count_ = count;
+    KBVH_ASSERT(count <= ~std::uint32_t(0));
+    const std::uint32_t runners = helpers_ + 1;
+    for (std::uint32_t runner = 0; runner < runners; ++runner)
+      slots_[runner].left.store(
+          packed(std::uint32_t(count * runner / runners), std::uint32_t(count * (runner + 1) / runners)),
+          std::memory_order_relaxed);
     call_ = call;
     context_ = context;
     failure_ = nullptr;
     failed_.store(false, std::memory_order_relaxed);
-    next_.store(0, std::memory_order_relaxed);
     job_.fetch_add(1);  // open: odd
     wake_helpers(count);
     work(0);
@@ -56,9 +61,29 @@ class Workers::Jobs {
  private:
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::microseconds patience{1000};
+  /// What belongs to one runner: its items that nobody has begun, [begin, end) in one word, and whether a
+  /// helper has its number.
   struct alignas(cache_line) Slot {
+    std::atomic<std::uint64_t> left{0};
     std::atomic<bool> taken{false};
   };
+  static std::uint64_t packed(std::uint32_t begin, std::uint32_t end) {
+    return std::uint64_t(begin) << 32 | end;
+  }
+  static constexpr std::uint32_t no_item = ~std::uint32_t(0);
+  enum class From : std::uint8_t { front, back };
+  /// Takes an item of a runner's; returns `no_item` if all have been begun.
+  static std::uint32_t take(Slot& slot, From from) {
+    std::uint64_t left = slot.left.load(std::memory_order_relaxed);
+    for (;;) {
+      const auto begin = std::uint32_t(left >> 32), end = std::uint32_t(left);
+      if (begin >= end) return no_item;
+      const bool front = from == From::front;
+      if (slot.left.compare_exchange_weak(left, front ? packed(begin + 1, end) : packed(begin, end - 1),
+                                          std::memory_order_relaxed))
+        return front ? begin : end - 1;
+    }
+  }
 
   void wake_helpers(std::size_t count) {
     const auto wanted = std::uint32_t(std::min<std::size_t>(helpers_, count - 1));
@@ -76,7 +101,7 @@ class Workers::Jobs {
   }
   void help() {
     std::uint32_t slot = 0;
-    while (awake_.load() == 0 || taken_[slot].taken.exchange(true)) slot = (slot + 1) % helpers_;
+    while (awake_.load() == 0 || slots_[slot + 1].taken.exchange(true)) slot = (slot + 1) % helpers_;
     auto idle_since = Clock::now();
     for (std::uint64_t last = 0; !ended_.load();) {
       const std::uint64_t job = job_.load();
@@ -92,17 +117,21 @@ class Workers::Jobs {
         relax();  // a helper that yielded would lose its core for milliseconds where cores are wanted
       }
     }
-    taken_[slot].taken.store(false);
+    slots_[slot + 1].taken.store(false);
     awake_.fetch_sub(1);
     release();
   }
   void work(std::uint32_t runner) {
+    const std::uint32_t runners = helpers_ + 1;
     try {
-      for (std::size_t item; (item = next_.fetch_add(1, std::memory_order_relaxed)) < count_;)
-        call_(context_, item, runner);
+      for (std::uint32_t k = 0; k < runners; ++k) {
+        Slot& slot = slots_[(runner + k) % runners];
+        for (std::uint32_t item; (item = take(slot, k == 0 ? From::front : From::back)) != no_item;)
+          call_(context_, item, runner);
+      }
     } catch (...) {
       if (!failed_.exchange(true)) failure_ = std::current_exception();
-      next_.store(count_);  // the others stop, too
+      for (std::uint32_t k = 0; k < runners; ++k) slots_[k].left.store(0);  // the others stop, too
     }
   }
   void release() {
@@ -119,12 +148,10 @@ class Workers::Jobs {
 
   Pool pool_;
   std::uint32_t helpers_;
-  std::unique_ptr<Slot[]> taken_;  ///< [helper]: the number of its runner, less 1
-  std::size_t count_ = 0;
+  std::unique_ptr<Slot[]> slots_;  ///< [runner]; the caller's is the first
   Call call_ = nullptr;
   const void* context_ = nullptr;
   std::exception_ptr failure_;
-  alignas(cache_line) std::atomic<std::size_t> next_{0};
   alignas(cache_line) std::atomic<std::uint64_t> job_{0};
   alignas(cache_line) std::atomic<std::uint32_t> inside_{0};  ///< helpers at work
   std::atomic<std::uint32_t> awake_{0}, users_{1};

@@ -35,10 +35,12 @@ class Workers {
 
   /// Calls work(item, runner) once for each item in [0, count), and returns when all calls have returned.
   /// `runner`, in [0, threads()), is the same for no two calls that run at the same time: it selects memory
-  /// for temporary use. Items are handed out in ascending order, one at a time, to the next free thread, so
-  /// they should be several times more than threads and last microseconds at least. What one call wrote may
-  /// be read after the return. The first exception of a call is passed on after the others have returned;
-  /// items not yet begun are then left out. Allocates nothing itself (TBB keeps a pool of small blocks).
+  /// for temporary use. Each runner has an equal range of consecutive items, the same in every call with the
+  /// same count, and takes them in ascending order; what it wrote in the last call is then in its cache. A
+  /// runner without items of its own takes others' last ones. Items should be several times more than threads
+  /// and last microseconds at least; there are fewer than 2^32. What one call wrote may be read after the
+  /// return. The first exception of a call is passed on after the others have returned; items not yet begun
+  /// are then left out. Allocates nothing itself (TBB keeps a pool of small blocks).
   template <class Work>
   void for_each(std::size_t count, Work&& work) {
     if (!several() || count < 2) {

@@ -138,8 +138,8 @@ std::size_t keep_intersecting(CandidateBlock<S>& candidates, PairBuffer& pairs, 
   return kept - begin;
 }
 
-/// The pairs that one thread tests at once: tens of microseconds.
-constexpr std::size_t pairs_at_once = 16 * block;
+/// The pairs that one thread tests at once: some ten microseconds.
+constexpr std::size_t pairs_at_once = 4 * block;
 
 }  // namespace
 
@@ -181,6 +181,10 @@ void SharedConfirmation<S>::confirm(const SceneView<S>& scene, const SampledMoti
 template <class S>
 void SharedConfirmation<S>::fetch(const SceneView<S>& scene, const SampledMotion<S>& motion,
                                   const PairBuffer& pairs) {
+  bool all_current = true;
+  for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+    all_current = all_current && motion.all_current(body);
+  if (all_current) return;
   for (std::size_t begin = 0, end = 0; begin < pairs.size(); begin = end) {
     const std::uint32_t bodies[2] = {pairs[begin].body_a, pairs[begin].body_b};
     while (end < pairs.size() && pairs[end].body_a == bodies[0] && pairs[end].body_b == bodies[1]) ++end;
@@ -190,7 +194,7 @@ void SharedConfirmation<S>::fetch(const SceneView<S>& scene, const SampledMotion
       to_fetch_.clear();
       for (std::size_t i = begin; i < end; ++i) {
         const auto vertices = primitives[side == 0 ? pairs[i].primitive_a : pairs[i].primitive_b];
-        to_fetch_.insert(to_fetch_.end(), vertices.begin(), vertices.end());
+        for (const std::uint32_t vertex : vertices) to_fetch_.push_back(vertex);
       }
       motion.fetch(bodies[side], to_fetch_);
     }

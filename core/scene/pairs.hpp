@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/counters.hpp"
+#include "core/base/unfilled_array.hpp"
 #include "core/geometry/triangle_triangle.hpp"
 #include "core/scene/motion_view.hpp"
 
@@ -27,8 +28,9 @@ struct PrimitivePair {
 };
 static_assert(sizeof(PrimitivePair) == 16);
 
-/// The caller-owned answer of a query; strategies append and never shrink its capacity.
-using PairBuffer = std::vector<PrimitivePair>;
+/// The caller-owned answer of a query; strategies append and never shrink its capacity. `resize` leaves new
+/// pairs unset: filling them before they are written takes as long as writing them.
+using PairBuffer = UnfilledArray<PrimitivePair>;
 
 /// A primitive pair and the closed span of time over which it is reported.
 struct PairSpan {

@@ -11,6 +11,8 @@ namespace kbvh {
 namespace {
 /// The vertices that one thread evaluates at once: 48 KiB of floats read and written, some microseconds.
 constexpr std::uint32_t vertices_at_once = 2048, none_gathered = vertices_at_once + 1;
+/// The same for vertices of a list: each costs 10 to 40 times as much.
+constexpr std::size_t listed_at_once = 256;
 }  // namespace
 
 template <class S>
@@ -20,7 +22,8 @@ Playback<S>::Playback(const Scene<S>& scene) {
   for (const auto& body : scene.bodies) {
     BodyState state;
     state.plans = state.scene_plans = body.plans;
-    state.positions.assign(std::size_t(3) * body.plans.vertex_count() + 1, S(0));
+    state.positions.resize(std::size_t(3) * body.plans.vertex_count() + 1);
+    state.positions.back() = S(0);
     state.stamp.assign(body.plans.vertex_count(), 0);
     largest = std::max<std::size_t>(largest, body.plans.vertex_count());
     bodies_.push_back(std::move(state));
@@ -54,15 +57,44 @@ void Playback<S>::evaluate_all() {
   }
 }
 
-/// Large bodies in parts, small ones several at a time.
 template <class S>
-void Playback<S>::evaluate_shared() {
+void Playback<S>::use_threads(std::uint32_t threads) {
+  workers_ = Workers(threads);
+  if (!workers_.several()) return;
+  // Moves the positions to the memory of the threads that will evaluate them.
+  std::vector<UnfilledArray<S>> placed(bodies_.size());
+  for (std::size_t body = 0; body < bodies_.size(); ++body)
+    placed[body].resize(bodies_[body].positions.size());
+  cut_items([](const BodyState& state) { return state.plans.moving(); });
+  workers_.for_each(items_.size(), [&](std::size_t i, std::uint32_t) {
+    const Item item = items_[i];
+    for (std::uint32_t body = item.body; body < item.end_body; ++body) {
+      const auto from = bodies_[body].positions.begin();
+      const std::size_t end = item.end == 0 ? placed[body].size() : std::size_t(3) * item.end;
+      std::copy(from + std::ptrdiff_t(3) * item.begin, from + std::ptrdiff_t(end),
+                placed[body].begin() + std::ptrdiff_t(3) * item.begin);
+    }
+  });
+  for (std::size_t body = 0; body < bodies_.size(); ++body) {
+    BodyState& state = bodies_[body];
+    if (!state.plans.moving()) continue;
+    const std::size_t shared = std::size_t(3) * state.plans.keyframed_count();
+    std::copy(state.positions.begin() + std::ptrdiff_t(shared), state.positions.end(),
+              placed[body].begin() + std::ptrdiff_t(shared));
+    state.positions = std::move(placed[body]);
+  }
+}
+
+/// Cuts the work on the bodies for which `which(state)`: large ones in parts, small ones several at a time.
+template <class S>
+template <class Which>
+void Playback<S>::cut_items(const Which& which) {
   items_.clear();
   std::uint32_t gathered = none_gathered;  // vertices of the last item, if bodies may be added to it
   for (std::uint32_t body = 0; body < body_count(); ++body) {
     const FlightPlans<S>& plans = bodies_[body].plans;
     const std::uint32_t vertices = plans.vertex_count();
-    if (bodies_[body].all_current) {
+    if (!which(bodies_[body])) {
       gathered = none_gathered;
     } else if (vertices < 2 * vertices_at_once) {
       if (gathered + vertices > vertices_at_once) {
@@ -78,6 +110,11 @@ void Playback<S>::evaluate_shared() {
       gathered = none_gathered;
     }
   }
+}
+
+template <class S>
+void Playback<S>::evaluate_shared() {
+  cut_items([](const BodyState& state) { return !state.all_current; });
   workers_.for_each(items_.size(), [this](std::size_t i, std::uint32_t) {
     const Item item = items_[i];
     for (std::uint32_t body = item.body; body < item.end_body; ++body) {
@@ -147,10 +184,10 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
   if (stale_.empty()) return;
   fetched_ += stale_.size();
   state.fetched += std::uint32_t(stale_.size());
-  if (!workers_.several() || stale_.size() < 2 * vertices_at_once)
+  if (!workers_.several() || stale_.size() < 2 * listed_at_once)
     return state.plans.evaluate(time_, stale_, state.positions.data());
   // Neighbours in the list may share a cache line of positions, but no position is written twice.
-  const Parts cut{stale_.size(), vertices_at_once};
+  const Parts cut{stale_.size(), listed_at_once};
   workers_.for_each(cut.parts(), [&](std::size_t part, std::uint32_t) {
     const std::span<const std::uint32_t> all(stale_);
     state.plans.evaluate(time_, all.subspan(cut.begin(part), cut.end(part) - cut.begin(part)),
@@ -192,6 +229,7 @@ void Playback<S>::restore_plans() {
     if (!state.plans.has_own_plans()) continue;
     state.plans = state.scene_plans;
     state.positions.resize(std::size_t(3) * state.plans.vertex_count() + 1);
+    state.positions.back() = S(0);
     state.stamp.resize(state.plans.vertex_count());
     state.all_current = false;
   }

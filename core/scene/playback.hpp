@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/unfilled_array.hpp"
 #include "core/parallel/workers.hpp"
 #include "core/scene/scene.hpp"
 
@@ -69,14 +70,14 @@ class Playback {
 
   /// Evaluates positions on this many threads from now on, which the strategy may use, too, while it is
   /// called (Workers). Throws std::invalid_argument like Workers.
-  void use_threads(std::uint32_t threads) { workers_ = Workers(threads); }
+  void use_threads(std::uint32_t threads);
   Workers& workers() { return workers_; }
 
  private:
   struct BodyState {
     FlightPlans<S> plans, scene_plans;  ///< with changes, and as in the scene
-    std::vector<S> positions;
-    const S* given = nullptr;  ///< the caller's array, if positions were handed in
+    UnfilledArray<S> positions;         ///< [vertex][3] and one for reads of four; set by evaluation only
+    const S* given = nullptr;           ///< the caller's array, if positions were handed in
     std::vector<std::uint32_t> stamp;
     std::uint32_t fetched = 0;  ///< at the current time
     bool all_current = false;
@@ -92,6 +93,8 @@ class Playback {
   void evaluate(BodyState& state);
   void evaluate_own(BodyState& state);
   void evaluate_shared();
+  template <class Which>
+  void cut_items(const Which& which);
 
   double time_ = 0;
   std::uint32_t epoch_ = 0;

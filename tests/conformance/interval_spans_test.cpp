@@ -204,7 +204,7 @@ void check_spans(const Play<S>& play, Tally& tally) {
 /// What is read at a frame is what has the frame in its span, and what is true of that is all the truth.
 template <class S>
 void check_frame(Play<S>& play) {
-  const std::vector<PrimitivePair> truth = brute_force_pairs(play.scene, play.playback);
+  const PairBuffer truth = brute_force_pairs(play.scene, play.playback);
   for (const auto& joiner : play.joiners) {
     const float fraction = float(joiner->bounds.fraction(play.playback.time()));
     PairBuffer all;

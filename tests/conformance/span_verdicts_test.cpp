@@ -90,7 +90,7 @@ void check_verdicts(const Play<S>& play, Tally& tally) {
 
 template <class S>
 void check_frame(Play<S>& play) {
-  const std::vector<PrimitivePair> truth = brute_force_pairs(play.scene, play.playback);
+  const PairBuffer truth = brute_force_pairs(play.scene, play.playback);
   const SceneView<S> view(play.scene);
   for (const auto& joiner : play.joiners) {
     PairBuffer all;

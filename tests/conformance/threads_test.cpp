@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <atomic>
 #include <set>
+#include <thread>
 
 #include "core/base/hasher.hpp"
 #include "core/families/wide/shared_front.hpp"
 #include "core/judge/session.hpp"
 #include "core/parallel/workers.hpp"
+#include "core/scene/pairs_by_thread.hpp"
 #include "tests/conformance/check.hpp"
 #include "tests/support/grids.hpp"
 
@@ -140,8 +142,7 @@ TEST(Threads, AnswerTheSameInTheSameOrder) {
 TEST(Threads, AreCorrectOnChangingPlansAndManyBodies) {
   if (most_threads() < 4) GTEST_SKIP() << "built without TBB";
   for (const StrategyEntry& entry : registry()) {
-    if (!takes_threads(entry) || entry.info.guarantee == Guarantee::approximate || entry.info.topology.own)
-      continue;
+    if (!takes_threads(entry) || entry.info.guarantee == Guarantee::approximate) continue;
     for (const char* name : {"plan_changes", "four_bodies_own_keyframes"}) {
       const std::string violation =
           check(entry, synthetic_scene<float>(name, 7), 7, {{"threads", "4"}}, entry.info.topology.preferred);
@@ -162,6 +163,67 @@ TEST(Workers, CallEachItemOnceWithARunnerOfItsOwn) {
     busy[runner].fetch_sub(1);
   });
   EXPECT_EQ(std::count(calls.begin(), calls.end(), 1u), 10000);
+}
+
+TEST(Workers, TakeItemsOfThoseWhoAreBehind) {
+  if (most_threads() < 4) GTEST_SKIP() << "built without TBB";
+  Workers workers(4);
+  for (const std::size_t slow : {std::size_t(0), std::size_t(40)}) {  // one runner's items take all the time
+    std::vector<std::uint32_t> calls(160, 0);
+    workers.for_each(calls.size(), [&](std::size_t item, std::uint32_t) {
+      std::atomic<int> work{0};
+      while (item >= slow && item < slow + 40 && work.fetch_add(1) < 20000) {
+      }
+      ++calls[item];
+    });
+    EXPECT_EQ(std::count(calls.begin(), calls.end(), 1u), 160);
+  }
+}
+
+TEST(Workers, GiveARunnerTheSameItemsAgain) {
+  if (most_threads() < 2) GTEST_SKIP() << "built without TBB";
+  Workers workers(2);
+  // Whoever comes first may take the other's items, but his own are there for him at every call.
+  std::vector<std::uint32_t> first(200);
+  std::atomic<std::uint32_t> begun[2];
+  std::size_t own = 0, calls = 0;
+  for (int i = 0; i < 200; ++i) {
+    begun[0] = begun[1] = 0;
+    workers.for_each(2, [&](std::size_t item, std::uint32_t runner) {
+      first[item] = runner;
+      ++begun[runner];
+      std::atomic<int> work{0};
+      while (work.fetch_add(1) < 2000) {
+      }
+    });
+    if (begun[0] != 1) continue;  // the other one did not come in time
+    ++calls;
+    own += first[0] == 0 && first[1] == 1 ? 1 : 0;
+  }
+  EXPECT_EQ(own, calls);
+}
+
+TEST(Threads, OfALibraryCollectPairsWithoutALoss) {
+  PairsByThread found;
+  for (std::uint32_t query = 0; query < 3; ++query) {
+    found.start();
+    std::vector<std::thread> threads;
+    for (std::uint32_t t = 0; t < 4; ++t)
+      threads.emplace_back([&found, t] {
+        for (std::uint32_t i = 0; i < 1000; ++i) {
+          found.mine().pairs.push_back({0, t, 1, i});
+          ++found.mine().box_tests;
+        }
+      });
+    for (std::thread& thread : threads) thread.join();
+    PairBuffer pairs{{9, 9, 9, 9}};
+    EXPECT_EQ(found.take(pairs), 4000u);
+    std::sort(pairs.begin(), pairs.end());
+    ASSERT_EQ(pairs.size(), 4001u);
+    EXPECT_EQ(std::adjacent_find(pairs.begin(), pairs.end()), pairs.end());
+    EXPECT_EQ(found.take(pairs), 0u);
+    EXPECT_EQ(pairs.size(), 4001u);
+  }
 }
 
 TEST(Workers, PassExceptionsOn) {

@@ -118,7 +118,7 @@ TEST(Oracle, CacheOnDiskIsUsedAndDamageIsIgnored) {
   const auto test = synthetic_scene<float>("soups");
   const auto folder = std::filesystem::temp_directory_path() / ("kbvh-oracle-" + std::to_string(::getpid()));
   Playback<float> playback(test.scene);
-  std::vector<PrimitivePair> truth;
+  PairBuffer truth;
   { truth = Oracle<float>(test.scene, folder).pairs(playback); }
   ASSERT_FALSE(truth.empty());
   ASSERT_FALSE(std::filesystem::is_empty(folder));

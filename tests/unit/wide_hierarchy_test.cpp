@@ -52,7 +52,7 @@ void check_all_shapes() {
     playback.evaluate_all();
     const SampledMotion<S> motion(playback);
     std::vector<Box<S>> boxes[2];
-    std::vector<PrimitivePair> expected;
+    PairBuffer expected;
     for (std::uint32_t body = 0; body < 2; ++body)
       boxes[body] = primitive_boxes(view.primitives(body), playback.positions(body));
     for (std::uint32_t p = 0; p < boxes[0].size(); ++p)

@@ -1,6 +1,5 @@
 #pragma once
 #include <cstddef>
-#include <limits>
 #include <map>
 #include <vector>
 
@@ -14,8 +13,8 @@ template <class S>
 class BoundsCache {
  public:
   struct Boxes {
-    AlignedArray<S> child_bounds, node_bounds;  ///< as in WideArrays
-    bool complete = false;                      ///< set by the caller after filling in the boxes
+    UnfilledArray<S> child_bounds, node_bounds;  ///< as in WideArrays
+    bool complete = false;                       ///< set by the caller after filling in the boxes
   };
 
   BoundsCache(std::size_t bodies, std::size_t most_bytes) : kept_(bodies), most_bytes_(most_bytes) {}
@@ -26,15 +25,15 @@ class BoundsCache {
     const auto found = kept_[body].find(t);
     return found == kept_[body].end() || !found->second.complete ? nullptr : &found->second;
   }
-  /// Reserves boxes of a body at t, not yet complete; null if memory is short.
+  /// Reserves boxes of a body at t, unset or not yet complete; null if memory is short.
   Boxes* add(std::size_t body, double t, std::size_t child_bounds, std::size_t node_bounds) {
     if (const auto begun = kept_[body].find(t); begun != kept_[body].end()) return &begun->second;
     const std::size_t more = (child_bounds + node_bounds) * sizeof(S);
     if (bytes_ + more > most_bytes_) return nullptr;
     bytes_ += more;
     Boxes& boxes = kept_[body][t];
-    boxes.child_bounds.assign(child_bounds, std::numeric_limits<S>::infinity());
-    boxes.node_bounds.assign(node_bounds, S(0));
+    boxes.child_bounds.resize(child_bounds);
+    boxes.node_bounds.resize(node_bounds);
     return &boxes;
   }
   std::size_t bytes() const { return bytes_; }

@@ -61,11 +61,11 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   BodySegmentBounds<S>& side = segment.sides[index];
   EndpointBounds<S>& at = side.at[end];
   const std::size_t nodes = body.hierarchy.node_count();
-  AlignedArray<S>&child_bounds = body.child_bounds[at.slot], &node_bounds = body.node_bounds[at.slot];
+  UnfilledArray<S>&child_bounds = body.child_bounds[at.slot], &node_bounds = body.node_bounds[at.slot];
   if (node_bounds.size() != 8 * nodes) {
-    child_bounds.assign(nodes * lane_scalars(body.hierarchy.topology().width),
-                        std::numeric_limits<S>::infinity());
-    node_bounds.assign(8 * nodes, S(0));
+    child_bounds.resize(nodes * lane_scalars(body.hierarchy.topology().width));
+    node_bounds.resize(8 * nodes);
+    make_empty(index, child_bounds.data(), node_bounds.data());
   }
   at.child_bounds = child_bounds.data();
   at.node_bounds = node_bounds.data();
@@ -118,6 +118,7 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
     if (auto* target = memory_.add(index, knot, child_bounds.size(), node_bounds.size())) {
       at.child_bounds = refit.child_bounds = target->child_bounds.data();
       at.node_bounds = refit.node_bounds = target->node_bounds.data();
+      make_empty(index, refit.child_bounds, refit.node_bounds);
       refit.remembered = target;
     }
   }

@@ -149,6 +149,12 @@ class LinearBounds {
   double looseness_in_the_middle();
   Refit begin_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body, std::uint32_t end,
                   double t);
+  /// Makes all boxes in new memory of a body's empty.
+  void make_empty(std::uint32_t body, S* child_bounds, S* node_bounds) {
+    shared_refit_.start();
+    shared_refit_.add(hierarchy(body), nullptr, child_bounds, node_bounds);
+    shared_refit_.make_empty(motion_.workers());
+  }
   void step_refit(std::uint32_t body, Refit& refit, std::uint64_t nodes);
   bool make_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body, std::uint32_t end,
                 double t);

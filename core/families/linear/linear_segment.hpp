@@ -26,16 +26,16 @@ template <class S>
 struct LinearBody {
   static constexpr std::uint32_t slots = 3;
   WideHierarchy<S> hierarchy;  ///< its boxes are free for temporary use
-  AlignedArray<S> child_bounds[slots], node_bounds[slots];
+  UnfilledArray<S> child_bounds[slots], node_bounds[slots];
   std::vector<S> room[slots];  ///< for positions that are not stored elsewhere
   /// Rows of the leaves that a join visited, with stamps of their positions.
-  AlignedArray<S> rows[slots];
+  UnfilledArray<S> rows[slots];
   std::vector<std::uint32_t> stamps[slots];
   std::uint32_t made = 0;  ///< number of ends made so far
   /// Corners of the leaves that a join with slabs visited, with stamps of their positions.
-  AlignedArray<S> blocks[slots];
+  UnfilledArray<S> blocks[slots];
   std::vector<std::uint32_t> block_stamps[slots];
-  AlignedArray<SpanSlab<S>> slabs;  ///< [leaf]
+  UnfilledArray<SpanSlab<S>> slabs;  ///< [leaf]
   std::vector<std::uint32_t> slab_stamps;
   std::uint32_t slab_stamp = 0, slab_ends[2] = {0, 0};  ///< of the last segment asked for, and its `made`
 

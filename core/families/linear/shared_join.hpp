@@ -13,8 +13,8 @@ namespace kbvh {
 
 /// The pairs found by a join, in columns; the columns have spare space.
 struct JoinedColumns {
-  std::vector<std::uint32_t> primitive_a, primitive_b;
-  std::vector<float> begin, end;
+  UnfilledArray<std::uint32_t> primitive_a, primitive_b;
+  UnfilledArray<float> begin, end;
 
   /// Returns the columns with room for some thousand pairs after the first `found`. Only `timed` pairs have a
   /// begin and an end.

@@ -8,7 +8,7 @@ namespace {
 /// An upper bound of all rounding of fractions in float.
 constexpr float fraction_slack = 0x1p-21F;
 /// The pairs that one thread attempts at once.
-constexpr std::size_t attempts_at_once = 1024;
+constexpr std::size_t attempts_at_once = 256;
 
 bool differ(const BodyPair& a, const BodyPair& b) {
   return a.first != b.first || a.second != b.second;

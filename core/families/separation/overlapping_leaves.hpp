@@ -152,7 +152,7 @@ class LeafOverlaps {
   }
 
   std::vector<std::vector<OverlappingLeaves>> leaves_;  ///< [body pair]
-  std::vector<std::vector<PrimitivePair>> primitives_;  ///< [body pair]
+  std::vector<PairBuffer> primitives_;                  ///< [body pair]
   bool recording_ = false;
   std::vector<EndedOverlap> ended_;
   bool notes_changes_ = false;

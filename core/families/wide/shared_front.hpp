@@ -103,7 +103,7 @@ class SharedFront {
 
  private:
   /// Items more than threads, so that none of them is long compared with a thread's share.
-  static constexpr std::size_t items_per_thread = 48;
+  static constexpr std::size_t items_per_thread = 24;
   static constexpr std::uint32_t most_levels = 12;
   /// As many as `leaf_pair_room`: they stay in the cache.
   static constexpr std::size_t leaf_pairs_at_once = 2048;

@@ -57,16 +57,37 @@ void SharedQuery<S>::run(Workers& workers, PairBuffer& out, std::uint64_t& tests
     for (auto* list : {&room.leaves, &room.own, &room.own_pairs})
       list->reserve(SharedFront::most_batch_slots);
   }
-  const auto append_range = [&out](const PairBuffer& from, std::size_t begin, std::size_t end) {
-    out.insert(out.end(), from.begin() + std::ptrdiff_t(begin), from.begin() + std::ptrdiff_t(end));
-  };
+  copy_found(workers, out);
+}
+
+/// Appends what the batches found, in their order; of a body with itself the pairs of two leaves come first.
+template <class S>
+void SharedQuery<S>::copy_found(Workers& workers, PairBuffer& out) {
+  const auto batches = front_.batches();
+  std::size_t to = out.size();
   for (std::size_t first = 0, last = 0; first < batches.size(); first = last) {
-    for (; last < batches.size() && batches[last].traversal == batches[first].traversal; ++last)
-      append_range(runners_[results_[last].runner].found, results_[last].begin, results_[last].end);
-    if (!pairs_[batches[first].traversal].self()) continue;
-    for (std::size_t i = first; i < last; ++i)
-      append_range(runners_[results_[i].runner].found_own, results_[i].begin_own, results_[i].end_own);
+    for (; last < batches.size() && batches[last].traversal == batches[first].traversal; ++last) {
+      results_[last].to = to;
+      to += results_[last].end - results_[last].begin;
+    }
+    for (std::size_t i = first; i < last; ++i) {
+      results_[i].to_own = to;
+      to += results_[i].end_own - results_[i].begin_own;
+    }
   }
+  out.resize(to);
+  const Parts cut{results_.size(), copied_at_once};
+  workers.for_each(cut.parts(), [&](std::size_t part, std::uint32_t) {
+    const auto copy = [&out](const PairBuffer& from, std::size_t begin, std::size_t end, std::size_t place) {
+      std::copy(from.begin() + std::ptrdiff_t(begin), from.begin() + std::ptrdiff_t(end),
+                out.begin() + std::ptrdiff_t(place));
+    };
+    for (std::size_t i = cut.begin(part); i < cut.end(part); ++i) {
+      const Result& result = results_[i];
+      copy(runners_[result.runner].found, result.begin, result.end, result.to);
+      copy(runners_[result.runner].found_own, result.begin_own, result.end_own, result.to_own);
+    }
+  });
 }
 
 /// Computes the boxes of primitives in leaves that no thread has reached since the positions changed.
@@ -114,7 +135,7 @@ void SharedQuery<S>::compare(std::size_t which, std::uint32_t runner) {
     append(bodies, room.own_pairs.data(), room.own.size(), room, room.found_own);
     keep(LeavesOf::one, room.found_own, begin_own);
   }
-  result = {runner, begin, room.found.size(), begin_own, room.found_own.size()};
+  result = {runner, begin, room.found.size(), begin_own, room.found_own.size(), 0, 0};
 }
 
 template <class S>

@@ -50,13 +50,16 @@ class SharedQuery {
     PairBuffer found, found_own;  ///< of two leaves, or of two bodies, and of one leaf
     std::uint64_t tests = 0;
   };
-  /// Where the pairs of a batch are: [begin, end) of a runner's lists.
+  /// Where the pairs of a batch are, [begin, end) of a runner's lists, and where they go in the answer.
   struct Result {
     std::uint32_t runner;
-    std::size_t begin, end, begin_own, end_own;
+    std::size_t begin, end, begin_own, end_own, to, to_own;
   };
+  /// The batches whose pairs one thread copies at once.
+  static constexpr std::size_t copied_at_once = 8;
   void claim_leaves(const Batch& batch, Runner& room);
   void compare(std::size_t batch, std::uint32_t runner);
+  void copy_found(Workers& workers, PairBuffer& out);
   void append(const Bodies& bodies, const LeafSlot* leaves, std::size_t count, Runner& room,
               PairBuffer& out) {
     append_leaf_pairs(bodies.a, positions(bodies.a), bodies.b, positions(bodies.b), leaves, 0, count,

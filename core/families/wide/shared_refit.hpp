@@ -1,5 +1,8 @@
 #pragma once
+#include <algorithm>
 #include <cstdint>
+#include <limits>
+#include <span>
 #include <vector>
 
 #include "core/families/wide/wide_hierarchy.hpp"
@@ -41,26 +44,52 @@ class SharedRefit {
     gathered_ += hierarchy.node_count();
   }
   void run(Workers& workers) {
-    workers.for_each(items_.size(), [this](std::size_t i, std::uint32_t) {
-      const Item& item = items_[i];
-      for (std::uint32_t k = item.first; k < item.end; ++k) {
-        const Refit& refit = refits_[k];
-        if (item.end_node != 0)
-          refit.hierarchy->refit_into(refit.child_bounds, refit.node_bounds, refit.positions, item.begin_node,
-                                      item.end_node);
-        else
-          refit.hierarchy->refit_into(refit.child_bounds, refit.node_bounds, refit.positions);
-      }
+    for_each_range(workers, [](const Refit& refit, std::uint32_t begin, std::uint32_t end) {
+      if (begin == 0 && end == refit.hierarchy->node_count())  // edited ones have an order of their own
+        refit.hierarchy->refit_into(refit.child_bounds, refit.node_bounds, refit.positions);
+      else
+        refit.hierarchy->refit_into(refit.child_bounds, refit.node_bounds, refit.positions, begin, end);
     });
-    for (const Refit& refit : refits_) {
-      if (!refit.hierarchy->can_be_shared()) continue;
-      for (const std::uint32_t node : refit.hierarchy->above_subtrees())
-        refit.hierarchy->refit_into(refit.child_bounds, refit.node_bounds, refit.positions, node, node + 1);
-    }
+  }
+  /// Makes all boxes empty, without positions: those of a node in the memory of the thread that will refit
+  /// it.
+  void make_empty(Workers& workers) {
+    for_each_range(workers, [](const Refit& refit, std::uint32_t begin, std::uint32_t end) {
+      const std::size_t lanes = lane_scalars(refit.hierarchy->width());
+      std::fill(refit.child_bounds + begin * lanes, refit.child_bounds + end * lanes,
+                std::numeric_limits<S>::infinity());
+      std::fill(refit.node_bounds + std::size_t(8) * begin, refit.node_bounds + std::size_t(8) * end, S(0));
+    });
+  }
+  /// Moves the boxes and vertex lists of hierarchies, those of the added refits in their order, to the memory
+  /// of the threads that will refit them.
+  void place(Workers& workers, std::span<WideHierarchy<S>> hierarchies) {
+    std::vector<typename WideHierarchy<S>::Placed> places;
+    for (const WideHierarchy<S>& hierarchy : hierarchies) places.push_back(hierarchy.new_place());
+    for_each_range(workers, [&](const Refit& refit, std::uint32_t begin, std::uint32_t end) {
+      refit.hierarchy->place(places[std::size_t(&refit - refits_.data())], begin, end);
+    });
+    for (std::size_t i = 0; i < places.size(); ++i) hierarchies[i].take_place(std::move(places[i]));
   }
   std::size_t bytes() const { return refits_.capacity() * sizeof(Refit) + items_.capacity() * sizeof(Item); }
 
  private:
+  /// Calls work(refit, begin, end) for ranges of nodes that together are all: children before their parents.
+  template <class Work>
+  void for_each_range(Workers& workers, const Work& work) {
+    workers.for_each(items_.size(), [&](std::size_t i, std::uint32_t) {
+      const Item& item = items_[i];
+      for (std::uint32_t k = item.first; k < item.end; ++k)
+        if (item.end_node != 0)
+          work(refits_[k], item.begin_node, item.end_node);
+        else
+          work(refits_[k], 0, refits_[k].hierarchy->node_count());
+    });
+    for (const Refit& refit : refits_) {
+      if (!refit.hierarchy->can_be_shared()) continue;
+      for (const std::uint32_t node : refit.hierarchy->above_subtrees()) work(refit, node, node + 1);
+    }
+  }
   /// Small bodies share an item up to this number of nodes.
   static constexpr std::uint32_t nodes_at_once = 64, none_gathered = nodes_at_once + 1;
   struct Refit {

@@ -202,8 +202,8 @@ class WideFollower {
     const auto first = std::uint32_t(h_.nodes_.size());
     h_.nodes_.resize(first + count);
     h_.check_node_count();
-    h_.child_bounds_.resize((first + count) * scalars());
-    h_.node_bounds_.resize(std::size_t(8) * (first + count));
+    h_.child_bounds_.resize((first + count) * scalars(), S(0));
+    h_.node_bounds_.resize(std::size_t(8) * (first + count), S(0));
     h_.parent_.resize(first + count);
     h_.listed_.resize(first + count);
     e_.list_room.resize(first + count);

@@ -180,7 +180,40 @@ void WideHierarchy<S>::list_leaves(const Primitives& primitives) {
   fetched_.assign(leaves, 0);
   stamp_ = 1;
   // Leaves of one primitive need no boxes besides their own.
-  rows_.assign(padded_leaf_size() == 1 ? 0 : leaves * lane_scalars(padded_leaf_size()), S(0));
+  rows_.clear();
+  rows_.resize(padded_leaf_size() == 1 ? 0 : leaves * lane_scalars(padded_leaf_size()));
+}
+
+template <class S>
+typename WideHierarchy<S>::Placed WideHierarchy<S>::new_place() const {
+  Placed placed;
+  placed.child_bounds.resize(child_bounds_.size());
+  placed.node_bounds.resize(node_bounds_.size());
+  placed.vertices.resize(vertices_.size());
+  return placed;
+}
+
+template <class S>
+void WideHierarchy<S>::place(Placed& to, std::uint32_t begin, std::uint32_t end) const {
+  KBVH_ASSERT(!edited_ && !refilled_);
+  const auto copy = [](const auto& from, auto& target, std::size_t first, std::size_t last) {
+    std::copy(from.begin() + std::ptrdiff_t(first), from.begin() + std::ptrdiff_t(last),
+              target.begin() + std::ptrdiff_t(first));
+  };
+  const std::size_t lanes = lane_scalars(topology_.width);
+  copy(child_bounds_, to.child_bounds, begin * lanes, end * lanes);
+  copy(node_bounds_, to.node_bounds, std::size_t(8) * begin, std::size_t(8) * end);
+  for (std::uint32_t n = begin; n < end; ++n)
+    if (nodes_[n].leaf_count > 0)
+      copy(vertices_, to.vertices, nodes_[n].list,
+           nodes_[n].list + std::size_t(nodes_[n].length) * topology_.width);
+}
+
+template <class S>
+void WideHierarchy<S>::take_place(Placed&& placed) {
+  child_bounds_ = std::move(placed.child_bounds);
+  node_bounds_ = std::move(placed.node_bounds);
+  vertices_ = std::move(placed.vertices);
 }
 
 template <class S>

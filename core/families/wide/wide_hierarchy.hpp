@@ -92,6 +92,16 @@ class WideHierarchy : public WideTree<S> {
   /// Returns whether there are ranges, and no edit has changed the order of the nodes.
   bool can_be_shared() const { return !subtrees_.empty() && !edited_; }
   const std::vector<std::uint32_t>& above_subtrees() const { return above_subtrees_; }
+  /// Boxes and vertex lists as in WideArrays, to be moved to the memory of the threads that work on them:
+  /// new_place makes unset arrays, place copies the nodes [begin, end) and may be called by several threads
+  /// for different nodes, take_place replaces the arrays. Not after edits or refills.
+  struct Placed {
+    UnfilledArray<S> child_bounds, node_bounds;
+    UnfilledArray<std::uint32_t> vertices;
+  };
+  Placed new_place() const;
+  void place(Placed& to, std::uint32_t begin, std::uint32_t end) const;
+  void take_place(Placed&& placed);
 
   static constexpr std::uint32_t no_node = ~std::uint32_t(0);
   /// Returns the wide node of an inner node of the topology; `no_node` for a leaf.

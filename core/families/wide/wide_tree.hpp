@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/unfilled_array.hpp"
 #include "core/families/wide/kernels/wide_overlap.hpp"
 #include "core/geometry/box.hpp"
 #include "core/kernels/kernel_set.hpp"
@@ -110,12 +111,12 @@ class WideTree {
   std::uint32_t width_ = 2, leaf_size_ = 1;
   KernelSet kernels_ = KernelSet::portable;
   AlignedArray<WideNode> nodes_;
-  AlignedArray<S> child_bounds_, node_bounds_;
-  AlignedArray<std::uint32_t> vertices_;
+  UnfilledArray<S> child_bounds_, node_bounds_;
+  UnfilledArray<std::uint32_t> vertices_;
   std::vector<std::uint32_t> first_entry_;
   std::vector<std::uint32_t> end_entry_;  ///< empty: each leaf ends where the next one begins
   std::vector<std::uint32_t> first_corner_, corners_, primitives_, stamps_, fetched_;
-  AlignedArray<S> rows_;
+  UnfilledArray<S> rows_;  ///< of a leaf: set when its stamp is
   std::uint32_t stamp_ = 1;
   bool only_triangles_ = false;  ///< and corners are listed
 };
