@@ -113,7 +113,8 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
 
   /// Returns the bytes that Embree reports as allocated, plus those of this adapter's own buffers.
   std::size_t bytes() const override {
-    std::size_t total = std::size_t(memory_.load()) + bodies_.size() * sizeof(BodyState);
+    std::size_t total = std::size_t(memory_.load()) + bodies_.size() * sizeof(BodyState) +
+                        collected_.found.bytes() + shared_confirmation_.bytes();
     for (const BodyState& state : bodies_)
       total += state.own_vertices.size() * sizeof(float) +
                (state.own_indices.size() + state.fan_indices.size() + state.fan_primitives.size()) *
@@ -173,7 +174,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
         refit_boxes(state);
         KBVH_ASSERT(bounds_triangles(state));
       }
-    collected_.found.start();
+    collected_.found.start(out);
     std::uint64_t tests = 0;
     const auto box_of = [&](std::uint32_t body) { return to_double(bounds_of_scene(bodies_[body].boxes)); };
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
@@ -183,7 +184,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
       collected_.a = &bodies_[pair.first];
       collected_.b = &bodies_[pair.second];
       rtcCollide(collected_.a->boxes.scene.get(), collected_.b->boxes.scene.get(), &collect, &collected_);
-      tests += collected_.found.take(out);
+      tests += collected_.found.collect();
     }
     this->count_.add(Counter::box_tests, tests);
     check();
@@ -419,7 +420,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
         overlap =
             overlap & (box_a.lower[axis] <= box_b.upper[axis]) & (box_b.lower[axis] <= box_a.upper[axis]);
       if (overlap)
-        found.pairs.push_back({to.bodies.first, candidate.primID0, to.bodies.second, candidate.primID1});
+        found.pairs->push_back({to.bodies.first, candidate.primID0, to.bodies.second, candidate.primID1});
     }
   }
 
@@ -428,7 +429,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     PairsByThread::Found& found = collected.found.mine();
     const BodyPair& bodies = collected.bodies;
     if (count == 1)
-      found.pairs.push_back({bodies.first, collisions->primID0, bodies.second, collisions->primID1});
+      found.pairs->push_back({bodies.first, collisions->primID0, bodies.second, collisions->primID1});
     else
       append_overlapping(collected, {collisions, count}, found);
   }

@@ -9,20 +9,22 @@
 
 namespace kbvh {
 
-/// The pairs of a query whose library calls back from threads of its own: each thread appends to a list of
-/// its own, and takes a lock only when it comes for the first time.
+/// The pairs of a query whose library calls back from threads of its own: the caller's thread appends to the
+/// answer, each other one to a list of its own, and takes a lock only when it comes for the first time.
 class PairsByThread {
  public:
   struct alignas(cache_line) Found {
-    PairBuffer pairs;
+    PairBuffer* pairs = nullptr;
     std::uint64_t box_tests = 0;
+    PairBuffer own;
   };
 
-  /// Starts a query. No thread of an earlier one may be at work.
-  void start() {
+  /// Starts a query by the calling thread. No thread of an earlier one may be at work.
+  void start(PairBuffer& out) {
     static std::atomic<std::uint64_t> calls{0};
     call_ = ++calls;
     threads_ = 0;
+    mine().pairs = &out;
   }
   /// Returns the list of the calling thread.
   Found& mine() {
@@ -34,18 +36,27 @@ class PairsByThread {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (threads_ == found_.size()) found_.emplace_back();
       known = {call_, &found_[threads_++]};
+      known.found->pairs = &known.found->own;
     }
     return *known.found;
   }
-  /// Moves the pairs found since the last call to the end of `out`, and returns the box tests counted since.
-  std::uint64_t take(PairBuffer& out) {
+  /// Moves the pairs that other threads have found since the last call to the end of the answer, and returns
+  /// the box tests that all have counted since. For the thread that started the query; no other may be at
+  /// work.
+  std::uint64_t collect() {
+    PairBuffer& out = *found_[0].pairs;
     std::uint64_t tests = 0;
     for (Found& found : found_) {
-      out.insert(out.end(), found.pairs.begin(), found.pairs.end());
-      found.pairs.clear();
+      out.insert(out.end(), found.own.begin(), found.own.end());
+      found.own.clear();
       tests += std::exchange(found.box_tests, 0);
     }
     return tests;
+  }
+  std::size_t bytes() const {
+    std::size_t total = found_.size() * sizeof(Found);
+    for (const Found& found : found_) total += found.own.capacity() * sizeof(PrimitivePair);
+    return total;
   }
 
  private:

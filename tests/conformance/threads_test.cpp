@@ -206,23 +206,24 @@ TEST(Workers, GiveARunnerTheSameItemsAgain) {
 TEST(Threads, OfALibraryCollectPairsWithoutALoss) {
   PairsByThread found;
   for (std::uint32_t query = 0; query < 3; ++query) {
-    found.start();
+    PairBuffer pairs{{9, 9, 9, 9}};
+    found.start(pairs);
     std::vector<std::thread> threads;
     for (std::uint32_t t = 0; t < 4; ++t)
       threads.emplace_back([&found, t] {
         for (std::uint32_t i = 0; i < 1000; ++i) {
-          found.mine().pairs.push_back({0, t, 1, i});
+          found.mine().pairs->push_back({0, t, 1, i});
           ++found.mine().box_tests;
         }
       });
     for (std::thread& thread : threads) thread.join();
-    PairBuffer pairs{{9, 9, 9, 9}};
-    EXPECT_EQ(found.take(pairs), 4000u);
+    found.mine().pairs->push_back({0, 4, 1, 0});
+    EXPECT_EQ(found.collect(), 4000u);
     std::sort(pairs.begin(), pairs.end());
-    ASSERT_EQ(pairs.size(), 4001u);
+    ASSERT_EQ(pairs.size(), 4002u);
     EXPECT_EQ(std::adjacent_find(pairs.begin(), pairs.end()), pairs.end());
-    EXPECT_EQ(found.take(pairs), 0u);
-    EXPECT_EQ(pairs.size(), 4001u);
+    EXPECT_EQ(found.collect(), 0u);
+    EXPECT_EQ(pairs.size(), 4002u);
   }
 }
 

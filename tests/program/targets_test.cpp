@@ -12,10 +12,20 @@
 #include "experiments/study/targets.hpp"
 #include "temporary_folder.hpp"
 
+#if defined(KBVH_TEST_HAS_TBB)
+#include <tbb/global_control.h>
+#endif
+
 namespace kbvh::experiments {
 namespace {
 
 using nlohmann::json;
+
+#if defined(KBVH_TEST_HAS_TBB)
+// As many threads as shipped plans ask for, on machines with fewer cores, too; before the registry states its
+// parameters.
+const tbb::global_control sixteen(tbb::global_control::max_allowed_parallelism, 16);
+#endif
 
 /// A plan with one target that is right: period over flat, on "sheet".
 json example_plan() {
