@@ -155,15 +155,15 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   void make_device(const SceneView<S>& scene, const SampledMotion<S>& motion) {
+    // Before Embree changes the floating-point state: positions may be evaluated by threads that inherit it.
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
     const KeepFloatingPointState keep;
     device_.reset(rtcNewDevice(LibraryThreads::are_limited() ? "threads=0,set_affinity=0"
                                                              : "threads=1,set_affinity=0"));
     if (!device_) fail("Embree cannot make a device", rtcGetDeviceError(nullptr));
     rtcSetDeviceMemoryMonitorFunction(device_.get(), &count_memory, &memory_);
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
-      for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
-      build(body);
-    }
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) build(body);
     check();
   }
 

@@ -24,6 +24,10 @@ class PairsByThread {
     static std::atomic<std::uint64_t> calls{0};
     call_ = ++calls;
     threads_ = 0;
+    for (Found& found : found_) {  // a query that threw has left pairs behind
+      found.own.clear();
+      found.box_tests = 0;
+    }
     mine().pairs = &out;
   }
   /// Returns the list of the calling thread.

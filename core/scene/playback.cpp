@@ -22,8 +22,7 @@ Playback<S>::Playback(const Scene<S>& scene) {
   for (const auto& body : scene.bodies) {
     BodyState state;
     state.plans = state.scene_plans = body.plans;
-    state.positions.resize(std::size_t(3) * body.plans.vertex_count() + 1);
-    state.positions.back() = S(0);
+    state.positions.assign(std::size_t(3) * body.plans.vertex_count() + 1, S(0));
     state.stamp.assign(body.plans.vertex_count(), 0);
     largest = std::max<std::size_t>(largest, body.plans.vertex_count());
     bodies_.push_back(std::move(state));

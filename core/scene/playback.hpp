@@ -76,7 +76,7 @@ class Playback {
  private:
   struct BodyState {
     FlightPlans<S> plans, scene_plans;  ///< with changes, and as in the scene
-    UnfilledArray<S> positions;         ///< [vertex][3] and one for reads of four; set by evaluation only
+    UnfilledArray<S> positions;         ///< [vertex][3] and one for reads of four
     const S* given = nullptr;           ///< the caller's array, if positions were handed in
     std::vector<std::uint32_t> stamp;
     std::uint32_t fetched = 0;  ///< at the current time
