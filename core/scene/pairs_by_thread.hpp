@@ -13,6 +13,7 @@ namespace kbvh {
 /// answer, each other one to a list of its own, and takes a lock only when it comes for the first time.
 class PairsByThread {
  public:
+  /// What one thread finds: `pairs` is the answer or `own`; box tests since the last `collect`.
   struct alignas(cache_line) Found {
     PairBuffer* pairs = nullptr;
     std::uint64_t box_tests = 0;
@@ -57,6 +58,7 @@ class PairsByThread {
     }
     return tests;
   }
+  /// Returns the memory of the lists in bytes, without the answer.
   std::size_t bytes() const {
     std::size_t total = found_.size() * sizeof(Found);
     for (const Found& found : found_) total += found.own.capacity() * sizeof(PrimitivePair);
