@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Runs the registered tests with one process for all cases of an executable, where CTest starts one for each case.
+"""Runs the registered tests with one process for all cases of a suite, where CTest starts one for each case.
 
 usage: quick.py BUILD [CTEST OPTION...]
 
-The options choose tests as ctest does (-L, -LE, -R, -E). Executables run side by side, those with most cases first. A
-case that fails is printed with what its executable said. Exit code 1 if any failed.
+The options choose tests as ctest does (-L, -LE, -R, -E). Suites run side by side, those first that took longest in this
+build before. A case that fails is printed with what its executable said. Exit code 1 if any failed.
 """
 import concurrent.futures
 import json
@@ -25,7 +25,7 @@ def registered(build, options):
 
 
 def batches(tests):
-    """Groups cases of one GoogleTest executable: [(name, number of cases, command, environment, folder, expected output)]."""
+    """Groups cases of one GoogleTest suite: [(name, number of cases, command, environment, folder, expected output)]."""
     groups = {}
     for test in tests:
         properties = {p["name"]: p["value"] for p in test.get("properties", [])}
@@ -34,9 +34,10 @@ def batches(tests):
         cases = [word for word in test["command"] if word.startswith("--gtest_filter=")]
         rest = [word for word in test["command"] if word not in cases and word != "--also_run_disabled_tests"]
         case = cases[0].split("=", 1)[1] if cases else None
-        key = (tuple(rest), environment, folder, case is None and test["name"])
+        suite = test["name"] if case is None else case.rpartition(".")[0]
+        key = (tuple(rest), environment, folder, suite)
         groups.setdefault(key, (test["name"], [], properties.get("PASS_REGULAR_EXPRESSION", ())))[1].append(case)
-    for (command, environment, folder, _), (name, cases, expected) in groups.items():
+    for (command, environment, folder, suite), (name, cases, expected) in groups.items():
         if cases == [None]:
             yield name, 1, list(command), environment, folder, expected
             continue
@@ -46,7 +47,7 @@ def batches(tests):
                 filters.append("")
             filters[-1] += (":" if filters[-1] else "") + case
         for part in filters:
-            yield (os.path.basename(command[0]), part.count(":") + 1,
+            yield (f"{os.path.basename(command[0])} {suite}", part.count(":") + 1,
                    [*command, "--gtest_brief=1", "--gtest_filter=" + part], environment, folder, expected)
 
 
@@ -68,7 +69,13 @@ def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     begin = time.monotonic()
-    work = sorted(batches(registered(sys.argv[1], sys.argv[2:])), key=lambda batch: -batch[1])
+    past = os.path.join(sys.argv[1], "quick_times.json")
+    before = {}
+    if os.path.exists(past):
+        with open(past) as file:
+            before = json.load(file)
+    work = sorted(batches(registered(sys.argv[1], sys.argv[2:])),
+                  key=lambda batch: (-before.get(batch[0], 0), -batch[1]))
     if not work:
         sys.exit("no test is chosen")
     failed, cases, times = [], 0, []
@@ -79,9 +86,11 @@ def main():
             if code != 0:
                 failed.append(name)
                 print(f"FAILED ({code}): {name}\n{output}", flush=True)
+    with open(past, "w") as file:
+        json.dump({**before, **{name: seconds for seconds, name in times}}, file)
     for seconds, name in sorted(times, reverse=True)[:8]:
         print(f"{seconds:7.1f} s  {name}")
-    print(f"{cases} cases of {len(work)} executables in {time.monotonic() - begin:.0f} s, "
+    print(f"{cases} cases of {len(work)} suites in {time.monotonic() - begin:.0f} s, "
           + (f"{len(failed)} failed: " + ", ".join(failed) if failed else "all passed"))
     sys.exit(1 if failed else 0)
 

@@ -47,16 +47,15 @@ foreach(set IN LISTS kbvh_kernel_sets)
 endforeach()
 
 set(KBVH_OUTER_OPTIMISATION "" CACHE STRING
-  "optimisation level of adapters, of the program around the strategies and of strategies that take long to compile, for builds that are not measured; empty: as all")
+  "optimisation level of strategies, adapters and the program around them, for builds that are not measured; empty: as all")
 # Rooms of the program that compute themselves.
 set(kbvh_computing_rooms scenes stress theory)
 
-# kbvh_room(NAME SOURCES file... [KERNELS file...] [USES room...] [NO_UNITY]): the folder that calls it is a room, the library
+# kbvh_room(NAME SOURCES file... [KERNELS file...] [USES room...]): the folder that calls it is a room, the library
 # kbvh_NAME. Its headers are staged alone, under the path that #include spells, so that a file sees the rooms that its
 # own room uses, those that these use in turn, and nothing else of the tree. USES lists all edges.
-# NO_UNITY: its sources are always compiled one by one, because they use the same names for different entities.
 function(kbvh_room name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "NO_UNITY" "" "SOURCES;KERNELS;USES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;KERNELS;USES")
   cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY ${PROJECT_SOURCE_DIR} OUTPUT_VARIABLE path)
   set(stage ${CMAKE_BINARY_DIR}/rooms/${name})
   cmake_path(GET path PARENT_PATH folder)
@@ -70,7 +69,7 @@ function(kbvh_room name)
   list(TRANSFORM uses PREPEND kbvh_)
   if(arg_SOURCES)
     add_library(kbvh_${name} STATIC ${arg_SOURCES})
-    if(KBVH_UNITY AND NOT arg_NO_UNITY)
+    if(KBVH_UNITY)
       set_target_properties(kbvh_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
     endif()
     if(KBVH_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")

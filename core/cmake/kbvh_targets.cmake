@@ -1,28 +1,27 @@
 # Shared by the build in the tree and, installed, by projects that add strategies of their own.
 
-# kbvh_add_strategy(NAME SOURCE TARGET [SCALARS_APART | TOGETHER]): compiles SOURCE into TARGET (a static library) and
+# kbvh_add_strategy(NAME SOURCE TARGET [SCALARS_APART] [GROUP group]): compiles SOURCE into TARGET (a static library) and
 # lists NAME, the word in its KBVH_STRATEGY(NAME), in the manifest.
-# SCALARS_APART: compiles a SOURCE with one entry or several, all in both scalars, once a scalar and side by side. It is
-# for those that take long, and KBVH_OUTER_OPTIMISATION applies to them.
-# TOGETHER: SOURCE may be compiled in one unit with others (KBVH_UNITY_STRATEGIES), whose names it does not use.
+# GROUP: with KBVH_UNITY_STRATEGIES, SOURCE is compiled in one unit with the others of this group, whose names it does not
+# use.
+# SCALARS_APART: otherwise, a SOURCE with one entry or several, all in both scalars, is compiled once a scalar and side by
+# side. It is for those that take long.
 # KBVH_STRATEGIES, a list of such words, leaves out all others.
 function(kbvh_add_strategy name source target)
+  cmake_parse_arguments(PARSE_ARGV 3 arg "SCALARS_APART" "GROUP" "")
   if(KBVH_STRATEGIES AND NOT name IN_LIST KBVH_STRATEGIES)
     return()
   endif()
   target_sources(${target} PRIVATE ${source})
-  if(NOT "TOGETHER" IN_LIST ARGN)
-    set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-  endif()
-  if("SCALARS_APART" IN_LIST ARGN)
+  if(arg_GROUP AND KBVH_UNITY_STRATEGIES)
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${arg_GROUP})
+  elseif(arg_SCALARS_APART)
     cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} OUTPUT_VARIABLE file)
     set(in_double ${CMAKE_CURRENT_BINARY_DIR}/in_double/${name}.cpp)
     file(CONFIGURE OUTPUT ${in_double} CONTENT "#define KBVH_SCALARS_HERE double_only\n#include \"@file@\"\n" @ONLY)
     target_sources(${target} PRIVATE ${in_double})
-    set_source_files_properties(${in_double} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     set_source_files_properties(${source} PROPERTIES
       COMPILE_DEFINITIONS "KBVH_SCALARS_HERE=float_only;KBVH_JOINS_SCALARS")
-    set_source_files_properties(${source} ${in_double} PROPERTIES COMPILE_OPTIONS "${KBVH_OUTER_OPTIMISATION}")
   endif()
   kbvh_add_about(${name} ${source} ${target})
   set_property(GLOBAL APPEND PROPERTY KBVH_STRATEGY_NAMES ${name})
@@ -36,6 +35,7 @@ function(kbvh_add_about name source target)
   add_custom_command(OUTPUT ${file} DEPENDS ${source} ${kbvh_about_script} COMMENT "" VERBATIM
     COMMAND ${CMAKE_COMMAND} -DNAME=${name} -DSOURCE=${source} -DFILE=${file} -P ${kbvh_about_script})
   target_sources(${target} PRIVATE ${file})
+  set_source_files_properties(${file} PROPERTIES UNITY_GROUP about)
 endfunction()
 
 # kbvh_write_manifest(FILE [NAME...] [NAMESPACE namespace]): writes the source that lists these strategies; without

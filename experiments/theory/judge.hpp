@@ -1,4 +1,5 @@
 #pragma once
+#include <string>
 #include <vector>
 
 #include "experiments/theory/claim.hpp"
@@ -28,6 +29,15 @@ Claim judge_separation_list(const std::vector<SeparationRun>& separations);  // 
 Claim judge_list_size(const std::vector<ListSizeRun>& sizes);                // T14
 Claim judge_plan_changes(const std::vector<PlanRun>& plans);                 // T15
 Claim judge_lower_bound(const std::vector<LooseRun>& loose);                 // T16
+
+/// Short names for criteria.
+inline constexpr Role always = Role::always, as_stated = Role::as_stated;
+
+/// Names the scene of a run and its size.
+template <class Run>
+std::string place(const Run& run) {
+  return run.scene + ", " + number(run.triangles) + " polygons";
+}
 
 /// Makes a claim that cannot be decided here, with the reason.
 Claim undecided(Claim claim, const std::string& why);

@@ -11,14 +11,6 @@ namespace kbvh::theory {
 
 using experiments::counted;
 
-namespace {
-constexpr Role always = Role::always, as_stated = Role::as_stated;
-
-std::string place(const BoxTreeRun& run) {
-  return run.scene + ", " + number(run.triangles) + " polygons";
-}
-}  // namespace
-
 Claim judge_boxtree_size(const std::vector<BoxTreeRun>& boxtrees) {
   Claim claim{
       .id = "T11",

@@ -14,10 +14,6 @@ namespace kbvh::theory {
 using experiments::counted;
 using experiments::joined;
 
-namespace {
-constexpr Role always = Role::always, as_stated = Role::as_stated;
-}
-
 Claim judge_separation_list(const std::vector<SeparationRun>& separations) {
   Claim claim{
       .id = "T13",

@@ -14,13 +14,6 @@ namespace kbvh::theory {
 using experiments::counted;
 
 namespace {
-constexpr Role always = Role::always, as_stated = Role::as_stated;
-
-template <class Run>
-std::string place(const Run& run) {
-  return run.scene + ", " + number(run.triangles) + " polygons";
-}
-
 template <class Run>
 std::size_t scene_count(const std::vector<Run>& runs) {
   std::set<std::string> names;

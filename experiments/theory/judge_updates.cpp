@@ -16,12 +16,6 @@ using experiments::counted;
 using experiments::joined;
 
 namespace {
-constexpr Role always = Role::always, as_stated = Role::as_stated;
-
-template <class Run>
-std::string place(const Run& run) {
-  return run.scene + ", " + number(run.triangles) + " polygons";
-}
 std::string place(const FrameRun& run) {
   return run.scene + ", " + counted(run.triangles, "polygon") + ", l = " + std::to_string(run.l);
 }

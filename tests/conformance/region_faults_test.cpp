@@ -8,7 +8,7 @@
 #include "tests/conformance/check.hpp"
 #include "tests/support/grids.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::region_faults {
 namespace {
 
 enum class RegionFault : std::uint8_t {
@@ -132,4 +132,4 @@ TEST(RegionFaults, NodesLeftOut) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::region_faults

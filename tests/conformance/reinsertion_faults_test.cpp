@@ -39,7 +39,7 @@ struct MovingTreeFaults {
   }
 };
 
-namespace test {
+namespace test::reinsertion_faults {
 namespace {
 
 enum class MoveFault : std::uint8_t {
@@ -156,5 +156,5 @@ TEST(ReinsertionFaults, ALeafAtTwoPlaces) {
 }
 
 }  // namespace
-}  // namespace test
+}  // namespace test::reinsertion_faults
 }  // namespace kbvh
