@@ -9,7 +9,7 @@
 #include "tests/conformance/check.hpp"
 #include "tests/support/grids.hpp"
 
-namespace kbvh::test::blend_faults {
+namespace kbvh::test::blend_faults_test {
 namespace {
 
 enum class BlendFault : std::uint8_t {
@@ -187,4 +187,4 @@ TEST(BlendFaults, NoMarginBetweenKeyframes) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::blend_faults
+}  // namespace kbvh::test::blend_faults_test

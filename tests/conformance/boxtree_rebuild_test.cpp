@@ -5,7 +5,7 @@
 
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::boxtree_rebuild_test {
 namespace {
 
 using Words = std::map<std::string, std::string>;
@@ -70,4 +70,4 @@ TEST(Rebuilding, IsOffByDefault) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::boxtree_rebuild_test

@@ -11,7 +11,7 @@
 #include "core/judge/session.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test::contacts {
+namespace kbvh::test::contacts_test {
 namespace {
 
 std::vector<std::string> scene_names() {
@@ -360,4 +360,4 @@ TEST(Registry, ContactsAreDeclaredOrRefused) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::contacts
+}  // namespace kbvh::test::contacts_test

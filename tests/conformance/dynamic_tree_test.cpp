@@ -13,7 +13,7 @@
 #include "core/geometry/lane_box.hpp"
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test::dynamic_trees {
+namespace kbvh::test::dynamic_tree_test {
 namespace {
 
 Box<float> random_box(Random& random) {
@@ -186,4 +186,4 @@ TEST(DynamicTreeFaults, AreCaught) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::dynamic_trees
+}  // namespace kbvh::test::dynamic_tree_test

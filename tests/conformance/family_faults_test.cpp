@@ -15,7 +15,7 @@
 #include "core/families/wide/stored_hierarchy.hpp"
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test::family_faults {
+namespace kbvh::test::family_faults_test {
 namespace {
 
 enum class Fault : std::uint8_t {
@@ -485,4 +485,4 @@ TEST(FamilyFaults, SweepsOfTheEndOnly) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::family_faults
+}  // namespace kbvh::test::family_faults_test

@@ -11,7 +11,7 @@
 #include "core/topology/leaf_pairs.hpp"
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test::refit_faults {
+namespace kbvh::test::faults_test {
 namespace {
 
 enum class Fault {
@@ -400,4 +400,4 @@ TEST(Faults, AncestorsForgottenWhenGeometryChanges) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::refit_faults
+}  // namespace kbvh::test::faults_test

@@ -7,7 +7,7 @@
 #include "core/families/wide/stored_hierarchy.hpp"
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test::front_faults {
+namespace kbvh::test::front_faults_test {
 namespace {
 
 enum class FrontFault : std::uint8_t {
@@ -74,4 +74,4 @@ TEST(FrontFaults, AFrontThatClimbsWrongly) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::front_faults
+}  // namespace kbvh::test::front_faults_test

@@ -6,7 +6,7 @@
 #include "core/families/grid/hash_grid.hpp"
 #include "tests/conformance/list_faults.hpp"
 
-namespace kbvh::test::grid_faults {
+namespace kbvh::test::grid_faults_test {
 namespace {
 
 enum class Fault : std::uint8_t {
@@ -75,4 +75,4 @@ TEST(GridFaults, APrimitiveThatIsNotEntered) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::grid_faults
+}  // namespace kbvh::test::grid_faults_test

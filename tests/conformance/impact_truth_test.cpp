@@ -12,7 +12,7 @@
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/study/impact_queries.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::impact_truth_test {
 namespace {
 
 TEST(ImpactTruth, EveryVerdictIsRight) {
@@ -136,4 +136,4 @@ TEST(ImpactQueries, ComplainWithTheLine) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::impact_truth_test

@@ -29,7 +29,7 @@
 #include "core/judge/oracle.hpp"
 #include "tests/conformance/interval_play.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::interval_spans_test {
 namespace {
 
 /// What is taken off a span's begin and added to its end.
@@ -267,4 +267,4 @@ INSTANTIATE_TEST_SUITE_P(Scenes, IntervalSpans,
                          [](const auto& test) { return test.param; });
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::interval_spans_test

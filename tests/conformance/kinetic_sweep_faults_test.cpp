@@ -9,7 +9,7 @@
 #include "core/scene/self_pairs.hpp"
 #include "tests/conformance/list_faults.hpp"
 
-namespace kbvh::test::kinetic_sweep_faults {
+namespace kbvh::test::kinetic_sweep_faults_test {
 namespace {
 
 enum class Fault : std::uint8_t {
@@ -150,4 +150,4 @@ TEST(KineticSweepFaults, ASwapThatDoesNotReachTheSet) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::kinetic_sweep_faults
+}  // namespace kbvh::test::kinetic_sweep_faults_test

@@ -8,7 +8,7 @@
 #include "core/families/volumes/volume_strategy.hpp"
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test::lane_volume_faults {
+namespace kbvh::test::lane_volume_faults_test {
 namespace {
 
 enum class Fault : std::uint8_t {
@@ -141,4 +141,4 @@ TEST(LaneVolumeFaults, AreFoundInOrientedBoxes) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::lane_volume_faults
+}  // namespace kbvh::test::lane_volume_faults_test

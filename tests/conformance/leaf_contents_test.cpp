@@ -14,7 +14,7 @@
 #include "tests/conformance/check.hpp"
 #include "tests/support/polygon_soups.hpp"
 
-namespace kbvh::test::leaf_contents {
+namespace kbvh::test::leaf_contents_test {
 namespace {
 
 /// The first body of a soup of polygons with 3 to 5 corners, and its hierarchy.
@@ -270,4 +270,4 @@ TEST(LeafContents, ALostPrimitiveIsSeen) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::leaf_contents
+}  // namespace kbvh::test::leaf_contents_test

@@ -10,7 +10,7 @@
 #include "tests/conformance/check.hpp"
 #include "tests/support/many_bodies.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::many_bodies_test {
 namespace {
 
 /// The true pairs by one sweep over all triangles of a scene.
@@ -203,4 +203,4 @@ INSTANTIATE_TEST_SUITE_P(Registry, ManyBodiesOf, testing::ValuesIn(all_ids()),
                          [](const auto& test) { return test.param; });
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::many_bodies_test

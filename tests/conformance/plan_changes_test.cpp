@@ -10,7 +10,7 @@
 #include "tests/conformance/check.hpp"
 #include "tests/support/plan_changes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::plan_changes_test {
 namespace {
 
 /// Goes through one point of its own, then stays there.
@@ -334,4 +334,4 @@ TEST(Script, TimesMustBeFrames) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::plan_changes_test

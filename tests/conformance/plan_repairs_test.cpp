@@ -11,7 +11,7 @@
 #include "core/families/linear/triangle_span_filter.hpp"
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test::plan_repairs {
+namespace kbvh::test::plan_repairs_test {
 namespace {
 
 enum class Fault : std::uint8_t {
@@ -251,4 +251,4 @@ TEST(PlanRepairs, ASpanThatIsNotCut) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::plan_repairs
+}  // namespace kbvh::test::plan_repairs_test

@@ -10,7 +10,7 @@
 #include "experiments/scenes/scene_spec.hpp"
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::primitives_test {
 namespace {
 
 using experiments::LoadedScene;
@@ -197,4 +197,4 @@ INSTANTIATE_TEST_SUITE_P(Registry, Primitives, testing::ValuesIn(ids()),
                          [](const auto& test) { return test.param; });
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::primitives_test

@@ -6,7 +6,7 @@
 #include "core/topology/ray_traversal.hpp"
 #include "tests/conformance/ray_check.hpp"
 
-namespace kbvh::test::ray_faults {
+namespace kbvh::test::ray_faults_test {
 namespace {
 
 enum class Fault : std::uint8_t {
@@ -238,4 +238,4 @@ TEST(RayFaults, EveryWrongTestOfHiddenBodiesIsCaught) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::ray_faults
+}  // namespace kbvh::test::ray_faults_test

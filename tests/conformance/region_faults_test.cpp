@@ -8,7 +8,7 @@
 #include "tests/conformance/check.hpp"
 #include "tests/support/grids.hpp"
 
-namespace kbvh::test::region_faults {
+namespace kbvh::test::region_faults_test {
 namespace {
 
 enum class RegionFault : std::uint8_t {
@@ -132,4 +132,4 @@ TEST(RegionFaults, NodesLeftOut) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::region_faults
+}  // namespace kbvh::test::region_faults_test

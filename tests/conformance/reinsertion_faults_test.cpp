@@ -39,7 +39,7 @@ struct MovingTreeFaults {
   }
 };
 
-namespace test::reinsertion_faults {
+namespace test::reinsertion_faults_test {
 namespace {
 
 enum class MoveFault : std::uint8_t {
@@ -156,5 +156,5 @@ TEST(ReinsertionFaults, ALeafAtTwoPlaces) {
 }
 
 }  // namespace
-}  // namespace test::reinsertion_faults
+}  // namespace test::reinsertion_faults_test
 }  // namespace kbvh

@@ -11,7 +11,7 @@
 #include "tests/conformance/check.hpp"
 #include "tests/support/flying_triangles.hpp"
 
-namespace kbvh::test::restructuring {
+namespace kbvh::test::restructuring_test {
 namespace {
 
 struct Eager {
@@ -159,4 +159,4 @@ INSTANTIATE_TEST_SUITE_P(Eager, Restructuring, testing::Range(std::size_t(0), ea
                          });
 
 }  // namespace
-}  // namespace kbvh::test::restructuring
+}  // namespace kbvh::test::restructuring_test

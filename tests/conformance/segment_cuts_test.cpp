@@ -10,7 +10,7 @@
 
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::segment_cuts_test {
 namespace {
 
 const std::array<const char*, 2> strategies{"linear_bounds", "interval_join"};
@@ -81,4 +81,4 @@ TEST(SegmentCuts, MakeLooseBoxesTighter) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::segment_cuts_test

@@ -10,7 +10,7 @@
 #include "core/judge/oracle.hpp"
 #include "tests/conformance/interval_play.hpp"
 
-namespace kbvh::test::span_verdicts {
+namespace kbvh::test::span_verdicts_test {
 namespace {
 
 /// About as many pairs of a segment are looked at.
@@ -170,4 +170,4 @@ TEST(RationalTriangles, KnowsTheOddCases) {
   EXPECT_FALSE(RationalTriangles::intersect(across.data(), point.data()));
 }
 
-}  // namespace kbvh::test::span_verdicts
+}  // namespace kbvh::test::span_verdicts_test

@@ -10,7 +10,7 @@
 #include "core/geometry/volumes/sphere.hpp"
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test::volume_faults {
+namespace kbvh::test::volume_faults_test {
 namespace {
 
 constexpr double shrinkage = 2e-4;
@@ -259,4 +259,4 @@ TEST(VolumeFaults, LateAndForgetfulDopsAreFound) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::volume_faults
+}  // namespace kbvh::test::volume_faults_test

@@ -13,7 +13,7 @@
 #include "core/judge/audit.hpp"
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::volumes_test {
 namespace {
 
 std::vector<std::string> every_scene() {
@@ -181,4 +181,4 @@ TEST(Rotations, AreTakenBackByReset) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::volumes_test

@@ -8,7 +8,7 @@
 #include "core/topology/subtree_swap.hpp"
 #include "tests/conformance/check.hpp"
 
-namespace kbvh::test::wide_rotations {
+namespace kbvh::test::wide_rotations_test {
 namespace {
 
 enum class Boxes : std::uint8_t { recomputed, as_before_the_edit };
@@ -136,4 +136,4 @@ TEST(WideRotation, IsTakenBackByReset) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::wide_rotations
+}  // namespace kbvh::test::wide_rotations_test

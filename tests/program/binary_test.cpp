@@ -2,7 +2,7 @@
 #include "binary.hpp"
 #include "core/contract/registry.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::binary_test {
 namespace {
 
 TEST_F(Binary, HelpHasExamples) {
@@ -141,4 +141,4 @@ TEST_F(Binary, NothingMovesAndNothingMeets) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::binary_test

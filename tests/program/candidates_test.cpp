@@ -12,7 +12,7 @@
 #include "experiments/common/environment.hpp"
 #include "experiments/study/box_candidates.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::candidates_test {
 namespace {
 
 /// A grid of triangles whose vertices jump to multiples of a step, so that many boxes touch.
@@ -118,4 +118,4 @@ TEST(BoxCandidates, OfClothBallAreThePublishedOnes) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::candidates_test

@@ -5,7 +5,7 @@
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/study/plan.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::input_test {
 namespace {
 
 std::string name_error(const std::string& name) {
@@ -186,4 +186,4 @@ TEST_F(Binary, PolygonsOfManyCornersAreInputErrors) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::input_test

@@ -11,7 +11,7 @@
 #include "experiments/results/results.hpp"
 #include "experiments/run/jobs.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::jobs_test {
 namespace {
 
 std::vector<Job> jobs_in(const json& plan, std::vector<std::string>* notes = nullptr) {
@@ -214,4 +214,4 @@ TEST(ResultStore, KnowsOtherFilesAndWritesItsOwn) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::jobs_test

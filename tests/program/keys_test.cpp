@@ -15,7 +15,7 @@
 #include "experiments/study/plan.hpp"
 #include "temporary_folder.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::keys_test {
 namespace {
 
 using nlohmann::json;
@@ -272,4 +272,4 @@ TEST(Keys, SeeTheMachineTheProgramAndTheHarness) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::keys_test

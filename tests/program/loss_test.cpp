@@ -18,7 +18,7 @@
 #include "experiments/run/bench_harness.hpp"
 #include "experiments/study/contestants.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::loss_test {
 namespace {
 
 const std::string one = tiny + "--strategies bottom_up ";
@@ -476,4 +476,4 @@ TEST_F(Binary, ThreadsThatTheMachineHasNotAreRefused) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::loss_test

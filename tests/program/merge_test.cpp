@@ -1,7 +1,7 @@
 // kbvh merge: nothing is lost, nothing counts twice, and damaged input is refused before anything is written.
 #include "binary.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::merge_test {
 namespace {
 
 /// A record with the fields that the program checks.
@@ -202,4 +202,4 @@ TEST_F(Binary, ARecordLeadsBackToItsConfiguration) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::merge_test

@@ -7,7 +7,7 @@
 #include "binary.hpp"
 #include "experiments/cli/program.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::options_test {
 namespace {
 
 /// What an option takes, and so what it must refuse.
@@ -456,4 +456,4 @@ TEST_F(Binary, AMeshWithoutPolygonsIsSaid) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::options_test

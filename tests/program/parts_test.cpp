@@ -13,7 +13,7 @@
 #include "experiments/study/plan.hpp"
 #include "temporary_folder.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::parts_test {
 namespace {
 
 using nlohmann::json;
@@ -346,4 +346,4 @@ TEST(Contestants, EveryRegisteredStrategyHasADefaultConfiguration) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::parts_test

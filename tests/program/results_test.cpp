@@ -8,7 +8,7 @@
 #include "experiments/study/measure.hpp"
 #include "temporary_folder.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::results_test {
 namespace {
 
 using nlohmann::json;
@@ -232,4 +232,4 @@ TEST(Table, ColumnsCountCharacters) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::results_test

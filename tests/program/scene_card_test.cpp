@@ -10,7 +10,7 @@
 #include "experiments/scenes/scene_card.hpp"
 #include "experiments/scenes/shapes.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::scene_card_test {
 namespace {
 
 LoadedScene scene_of(std::vector<io::AnimatedMesh> meshes) {
@@ -109,4 +109,4 @@ TEST(LabScene, HoldsWhatTheSceneIs) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::scene_card_test

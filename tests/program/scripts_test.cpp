@@ -12,7 +12,7 @@
 #include "experiments/study/plan.hpp"
 #include "temporary_folder.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::scripts_test {
 namespace {
 
 using nlohmann::json;
@@ -188,4 +188,4 @@ TEST(Scripts, ArePartOfAConfigurationsKey) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::scripts_test

@@ -6,7 +6,7 @@
 #include "binary.hpp"
 #include "core/kernels/kernel_set.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::study_test {
 namespace {
 
 TEST_F(Binary, RunsRecordsAndResumes) {
@@ -412,4 +412,4 @@ TEST_F(Binary, ForcedKernelsAreAnotherConfiguration) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::study_test

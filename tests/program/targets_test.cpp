@@ -16,7 +16,7 @@
 #include <tbb/global_control.h>
 #endif
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::targets_test {
 namespace {
 
 using nlohmann::json;
@@ -433,4 +433,4 @@ TEST(Targets, RowsOfTheSamePlanAreReplacedAndOthersStay) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::targets_test

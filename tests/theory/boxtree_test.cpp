@@ -13,7 +13,7 @@
 #include "tests/theory/boxtree_log.hpp"
 #include "tests/theory/lossy_queue.hpp"
 
-namespace kbvh::test::boxtree_envelopes {
+namespace kbvh::test::boxtree_test {
 namespace {
 
 std::string summary(const BoxTreeReport& r) {
@@ -444,4 +444,4 @@ TEST(BoxTree, RefusesWideTopologies) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::boxtree_envelopes
+}  // namespace kbvh::test::boxtree_test

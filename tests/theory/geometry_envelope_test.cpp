@@ -12,7 +12,7 @@
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::geometry_envelope_test {
 namespace {
 
 using namespace kbvh::theory;
@@ -365,4 +365,4 @@ TEST(BoxTreeEdits, AreLocal) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::geometry_envelope_test

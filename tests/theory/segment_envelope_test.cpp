@@ -10,7 +10,7 @@
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::segment_envelope_test {
 namespace {
 
 using namespace kbvh::theory;
@@ -131,4 +131,4 @@ INSTANTIATE_TEST_SUITE_P(Scenes, SegmentEnvelopes, testing::ValuesIn(scenes_with
                          [](const auto& param_info) { return param_info.param; });
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::segment_envelope_test

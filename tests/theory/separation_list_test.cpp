@@ -10,7 +10,7 @@
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::separation_list_test {
 namespace {
 
 using theory::exact;
@@ -381,4 +381,4 @@ TEST(Widening, ExceedsFourUnitsInTheLastPlace) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::separation_list_test

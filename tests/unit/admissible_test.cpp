@@ -12,7 +12,7 @@
 #include "tests/support/plan_changes.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh {
+namespace kbvh::admissible_test {
 namespace {
 
 using test::flies;
@@ -268,4 +268,4 @@ INSTANTIATE_TEST_SUITE_P(Registry, EveryStrategy, testing::ValuesIn(ids()),
                          [](const auto& test) { return test.param; });
 
 }  // namespace
-}  // namespace kbvh
+}  // namespace kbvh::admissible_test

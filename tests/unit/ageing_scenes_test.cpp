@@ -12,7 +12,7 @@
 #include "experiments/scenes/scene_spec.hpp"
 #include "tests/support/mesh_checks.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::ageing_scenes_test {
 namespace {
 
 using namespace test;
@@ -146,4 +146,4 @@ TEST(AgeingScenes, ScenesOfOneBodyRefuseAnObstacle) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::ageing_scenes_test

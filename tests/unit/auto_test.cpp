@@ -13,7 +13,7 @@
 #include "tests/support/moving_grids.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::auto_test {
 namespace {
 
 constexpr auto slow = [](std::uint32_t i) { return 0.02 + 0.001 * i; };
@@ -451,4 +451,4 @@ TEST(NestedStrategies, KnowNoMoreOfTheFutureThanTheirOwner) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::auto_test

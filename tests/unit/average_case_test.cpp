@@ -14,7 +14,7 @@
 #include "core/topology/builders.hpp"
 #include "experiments/scenes/scene_spec.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::average_case_test {
 namespace {
 
 /// Pairs of nodes with a predicted probability in one tenth of [0, 1].
@@ -279,4 +279,4 @@ TEST(PairProbability, GrowsWithTheFilledCellsInTheOverlap) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::average_case_test

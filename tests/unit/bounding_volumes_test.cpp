@@ -5,7 +5,7 @@
 
 #include "tests/support/rational_volumes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::bounding_volumes_test {
 namespace {
 
 template <class V>
@@ -186,4 +186,4 @@ TYPED_TEST(Volumes, EmptyOnesContainAndOverlapNothing) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::bounding_volumes_test

@@ -11,7 +11,7 @@
 #include "core/families/build/curve_builders.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::build_test {
 namespace {
 
 /// Primitives and the positions of their vertices, one scalar past the end.
@@ -277,4 +277,4 @@ TEST(BuiltTree, RefusesLeafSizesThatItDoesNotHave) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::build_test

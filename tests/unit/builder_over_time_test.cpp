@@ -9,7 +9,7 @@
 
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test::builder_over_time {
+namespace kbvh::test::builder_over_time_test {
 namespace {
 
 /// Short segments along x at first and along y at last, in orders without relation to each other.
@@ -107,4 +107,4 @@ TEST(BuilderOverTime, RemovedPrimitivesAndWrongInput) {
 }
 
 }  // namespace
-}  // namespace kbvh::test::builder_over_time
+}  // namespace kbvh::test::builder_over_time_test

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace kbvh::test {
+namespace kbvh::test::compiler_test {
 namespace {
 
 struct Rounded {
@@ -34,4 +34,4 @@ TEST(Compiler, KeepsRoundingToFloatBetweenDoubles) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::compiler_test

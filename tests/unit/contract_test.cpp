@@ -10,7 +10,7 @@
 #include "core/contract/registry.hpp"
 #include "tests/support/moving_grids.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::contract_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -381,4 +381,4 @@ TEST(Contract, PositionsCanBeHandedIn) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::contract_test

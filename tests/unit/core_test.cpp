@@ -14,7 +14,7 @@
 #include "core/topology/renumber.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::core_test {
 namespace {
 
 template <class S>
@@ -334,4 +334,4 @@ TEST(Audit, MeasuresProtrusionAndLooseness) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::core_test

@@ -11,7 +11,7 @@
 #include "core/topology/builders.hpp"
 #include "tests/support/rational_volumes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::dop_hierarchy_test {
 namespace {
 
 using LeafPair = std::pair<std::uint32_t, std::uint32_t>;
@@ -171,4 +171,4 @@ TEST(DopHierarchy, OfNothingFindsNothing) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::dop_hierarchy_test

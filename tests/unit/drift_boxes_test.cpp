@@ -14,7 +14,7 @@
 #include "tests/support/ray_sets.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::drift_boxes_test {
 namespace {
 
 // ---- How far vertices moved
@@ -256,4 +256,4 @@ TEST(DriftBoxes, WhatMovesTogetherStaysListed) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::drift_boxes_test

@@ -9,7 +9,7 @@
 #include "tests/support/play.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::envelopes_ahead_test {
 namespace {
 
 constexpr const char* both[] = {"kinetic_envelope", "kinetic_envelope_ahead"};
@@ -198,4 +198,4 @@ TEST(EnvelopesAhead, AScenesOwnTranslationIsSeenWhereItIsExact) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::envelopes_ahead_test

@@ -11,7 +11,7 @@
 #include "core/judge/follow_script.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::event_source_test {
 namespace {
 
 std::vector<const StrategyEntry*> sources() {
@@ -353,4 +353,4 @@ TEST(BoxTreeCounters, CountSearchesSinceTheReset) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::event_source_test

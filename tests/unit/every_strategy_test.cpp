@@ -8,7 +8,7 @@
 #include "core/contract/registry.hpp"
 #include "tests/support/moving_grids.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::every_strategy_test {
 namespace {
 
 TEST(EveryStrategy, ASilentInstanceCountsNothing) {
@@ -182,4 +182,4 @@ TEST(EveryStrategy, RefusesTimesThatAreNone) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::every_strategy_test

@@ -12,7 +12,7 @@
 #include "core/topology/builders.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::exact_tight_test {
 namespace {
 
 template <class S>
@@ -376,4 +376,4 @@ TEST(RealiserKernels, AgreeWithBoxes) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::exact_tight_test

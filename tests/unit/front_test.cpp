@@ -11,7 +11,7 @@
 #include "tests/support/moving_grids.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::front_test {
 namespace {
 
 /// The hierarchies of a scene, and one front for all pairs of bodies, as a strategy keeps it.
@@ -148,4 +148,4 @@ TYPED_TEST(FrontTest, SurvivesFramesThatABudgetCut) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::front_test

@@ -12,7 +12,7 @@
 #include "experiments/scenes/garment.hpp"
 #include "experiments/scenes/garment_solver.hpp"
 
-namespace kbvh::scenes {
+namespace kbvh::scenes::garment_test {
 namespace {
 
 using cloth::length;
@@ -336,4 +336,4 @@ TEST(Walker, SkinLiesOnTheSolid) {
 }
 
 }  // namespace
-}  // namespace kbvh::scenes
+}  // namespace kbvh::scenes::garment_test

@@ -13,7 +13,7 @@
 #include "core/judge/plan_script.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::geometry_change_test {
 namespace {
 
 using Change = GeometryChange<double>;
@@ -302,4 +302,4 @@ TEST(GeometryChange, QueuesGrow) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::geometry_change_test

@@ -8,7 +8,7 @@
 #include "core/families/grid/hash_grid.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::hash_grid_test {
 namespace {
 
 using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
@@ -153,4 +153,4 @@ TYPED_TEST(HashGridTest, NothingHasNoBox) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::hash_grid_test

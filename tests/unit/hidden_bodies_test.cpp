@@ -9,7 +9,7 @@
 #include "core/topology/builders.hpp"
 #include "core/topology/ray_traversal.hpp"
 
-namespace kbvh {
+namespace kbvh::hidden_bodies_test {
 namespace {
 
 /// Squares of side 2 across the axis z, one body each, at the given heights, and another one far aside.
@@ -146,4 +146,4 @@ TEST(BodiesBehindOthers, AreEnteredIfOneRayReachesThem) {
 }
 
 }  // namespace
-}  // namespace kbvh
+}  // namespace kbvh::hidden_bodies_test

@@ -17,7 +17,7 @@
 #include "core/geometry/triangle_triangle.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::impact_test {
 namespace {
 
 using Kind = Contact::Kind;
@@ -479,4 +479,4 @@ TEST(AlgebraicTime, FindsRootsAndSigns) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::impact_test

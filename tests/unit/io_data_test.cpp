@@ -8,7 +8,7 @@
 #include "experiments/io/gltf.hpp"
 #include "io_test_support.hpp"
 
-namespace kbvh::io::test {
+namespace kbvh::io::test::io_data_test {
 namespace {
 
 struct Counts {
@@ -184,4 +184,4 @@ TEST(IoData, KeyTimesOfTheFileAreKeyframes) {
 }
 
 }  // namespace
-}  // namespace kbvh::io::test
+}  // namespace kbvh::io::test::io_data_test

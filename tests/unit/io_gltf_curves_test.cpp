@@ -9,7 +9,7 @@
 #include "experiments/io/keyframe_times.hpp"
 #include "io_gltf_fixture.hpp"
 
-namespace kbvh::io::test {
+namespace kbvh::io::test::io_gltf_curves_test {
 namespace {
 
 class IoGltfCurves : public IoTest {
@@ -191,4 +191,4 @@ TEST(KeyframeTimes, JumpsOfNeighbouringDoubles) {
 }
 
 }  // namespace
-}  // namespace kbvh::io::test
+}  // namespace kbvh::io::test::io_gltf_curves_test

@@ -5,7 +5,7 @@
 #include "experiments/io/gltf.hpp"
 #include "io_gltf_fixture.hpp"
 
-namespace kbvh::io::test {
+namespace kbvh::io::test::io_gltf_test {
 namespace {
 
 class IoGltf : public IoTest {
@@ -361,4 +361,4 @@ TEST_F(IoGltf, ALongChainOfNodes) {
 }
 
 }  // namespace
-}  // namespace kbvh::io::test
+}  // namespace kbvh::io::test::io_gltf_test

@@ -5,7 +5,7 @@
 #include "experiments/io/validate.hpp"
 #include "io_gltf_fixture.hpp"
 
-namespace kbvh::io::test {
+namespace kbvh::io::test::io_mutation_test {
 namespace {
 
 /// More of them for a long run: KBVH_MUTATIONS=10 tries ten times as many.
@@ -155,4 +155,4 @@ TEST_F(IoMutation, RealGltf) {
 }
 
 }  // namespace
-}  // namespace kbvh::io::test
+}  // namespace kbvh::io::test::io_mutation_test

@@ -6,7 +6,7 @@
 #include "experiments/io/primitives.hpp"
 #include "tests/unit/io_test_support.hpp"
 
-namespace kbvh::io::test {
+namespace kbvh::io::test::io_primitives_test {
 namespace {
 
 using IoPrimitives = IoTest;
@@ -138,4 +138,4 @@ TEST_F(IoPrimitives, SurfacesThatAreNotKnownAreRefused) {
 }
 
 }  // namespace
-}  // namespace kbvh::io::test
+}  // namespace kbvh::io::test::io_primitives_test

@@ -10,7 +10,7 @@
 #include "experiments/io/validate.hpp"
 #include "io_test_support.hpp"
 
-namespace kbvh::io::test {
+namespace kbvh::io::test::io_test {
 namespace {
 
 const std::string quad_with_tail =
@@ -416,4 +416,4 @@ TEST_F(IoSave, DamagedCachesAreRefused) {
 }
 
 }  // namespace
-}  // namespace kbvh::io::test
+}  // namespace kbvh::io::test::io_test

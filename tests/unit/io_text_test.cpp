@@ -6,7 +6,7 @@
 #include "experiments/io/json_text.hpp"
 #include "io_gltf_fixture.hpp"
 
-namespace kbvh::io::test {
+namespace kbvh::io::test::io_text_test {
 namespace {
 
 using IoText = IoTest;
@@ -146,4 +146,4 @@ TEST(IoJson, RandomTextsAreReadOrRefused) {
 }
 
 }  // namespace
-}  // namespace kbvh::io::test
+}  // namespace kbvh::io::test::io_text_test

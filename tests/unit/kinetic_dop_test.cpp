@@ -13,7 +13,7 @@
 #include "core/topology/builders.hpp"
 #include "tests/support/rational_volumes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::kinetic_dop_test {
 namespace {
 
 enum class Clip { ties, random, far_away, tiny, mixed_scales };
@@ -312,4 +312,4 @@ TEST(KineticDopFaults, MissingMarginsAreFound) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::kinetic_dop_test

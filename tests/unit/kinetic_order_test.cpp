@@ -6,7 +6,7 @@
 #include "core/families/sweep/kinetic_overlaps.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::kinetic_order_test {
 namespace {
 
 template <class S>
@@ -129,4 +129,4 @@ TEST(BoxPairSet, HoldsWhatWasInsertedAndNotErased) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::kinetic_order_test

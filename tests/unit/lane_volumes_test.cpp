@@ -13,7 +13,7 @@
 #include "core/topology/builders.hpp"
 #include "tests/support/rational_volumes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::lane_volumes_test {
 namespace {
 
 template <class S>
@@ -165,4 +165,4 @@ TEST(LaneVolumes, OfNothingFindNothing) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::lane_volumes_test

@@ -12,7 +12,7 @@
 #include "core/kernels/kernel_set.hpp"
 #include "tests/support/moving_grids.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::lazy_strategies_test {
 namespace {
 
 TEST(InflatedLazy, SkipsFramesUntilTheMarginMayBeUsedUp) {
@@ -265,4 +265,4 @@ TEST(BoundsKernels, EqualTheBoxPointByPoint) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::lazy_strategies_test

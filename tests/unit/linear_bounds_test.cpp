@@ -10,7 +10,7 @@
 #include "core/judge/verify.hpp"
 #include "tests/support/moving_grids.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::linear_bounds_test {
 namespace {
 
 constexpr std::array<const char*, 3> all_linear{"linear_bounds", "interval_join", "interval_join_ahead"};
@@ -334,4 +334,4 @@ TEST(IntervalJoinAhead, EqualsTheJoinAtOnceWhateverFramesThereAre) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::linear_bounds_test

@@ -10,7 +10,7 @@
 #include "experiments/scenes/scene_spec.hpp"
 #include "tests/support/mesh_checks.hpp"
 
-namespace kbvh::experiments::modal_scenes {
+namespace kbvh::experiments::modal_scenes_test {
 namespace {
 
 using namespace test;
@@ -71,4 +71,4 @@ TEST(ModalScenes, DentsMoveFewVertices) {
 }
 
 }  // namespace
-}  // namespace kbvh::experiments::modal_scenes
+}  // namespace kbvh::experiments::modal_scenes_test

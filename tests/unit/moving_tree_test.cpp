@@ -11,7 +11,7 @@
 #include "core/topology/builders.hpp"
 #include "tests/support/polygon_soups.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::moving_tree_test {
 namespace {
 
 template <class S>
@@ -287,4 +287,4 @@ TEST(MovingTree, TakesTreesOfOneLeafAndOfNone) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::moving_tree_test

@@ -19,7 +19,7 @@
 #include "tests/support/rational_geometry.hpp"
 #include "tests/support/ray_sets.hpp"
 
-namespace kbvh {
+namespace kbvh::rays_test {
 namespace {
 
 using test::exact;
@@ -373,4 +373,4 @@ TEST(WideRays, BlocksKeepRaysThatMeetABoxInDouble) {
 }
 
 }  // namespace
-}  // namespace kbvh
+}  // namespace kbvh::rays_test

@@ -10,7 +10,7 @@
 #include "core/kernels/kernel_set.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::reduced_model_test {
 namespace {
 
 TEST(SymmetricEigen, ReproducesTheMatrix) {
@@ -152,4 +152,4 @@ TEST(BlendKernels, AllAgree) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::reduced_model_test

@@ -14,7 +14,7 @@
 #include "experiments/scenes/tablecloth.hpp"
 #include "tests/support/mesh_checks.hpp"
 
-namespace kbvh::scenes {
+namespace kbvh::scenes::scenes_test {
 namespace {
 
 using namespace test;
@@ -341,4 +341,4 @@ TEST(Tablecloth, EverySizeRuns) {
 }
 
 }  // namespace
-}  // namespace kbvh::scenes
+}  // namespace kbvh::scenes::scenes_test

@@ -12,7 +12,7 @@
 #include "tests/support/synthetic_scenes.hpp"
 #include "tests/unit/slab_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::slab_spans_test {
 namespace {
 
 /// A scene whose segments are joined with slabs and without.
@@ -152,4 +152,4 @@ TYPED_TEST(SlabSpansTest, StaleSlabsAndThoseOfOtherLeavesLosePairs) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::slab_spans_test

@@ -13,7 +13,7 @@
 #include "tests/support/synthetic_scenes.hpp"
 #include "tests/unit/slab_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::slabs_test {
 namespace {
 
 template <class S>
@@ -210,4 +210,4 @@ TYPED_TEST(SlabsTest, StaleSlabsAndThoseOfOtherLeavesLosePairs) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::slabs_test

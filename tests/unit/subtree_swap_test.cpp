@@ -11,7 +11,7 @@
 #include "core/topology/subtree_swap.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::subtree_swap_test {
 namespace {
 
 Topology random_tree(std::uint32_t primitives, BuildMethod method, Random& random, std::uint32_t width = 2) {
@@ -308,4 +308,4 @@ TEST(Collapse, RefusesWhatItCannotDo) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::subtree_swap_test

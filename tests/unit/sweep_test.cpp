@@ -7,7 +7,7 @@
 #include "core/families/sweep/sorted_boxes.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::sweep_test {
 namespace {
 
 /// `count` segments, of which the first and then every `removed_every`-th one is removed; 0: none.
@@ -93,4 +93,4 @@ TYPED_TEST(SweepTest, NothingHasNoBox) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::sweep_test

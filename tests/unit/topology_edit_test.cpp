@@ -11,7 +11,7 @@
 #include "core/topology/topology_edit.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::topology_edit_test {
 namespace {
 
 /// Primitives of one vertex each, boxes given apart; an edited topology beside boxes kept up to date.
@@ -320,4 +320,4 @@ TEST(TopologyEditor, RefusesMovesThatLeadNowhere) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::topology_edit_test

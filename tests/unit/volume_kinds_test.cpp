@@ -4,7 +4,7 @@
 
 #include "tests/support/rational_volumes.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::volume_kinds_test {
 namespace {
 
 // Those of fixed directions are tight: from below as from the points.
@@ -284,4 +284,4 @@ TEST(OrientedBoxes, GrowLittleFromLevelToLevel) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::volume_kinds_test

@@ -13,7 +13,7 @@
 #include "core/topology/subtree_swap.hpp"
 #include "tests/support/polygon_soups.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::wide_edits_test {
 namespace {
 
 /// A hierarchy of the first body, edited, and one of the second body.
@@ -278,4 +278,4 @@ TEST(HeightOrder, ListsChildrenBeforeParents) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::wide_edits_test

@@ -11,7 +11,7 @@
 #include "core/contract/registry.hpp"
 #include "core/facade/world.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::world_events_test {
 namespace {
 
 /// A strip of triangles whose vertices cross each other on every axis, and a strip that stands in its way.
@@ -206,4 +206,4 @@ TEST(WorldEvents, DescribesEveryStrategy) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::world_events_test

@@ -12,7 +12,7 @@
 #include "tests/support/synthetic_scenes.hpp"
 #include "tests/support/world_of.hpp"
 
-namespace kbvh::test {
+namespace kbvh::test::world_judgement_test {
 namespace {
 
 const std::vector<std::uint32_t> triangle{0, 1, 2};
@@ -143,4 +143,4 @@ TEST(World, RefusesToVerifyWhatCannotBeVerified) {
 }
 
 }  // namespace
-}  // namespace kbvh::test
+}  // namespace kbvh::test::world_judgement_test
