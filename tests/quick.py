@@ -86,8 +86,9 @@ def main():
             if code != 0:
                 failed.append(name)
                 print(f"FAILED ({code}): {name}\n{output}", flush=True)
-    with open(past, "w") as file:
+    with open(past + ".new", "w") as file:
         json.dump({**before, **{name: seconds for seconds, name in times}}, file)
+    os.replace(past + ".new", past)
     for seconds, name in sorted(times, reverse=True)[:8]:
         print(f"{seconds:7.1f} s  {name}")
     print(f"{cases} cases of {len(work)} suites in {time.monotonic() - begin:.0f} s, "
