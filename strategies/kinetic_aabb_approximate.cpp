@@ -8,24 +8,21 @@
 namespace kbvh {
 namespace {
 
-template <class S, class T, FailureRule rule>
-using RoundedQueue = AvlEventQueue<RoundedClock<S, T, rule>>;
-
 template <class S, class Count>
-using Approximate = KineticAabbStrategy<S, Count, RoundedQueue<S, double, FailureRule::end_point_rule>,
-                                        RoundedQueue<S, double, FailureRule::textbook>,
-                                        RoundedQueue<S, float, FailureRule::end_point_rule>,
-                                        RoundedQueue<S, float, FailureRule::textbook>>;
+using Approximate = KineticAabbStrategy<S, Count, AvlEventQueue<RoundedClock<S>>>;
 
 template <class S, class Count>
 class KineticAabbApproximate final : public Approximate<S, Count> {
  public:
   KineticAabbApproximate(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                          const Params& params)
-      : Approximate<S, Count>(scene, motion, std::move(topologies),
-                              (params.word("event_times") == "float" ? 2u : 0u) +
-                                  (params.word("formula") == "textbook" ? 1u : 0u),
-                              KineticQuery::wide_rows) {}
+      : Approximate<S, Count>(scene, motion, std::move(topologies), 0, KineticQuery::wide_rows) {
+    this->on_forest([&](auto& forest) {
+      forest.clock().choose(
+          params.word("event_times") == "float" ? EventTimes::in_float : EventTimes::in_double,
+          params.word("formula") == "textbook" ? FailureRule::textbook : FailureRule::end_point_rule);
+    });
+  }
 };
 
 }  // namespace

@@ -130,7 +130,7 @@ template <class S>
 class Strategy {
  public:
   Strategy(const SceneView<S>& scene, const SampledMotion<S>& motion) : scene_(scene), sampled_(motion) {}
-  virtual ~Strategy() = default;
+  virtual ~Strategy();
   Strategy(const Strategy&) = delete;
   Strategy& operator=(const Strategy&) = delete;
 
@@ -424,6 +424,14 @@ class CountedStrategy : public Strategy<S> {
   std::uint64_t first_fetch_ = 0;
   RayBodies ray_bodies_;
 };
+
+// Compiled once, in strategy.cpp, and not with every strategy.
+extern template class Strategy<float>;
+extern template class Strategy<double>;
+extern template class CountedStrategy<float, Counting>;
+extern template class CountedStrategy<float, Silent>;
+extern template class CountedStrategy<double, Counting>;
+extern template class CountedStrategy<double, Silent>;
 
 /// One topology per body; empty for strategies that build their own.
 using Topologies = std::vector<Topology>;

@@ -19,6 +19,18 @@ struct RayNode {
   Node node;
 };
 
+/// Sorts the nodes from index `first` on, the nearest last, so that it is popped first: the few children of
+/// one node.
+template <class Node>
+void sort_nearest_last(std::vector<RayNode<Node>>& nodes, std::size_t first) {
+  for (std::size_t i = first + 1; i < nodes.size(); ++i) {
+    const RayNode<Node> node = nodes[i];
+    std::size_t place = i;
+    for (; place > first && nodes[place - 1].near < node.near; --place) nodes[place] = nodes[place - 1];
+    nodes[place] = node;
+  }
+}
+
 /// Follows one ray through one hierarchy, nearer children first. `tree` gives access to it:
 ///   Node                                    names a node; `tree.root()` is one
 ///   box(Node)                               its Box<S>, which contains the polygons below
@@ -51,8 +63,7 @@ bool follow_ray(const Tree& tree, RaySearch<S>& search, std::uint32_t body, cons
     if (is_leaf) continue;
     const std::size_t before = stack.size();
     tree.children(top.node, enter);
-    std::sort(stack.begin() + std::ptrdiff_t(before), stack.end(),
-              [](const auto& a, const auto& b) { return a.near > b.near; });
+    sort_nearest_last(stack, before);
   }
   count.add(Counter::box_tests, tests);
   return over;
@@ -105,15 +116,7 @@ class RayBodyOrder {
   /// returns true. Bodies that lie behind what has been found are left out. Returns the number of box tests.
   template <class Limit, class Enter>
   std::uint64_t follow(const RayLine& line, const Limit& limit, const Enter& enter) {
-    const RaySlabs slabs(line);
-    met_.clear();
-    for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
-      double near = 0;
-      if (slabs.meet(bodies_[i].box, limit(), near)) met_.push_back({near, i});
-    }
-    std::sort(met_.begin(), met_.end(), [](const auto& a, const auto& b) {
-      return a.near != b.near ? a.near < b.near : a.node < b.node;
-    });
+    find_met(line, limit());
     bool over = false;
     for (const RayNode<std::uint32_t>& next : met_) {
       Body& body = bodies_[next.node];
@@ -130,13 +133,7 @@ class RayBodyOrder {
   }
 
   /// Adds what the call did with each body; null: nothing.
-  void count(RayBodies* bodies) const {
-    if (bodies == nullptr) return;
-    for (const Body& body : bodies_)
-      ++(body.seen == Seen::entered  ? bodies->entered
-         : body.seen == Seen::hidden ? bodies->hidden
-                                     : bodies->unmet);
-  }
+  void count(RayBodies* bodies) const;
 
   std::size_t bytes() const {
     return bodies_.capacity() * sizeof(Body) + met_.capacity() * sizeof(RayNode<std::uint32_t>);
@@ -149,6 +146,9 @@ class RayBodyOrder {
     std::uint32_t id;
     Seen seen;
   };
+  /// Lists the bodies whose boxes the ray may meet at a parameter of at most `limit`, front to back.
+  void find_met(const RayLine& line, double limit);
+
   std::vector<Body> bodies_;
   std::vector<RayNode<std::uint32_t>> met_;
 };

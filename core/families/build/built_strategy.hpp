@@ -114,4 +114,12 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
   std::uint64_t last_box_tests_ = 0, last_ray_tests_ = 0;
 };
 
+// Compiled once, in built_strategy.cpp, and not with every strategy.
+extern template class BuiltEachFrame<float, Counting, BuiltTree<float>>;
+extern template class BuiltEachFrame<double, Counting, BuiltTree<double>>;
+#ifndef KBVH_COUNTING_ONLY
+extern template class BuiltEachFrame<float, Silent, BuiltTree<float>>;
+extern template class BuiltEachFrame<double, Silent, BuiltTree<double>>;
+#endif
+
 }  // namespace kbvh

@@ -19,10 +19,13 @@ enum class FailureRule : std::uint8_t {
              ///< printed); everything is rounded
 };
 
-/// EventClock without exact arithmetic: event times are numbers of type T (float or double), compared as they
-/// are. For contestants that show the benefit of exactness; with either rule a bound may be late. Per-vertex
-/// plans are not supported.
-template <class S, class T, FailureRule rule>
+/// The arithmetic of a clock with rounded times.
+enum class EventTimes : std::uint8_t { in_float, in_double };
+
+/// EventClock without exact arithmetic: event times are floats or doubles, compared as they are. For
+/// contestants that show the benefit of exactness; with either rule a bound may be late. Per-vertex plans are
+/// not supported.
+template <class S>
 class RoundedClock {
  public:
   using Event = kbvh::Event;
@@ -31,6 +34,12 @@ class RoundedClock {
       : plans_(std::move(plans)) {
     KBVH_ASSERT(directions.size() == 3);
     (void)directions;
+  }
+
+  /// Chooses the arithmetic, by default double, and the rule, by default `textbook`; before the first event.
+  void choose(EventTimes times, FailureRule rule) {
+    times_ = times;
+    rule_ = rule;
   }
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return *plans_[body]; }
@@ -51,6 +60,42 @@ class RoundedClock {
   bool first_failure(Event& event, const Instant<S>& now, std::optional<Crossing<S>>& own_crossing,
                      double until = std::numeric_limits<double>::infinity()) const {
     own_crossing.reset();
+    if (times_ == EventTimes::in_float)
+      return rule_ == FailureRule::textbook ? find<float, FailureRule::textbook>(event, now, until)
+                                            : find<float, FailureRule::end_point_rule>(event, now, until);
+    return rule_ == FailureRule::textbook ? find<double, FailureRule::textbook>(event, now, until)
+                                          : find<double, FailureRule::end_point_rule>(event, now, until);
+  }
+
+  /// Compares exactly: only times are rounded, not the state at the beginning.
+  int compare_values(std::uint32_t body, Side side, std::uint32_t challenger, std::uint32_t winner,
+                     double t) const {
+    const FlightPlans<S>& plan = *plans_[body];
+    const int axis = axis_of(side);
+    const int sign = compare_at(plan.piece_after(challenger, axis, t), plan.piece_after(winner, axis, t), t);
+    return is_upper(side) ? sign : -sign;
+  }
+
+  /// Returns whether `a` comes first of two failures of one certificate. At equal times the loser that is
+  /// further ahead at the segment's end comes first.
+  bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& /*crossing_a*/, const Event& b,
+                       const std::optional<Crossing<S>>& /*crossing_b*/) const {
+    if (a.hint != b.hint) return a.hint < b.hint;
+    const FlightPlans<S>& plan = *plans_[a.body];
+    const std::size_t k = std::min(plan.segment_at(a.hint) + 1, plan.keyframe_count() - 1);
+    const auto axis = std::size_t(axis_of(a.side));
+    const S end_a = plan.keyframe(k)[std::size_t(3) * a.loser + axis];
+    const S end_b = plan.keyframe(k)[std::size_t(3) * b.loser + axis];
+    return is_upper(a.side) ? end_a > end_b : end_a < end_b;
+  }
+
+  void remember(std::uint32_t /*slot*/, const std::optional<Crossing<S>>& /*own_crossing*/) {}
+  void clear() {}
+
+ private:
+  /// Implements `first_failure` with times of type T.
+  template <class T, FailureRule rule>
+  bool find(Event& event, const Instant<S>& now, double until) const {
     const FlightPlans<S>& plan = *plans_[event.body];
     const auto times = plan.keyframe_times();
     const auto axis = std::size_t(axis_of(event.side));
@@ -88,33 +133,9 @@ class RoundedClock {
     return false;
   }
 
-  /// Compares exactly: only times are rounded, not the state at the beginning.
-  int compare_values(std::uint32_t body, Side side, std::uint32_t challenger, std::uint32_t winner,
-                     double t) const {
-    const FlightPlans<S>& plan = *plans_[body];
-    const int axis = axis_of(side);
-    const int sign = compare_at(plan.piece_after(challenger, axis, t), plan.piece_after(winner, axis, t), t);
-    return is_upper(side) ? sign : -sign;
-  }
-
-  /// Returns whether `a` comes first of two failures of one certificate. At equal times the loser that is
-  /// further ahead at the segment's end comes first.
-  bool overtakes_first(const Event& a, const std::optional<Crossing<S>>& /*crossing_a*/, const Event& b,
-                       const std::optional<Crossing<S>>& /*crossing_b*/) const {
-    if (a.hint != b.hint) return a.hint < b.hint;
-    const FlightPlans<S>& plan = *plans_[a.body];
-    const std::size_t k = std::min(plan.segment_at(a.hint) + 1, plan.keyframe_count() - 1);
-    const auto axis = std::size_t(axis_of(a.side));
-    const S end_a = plan.keyframe(k)[std::size_t(3) * a.loser + axis];
-    const S end_b = plan.keyframe(k)[std::size_t(3) * b.loser + axis];
-    return is_upper(a.side) ? end_a > end_b : end_a < end_b;
-  }
-
-  void remember(std::uint32_t /*slot*/, const std::optional<Crossing<S>>& /*own_crossing*/) {}
-  void clear() {}
-
- private:
   std::vector<const FlightPlans<S>*> plans_;
+  EventTimes times_ = EventTimes::in_double;
+  FailureRule rule_ = FailureRule::textbook;
 };
 
 }  // namespace kbvh

@@ -55,6 +55,8 @@ NearBodies::NearBodies(std::span<const BodyPair> pairs, std::uint32_t body_count
     primitives_.add(std::vector<std::uint32_t>{2 * body, 2 * body + 1});
 }
 
+NearBodies::~NearBodies() = default;
+
 /// An empty box becomes a point of the preceding body: pairs with such a body never count.
 void NearBodies::put(std::uint32_t body, const Box<double>& box) {
   double* const corners = corners_.data() + std::size_t(6) * body;

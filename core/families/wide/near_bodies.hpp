@@ -32,6 +32,9 @@ class NearBodies {
  public:
   /// `pairs` must outlive this object and stay unchanged.
   NearBodies(std::span<const BodyPair> pairs, std::uint32_t body_count);
+  ~NearBodies();
+  NearBodies(const NearBodies&) = delete;
+  NearBodies& operator=(const NearBodies&) = delete;
 
   /// Returns false if `find` returns all pairs without reading boxes.
   bool searches() const { return searches_; }

@@ -29,14 +29,8 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>,
  public:
   FixedPlansHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion,
                               Topologies topologies, const Params& /*params*/,
-                              KernelSet kernels = active_kernel_set())
-      : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
-    hierarchies_.resize(scene.body_count());
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-      hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), kernels);
-    check_layouts(
-        scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
-  }
+                              KernelSet kernels = active_kernel_set());
+  ~FixedPlansHierarchyStrategy() override;
 
   /// Restarts with the initial topologies, or those of the last change of geometry.
   void reset_to(double /*t*/) override {
@@ -197,5 +191,17 @@ class StoredHierarchyStrategy : public FixedPlansHierarchyStrategy<S, Count>, pu
     this->plans_changed_ = true;
   }
 };
+
+// Compiled once, in stored_hierarchy.cpp, and not with every strategy.
+extern template class StoredHierarchyStrategy<float, Counting>;
+extern template class StoredHierarchyStrategy<double, Counting>;
+extern template class FixedPlansHierarchyStrategy<float, Counting>;
+extern template class FixedPlansHierarchyStrategy<double, Counting>;
+#ifndef KBVH_COUNTING_ONLY
+extern template class StoredHierarchyStrategy<float, Silent>;
+extern template class StoredHierarchyStrategy<double, Silent>;
+extern template class FixedPlansHierarchyStrategy<float, Silent>;
+extern template class FixedPlansHierarchyStrategy<double, Silent>;
+#endif
 
 }  // namespace kbvh

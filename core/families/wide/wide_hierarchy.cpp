@@ -264,6 +264,19 @@ std::size_t WideHierarchy<S>::bytes() const {
          above_subtrees_.capacity() * sizeof(std::uint32_t) + edits_.bytes() + refill_.bytes();
 }
 
+template <class S>
+WideHierarchy<S>::WideHierarchy() = default;
+template <class S>
+WideHierarchy<S>::~WideHierarchy() = default;
+template <class S>
+WideHierarchy<S>::WideHierarchy(const WideHierarchy&) = default;
+template <class S>
+WideHierarchy<S>::WideHierarchy(WideHierarchy&&) noexcept = default;
+template <class S>
+WideHierarchy<S>& WideHierarchy<S>::operator=(const WideHierarchy&) = default;
+template <class S>
+WideHierarchy<S>& WideHierarchy<S>::operator=(WideHierarchy&&) noexcept = default;
+
 template class WideHierarchy<float>;
 template class WideHierarchy<double>;
 

@@ -28,6 +28,14 @@ class WideHierarchy : public WideTree<S> {
   using WideTree<S>::leaf_count;
   using WideTree<S>::padded_leaf_size;
 
+  // Compiled once, and not with every strategy.
+  WideHierarchy();
+  ~WideHierarchy();
+  WideHierarchy(const WideHierarchy&);
+  WideHierarchy(WideHierarchy&&) noexcept;
+  WideHierarchy& operator=(const WideHierarchy&);
+  WideHierarchy& operator=(WideHierarchy&&) noexcept;
+
   /// Takes a topology over the primitives, in built layout; boxes are invalid until they are computed. Throws
   /// std::length_error beyond 2^28 nodes, 65,535 vertices in a leaf, or 2^32 entries of vertex lists.
   void assign(Topology topology, const Primitives& primitives, KernelSet kernels);

@@ -53,6 +53,12 @@ double summed_area(const WideHierarchy<S>& hierarchy) {
 }  // namespace
 
 template <class S>
+WideRays<S>::WideRays(const SceneView<S>& scene, const SampledMotion<S>& motion)
+    : scene_(scene), motion_(motion) {}
+template <class S>
+WideRays<S>::~WideRays() = default;
+
+template <class S>
 void WideRays<S>::refit_bodies() {
   const auto has_polygons = [&](std::uint32_t body) {
     return scene_.primitives(body).kind == PrimitiveKind::polygons && !sides_[body].hierarchy->empty();

@@ -40,7 +40,10 @@ struct RayWork {
 template <class S>
 class WideRays {
  public:
-  WideRays(const SceneView<S>& scene, const SampledMotion<S>& motion) : scene_(scene), motion_(motion) {}
+  WideRays(const SceneView<S>& scene, const SampledMotion<S>& motion);
+  ~WideRays();
+  WideRays(const WideRays&) = delete;
+  WideRays& operator=(const WideRays&) = delete;
 
   /// Sets hits[i] to the answer to rays[i]. side_of(body) returns the WideRaySide<S> of a body, or its
   /// WideSide<S>. make(body, wide node) computes the boxes of the node's children and clears the node's mark;
