@@ -8,13 +8,6 @@
 
 namespace kbvh {
 
-StrategyEntry::StrategyEntry() = default;
-StrategyEntry::~StrategyEntry() = default;
-StrategyEntry::StrategyEntry(const StrategyEntry&) = default;
-StrategyEntry::StrategyEntry(StrategyEntry&&) noexcept = default;
-StrategyEntry& StrategyEntry::operator=(const StrategyEntry&) = default;
-StrategyEntry& StrategyEntry::operator=(StrategyEntry&&) noexcept = default;
-
 std::vector<StrategyEntry> with_unique_ids(std::vector<StrategyEntry> entries) {
   for (std::size_t i = 0; i < entries.size(); ++i)
     for (std::size_t j = i + 1; j < entries.size(); ++j)

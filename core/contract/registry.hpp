@@ -18,14 +18,6 @@ struct StrategyEntry {
   Factory<float> make_float = nullptr;
   Factory<double> make_double = nullptr;
 
-  // Compiled once, and not with every strategy.
-  StrategyEntry();
-  ~StrategyEntry();
-  StrategyEntry(const StrategyEntry&);
-  StrategyEntry(StrategyEntry&&) noexcept;
-  StrategyEntry& operator=(const StrategyEntry&);
-  StrategyEntry& operator=(StrategyEntry&&) noexcept;
-
   template <class S>
   Factory<S> factory() const {
     if constexpr (std::is_same_v<S, float>)

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <list>
 
 #include "core/judge/verify.hpp"
@@ -9,6 +10,11 @@
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test {
+
+/// Returns whether checks of both scalars ask for double, too: `tests/run --quick` is mostly in float.
+inline bool in_double_too() {
+  return std::getenv("KBVH_FEW_FRAMES") == nullptr;
+}
 
 /// Why the contestant does not take part in a scene (scalar, capability, size): "skipped: ..."; or an empty
 /// text.

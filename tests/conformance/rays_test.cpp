@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <map>
 
 #include "core/kernels/kernel_set.hpp"
@@ -35,7 +34,7 @@ TEST_P(Rays, MeetWhatEveryPrimitiveSays) {
     }
   };
   run(synthetic_scene<float>(GetParam()));
-  if (std::getenv("KBVH_FEW_FRAMES") == nullptr) run(synthetic_scene<double>(GetParam()));  // not in --quick
+  if (in_double_too()) run(synthetic_scene<double>(GetParam()));
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Rays, testing::ValuesIn(all_scenes()),

@@ -1,5 +1,6 @@
 #pragma once
 #include <optional>
+#include <utility>
 
 #include "core/contract/strategy.hpp"
 #include "core/contract/tells_work.hpp"
@@ -178,6 +179,23 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>,
   std::uint64_t last_box_tests_ = 0, last_ray_tests_ = 0;
   std::optional<SweptHierarchies<S>> swept_;  ///< made at the first request for contacts
 };
+
+template <class S, class Count>
+FixedPlansHierarchyStrategy<S, Count>::FixedPlansHierarchyStrategy(const SceneView<S>& scene,
+                                                                   const SampledMotion<S>& motion,
+                                                                   Topologies topologies,
+                                                                   const Params& /*params*/,
+                                                                   KernelSet kernels)
+    : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+  hierarchies_.resize(scene.body_count());
+  for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+    hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), kernels);
+  check_layouts(
+      scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
+}
+
+template <class S, class Count>
+FixedPlansHierarchyStrategy<S, Count>::~FixedPlansHierarchyStrategy() = default;
 
 /// The same for plans that change, too.
 template <class S, class Count>
