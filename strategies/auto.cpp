@@ -406,7 +406,7 @@ class Auto final : public Strategy<S>,
       touching_.clear();
       touching_of_->sample(ObservedMotion<S>::samples, touching_);
     }
-    steps_.look(step_, touching_, seen_);
+    steps_.observe(step_, touching_, seen_);
     segment_end_ = end > t ? end : t;
     if (bounded)
       seen_.frames_per_segment = std::max(1.0, (end - begin) / step_);

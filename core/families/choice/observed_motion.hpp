@@ -31,9 +31,9 @@ class ObservedMotion {
   /// Returns the number of bodies that move.
   std::uint32_t moving_bodies() const { return moving_; }
 
-  /// Looks at the plans. `step`: the length of a frame, in seconds. `touching`: some candidates of the last
+  /// Reads the plans. `step`: the length of a frame, in seconds. `touching`: some candidates of the last
   /// frame.
-  void look(double step, std::span<const PrimitivePair> touching, Observed& seen) {
+  void observe(double step, std::span<const PrimitivePair> touching, Observed& seen) {
     const bool plans_change = seen.changes_per_frame != 0;
     for (std::uint32_t body = 0; body < scene_.body_count(); ++body) sample(body, plans_change);
     const double spread = seen.spread;

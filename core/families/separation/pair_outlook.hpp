@@ -61,7 +61,7 @@ class PairOutlook {
   double segment_end() const { return by_segments_ ? boxes_.end() : std::numeric_limits<double>::infinity(); }
   /// Advances to the next segment, and returns its begin.
   double open_segment() {
-    boxes_.go_on();
+    boxes_.next_segment();
     for (std::uint32_t body = 0; body < bodies_.size(); ++body)
       boxes_.make_all(body, [&](std::uint32_t node) { return tree_->has_pairs(body, node); });
     return boxes_.begin();
@@ -131,7 +131,7 @@ class PairOutlook {
   bool depends_on(std::uint32_t slot, std::uint8_t gaps) const { return (gaps_[slot] & gaps) != 0; }
 
   /// Finds the state of a pair right after `now`, unless `known` gives it, and the next change of that state.
-  Outlook look(std::uint32_t slot, const Moment<S>& now, State known) {
+  Outlook predict(std::uint32_t slot, const Moment<S>& now, State known) {
     using Kind = typename SegmentOverlap<S>::Kind;
     const BoxPair& pair = (*tree_)[slot];
     const std::uint32_t body_a = tree_->body_of(pair, 0), body_b = tree_->body_of(pair, 1);
@@ -144,7 +144,7 @@ class PairOutlook {
         return {known == State::unknown ? kind == Kind::overlapping : known == State::overlapping, false};
       if (kind == Kind::changes) {
         const SegmentOverlap<S> overlap(boxes_, body_a, a, body_b, b);
-        return look(
+        return predict(
             pair, slot, known, [&] { return overlap.overlap_after(now); },
             [&] { return overlap.next_separation(event_); },
             [&] { return overlap.next_overlap(now, event_); });
@@ -152,12 +152,12 @@ class PairOutlook {
     }
     const RealisedBox<S> a = box(body_a, pair.a), b = box(body_b, pair.b);
     const Instant<S>& instant = now.instant;
-    return look(
+    return predict(
         pair, slot, known, [&] { return clock_.overlap_after(a, b, instant); },
         [&] { return clock_.next_separation(a, b, instant, event_); },
         [&] { return clock_.next_overlap(a, b, instant, event_); });
   }
-  /// Returns the event of the last pair that `look` examined. Valid only if the state of the pair changes.
+  /// Returns the event of the last pair that `predict` examined. Valid only if the state of the pair changes.
   const OverlapEvent<S>& event() const { return event_; }
 
   std::size_t bytes() const { return boxes_.bytes() + gaps_.capacity(); }
@@ -169,8 +169,8 @@ class PairOutlook {
   };
 
   template <class OverlapAfter, class NextSeparation, class NextOverlap>
-  Outlook look(const BoxPair& pair, std::uint32_t slot, State known, const OverlapAfter& overlap_after,
-               const NextSeparation& next_separation, const NextOverlap& next_overlap) {
+  Outlook predict(const BoxPair& pair, std::uint32_t slot, State known, const OverlapAfter& overlap_after,
+                  const NextSeparation& next_separation, const NextOverlap& next_overlap) {
     event_.slot = slot;
     event_.depth = pair.depth;
     const bool overlapping = known == State::unknown ? overlap_after() : known == State::overlapping;

@@ -81,7 +81,7 @@ class SegmentBoxes {
     go_to(std::size_t(std::upper_bound(times_.begin(), times_.end(), t) - times_.begin()));
   }
   /// Advances to the next segment.
-  void go_on() { go_to(segment_ + 1); }
+  void next_segment() { go_to(segment_ + 1); }
 
   /// Computes the boxes of the nodes for which wanted(node) is true, in the order of the nodes.
   template <class Wanted>

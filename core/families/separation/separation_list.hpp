@@ -145,7 +145,7 @@ class SeparationList {
     BoxPair& pair = tree_[event.slot];
     pair.scheduled = false;
     if (event.review) {
-      put(event.slot, look(event.slot, Moment<S>::at(event.hint), state(pair)));
+      put(event.slot, predict(event.slot, Moment<S>::at(event.hint), state(pair)));
       return;
     }
     count_->add(Counter::certificates_failed);
@@ -153,7 +153,7 @@ class SeparationList {
     time_ = event.not_after();
     end_ = event.not_before();
     const Moment<S> now{{time_, end_, &event.crossing}, event.hint, event.error};
-    turn(event.slot, now, look(event.slot, now, pair.overlapping ? State::apart : State::overlapping));
+    turn(event.slot, now, predict(event.slot, now, pair.overlapping ? State::apart : State::overlapping));
   }
 
   /// Prefetches the data that an event of a pair will read (PairOutlook).
@@ -180,7 +180,7 @@ class SeparationList {
     for (std::uint32_t slot = 0; slot < slots; ++slot) {
       if (slot + ahead < slots) outlook_.prefetch(tree_[slot + ahead]);
       const BoxPair& pair = tree_[slot];
-      if (pair.used && !pair.scheduled) put(slot, look(slot, now, state(pair)));
+      if (pair.used && !pair.scheduled) put(slot, predict(slot, now, state(pair)));
     }
   }
 
@@ -215,7 +215,7 @@ class SeparationList {
         // Skips a pair that a collapse has removed, and a slot that an expansion has reused for other nodes.
         if (!tree_[slot].used || !tree_.has_node(slot, box.body, box.node)) continue;
         ++work_done_.decided;
-        const Outlook outlook = look(slot, now, State::unknown);
+        const Outlook outlook = predict(slot, now, State::unknown);
         if (outlook.overlapping != tree_[slot].overlapping)
           turn(slot, now, outlook);
         else
@@ -407,7 +407,7 @@ class SeparationList {
       count_->add(Counter::nodes_visited);
       ++work_done_.decided;
       list_changed(1);
-      const Outlook outlook = look(slot, now, State::unknown);
+      const Outlook outlook = predict(slot, now, State::unknown);
       put(slot, outlook);
       if (outlook.overlapping) begin_overlap(slot);
     }
@@ -459,9 +459,9 @@ class SeparationList {
     }
   }
 
-  Outlook look(std::uint32_t slot, const Moment<S>& now, State known) {
+  Outlook predict(std::uint32_t slot, const Moment<S>& now, State known) {
     count_->add(Counter::certificates_made);
-    return outlook_.look(slot, now, known);
+    return outlook_.predict(slot, now, known);
   }
   /// Replaces the pair's event in the queue by its next one.
   void put(std::uint32_t slot, const Outlook& outlook) {
