@@ -21,6 +21,20 @@ void expect_conforms(const std::string& violation, const std::string& where) {
   EXPECT_EQ(violation, "") << where;
 }
 
+std::vector<std::string> all_scene_names() {
+  std::vector<std::string> names = synthetic_scene_names();
+  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
+  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
+  return names;
+}
+
+/// In short runs each scene is played in float with few frames and in double with more, or the other way
+/// round, by turns: every strategy is played in all four ways.
+bool plays_in_float_first(const std::string& scene) {
+  static const std::vector<std::string> scenes = all_scene_names();
+  return (std::find(scenes.begin(), scenes.end(), scene) - scenes.begin()) % 2 == 0;
+}
+
 /// Scene, strategy.
 class Conformance : public testing::TestWithParam<std::pair<std::string, std::string>> {};
 
@@ -29,14 +43,17 @@ TEST_P(Conformance, KeepsItsGuaranteeOnEveryFrame) {
   const StrategyEntry& entry = find_strategy(id);
   const BuilderConfig builder = entry.info.topology.preferred;
   // The slow tests play every scene with many frames. Sanitizers take their time.
-  const std::uint32_t most = std::getenv("KBVH_FEW_FRAMES") != nullptr ? 7
-                             : std::getenv("KBVH_SLOW") != nullptr     ? 100
-                                                                       : 20;
+  const bool is_short = std::getenv("KBVH_FEW_FRAMES") != nullptr;
+  const std::uint32_t most = is_short ? 7 : std::getenv("KBVH_SLOW") != nullptr ? 100 : 20;
   for (std::uint32_t l : {1u, 7u, 20u, 100u}) {
     if (l > most) continue;
     const std::string where = id + " on " + scene_name + ", l = " + std::to_string(l);
-    expect_conforms(check(entry, synthetic_scene<float>(scene_name, l), l, {}, builder), where + ", float");
-    expect_conforms(check(entry, synthetic_scene<double>(scene_name, l), l, {}, builder), where + ", double");
+    const bool float_alone = (l == 1) == plays_in_float_first(scene_name);
+    if (!is_short || float_alone)
+      expect_conforms(check(entry, synthetic_scene<float>(scene_name, l), l, {}, builder), where + ", float");
+    if (!is_short || !float_alone)
+      expect_conforms(check(entry, synthetic_scene<double>(scene_name, l), l, {}, builder),
+                      where + ", double");
   }
 }
 
@@ -44,13 +61,6 @@ std::vector<std::string> strategy_ids() {
   std::vector<std::string> ids;
   for (const StrategyEntry& entry : registry()) ids.push_back(entry.info.id);
   return ids;
-}
-
-std::vector<std::string> all_scene_names() {
-  std::vector<std::string> names = synthetic_scene_names();
-  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
-  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
-  return names;
 }
 
 /// Every strategy on every scene in which it takes part; scene by scene, so that its truth is found once.
