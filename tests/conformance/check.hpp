@@ -11,9 +11,9 @@
 
 namespace kbvh::test {
 
-/// Returns whether checks of both scalars ask for double, too: `tests/run --quick` is mostly in float.
-inline bool in_double_too() {
-  return std::getenv("KBVH_FEW_FRAMES") == nullptr;
+/// Returns whether scenes are played in float and in double; `tests/run --quick` plays most in one of them.
+inline bool in_both_scalars() {
+  return std::getenv("KBVH_ONE_SCALAR") == nullptr;
 }
 
 /// Why the contestant does not take part in a scene (scalar, capability, size): "skipped: ..."; or an empty

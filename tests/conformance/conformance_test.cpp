@@ -28,8 +28,9 @@ std::vector<std::string> all_scene_names() {
   return names;
 }
 
-/// Returns whether it is float's turn, where a scene is played with l frames a keyframe in one scalar only:
-/// the scalars take turns from scene to scene, so that every strategy is played in both.
+/// Returns whether it is float's turn, where scenes are not played in both scalars: the scalars take turns
+/// from scene to scene, and within a scene by the number of frames a keyframe, so that every strategy is
+/// played in both.
 bool is_turn_of_float(const std::string& scene, std::uint32_t l) {
   static const std::vector<std::string> scenes = all_scene_names();
   const auto place = std::find(scenes.begin(), scenes.end(), scene) - scenes.begin();
@@ -43,19 +44,17 @@ TEST_P(Conformance, KeepsItsGuaranteeOnEveryFrame) {
   const auto& [scene_name, id] = GetParam();
   const StrategyEntry& entry = find_strategy(id);
   const BuilderConfig builder = entry.info.topology.preferred;
-  // The slow tests play every scene with many frames. CTest plays twenty in one scalar, and short runs, as
-  // under sanitizers, do so always.
-  const bool is_short = std::getenv("KBVH_FEW_FRAMES") != nullptr;
-  const bool in_turn = std::getenv("KBVH_SCALARS_IN_TURN") != nullptr;
-  const std::uint32_t most = is_short ? 7 : std::getenv("KBVH_SLOW") != nullptr ? 100 : 20;
+  // The slow tests play every scene with many frames. Sanitizers take their time.
+  const std::uint32_t most = std::getenv("KBVH_FEW_FRAMES") != nullptr ? 7
+                             : std::getenv("KBVH_SLOW") != nullptr     ? 100
+                                                                       : 20;
   for (std::uint32_t l : {1u, 7u, 20u, 100u}) {
     if (l > most) continue;
     const std::string where = id + " on " + scene_name + ", l = " + std::to_string(l);
-    const bool in_both = !is_short && (l < 20 || !in_turn);
     const bool float_alone = is_turn_of_float(scene_name, l);
-    if (in_both || float_alone)
+    if (in_both_scalars() || float_alone)
       expect_conforms(check(entry, synthetic_scene<float>(scene_name, l), l, {}, builder), where + ", float");
-    if (in_both || !float_alone)
+    if (in_both_scalars() || !float_alone)
       expect_conforms(check(entry, synthetic_scene<double>(scene_name, l), l, {}, builder),
                       where + ", double");
   }

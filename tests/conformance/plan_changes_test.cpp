@@ -51,7 +51,7 @@ class PlanChanges : public testing::TestWithParam<std::string> {
       conforms(test, what + " on " + scene);
     };
     run(synthetic_scene<float>(scene, l));
-    if (in_double_too()) run(synthetic_scene<double>(scene, l));
+    if (in_both_scalars()) run(synthetic_scene<double>(scene, l));
   }
 };
 
@@ -107,7 +107,7 @@ TEST_P(PlanChanges, AtTheExactTimeOfEvents) {
   };
   for (const std::uint32_t turned : {0u, 1u, 2u}) {
     conforms(meeting(float(), turned), "vertices that meet and turn");
-    if (in_double_too()) conforms(meeting(double(), turned), "vertices that meet and turn");
+    if (in_both_scalars()) conforms(meeting(double(), turned), "vertices that meet and turn");
   }
 }
 

@@ -149,9 +149,9 @@ TEST_P(Primitives, PatchesStayInTheBoxesOfTheirControlNets) {
   for (const auto spacing : {scenes::KnotSpacing::clamped, scenes::KnotSpacing::uniform}) {
     const NurbsSurface surface = scenes::nurbs_surface({.spans = 81, .knots = spacing, .keyframes = 4});
     conforms<float>(surface_and_sphere(surface), 7);
-    if (in_double_too()) conforms<double>(surface_and_sphere(surface), 7);
+    if (in_both_scalars()) conforms<double>(surface_and_sphere(surface), 7);
     patches_stay_in_boxes<float>(surface, points);
-    if (in_double_too()) patches_stay_in_boxes<double>(surface, points);
+    if (in_both_scalars()) patches_stay_in_boxes<double>(surface, points);
   }
   std::printf("%s: %llu points of patches\n", GetParam().c_str(), (unsigned long long)points);
 }
@@ -165,7 +165,7 @@ TEST_P(Primitives, SoupsOfPolygonsAndPoints) {
     return experiments::load(experiments::read_scenes(plan, "test", {}).at(0));
   };
   conforms<float>(scene("points"), 7);
-  if (in_double_too()) conforms<double>(scene("points"), 7);
+  if (in_both_scalars()) conforms<double>(scene("points"), 7);
   // Quadrilaterals and hexagons that are neither flat nor convex all the time: two and four triangles each.
   for (const std::size_t joined : {std::size_t(2), std::size_t(4)}) {
     LoadedScene polygons = scene("given");
@@ -183,7 +183,7 @@ TEST_P(Primitives, SoupsOfPolygonsAndPoints) {
     mesh.primitive_offsets = offsets;
     mesh.primitive_vertices = corners;
     conforms<float>(polygons, 7);
-    if (in_double_too()) conforms<double>(polygons, 7);
+    if (in_both_scalars()) conforms<double>(polygons, 7);
   }
 }
 

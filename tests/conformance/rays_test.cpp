@@ -34,7 +34,7 @@ TEST_P(Rays, MeetWhatEveryPrimitiveSays) {
     }
   };
   run(synthetic_scene<float>(GetParam()));
-  if (in_double_too()) run(synthetic_scene<double>(GetParam()));
+  if (in_both_scalars()) run(synthetic_scene<double>(GetParam()));
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Rays, testing::ValuesIn(all_scenes()),

@@ -28,7 +28,7 @@ std::string violations(const StrategyEntry& entry, const std::string& scene, std
                        const std::map<std::string, std::string>& params) {
   const BuilderConfig& builder = entry.info.topology.preferred;
   return check(entry, synthetic_scene<float>(scene, l), l, params, builder) + "|" +
-         (in_double_too() ? check(entry, synthetic_scene<double>(scene, l), l, params, builder) : "");
+         (in_both_scalars() ? check(entry, synthetic_scene<double>(scene, l), l, params, builder) : "");
 }
 
 std::vector<std::string> volume_words() {
