@@ -4,6 +4,7 @@
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include "core/geometry/scaled_integers.hpp"
@@ -119,37 +120,88 @@ double rounded(const Fraction& x) {
   return std::ldexp(quotient.convert_to<double>(), x.exponent - shift);
 }
 
+/// A ray and a triangle: points in units of 2^points.lowest, and the direction in units of its own.
+struct ScaledPair {
+  scaled::Scaled<12> points;  ///< the corners, then the origin
+  scaled::Scaled<3> along;
+
+  ScaledPair(const RayLine& ray, const double* corners) {
+    for (int i = 0; i < 9; ++i) points.values[i] = scaled::odd_multiple(corners[i]);
+    for (int axis = 0; axis < 3; ++axis) {
+      points.values[9 + axis] = scaled::odd_multiple(ray.origin[axis]);
+      along.values[axis] = scaled::odd_multiple(ray.direction[axis]);
+    }
+    points.measure();
+    along.measure();
+  }
+
+  /// Returns whether the ray misses the triangle, by signs alone; most pairs for which the filter is
+  /// open do, such as those of rays in the plane of a grid. `false` where the numbers are too long for it.
+  bool misses_by_signs() const {
+    const int width = std::max(points.width, along.width);
+    if (width <= 60) return misses<std::int64_t>();
+    return width <= 168 && misses<scaled::Int512>();
+  }
+
+ private:
+  template <class Integer>
+  bool misses() const {
+    Integer corner[3][3], direction[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto origin = scaled::integer<Integer>(points, 9 + axis);
+      for (int c = 0; c < 3; ++c) corner[c][axis] = scaled::integer<Integer>(points, 3 * c + axis) - origin;
+      direction[axis] = scaled::integer<Integer>(along, axis);
+    }
+    bool positive = false, negative = false;
+    for (int c = 0; c < 3; ++c) {
+      const int side = scaled::determinant_sign(direction, corner[(c + 1) % 3], corner[(c + 2) % 3]);
+      positive = positive || side > 0;
+      negative = negative || side < 0;
+      if (positive && negative) return true;
+    }
+    // Behind the origin; or, where all three are zero, parallel to the plane and not in it.
+    const int height = scaled::determinant_sign(corner[0], corner[1], corner[2]);
+    if (height != 0) return height != (positive ? 1 : negative ? -1 : 0);
+    return !positive && !negative && misses_in_plane(corner, direction);
+  }
+  /// Returns whether all corners are on one side of the ray's line, or behind the origin, as seen along an
+  /// axis.
+  template <class Integer>
+  static bool misses_in_plane(const Integer (&corner)[3][3], const Integer (&direction)[3]) {
+    using Product = std::conditional_t<std::is_same_v<Integer, std::int64_t>, scaled::Int128, Integer>;
+    for (int u = 0; u < 3; ++u) {
+      const int v = (u + 1) % 3, ahead = scaled::sign_of(direction[u]);
+      int left = 0, right = 0, behind = 0, before = 0;
+      for (const Integer* const point : corner) {
+        const Product turn = Product(direction[u]) * point[v] - Product(direction[v]) * point[u];
+        const int side = scaled::sign_of(turn), place = scaled::sign_of(point[u]);
+        left += side > 0 ? 1 : 0;
+        right += side < 0 ? 1 : 0;
+        behind += place < 0 ? 1 : 0;
+        before += place > 0 ? 1 : 0;
+      }
+      if (left == 3 || right == 3 || (behind == 3 && ahead >= 0) || (before == 3 && ahead <= 0)) return true;
+    }
+    return false;
+  }
+};
+
 /// A ray and a triangle in integers: points relative to the origin, in units of 2^unit, and the direction in
 /// units of its own.
 struct ExactPair {
   Vector corner[3], direction;
   int exponent;  ///< of a parameter in these units
 
-  ExactPair(const RayLine& ray, const double* corners) {
-    scaled::Scaled<12> points;
-    scaled::Scaled<3> along;
-    for (int axis = 0; axis < 3; ++axis) {
-      for (int c = 0; c < 3; ++c) points.values[3 * c + axis] = scaled::odd_multiple(corners[3 * c + axis]);
-      points.values[9 + axis] = scaled::odd_multiple(ray.origin[axis]);
-      along.values[axis] = scaled::odd_multiple(ray.direction[axis]);
-    }
-    points.measure();
-    along.measure();
+  explicit ExactPair(const ScaledPair& pair) {
     Vector origin;
     for (int axis = 0; axis < 3; ++axis) {
       const auto a = std::size_t(axis);
-      for (int c = 0; c < 3; ++c) corner[c][a] = get(points, 3 * c + axis);
-      origin[a] = get(points, 9 + axis);
-      direction[a] = get(along, axis);
+      for (int c = 0; c < 3; ++c) corner[c][a] = scaled::integer<Integer>(pair.points, 3 * c + axis);
+      origin[a] = scaled::integer<Integer>(pair.points, 9 + axis);
+      direction[a] = scaled::integer<Integer>(pair.along, axis);
     }
     for (Vector& point : corner) point = point - origin;
-    exponent = points.width == 0 || along.width == 0 ? 0 : points.lowest - along.lowest;
-  }
-
-  template <int N>
-  static Integer get(const scaled::Scaled<N>& s, int i) {
-    if (s.values[i].mantissa == 0) return Integer(0);
-    return Integer(s.values[i].mantissa) << unsigned(s.values[i].exponent - s.lowest);
+    exponent = pair.points.width == 0 || pair.along.width == 0 ? 0 : pair.points.lowest - pair.along.lowest;
   }
 
   /// Returns the first parameter at which they meet, whatever the ray's length.
@@ -223,7 +275,9 @@ bool ray_meets_triangle(const RayLine& ray, const double* corners, RayMeeting& m
     return verdict == Verdict::meets;
   }
   ++stats.exact;
-  const std::optional<Fraction> found = ExactPair(ray, corners).meeting();
+  const ScaledPair pair(ray, corners);
+  if (pair.misses_by_signs()) return false;
+  const std::optional<Fraction> found = ExactPair(pair).meeting();
   if (!found) return false;
   if (ray.length < HUGE_VAL) {
     const scaled::OddMultiple length = scaled::odd_multiple(ray.length);
@@ -235,7 +289,8 @@ bool ray_meets_triangle(const RayLine& ray, const double* corners, RayMeeting& m
 }
 
 int compare_meetings(const RayLine& ray, const double* first, const double* second) {
-  return compare(*ExactPair(ray, first).meeting(), *ExactPair(ray, second).meeting());
+  const auto meeting = [&](const double* corners) { return *ExactPair(ScaledPair(ray, corners)).meeting(); };
+  return compare(meeting(first), meeting(second));
 }
 
 }  // namespace kbvh
