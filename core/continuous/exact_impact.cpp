@@ -98,9 +98,10 @@ class ExactQuery {
     constexpr unsigned bits = 20;
     static_assert(impact_width == 1.0 / (1U << bits));
     for (AlgebraicTime& t : times_) {
+      t.refine(
+          bits);  // in a short interval, most polynomials that are not zero at t have one sign throughout
       if (!touch_at(t)) continue;
       if (t.end() == 0) return {true, 0, 0};
-      t.refine(bits);
       if (!result.touches) result = {true, t.begin(), t.end()};
       result.begin = std::min(result.begin, t.begin());
       result.end = std::min(result.end, t.end());

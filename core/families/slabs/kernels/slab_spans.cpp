@@ -102,7 +102,7 @@ void filter(SlabSpanPairs<S>& shared) {
     state.pairs[2 * kept] = slot_a;
     state.pairs[2 * kept + 1] = slot_b;
     state.masks[kept] = of_a | of_b << 16;
-    kept += (of_a != 0) & (of_b != 0) ? 1 : 0;
+    kept += ((of_a != 0) & (of_b != 0)) ? 1 : 0;
   }
   state.tests += 2 * state.count;
   state.count = kept;
