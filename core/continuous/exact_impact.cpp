@@ -98,8 +98,8 @@ class ExactQuery {
     constexpr unsigned bits = 20;
     static_assert(impact_width == 1.0 / (1U << bits));
     for (AlgebraicTime& t : times_) {
-      t.refine(
-          bits);  // in a short interval, most polynomials that are not zero at t have one sign throughout
+      // In a short interval, most polynomials that are not zero at t have one sign throughout.
+      t.refine(bits);
       if (!touch_at(t)) continue;
       if (t.end() == 0) return {true, 0, 0};
       if (!result.touches) result = {true, t.begin(), t.end()};

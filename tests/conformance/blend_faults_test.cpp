@@ -130,7 +130,7 @@ std::string violation(const std::string& scene) {
   info.positions = PositionUse::fetched;
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
   const TestScene<S> test = scene == "three_modes" ? three_modes<S>() : synthetic_scene<S>(scene, 7);
-  return check(make_entry<Strategy>(info), test, 7, {}, info.topology.preferred);
+  return check(make_counting_entry<Strategy>(info), test, 7, {}, info.topology.preferred);
 }
 
 constexpr const char* scenes[] = {

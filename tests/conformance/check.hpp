@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cstdlib>
 #include <list>
+#include <type_traits>
 
+#include "core/contract/registry.hpp"
 #include "core/judge/verify.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "tests/support/synthetic_scenes.hpp"
@@ -73,6 +75,24 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
   if (result.audited && entry.info.guarantee != Guarantee::approximate && result.audit.protrusion != 0)
     return "protrusion " + std::to_string(result.audit.protrusion);
   return {};
+}
+
+/// As `make_entry`, but every instance counts: what only `check` plays is compiled half as often.
+template <template <class, class> class T>
+StrategyEntry make_counting_entry(Info info) {
+  const auto make = [](const auto& scene, auto& playback, Topologies topologies, const Params& params,
+                       CountingPolicy) {
+    using S = std::conditional_t<std::is_same_v<decltype(scene), const SceneView<float>&>, float, double>;
+    return detail::construct<T, S, Counting>(scene, playback, std::move(topologies), params);
+  };
+  info.foresight = T<float, Counting>::foresight;
+  info.can = detail::capabilities<T<float, Counting>, float>(info.declares);
+  info.has_float = info.has_double = true;
+  StrategyEntry entry;
+  entry.info = std::move(info);
+  entry.make_float = make;
+  entry.make_double = make;
+  return entry;
 }
 
 /// Requires that a strategy that changes its topology during the clip has its first topology, and answers,

@@ -353,7 +353,7 @@ StrategyEntry entry_of() {
   info.id = "faulty";
   info.tightness = Tightness::conservative;
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
-  return make_entry<With<Family, fault>::template Strategy>(info);
+  return make_counting_entry<With<Family, fault>::template Strategy>(info);
 }
 
 /// The first violation in float and in double.

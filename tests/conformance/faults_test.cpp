@@ -318,7 +318,7 @@ Info info(const char* id) {
 template <template <class, class> class Strategy>
 std::string violation(const char* id, Tightness tightness = Tightness::tight, const char* scene = "soups",
                       std::uint32_t frames_per_keyframe = 7) {
-  StrategyEntry entry = make_entry<Strategy>(info(id));
+  StrategyEntry entry = make_counting_entry<Strategy>(info(id));
   entry.info.tightness = tightness;
   const BuilderConfig& builder = entry.info.topology.preferred;
   const std::uint32_t l = frames_per_keyframe;
@@ -387,7 +387,7 @@ template <template <class, class> class Strategy>
 std::string violation_with_changing_geometry(const char* id) {
   Info described = info(id);
   described.topology.preferred.leaf_size = 1;
-  const StrategyEntry entry = make_entry<Strategy>(described);
+  const StrategyEntry entry = make_counting_entry<Strategy>(described);
   const BuilderConfig builder = entry.info.topology.preferred;
   return check(entry, synthetic_scene<float>("geometry_changes_shared", 7), 7, {}, builder) + "|" +
          check(entry, synthetic_scene<double>("geometry_changes_shared", 7), 7, {}, builder);

@@ -49,8 +49,8 @@ std::string violation(const char* scene) {
   Info info;
   info.id = "faulty";
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
-  return check(make_entry<Fronts<fault>::template Strategy>(info), synthetic_scene<S>(scene, 7), 7, {},
-               info.topology.preferred);
+  return check(make_counting_entry<Fronts<fault>::template Strategy>(info), synthetic_scene<S>(scene, 7), 7,
+               {}, info.topology.preferred);
 }
 template <FrontFault fault>
 void expect_caught(const std::string& expected) {

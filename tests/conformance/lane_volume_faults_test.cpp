@@ -115,7 +115,8 @@ std::string violation() {
   info.tightness = Tightness::conservative;
   info.topology.widths = {8};
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 2};
-  const StrategyEntry entry = make_entry<FaultyStrategy<Base, fault>::template Strategy>(std::move(info));
+  const StrategyEntry entry =
+      make_counting_entry<FaultyStrategy<Base, fault>::template Strategy>(std::move(info));
   return check(entry, synthetic_scene<float>("soups", 7), 7, {}, entry.info.topology.preferred);
 }
 

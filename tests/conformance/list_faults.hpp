@@ -16,7 +16,7 @@ std::pair<std::string, std::string> violations_without_tree(const char* scene) {
   info.id = "faulty";
   info.tightness = Tightness::none;
   info.topology = {.own = true};
-  const StrategyEntry entry = make_entry<Strategy>(info);
+  const StrategyEntry entry = make_counting_entry<Strategy>(info);
   constexpr std::uint32_t l = 7;
   return {check(entry, synthetic_scene<float>(scene, l), l, {}, {}),
           check(entry, synthetic_scene<double>(scene, l), l, {}, {})};

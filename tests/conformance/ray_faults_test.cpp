@@ -196,7 +196,7 @@ std::string first_violation() {
   Info info;
   info.id = "simple";
   info.guarantee = Guarantee::approximate;  // of pairs, which it does not find
-  const StrategyEntry entry = make_entry<With<fault>::template Strategy>(info);
+  const StrategyEntry entry = make_counting_entry<With<fault>::template Strategy>(info);
   const BuilderConfig builder{.method = BuildMethod::median, .width = 2, .leaf_size = 2};
   std::uint64_t hits = 0;
   for (const char* name : {"soups", "polygons", "sheets", "integer_ties"}) {

@@ -101,7 +101,7 @@ std::string violation(std::uint32_t width) {
   Info info;
   info.id = "faulty";
   info.topology.preferred = {.method = BuildMethod::median, .width = width, .leaf_size = 2};
-  return check(make_entry<Regions<fault>::template Strategy>(info), moving_in_places<S>(), 7, {},
+  return check(make_counting_entry<Regions<fault>::template Strategy>(info), moving_in_places<S>(), 7, {},
                info.topology.preferred);
 }
 template <RegionFault fault>

@@ -124,8 +124,8 @@ std::string violation(const char* scene, std::uint32_t leaf_size) {
   info.id = "moving";
   info.declares = {.restructures = true};
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = leaf_size};
-  return check(make_entry<Moving<fault>::template Strategy>(info), synthetic_scene<S>(scene, 7), 7, {},
-               info.topology.preferred);
+  return check(make_counting_entry<Moving<fault>::template Strategy>(info), synthetic_scene<S>(scene, 7), 7,
+               {}, info.topology.preferred);
 }
 template <MoveFault fault>
 void expect_caught(const std::string& expected) {

@@ -97,7 +97,8 @@ std::string violation() {
   info.id = "faulty_volumes";
   info.tightness = Tightness::conservative;
   info.topology.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 2};
-  const StrategyEntry entry = make_entry<Faulty<V, fault, shown>::template Strategy>(std::move(info));
+  const StrategyEntry entry =
+      make_counting_entry<Faulty<V, fault, shown>::template Strategy>(std::move(info));
   const BuilderConfig builder = entry.info.topology.preferred;
   return check(entry, synthetic_scene<float>("soups", 7), 7, {}, builder) + "|" +
          check(entry, synthetic_scene<double>("soups", 7), 7, {}, builder);
@@ -246,7 +247,7 @@ std::string kdop_violation() {
   info.id = "faulty_kdop";
   info.tightness = Tightness::conservative;
   info.topology.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 2};
-  const StrategyEntry entry = make_entry<FaultyKdop<fault>::template Strategy>(std::move(info));
+  const StrategyEntry entry = make_counting_entry<FaultyKdop<fault>::template Strategy>(std::move(info));
   return check(entry, synthetic_scene<float>("soups", 7), 7, {}, entry.info.topology.preferred);
 }
 
