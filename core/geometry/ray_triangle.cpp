@@ -138,6 +138,8 @@ struct ScaledPair {
   /// Returns whether the ray misses the triangle, by signs alone; most pairs for which the filter is
   /// open do, such as those of rays in the plane of a grid. `false` where the numbers are too long for it.
   bool misses_by_signs() const {
+    // Differences have one bit more: `determinant_sign` takes those of 60 bits, and a determinant of three of
+    // 168 bits is below 6 * 2^507.
     const int width = std::max(points.width, along.width);
     if (width <= 60) return misses<std::int64_t>();
     return width <= 168 && misses<scaled::Int512>();
@@ -164,8 +166,8 @@ struct ScaledPair {
     if (height != 0) return height != (positive ? 1 : negative ? -1 : 0);
     return !positive && !negative && misses_in_plane(corner, direction);
   }
-  /// Returns whether all corners are on one side of the ray's line, or behind the origin, as seen along an
-  /// axis.
+  /// Returns whether, seen along an axis, all corners lie strictly on one side of the ray's line; or whether,
+  /// on one axis, all lie strictly behind the origin.
   template <class Integer>
   static bool misses_in_plane(const Integer (&corner)[3][3], const Integer (&direction)[3]) {
     using Product = std::conditional_t<std::is_same_v<Integer, std::int64_t>, scaled::Int128, Integer>;

@@ -48,7 +48,7 @@ Oracle<S>& shared_oracle(const TestScene<S>& test) {
     Scene<S> scene;
     Oracle<S> oracle;
   };
-  constexpr std::size_t most = 16;  // Configurations plays 12; pairs of thousands of frames take memory
+  constexpr std::size_t most = 8;  // pairs of thousands of frames take memory
   static std::list<std::pair<std::uint64_t, Known>> known;
   const std::uint64_t key = hash(test.scene);
   for (auto& [scene, truth] : known)
