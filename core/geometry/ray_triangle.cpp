@@ -1,8 +1,10 @@
 #include "core/geometry/ray_triangle.hpp"
 
+#include <algorithm>
 #include <array>
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -173,16 +175,16 @@ struct ScaledPair {
     using Product = std::conditional_t<std::is_same_v<Integer, std::int64_t>, scaled::Int128, Integer>;
     for (int u = 0; u < 3; ++u) {
       const int v = (u + 1) % 3, ahead = scaled::sign_of(direction[u]);
-      int left = 0, right = 0, behind = 0, before = 0;
+      int left = 0, right = 0, below = 0, above = 0;
       for (const Integer* const point : corner) {
         const Product turn = Product(direction[u]) * point[v] - Product(direction[v]) * point[u];
         const int side = scaled::sign_of(turn), place = scaled::sign_of(point[u]);
         left += side > 0 ? 1 : 0;
         right += side < 0 ? 1 : 0;
-        behind += place < 0 ? 1 : 0;
-        before += place > 0 ? 1 : 0;
+        below += place < 0 ? 1 : 0;
+        above += place > 0 ? 1 : 0;
       }
-      if (left == 3 || right == 3 || (behind == 3 && ahead >= 0) || (before == 3 && ahead <= 0)) return true;
+      if (left == 3 || right == 3 || (below == 3 && ahead >= 0) || (above == 3 && ahead <= 0)) return true;
     }
     return false;
   }
