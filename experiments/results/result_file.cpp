@@ -10,6 +10,7 @@
 #include "experiments/common/machine.hpp"
 #include "experiments/common/progress.hpp"
 #include "experiments/common/text.hpp"
+#include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/results/results.hpp"
 
