@@ -48,6 +48,9 @@ endforeach()
 
 set(KBVH_OUTER_OPTIMISATION "" CACHE STRING
   "optimisation level of strategies, adapters and the program around them, for builds that are not measured; empty: as all")
+set(KBVH_JUDGE_OPTIMISATION "" CACHE STRING
+  "optimisation level of the rooms in which a comparison with brute force spends its time; empty: as all")
+set(kbvh_judging_rooms base geometry scene motion contract judge)
 # Rooms of the program that compute themselves.
 set(kbvh_computing_rooms scenes stress theory)
 
@@ -86,6 +89,8 @@ function(kbvh_room name)
       if(NOT name IN_LIST kbvh_computing_rooms)
         set(optimisation ${KBVH_OUTER_OPTIMISATION})
       endif()
+    elseif(name IN_LIST kbvh_judging_rooms)
+      set(optimisation ${KBVH_JUDGE_OPTIMISATION})
     endif()
     target_compile_options(kbvh_${name} PRIVATE ${optimisation})
     kbvh_precompile(kbvh_${name} ${kind} ${optimisation})

@@ -2,6 +2,7 @@
 
 #include "core/base/hasher.hpp"
 #include "core/geometry/lane_box.hpp"
+#include "core/judge/sort_pairs.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "core/topology/builders.hpp"
 
@@ -43,7 +44,7 @@ PairBuffer brute_force_pairs(const Scene<S>& scene, Playback<S>& playback) {
             truly_meet(a, i, playback.positions(pair.first), b, j, playback.positions(pair.second)))
           result.push_back({pair.first, i, pair.second, j});
   }
-  std::sort(result.begin(), result.end());
+  sort_pairs(result);
   return result;
 }
 
@@ -107,7 +108,7 @@ PairBuffer sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
       }
     }
   }
-  std::sort(result.begin(), result.end());
+  sort_pairs(result);
   return result;
 }
 

@@ -1,7 +1,8 @@
 #include "core/judge/verify.hpp"
 
 #include <algorithm>
-#include <array>
+
+#include "core/judge/sort_pairs.hpp"
 
 namespace kbvh {
 
@@ -24,34 +25,9 @@ bool well_formed(const Scene<S>& scene, const PrimitivePair& pair) {
   return known(pair.body_a, pair.primitive_a) && known(pair.body_b, pair.primitive_b);
 }
 
-/// Sorts by the word `of` returns, stably, one counting pass for each byte in which pairs differ.
-template <class Word>
-void sort_by(PairBuffer& pairs, PairBuffer& scratch, Word of) {
-  std::uint32_t differing = 0;
-  for (const PrimitivePair& pair : pairs) differing |= of(pair) ^ of(pairs[0]);
-  for (int shift = 0; shift < 32; shift += 8) {
-    if (((differing >> shift) & 0xff) == 0) continue;
-    const auto digit = [&](const PrimitivePair& pair) { return (of(pair) >> shift) & 0xff; };
-    std::array<std::size_t, 257> begin{};
-    for (const PrimitivePair& pair : pairs) ++begin[digit(pair) + 1];
-    for (std::size_t d = 1; d < begin.size(); ++d) begin[d] += begin[d - 1];
-    for (const PrimitivePair& pair : pairs) scratch[begin[digit(pair)]++] = pair;
-    pairs.swap(scratch);
-  }
-}
-
-/// Sorts, counts and removes repetitions. Sorting answers is a third of the time of a check with std::sort,
-/// so large ones are sorted by digits.
+/// Sorts, counts and removes repetitions.
 std::uint64_t sort_unique(PairBuffer& pairs) {
-  if (pairs.size() < 256) {
-    std::sort(pairs.begin(), pairs.end());
-  } else {
-    PairBuffer scratch(pairs.size());
-    sort_by(pairs, scratch, [](const PrimitivePair& pair) { return pair.primitive_b; });
-    sort_by(pairs, scratch, [](const PrimitivePair& pair) { return pair.body_b; });
-    sort_by(pairs, scratch, [](const PrimitivePair& pair) { return pair.primitive_a; });
-    sort_by(pairs, scratch, [](const PrimitivePair& pair) { return pair.body_a; });
-  }
+  sort_pairs(pairs);
   const auto end = std::unique(pairs.begin(), pairs.end());
   const auto repeated = std::uint64_t(pairs.end() - end);
   pairs.erase(end, pairs.end());

@@ -3,17 +3,25 @@
 #include <algorithm>
 #include <iterator>
 
+#include "core/judge/sort_pairs.hpp"
 #include "core/judge/verify.hpp"
 
 namespace kbvh {
 
 namespace {
 
-/// Returns the first pair of `a` that `b` lacks; both are sorted.
-const PrimitivePair* lacking(const PairBuffer& a, const PairBuffer& b) {
-  for (const PrimitivePair& pair : a)
-    if (!std::binary_search(b.begin(), b.end(), pair)) return &pair;
+/// Returns the first pair of `a` that `b` has, or the first that `b` lacks; null if there is none. Both are
+/// sorted, and read once.
+const PrimitivePair* first_of(const PairBuffer& a, bool had, const PairBuffer& b) {
+  auto from = b.begin();
+  for (const PrimitivePair& pair : a) {
+    while (from != b.end() && *from < pair) ++from;
+    if ((from != b.end() && *from == pair) == had) return &pair;
+  }
   return nullptr;
+}
+const PrimitivePair* lacking(const PairBuffer& a, const PairBuffer& b) {
+  return first_of(a, false, b);
 }
 
 const char* name(Answer answer) {
@@ -45,7 +53,7 @@ class ChangesChecker {
     session_.strategy().candidates_at(time(), candidates, Budget{});
     full_[std::size_t(Answer::pairs)] = candidates;
     session_.strategy().confirm(time(), full_[std::size_t(Answer::pairs)]);
-    for (PairBuffer& pairs : full_) std::sort(pairs.begin(), pairs.end());
+    for (PairBuffer& pairs : full_) sort_pairs(pairs);
   }
   void compare_with_full(Answer answer) {
     const PairBuffer &added = replays_[std::size_t(answer)].pairs(), &full = full_[std::size_t(answer)];
@@ -96,13 +104,12 @@ class ChangesChecker {
 
 std::string ChangeReplay::add(PairBuffer begun, PairBuffer ended) {
   for (PairBuffer* pairs : {&begun, &ended}) {
-    std::sort(pairs->begin(), pairs->end());
+    sort_pairs(*pairs);
     if (const auto twice = std::adjacent_find(pairs->begin(), pairs->end()); twice != pairs->end())
       return "pair " + text(*twice) + (pairs == &begun ? " begins twice" : " ends twice");
   }
-  for (const PrimitivePair& pair : begun)
-    if (std::binary_search(pairs_.begin(), pairs_.end(), pair))
-      return "pair " + text(pair) + " begins while it lasts";
+  if (const PrimitivePair* known = first_of(begun, true, pairs_))
+    return "pair " + text(*known) + " begins while it lasts";
   if (const PrimitivePair* unknown = lacking(ended, pairs_))
     return "pair " + text(*unknown) + " ends without a begin";
   kept_.clear();

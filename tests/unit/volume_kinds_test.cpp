@@ -138,6 +138,37 @@ TEST(Spheres, AreNearTheSmallest) {
   }
 }
 
+// Points on and next to spheres, whose numbers as integers of a common unit need `bits` bits and more.
+void expect_sides_of_rationals(int bits, std::uint32_t seed) {
+  Random random(seed);
+  std::size_t sides[3] = {0, 0, 0};  // inside, on, outside
+  for (int trial = 0; trial < 3000; ++trial) {
+    // A rational point of the unit sphere, times a power of two; the centre's last bit sets the width.
+    const double unit = std::ldexp(1, int(random.below(20)) - 10), least = std::ldexp(unit, -bits);
+    const double quadruples[4][4] = {{1, 2, 2, 3}, {2, 3, 6, 7}, {4, 4, 7, 9}, {0, 0, 1, 1}};
+    const double* quadruple = quadruples[random.below(4)];
+    double centre[3], point[3];
+    for (int d = 0; d < 3; ++d) {
+      const bool kept = bits <= 52 || quadruple[d] == 0;  // else the sum below loses it
+      centre[d] = kept ? least * (double(random.below(5)) - 2) : 0;
+      point[d] = centre[d] + unit * quadruple[d] * (random.below(2) == 0 ? 1 : -1);
+    }
+    double radius = unit * quadruple[3];
+    if (random.below(2) == 0) radius = std::nextafter(radius, random.below(2) == 0 ? 0 : 2 * radius);
+    if (random.below(3) == 0) point[random.below(3)] += least;
+    RationalPoint way;
+    for (int d = 0; d < 3; ++d) way[d] = exact(point[d]) - exact(centre[d]);
+    const Rational beyond = dot(way, way) - exact(radius) * exact(radius);
+    const int side = beyond > 0 ? 1 : beyond < 0 ? -1 : 0;
+    ++sides[side + 1];
+    ASSERT_EQ(side_of_sphere(centre, radius, point), side) << trial;
+  }
+  for (const std::size_t count : sides) EXPECT_GT(count, 300u) << bits;
+}
+TEST(Spheres, SidesAreThoseOfRationalNumbers) {
+  for (const int bits : {40, 51, 62, 100, 260, 900}) expect_sides_of_rationals(bits, std::uint32_t(bits));
+}
+
 // Exact truth: |c_a - c_b| <= r_a + r_b.
 template <class S>
 void expect_spheres_overlap_as_they_should() {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/geometry/predicates.hpp"
+#include "core/geometry/scaled_integers.hpp"
 #include "core/geometry/volumes/outward.hpp"
 
 namespace kbvh {
@@ -15,6 +16,19 @@ int sign(const Rational& value) {
   return value.sign();
 }
 
+/// Of the centre, the radius and the point, in this order, as integers below 2^w: squares and their sum are
+/// below 2^(2 w + 4).
+template <class Integer>
+int side_of_sphere(const scaled::Scaled<7>& all) {
+  const auto radius = scaled::integer<Integer>(all, 3);
+  Integer beyond = -(radius * radius);
+  for (int d = 0; d < 3; ++d) {
+    const Integer along = scaled::integer<Integer>(all, 4 + d) - scaled::integer<Integer>(all, d);
+    beyond += along * along;
+  }
+  return scaled::sign_of(beyond);
+}
+
 }  // namespace
 
 int side_of_sphere(const double* centre, double radius, const double* p) {
@@ -24,12 +38,16 @@ int side_of_sphere(const double* centre, double radius, const double* p) {
   const int filtered =
       sign_beyond(distance - reach, 16 * outward::unit_roundoff * (distance + reach) + 16 * outward::least);
   if (filtered != undecided_sign) return filtered;
-  Rational exact = -Rational(radius) * Rational(radius);
+  scaled::Scaled<7> all;
   for (int d = 0; d < 3; ++d) {
-    const Rational along = Rational(p[d]) - Rational(centre[d]);
-    exact += along * along;
+    all.values[d] = scaled::odd_multiple(centre[d]);
+    all.values[4 + d] = scaled::odd_multiple(p[d]);
   }
-  return sign(exact);
+  all.values[3] = scaled::odd_multiple(radius);
+  all.measure();
+  if (all.width <= 61) return side_of_sphere<scaled::Int128>(all);
+  if (all.width <= 253) return side_of_sphere<scaled::Int512>(all);
+  return side_of_sphere<boost::multiprecision::cpp_int>(all);
 }
 
 int side_of_slab(const double* axis, const double* centre, double half, const double* p) {
