@@ -91,7 +91,7 @@ def baselines_of(table: Table, declared: Sequence[dict[str, Any]]) -> list[tuple
     named = [(one["short"], one) for one in declared]
     not_for = next((one["not_for"] for one in declared if "not_for" in one), {})
     rows = table.rows[table.rows["baseline"] & (table.rows["guarantee"] != "approximate")]
-    singles = sorted({(str(row.id), str(row.title)) for row in rows.itertuples()})
+    singles = sorted({(str(row.id), str(row.title)) for row in rows[["id", "title"]].itertuples()})
     return named + [
         (title, {"strategy": identity, "baseline": True, "params": {"threads": "1"}, "not_for": not_for}) for identity, title in singles
     ]

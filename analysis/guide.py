@@ -90,9 +90,9 @@ def cells(study: Study) -> list[Cell]:
             Cell(
                 _title(rows.iloc[0]),
                 _kinds(refits.iloc[0]),
-                {str(row.id): least / float(row.total_motion) for row in best.itertuples()},
+                {str(row.id): least / float(row.total_motion) for row in best[["id", "total_motion"]].itertuples()},
                 least / float(refits["total_motion"].iloc[0]),
-                {str(row.id): str(row.contestant) for row in best.itertuples()},
+                {str(row.id): str(row.contestant) for row in best[["id", "contestant"]].itertuples()},
             )
         )
     return found

@@ -385,7 +385,7 @@ def _labels(runs: pd.DataFrame) -> pd.Series:
     """Returns titles, followed only by the settings that distinguish configurations of one strategy."""
     labels: dict[str, str] = {}
     for _, rows in runs.groupby("id"):
-        unique = rows.drop_duplicates("contestant")
+        unique = rows.drop_duplicates("contestant")[["contestant", "title", "params", "builder"]]
         facts = [_facts(row.params, row.builder) for row in unique.itertuples()]
         names = sorted({name for fact in facts for name in fact})
         varying = [name for name in names if len({fact.get(name, "") for fact in facts}) > 1]
@@ -394,7 +394,7 @@ def _labels(runs: pd.DataFrame) -> pd.Series:
             labels[row.contestant] = f"{row.title} ({told})" if told else row.title
     for title, same in runs.drop_duplicates("contestant").groupby(lambda i: labels[runs.at[i, "contestant"]]):
         if same["id"].nunique() > 1:  # two strategies with one title would share a line in a legend
-            for row in same.itertuples():
+            for row in same[["id", "contestant"]].itertuples():
                 labels[row.contestant] = f"{title} [{row.id}]"
     return runs["contestant"].map(labels)
 

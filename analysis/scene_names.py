@@ -31,14 +31,15 @@ def told_apart(runs: pd.DataFrame) -> tuple[pd.Series, list[str]]:
     Of several scenes with one name and size, for example after a correction of a mesh, the one measured last keeps the name;
     the others have their hash appended. Scenes from files and shapes have sizes only if their names contain them.
     """
-    card_of = {row.hash: row.card for row in runs.itertuples() if row.hash and row.card}
-    cards = [row.card or card_of.get(row.hash, "") for row in runs.itertuples()]
+    told = list(runs[["hash", "card", "scalar"]].itertuples())
+    card_of = {row.hash: row.card for row in told if row.hash and row.card}
+    cards = [row.card or card_of.get(row.hash, "") for row in told]
     # Without a card a hash is of one scalar: another scalar's is no other scene.
-    scalars = ["" if card else row.scalar for row, card in zip(runs.itertuples(), cards)]
+    scalars = ["" if card else row.scalar for row, card in zip(told, cards)]
     one_size = runs["origin"].isin(("files", "shapes")) & (runs["scene"] == runs["scene_name"])
     table = pd.DataFrame(
         {
-            "identity": [card or row.hash for row, card in zip(runs.itertuples(), cards)],
+            "identity": [card or row.hash for row, card in zip(told, cards)],
             "place": list(zip(runs["scene"], runs["primitives"].where(~one_size, 0), scalars)),
             "scene": runs["scene"].to_list(),
             "hash": runs["hash"].to_list(),

@@ -142,7 +142,7 @@ class WrittenOut:
 
     def of(self, rows: Any) -> Optional[Path]:
         """Returns the folder of the last of these runs whose scene was written; None if there is none."""
-        for row in reversed(list(rows.itertuples())):
+        for row in reversed(list(rows[["card", "scene_name"]].itertuples())):
             found = self.by_hash.get(row.card) if row.card else self.by_name.get(row.scene_name.replace("/", "-"))
             if found is not None:
                 return found

@@ -103,7 +103,8 @@ def groups(study: Study, all_ratios: Ratios) -> list[Group]:
         facts = _facts(first, several_machines)
         timed = rows[rows["refused"] == ""].sort_values("total_motion", kind="stable")
         refused = [
-            (row.contestant, row.label, row.refused) for row in rows[rows["refused"] != ""].itertuples()
+            (row.contestant, row.label, row.refused)
+            for row in rows.loc[rows["refused"] != "", ["contestant", "label", "refused"]].itertuples()
         ]  # fmt: skip
         made = [_row(row, all_ratios) for row in timed.itertuples()]
         result.append(Group(title, anchor(number), facts, made, refused, _notes(study, timed, all_ratios)))
@@ -191,7 +192,7 @@ def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
             f"The best refit is {text.listing([names[r] for r in with_motion])} with motion evaluation and "
             f"{text.listing([names[r] for r in without])} without it."
         )
-    lost = [row.label for row in timed.itertuples() if row.run not in all_ratios.with_motion]
+    lost = [row.label for row in timed[["label", "run"]].itertuples() if row.run not in all_ratios.with_motion]
     if with_motion and lost:
         notes.append(f"No ratio for {text.listing(lost)}: measured at another commit than any refit here.")
     if any(not all_ratios.with_motion[run].paired for run in timed["run"] if run in all_ratios.with_motion):

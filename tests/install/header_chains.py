@@ -1,4 +1,4 @@
-"""Prints the headers of each folder as chains: a header includes, by way of others, all those before it in its line.
+"""Prints the headers of the folders as chains: a header includes, by way of others, all those before it in its line.
 
     header_chains.py SOURCE FOLDER...
 
@@ -51,6 +51,6 @@ def chains(headers):
             yield chain
 
 
-for folder in folders:
-    for chain in chains(sorted(str(path.relative_to(source)) for path in (source / folder).rglob("*.hpp"))):
-        print(*chain)
+everything = sorted({str(path.relative_to(source)) for folder in folders for path in (source / folder).rglob("*.hpp")})
+for chain in chains(everything):
+    print(*chain)
