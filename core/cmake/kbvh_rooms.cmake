@@ -51,6 +51,7 @@ set(KBVH_OUTER_OPTIMISATION "" CACHE STRING
 set(KBVH_JUDGE_OPTIMISATION "" CACHE STRING
   "optimisation level of the rooms in which a comparison with brute force spends its time; empty: as all")
 set(kbvh_judging_rooms base geometry scene motion contract judge)
+set(kbvh_reading_rooms base contract)  # parameters are text
 # Rooms of the program that compute themselves.
 set(kbvh_computing_rooms scenes stress theory)
 
@@ -92,6 +93,9 @@ function(kbvh_room name)
     elseif(name IN_LIST kbvh_judging_rooms)
       set(optimisation ${KBVH_JUDGE_OPTIMISATION})
     endif()
+    if(path MATCHES "^core/" AND NOT name IN_LIST kbvh_reading_rooms)
+      target_compile_options(kbvh_${name} PRIVATE ${KBVH_CORE_OPTIONS})
+    endif()
     target_compile_options(kbvh_${name} PRIVATE ${optimisation})
     kbvh_precompile(kbvh_${name} ${kind} ${optimisation})
   else()
@@ -116,7 +120,7 @@ function(kbvh_room name)
     target_link_libraries(kbvh_${name}_${set} PRIVATE kbvh_flags kbvh_warnings ${uses})
     target_compile_definitions(kbvh_${name}_${set}
       PRIVATE KBVH_KERNELS=${set} KBVH_KERNELS_${set} ${kbvh_kernel_definitions})
-    target_compile_options(kbvh_${name}_${set} PRIVATE ${kbvh_kernel_flags_${set}}
+    target_compile_options(kbvh_${name}_${set} PRIVATE ${KBVH_CORE_OPTIONS} ${kbvh_kernel_flags_${set}}
       # Loops over the points of a node must be unrolled to stay in registers.
       $<$<NOT:$<CONFIG:Debug>>:${KBVH_KERNEL_OPTIMISATION}>)
     target_sources(kbvh_${name} PRIVATE $<TARGET_OBJECTS:kbvh_${name}_${set}>)

@@ -10,8 +10,8 @@ namespace kbvh {
 
 namespace {
 
-/// Returns the first pair of `a` that `b` has, or the first that `b` lacks; null if there is none. Both are
-/// sorted, and read once.
+/// Returns the first pair of `a` that `b` has (`had`) or lacks (not `had`); null if there is none. Both lists
+/// are sorted.
 const PrimitivePair* first_of(const PairBuffer& a, bool had, const PairBuffer& b) {
   auto from = b.begin();
   for (const PrimitivePair& pair : a) {

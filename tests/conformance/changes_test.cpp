@@ -6,6 +6,7 @@
 
 #include <set>
 
+#include "core/judge/sort_pairs.hpp"
 #include "core/judge/verify_changes.hpp"
 #include "core/scene/pair_difference.hpp"
 #include "tests/conformance/check.hpp"
@@ -196,6 +197,20 @@ TEST(ChangesFaults, AreCaught) {
 PairBuffer sorted(PairBuffer pairs) {
   std::sort(pairs.begin(), pairs.end());
   return pairs;
+}
+
+// Lists of both lengths, short and long, in which every byte of a pair differs, or only a few do.
+TEST(SortPairs, EqualsTheStandardSort) {
+  Random random(11);
+  for (const std::size_t size : {0, 1, 2, 127, 128, 129, 1000, 5000})
+    for (const std::uint32_t mask : {0xffffffffu, 0x00ff00ffu, 0x80000001u, 3u}) {
+      PairBuffer pairs;
+      const auto word = [&] { return (random.below(1u << 16) << 16 | random.below(1u << 16)) & mask; };
+      for (std::size_t i = 0; i < size; ++i) pairs.push_back({word(), word(), word(), word()});
+      const PairBuffer expected = sorted(pairs);
+      sort_pairs(pairs);
+      ASSERT_EQ(pairs, expected) << size;
+    }
 }
 
 /// Random answers of several lengths, in equal and in different orders, with few and many differences.

@@ -58,10 +58,10 @@ def stray_includes(rooms, source):
     for name, room in rooms.items():
         allowed = reach(rooms, name)
         for file in sorted((source / room["folder"]).rglob("*.[hc]pp")):
-            for path in re.findall(r'^ *# *include *"([^"]*)"', file.read_text(), re.M):
+            for mark, path in re.findall(r'^\s*#\s*include\s*(["<])([^">]*)', file.read_text(), re.M):
                 read += 1
                 home = next((other for folder, other in homes if path.startswith(folder + "/")), None)
-                if home is None and (path.startswith(("core/", "experiments/")) or "/" in path):
+                if home is None and (path.startswith(("core/", "experiments/")) or (mark == '"' and "/" in path)):
                     found.append(f"{file.relative_to(source)} includes {path}, which is in no room")
                 elif home is not None and home not in allowed:
                     found.append(f"{file.relative_to(source)} includes {path}: {name} does not declare {home}")

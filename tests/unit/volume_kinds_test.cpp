@@ -166,7 +166,20 @@ void expect_sides_of_rationals(int bits, std::uint32_t seed) {
   for (const std::size_t count : sides) EXPECT_GT(count, 300u) << bits;
 }
 TEST(Spheres, SidesAreThoseOfRationalNumbers) {
-  for (const int bits : {40, 51, 62, 100, 260, 900}) expect_sides_of_rationals(bits, std::uint32_t(bits));
+  for (const int bits : {40, 51, 55, 56, 57, 58, 100, 247, 248, 249, 250, 900})
+    expect_sides_of_rationals(bits, std::uint32_t(bits));
+}
+
+TEST(Spheres, ContainNothingWhereANumberIsNotFinite) {
+  const double inside[3] = {0, 0, 0};
+  for (const double wrong :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
+    for (int number = 0; number < 4; ++number) {
+      Sphere<double> sphere;
+      for (std::size_t d = 0; d < 3; ++d) sphere.centre[d] = number == int(d) ? wrong : 0;
+      sphere.radius = number == 3 ? wrong : 1;
+      EXPECT_EQ(protrusion(sphere, inside), std::numeric_limits<double>::infinity()) << number;
+    }
 }
 
 // Exact truth: |c_a - c_b| <= r_a + r_b.

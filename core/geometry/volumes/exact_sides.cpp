@@ -16,8 +16,8 @@ int sign(const Rational& value) {
   return value.sign();
 }
 
-/// Of the centre, the radius and the point, in this order, as integers below 2^w: squares and their sum are
-/// below 2^(2 w + 4).
+/// Returns the side of the sphere. The values are the centre, the radius and the point. As integers they are
+/// below 2^w, and their squares and the sum of these below 2^(2 w + 4).
 template <class Integer>
 int side_of_sphere(const scaled::Scaled<7>& all) {
   const auto radius = scaled::integer<Integer>(all, 3);

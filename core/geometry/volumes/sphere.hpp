@@ -117,12 +117,14 @@ double surface_area(const Sphere<S>& sphere) {
   return sphere.empty() ? 0 : 4 * pi * double(sphere.radius) * double(sphere.radius);
 }
 
-/// Returns the distance from the surface.
+/// Returns the distance from the surface; infinity if the sphere is empty or a number of it is not finite.
 template <class S>
 double protrusion(const Sphere<S>& sphere, const double* point) {
-  if (sphere.empty()) return std::numeric_limits<double>::infinity();
   const double centre[3] = {double(sphere.centre[0]), double(sphere.centre[1]), double(sphere.centre[2])};
   const double radius = double(sphere.radius);
+  const bool finite = std::isfinite(centre[0]) && std::isfinite(centre[1]) && std::isfinite(centre[2]) &&
+                      std::isfinite(radius);
+  if (sphere.empty() || !finite) return std::numeric_limits<double>::infinity();
   if (side_of_sphere(centre, radius, point) <= 0) return 0;
   double way[3];
   outward::difference(point, centre, way);
