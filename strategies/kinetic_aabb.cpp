@@ -2,13 +2,14 @@
 // events only.
 
 #include "core/contract/registry.hpp"
+#include "core/families/events/any_queue.hpp"
 #include "core/families/events/kinetic_tree_strategy.hpp"
 
 namespace kbvh {
 namespace {
 
 template <class S, class Count>
-using OnAnyQueue = ExactKineticAabbStrategy<S, Count, SegmentHeapQueue<S>, AvlOrHeapQueue<S>>;
+using OnAnyQueue = ExactKineticAabbStrategy<S, Count, AnyQueue<S>>;
 
 template <class S, class Count>
 class KineticAabb final : public OnAnyQueue<S, Count> {
@@ -16,7 +17,7 @@ class KineticAabb final : public OnAnyQueue<S, Count> {
   KineticAabb(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
               const Params& params)
       : OnAnyQueue<S, Count>(
-            scene, motion, std::move(topologies), params.word("queue") == SegmentHeapQueue<S>::name ? 0 : 1,
+            scene, motion, std::move(topologies), 0,
             params.word("query") == "rows" ? KineticQuery::wide_rows : KineticQuery::node_pairs) {
     this->on_forest([&](auto& forest) { forest.choose_queue(params.word("queue")); });
   }

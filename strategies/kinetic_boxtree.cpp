@@ -3,12 +3,12 @@
 // Degenerated parts can be rebuilt. Queries compute boxes on demand, many at once (BoxTreeRows).
 
 #include <numeric>
-#include <variant>
 
 #include "core/contract/registry.hpp"
 #include "core/families/boxtree/boxtree_degradation.hpp"
 #include "core/families/boxtree/boxtree_rows.hpp"
 #include "core/families/boxtree/kinetic_boxtree.hpp"
+#include "core/families/events/any_queue.hpp"
 #include "core/families/events/event_log.hpp"
 #include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
@@ -32,15 +32,13 @@ class KineticBox final : public CountedStrategy<S, Count>,
                          public EventSource<S>,
                          public TakesPlanChanges<S>,
                          public TakesGeometryChanges<S> {
-  template <class Queue>
-  using Forest = KineticBoxForest<S, Queue, Count, BoundObserver<S>>;
-
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
 
   KineticBox(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
              const Params& params)
       : CountedStrategy<S, Count>(scene, motion),
+        forest_(scene, motion, std::move(topologies), this->count_, BoundObserver<S>{&watch_}),
         motion_(motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         leaf_boxes_(params.word("leaf_boxes") == "tight" ? LeafBoxes::tight : LeafBoxes::inherited),
@@ -50,26 +48,18 @@ class KineticBox final : public CountedStrategy<S, Count>,
         frames_per_check_(std::uint64_t(params.number("check_every"))) {
     if (rebuilds_) {
       method_ = build_method(params.word("rebuild"));
-      for (const Topology& topology : topologies) caches_.emplace_back(topology.size());
-      degradations_.resize(topologies.size());
+      for (std::uint32_t body = 0; body < forest_.size(); ++body)
+        caches_.emplace_back(forest_.tree(body).topology().size());
+      degradations_.resize(forest_.size());
     }
-    const BoundObserver<S> observer{&watch_};
-    if (params.word("queue") == SegmentHeapQueue<S>::name)
-      forest_ = std::make_unique<Forest<SegmentHeapQueue<S>>>(scene, motion, std::move(topologies),
-                                                              this->count_, observer);
-    else
-      forest_ = std::make_unique<Forest<AvlOrHeapQueue<S>>>(scene, motion, std::move(topologies),
-                                                            this->count_, observer);
     const BoxTreeConstruction made = construction(params, leaf_boxes_, BoxTreeRows<S>::width);
-    on_forest([&](auto& forest) {
-      forest.choose_queue(params.word("queue"));
-      for (std::uint32_t body = 0; body < forest.size(); ++body) forest.tree(body).construct_as(made);
-    });
+    forest_.choose_queue(params.word("queue"));
+    for (std::uint32_t body = 0; body < forest_.size(); ++body) forest_.tree(body).construct_as(made);
   }
 
   void reset_to(double t) override {
     near_bodies_.start_over();
-    on_forest([&](auto& forest) { forest.reset(t); });
+    forest_.reset(t);
     for (std::uint32_t body = 0; body < rows_.size(); ++body) {
       follow_tree(body);
       rows_[body].start_over();
@@ -77,16 +67,15 @@ class KineticBox final : public CountedStrategy<S, Count>,
     }
     plans_changed_ = false;
     frames_ = 0;
-    for (std::uint32_t body = 0; body < degradations_.size(); ++body)
-      on_forest([&](auto& forest) {
-        const auto& tree = forest.tree(body);
-        const auto boxes = all_boxes(tree, body);
-        degradations_[body].start(tree.topology(), order_, boxes);
-      });
+    for (std::uint32_t body = 0; body < degradations_.size(); ++body) {
+      const auto& tree = forest_.tree(body);
+      const auto boxes = all_boxes(tree, body);
+      degradations_[body].start(tree.topology(), order_, boxes);
+    }
   }
 
   void advance_to(double t) override {
-    on_forest([&](auto& forest) { forest.advance(t); });
+    forest_.advance(t);
     for (std::uint32_t body = 0; body < rows_.size(); ++body) rows_[body].new_frame(motion_, body);
     for (auto& cache : caches_) cache.new_frame();
     if (rebuilds_ && ++frames_ % frames_per_check_ == 0)
@@ -124,7 +113,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
   }
 
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
-    on_forest([&](auto& forest) { forest.plans_changed(t, changes); });
+    forest_.plans_changed(t, changes);
     plans_changed_ = true;
     for (const PlanChange<S>& change : changes) rows_[change.body].plans_changed();
     for (std::uint32_t body = 0; body < rows_.size(); ++body) changed_now(body);  // realisers may differ now
@@ -132,61 +121,51 @@ class KineticBox final : public CountedStrategy<S, Count>,
 
   void follow_geometry(double t, const GeometryChange<S>& change) override {
     const std::vector<BodyChange> changes = body_changes(this->scene_, change);
-    on_forest([&](auto& forest) { forest.geometry_changed(t, this->scene_, this->sampled_, changes); });
+    forest_.geometry_changed(t, this->scene_, this->sampled_, changes);
     plans_changed_ = true;  // bodies that were at rest may move
     for (const BodyChange& own : changes) {
       follow_tree(own.body);
       changed_now(own.body);
     }
     if (!rebuilds_) return;
-    on_forest([&](auto& forest) {
-      for (const BodyChange& own : changes) {
-        const auto& tree = forest.tree(own.body);
-        caches_[own.body].resize(tree.topology().size());
-        const auto boxes = all_boxes(tree, own.body);
-        degradations_[own.body].edited(tree.topology(), order_, boxes);
-      }
-    });
+    for (const BodyChange& own : changes) {
+      const auto& tree = forest_.tree(own.body);
+      caches_[own.body].resize(tree.topology().size());
+      const auto boxes = all_boxes(tree, own.body);
+      degradations_[own.body].edited(tree.topology(), order_, boxes);
+    }
   }
 
   std::optional<ScheduledEvent<S>> next_event() const override {
-    return on_forest([](auto& forest) {
-      return forest.queue().empty() ? std::optional<ScheduledEvent<S>>()
-                                    : described(forest, forest.queue().top());
-    });
+    return forest_.queue().empty() ? std::optional<ScheduledEvent<S>>()
+                                   : described(forest_, forest_.queue().top());
   }
-  void scheduled_events(std::vector<ScheduledEvent<S>>& out) const override {
-    on_forest([&](auto& forest) { list_events(forest, out); });
-  }
-  const Topology& tree(std::uint32_t body) const override {
-    return on_forest([&](auto& forest) -> const Topology& { return forest.tree(body).topology(); });
-  }
+  void scheduled_events(std::vector<ScheduledEvent<S>>& out) const override { list_events(forest_, out); }
+  const Topology& tree(std::uint32_t body) const override { return forest_.tree(body).topology(); }
   std::uint32_t realiser(std::uint32_t body, std::uint32_t node, std::uint32_t side) const override {
-    return on_forest([&](auto& forest) { return forest.tree(body).realiser_or_none(node, side); });
+    return forest_.tree(body).realiser_or_none(node, side);
   }
   void watch_bounds(std::vector<BoundNotice<S>>* log) override { watch_.log = log; }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
-    return on_forest([&](auto& forest) {
-      const auto& tree = forest.tree(body);
-      std::vector<std::uint32_t> order;
-      AuditView view{tree.compacted_topology(order), {}, {}};
-      BoxCache<S> cache(tree.topology().size());
-      InheritedBoxes<S, std::remove_cvref_t<decltype(tree)>> boxes(tree, this->sampled_, body, cache,
-                                                                   leaf_boxes_);
-      for (const std::uint32_t node : order) {
-        boxes.ensure(node);
-        // Reports the box that a query has read, if there is one.
-        Box<S> room;
-        const Box<S>* read = rows_[body].read_box(node, room);
-        view.boxes.push_back(to_double(read != nullptr ? *read : boxes(node)));
-      }
-      return view;
-    });
+    const auto& tree = forest_.tree(body);
+    std::vector<std::uint32_t> order;
+    AuditView view{tree.compacted_topology(order), {}, {}};
+    BoxCache<S> cache(tree.topology().size());
+    InheritedBoxes<S, std::remove_cvref_t<decltype(tree)>> boxes(tree, this->sampled_, body, cache,
+                                                                 leaf_boxes_);
+    for (const std::uint32_t node : order) {
+      boxes.ensure(node);
+      // Reports the box that a query has read, if there is one.
+      Box<S> room;
+      const Box<S>* read = rows_[body].read_box(node, room);
+      view.boxes.push_back(to_double(read != nullptr ? *read : boxes(node)));
+    }
+    return view;
   }
 
   std::size_t bytes() const override {
-    std::size_t total = on_forest([](auto& forest) { return forest.bytes(); });
+    std::size_t total = forest_.bytes();
     total += near_bodies_.bytes() + query_.bytes() + rays_.bytes();
     for (const auto& rows : rows_) total += rows.bytes();
     for (const auto& cache : caches_) total += cache.bytes();
@@ -196,34 +175,23 @@ class KineticBox final : public CountedStrategy<S, Count>,
 
  protected:
   bool step(double until, EventDescription<S>& out) override {
-    return on_forest([&](auto& forest) { return step_forest(forest, watch_, until, out); });
+    return step_forest(forest_, watch_, until, out);
   }
   void counts_cleared() override {
-    first_step_ = on_forest([](auto& forest) { return forest.queue().steps(); });
-    on_forest([](auto& forest) {
-      for (std::uint32_t body = 0; body < forest.size(); ++body) forest.tree(body).search_cost().forget();
-    });
+    first_step_ = forest_.queue().steps();
+    for (std::uint32_t body = 0; body < forest_.size(); ++body) forest_.tree(body).search_cost().forget();
   }
   void add_counts(Counters& table) const override {
-    table[Counter::queue_steps] =
-        on_forest([](auto& forest) { return forest.queue().steps(); }) - first_step_;
+    table[Counter::queue_steps] = forest_.queue().steps() - first_step_;
     SearchCost cost;
-    on_forest([&](auto& forest) {
-      for (std::uint32_t body = 0; body < forest.size(); ++body) cost.add(forest.tree(body).search_cost());
-    });
+    for (std::uint32_t body = 0; body < forest_.size(); ++body) cost.add(forest_.tree(body).search_cost());
     table.add("certificate_searches", cost.searches);
     table.add("nodes_searched", cost.nodes);
     table.add("most_nodes_searched", cost.most_nodes);
   }
 
  private:
-  template <class Work>
-  decltype(auto) on_forest(Work&& work) const {
-    return std::visit([&](const auto& forest) -> decltype(auto) { return work(*forest); }, forest_);
-  }
-  const BoxTreeBounds& tree_of(std::uint32_t body) const {
-    return on_forest([&](auto& forest) -> const BoxTreeBounds& { return forest.tree(body); });
-  }
+  const BoxTreeBounds& tree_of(std::uint32_t body) const { return forest_.tree(body); }
   /// Lays out a body's rows anew if its tree has changed.
   void follow_tree(std::uint32_t body) {
     rows_[body].follow(tree_of(body), this->scene_.primitives(body), leaf_boxes_);
@@ -253,24 +221,21 @@ class KineticBox final : public CountedStrategy<S, Count>,
   }
 
   void rebuild_degenerate(std::uint32_t body) {
-    on_forest([&](auto& forest) {
-      auto& tree = forest.tree(body);
-      auto all = all_boxes(tree, body);
-      this->count_.add(Counter::nodes_visited, tree.topology().size());
-      const auto& nodes = degradations_[body].beyond(threshold_, tree.topology(), order_, all);
-      if (nodes.empty()) return;
-      for (const std::uint32_t node : nodes) tree.rebuild_below(node, all(node), this->sampled_, method_);
-      follow_tree(body);
-      changed_now(body);
-      const auto rebuilt = all_boxes(tree, body);
-      degradations_[body].rebuilt(tree.topology(), order_, rebuilt);
-      this->count_.add(Counter::nodes_visited, tree.topology().size());
-    });
+    auto& tree = forest_.tree(body);
+    auto all = all_boxes(tree, body);
+    this->count_.add(Counter::nodes_visited, tree.topology().size());
+    const auto& nodes = degradations_[body].beyond(threshold_, tree.topology(), order_, all);
+    if (nodes.empty()) return;
+    for (const std::uint32_t node : nodes) tree.rebuild_below(node, all(node), this->sampled_, method_);
+    follow_tree(body);
+    changed_now(body);
+    const auto rebuilt = all_boxes(tree, body);
+    degradations_[body].rebuilt(tree.topology(), order_, rebuilt);
+    this->count_.add(Counter::nodes_visited, tree.topology().size());
   }
 
   BoundWatch<S> watch_;
-  std::variant<std::unique_ptr<Forest<SegmentHeapQueue<S>>>, std::unique_ptr<Forest<AvlOrHeapQueue<S>>>>
-      forest_;
+  KineticBoxForest<S, AnyQueue<S>, Count, BoundObserver<S>> forest_;
   ClipMotion<S> motion_;
   NearBodies near_bodies_;
   LeafBoxes leaf_boxes_;

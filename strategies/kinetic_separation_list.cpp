@@ -3,9 +3,9 @@
 // no tree.
 
 #include <algorithm>
-#include <variant>
 
 #include "core/contract/registry.hpp"
+#include "core/families/events/any_queue.hpp"
 #include "core/families/events/kinetic_rows.hpp"
 #include "core/families/events/realiser_boxes.hpp"
 #include "core/families/separation/kinetic_collision.hpp"
@@ -26,39 +26,33 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
                                     public EventSource<S>,
                                     public TakesPlanChanges<S>,
                                     public TakesGeometryChanges<S> {
-  template <template <class> class Queue>
-  using Collision = KineticCollision<S, Queue, Count>;
-
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
 
   KineticSeparationList(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                         const Params& params)
-      : CountedStrategy<S, Count>(scene, motion), motion_(motion), rows_(scene, motion) {
-    for (const Topology& topology : topologies) by_rows_ = by_rows_ || topology.leaf_size > 1;
-    notes_changes_ = !by_rows_ && !has_self_pairs(scene.pairs());
-    const int look_ahead = std::stoi(params.word("look_ahead"));
+      : CountedStrategy<S, Count>(scene, motion),
+        by_rows_(std::any_of(topologies.begin(), topologies.end(),
+                             [](const Topology& topology) { return topology.leaf_size > 1; })),
+        collision_(scene, motion, std::move(topologies), this->count_, std::stoi(params.word("look_ahead")),
+                   params.word("queue")),
+        motion_(motion),
+        notes_changes_(!by_rows_ && !has_self_pairs(scene.pairs())),
+        rows_(scene, motion) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       vertices_ += motion.plans(body).vertex_count();
-    if (params.word("queue") == SegmentHeapQueue<S>::name)
-      collision_ = std::make_unique<Collision<SegmentHeapEventQueue>>(scene, motion, std::move(topologies),
-                                                                      this->count_, look_ahead);
-    else
-      collision_ = std::make_unique<Collision<AvlOrHeapEventQueue>>(scene, motion, std::move(topologies),
-                                                                    this->count_, look_ahead);
-    on_collision([&](auto& collision) { collision.choose_queue(params.word("queue")); });
-    if (by_rows_) on_collision([&](auto& collision) { rows_.assign(collision.forest(), scene); });
+    if (by_rows_) rows_.assign(collision_.forest(), scene);
   }
 
   void reset_to(double t) override {
     many_candidates_ = false;
-    on_collision([&](auto& collision) { collision.reset(t); });
+    collision_.reset(t);
     rows_.start_over();
     rows_.new_frame(motion_);
   }
 
   void advance_to(double t) override {
-    on_collision([&](auto& collision) { collision.advance(t); });
+    collision_.advance(t);
     rows_.new_frame(motion_);
   }
 
@@ -69,25 +63,23 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
     const std::size_t before = out.size();
     std::uint64_t tests = 0, reads = 0;
-    on_collision([&](auto& collision) {
-      for_body_pairs(collision, [&](std::uint32_t i, const BodyPair& pair) {
-        if (by_rows_) {
-          const auto for_leaves = [&](const auto& add) {
-            for (const auto& leaf : collision.list().leaf_pairs(i)) add(leaf.a, leaf.b);
-            for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) { add(leaf, leaf); });
-          };
-          rows_.find_in_leaves(collision.forest(), pair, for_leaves, this->sampled_, out, tests, reads);
-          return;
-        }
-        const auto primitives = collision.list().primitive_pairs(i);
-        out.insert(out.end(), primitives.begin(), primitives.end());
-        if (!primitives.empty()) return;
-        LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first,
-                                   collision.forest().tree(pair.first).topology(), pair.second,
-                                   collision.forest().tree(pair.second).topology(), this->count_, out);
-        for (const auto& leaf : collision.list().leaf_pairs(i)) leaves(leaf.a, leaf.b);
-        for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) { leaves(leaf, leaf); });
-      });
+    for_body_pairs([&](std::uint32_t i, const BodyPair& pair) {
+      if (by_rows_) {
+        const auto for_leaves = [&](const auto& add) {
+          for (const auto& leaf : collision_.list().leaf_pairs(i)) add(leaf.a, leaf.b);
+          for_leaves_with_themselves(pair, [&](std::uint32_t leaf) { add(leaf, leaf); });
+        };
+        rows_.find_in_leaves(collision_.forest(), pair, for_leaves, this->sampled_, out, tests, reads);
+        return;
+      }
+      const auto primitives = collision_.list().primitive_pairs(i);
+      out.insert(out.end(), primitives.begin(), primitives.end());
+      if (!primitives.empty()) return;
+      LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first,
+                                 collision_.forest().tree(pair.first).topology(), pair.second,
+                                 collision_.forest().tree(pair.second).topology(), this->count_, out);
+      for (const auto& leaf : collision_.list().leaf_pairs(i)) leaves(leaf.a, leaf.b);
+      for_leaves_with_themselves(pair, [&](std::uint32_t leaf) { leaves(leaf, leaf); });
     });
     this->count_.add(Counter::box_tests, tests);
     this->count_.add(Counter::positions_fetched, reads);
@@ -100,63 +92,56 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
     if (!notes_changes_ || answer != Answer::candidates)
       return this->compare_answers(t, answer, begun, ended);
-    on_collision([&](auto& collision) {
-      LeafOverlaps& overlaps = collision.list().overlaps();
-      if (overlaps.is_noting()) return overlaps.take_changes(begun, ended);
-      find_candidates(t, begun, {});
-      overlaps.start_noting();
-    });
+    LeafOverlaps& overlaps = collision_.list().overlaps();
+    if (overlaps.is_noting()) return overlaps.take_changes(begun, ended);
+    find_candidates(t, begun, {});
+    overlaps.start_noting();
   }
 
   /// Follows rays node by node, in boxes that are computed from their realisers.
   void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
                  std::span<RayHit> hits) override {
-    on_collision([&](auto& collision) {
-      auto& forest = collision.forest();
-      while (ray_boxes_.size() < this->scene_.body_count()) ray_boxes_.emplace_back(0);
-      for (std::uint32_t body = 0; body < ray_boxes_.size(); ++body) {
-        ray_boxes_[body].resize(forest.tree(body).topology().size());
-        ray_boxes_[body].new_frame();
-      }
-      const auto boxes_of = [&](std::uint32_t body) {
-        return RealiserBoxes<S>(forest.tree(body).realisers(0), this->sampled_, body, ray_boxes_[body]);
-      };
-      const auto box_of = [&](std::uint32_t body) {
-        if (forest.tree(body).topology().empty()) return Box<S>{};
-        auto boxes = boxes_of(body);
-        boxes.ensure(0);
-        return Box<S>(boxes(0));
-      };
-      const std::uint64_t tests =
-          find_hits_by_body(this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(),
-                            box_of, [&](std::uint32_t body, RaySearch<S>& search) {
-                              const Topology& topology = forest.tree(body).topology();
-                              auto boxes = boxes_of(body);
-                              const TopologyTree tree{topology, [&](std::uint32_t node) {
-                                                        boxes.ensure(node);
-                                                        return boxes(node);
-                                                      }};
-                              return follow_ray(tree, search, body, this->scene_.primitives(body),
-                                                this->sampled_.positions(body), ray_stack_, this->count_,
-                                                this->triangle_stats_);
-                            });
-      this->count_.add(Counter::box_tests, tests);
-    });
+    auto& forest = collision_.forest();
+    while (ray_boxes_.size() < this->scene_.body_count()) ray_boxes_.emplace_back(0);
+    for (std::uint32_t body = 0; body < ray_boxes_.size(); ++body) {
+      ray_boxes_[body].resize(forest.tree(body).topology().size());
+      ray_boxes_[body].new_frame();
+    }
+    const auto boxes_of = [&](std::uint32_t body) {
+      return RealiserBoxes<S>(forest.tree(body).realisers(0), this->sampled_, body, ray_boxes_[body]);
+    };
+    const auto box_of = [&](std::uint32_t body) {
+      if (forest.tree(body).topology().empty()) return Box<S>{};
+      auto boxes = boxes_of(body);
+      boxes.ensure(0);
+      return Box<S>(boxes(0));
+    };
+    const std::uint64_t tests = find_hits_by_body(
+        this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
+        [&](std::uint32_t body, RaySearch<S>& search) {
+          const Topology& topology = forest.tree(body).topology();
+          auto boxes = boxes_of(body);
+          const TopologyTree tree{topology, [&](std::uint32_t node) {
+                                    boxes.ensure(node);
+                                    return boxes(node);
+                                  }};
+          return follow_ray(tree, search, body, this->scene_.primitives(body), this->sampled_.positions(body),
+                            ray_stack_, this->count_, this->triangle_stats_);
+        });
+    this->count_.add(Counter::box_tests, tests);
   }
 
   void find_spans(double t0, double t1, SpanBuffer& out) override {
-    on_collision([&](auto& collision) {
-      auto& list = collision.list();
-      list.start_spans(t0);
-      collision.advance(t1);
-      for (const auto& ended : list.stop_spans())
-        append_spans(collision, ended.bodies, ended.leaf, t0, std::min(ended.until, t1), out);
-      for_body_pairs(collision, [&](std::uint32_t i, const BodyPair& pair) {
-        using Leaf = std::remove_cvref_t<decltype(list.leaf_pairs(i)[0])>;
-        for (const auto& leaf : list.leaf_pairs(i)) append_spans(collision, i, leaf, t0, t1, out);
-        for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) {
-          append_spans(collision, i, Leaf{leaf, leaf, 0, t0}, t0, t1, out);
-        });
+    auto& list = collision_.list();
+    list.start_spans(t0);
+    collision_.advance(t1);
+    for (const auto& ended : list.stop_spans())
+      append_spans(ended.bodies, ended.leaf, t0, std::min(ended.until, t1), out);
+    for_body_pairs([&](std::uint32_t i, const BodyPair& pair) {
+      using Leaf = std::remove_cvref_t<decltype(list.leaf_pairs(i)[0])>;
+      for (const auto& leaf : list.leaf_pairs(i)) append_spans(i, leaf, t0, t1, out);
+      for_leaves_with_themselves(pair, [&](std::uint32_t leaf) {
+        append_spans(i, Leaf{leaf, leaf, 0, t0}, t0, t1, out);
       });
     });
   }
@@ -165,28 +150,24 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   /// twice are reported once.
   void find_swept_pairs(double t0, double t1, std::span<const S* const> /*before*/,
                         PairBuffer& out) override {
-    on_collision([&](auto& collision) {
-      auto& list = collision.list();
-      list.start_spans(t0);
-      collision.advance(t1);
-      swept_leaves_.clear();
-      for (const auto& ended : list.stop_spans())
-        swept_leaves_.push_back({ended.bodies, ended.leaf.a, ended.leaf.b});
-      for_body_pairs(collision, [&](std::uint32_t i, const BodyPair& pair) {
-        for (const auto& leaf : list.leaf_pairs(i)) swept_leaves_.push_back({i, leaf.a, leaf.b});
-        for_leaves_with_themselves(collision, pair, [&](std::uint32_t leaf) {
-          swept_leaves_.push_back({i, leaf, leaf});
-        });
-      });
-      std::sort(swept_leaves_.begin(), swept_leaves_.end());
-      swept_leaves_.erase(std::unique(swept_leaves_.begin(), swept_leaves_.end()), swept_leaves_.end());
-      for (const SweptLeaves& swept : swept_leaves_)
-        append_leaves(collision, list.body_pair(swept.bodies), swept.a, swept.b, out);
+    auto& list = collision_.list();
+    list.start_spans(t0);
+    collision_.advance(t1);
+    swept_leaves_.clear();
+    for (const auto& ended : list.stop_spans())
+      swept_leaves_.push_back({ended.bodies, ended.leaf.a, ended.leaf.b});
+    for_body_pairs([&](std::uint32_t i, const BodyPair& pair) {
+      for (const auto& leaf : list.leaf_pairs(i)) swept_leaves_.push_back({i, leaf.a, leaf.b});
+      for_leaves_with_themselves(pair, [&](std::uint32_t leaf) { swept_leaves_.push_back({i, leaf, leaf}); });
     });
+    std::sort(swept_leaves_.begin(), swept_leaves_.end());
+    swept_leaves_.erase(std::unique(swept_leaves_.begin(), swept_leaves_.end()), swept_leaves_.end());
+    for (const SweptLeaves& swept : swept_leaves_)
+      append_leaves(list.body_pair(swept.bodies), swept.a, swept.b, out);
   }
 
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
-    on_collision([&](auto& collision) { collision.plans_changed(t, changes); });
+    collision_.plans_changed(t, changes);
     if (!by_rows_) return;
     for (const PlanChange<S>& change : changes) rows_.plans_changed(change.body);
     rows_.new_frame(motion_);  // realisers may differ now
@@ -194,91 +175,70 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
 
   void follow_geometry(double t, const GeometryChange<S>& change) override {
     const std::vector<BodyChange> changes = body_changes(this->scene_, change);
-    on_collision(
-        [&](auto& collision) { collision.geometry_changed(t, this->scene_, this->sampled_, changes); });
+    collision_.geometry_changed(t, this->scene_, this->sampled_, changes);
     if (!by_rows_) return;
-    for (const BodyChange& changed : changes)
-      on_collision([&](auto& collision) { rows_.follow(collision.forest(), this->scene_, changed.body); });
+    for (const BodyChange& changed : changes) rows_.follow(collision_.forest(), this->scene_, changed.body);
     rows_.new_frame(motion_);
   }
 
-  std::optional<ScheduledEvent<S>> next_event() const override {
-    return on_collision([](auto& collision) { return collision.next_event(); });
-  }
+  std::optional<ScheduledEvent<S>> next_event() const override { return collision_.next_event(); }
   void scheduled_events(std::vector<ScheduledEvent<S>>& out) const override {
-    on_collision([&](auto& collision) { collision.scheduled_events(out); });
+    collision_.scheduled_events(out);
   }
   const Topology& tree(std::uint32_t body) const override {
-    return on_collision(
-        [&](auto& collision) -> const Topology& { return collision.forest().tree(body).topology(); });
+    return collision_.forest().tree(body).topology();
   }
   std::uint32_t realiser(std::uint32_t body, std::uint32_t node, std::uint32_t side) const override {
-    return on_collision([&](auto& collision) { return collision.forest().tree(body).realiser(node, side); });
+    return collision_.forest().tree(body).realiser(node, side);
   }
-  void watch_bounds(std::vector<BoundNotice<S>>* log) override {
-    on_collision([&](auto& collision) { collision.watch().log = log; });
-  }
+  void watch_bounds(std::vector<BoundNotice<S>>* log) override { collision_.watch().log = log; }
   void watched_pairs(std::vector<WatchedPair>& out) const override {
     out.clear();
-    on_collision([&](auto& collision) {
-      const auto& list = collision.list();
-      for (const BoxPair& pair : list.pairs()) {
-        if (!pair.used) continue;
-        const BodyPair& bodies = list.body_pair(pair.bodies);
-        out.push_back({.body = bodies.first,
-                       .node = pair.a,
-                       .other_body = bodies.second,
-                       .other_node = pair.b,
-                       .overlapping = pair.overlapping,
-                       .listed = pair.children == BoxPair::none});
-      }
-    });
+    const auto& list = collision_.list();
+    for (const BoxPair& pair : list.pairs()) {
+      if (!pair.used) continue;
+      const BodyPair& bodies = list.body_pair(pair.bodies);
+      out.push_back({.body = bodies.first,
+                     .node = pair.a,
+                     .other_body = bodies.second,
+                     .other_node = pair.b,
+                     .overlapping = pair.overlapping,
+                     .listed = pair.children == BoxPair::none});
+    }
   }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
-    return on_collision([&](auto& collision) {
-      const auto& tree = collision.forest().tree(body);
-      std::vector<std::uint32_t> order;
-      AuditView view{tree.compacted_topology(order), {}, {}};
-      for (const std::uint32_t node : order) {
-        // Reports the box that a query has read, if there is one.
-        Box<S> room;
-        const Box<S>* read = by_rows_ ? rows_.read_box(body, node, room) : nullptr;
-        view.boxes.push_back(to_double(
-            read != nullptr ? *read : box_of_realisers(tree.realisers(node), this->sampled_, body)));
-      }
-      return view;
-    });
+    const auto& tree = collision_.forest().tree(body);
+    std::vector<std::uint32_t> order;
+    AuditView view{tree.compacted_topology(order), {}, {}};
+    for (const std::uint32_t node : order) {
+      // Reports the box that a query has read, if there is one.
+      Box<S> room;
+      const Box<S>* read = by_rows_ ? rows_.read_box(body, node, room) : nullptr;
+      view.boxes.push_back(
+          to_double(read != nullptr ? *read : box_of_realisers(tree.realisers(node), this->sampled_, body)));
+    }
+    return view;
   }
 
   std::size_t bytes() const override {
     std::size_t total = rows_.bytes() + open_.capacity() * sizeof(std::uint32_t) + ray_order_.bytes() +
                         ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
     for (const auto& boxes : ray_boxes_) total += boxes.bytes();
-    return total + on_collision([](auto& collision) { return collision.bytes(); });
+    return total + collision_.bytes();
   }
 
  protected:
-  bool step(double until, EventDescription<S>& out) override {
-    return on_collision([&](auto& collision) { return collision.step(until, out); });
-  }
+  bool step(double until, EventDescription<S>& out) override { return collision_.step(until, out); }
   void counts_cleared() override {
-    on_collision([&](auto& collision) {
-      first_step_ = collision.queue_steps();
-      this->count_.peak(Counter::list_peak, collision.list().size());
-    });
+    first_step_ = collision_.queue_steps();
+    this->count_.peak(Counter::list_peak, collision_.list().size());
   }
   void add_counts(Counters& table) const override {
-    table[Counter::queue_steps] =
-        on_collision([](auto& collision) { return collision.queue_steps(); }) - first_step_;
+    table[Counter::queue_steps] = collision_.queue_steps() - first_step_;
   }
 
  private:
-  template <class Work>
-  decltype(auto) on_collision(Work&& work) const {
-    return std::visit([&](const auto& collision) -> decltype(auto) { return work(*collision); }, collision_);
-  }
-
   /// Two leaves, and the number of their body pair in the list.
   struct SweptLeaves {
     std::uint32_t bodies, a, b;
@@ -286,17 +246,17 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   };
 
   /// Calls work(number, pair) for each body pair of the list.
-  template <class System, class Work>
-  static void for_body_pairs(const System& collision, const Work& work) {
-    const auto& list = collision.list();
+  template <class Work>
+  void for_body_pairs(const Work& work) const {
+    const auto& list = collision_.list();
     for (std::uint32_t i = 0; i < list.body_pair_count(); ++i)
       if (list.is_entered(i)) work(i, list.body_pair(i));
   }
   /// Visits leaves with themselves: within one body the list does not contain them.
-  template <class System, class Work>
-  void for_leaves_with_themselves(const System& collision, const BodyPair& pair, const Work& work) const {
+  template <class Work>
+  void for_leaves_with_themselves(const BodyPair& pair, const Work& work) const {
     if (pair.first != pair.second) return;
-    const Topology& topology = collision.forest().tree(pair.first).topology();
+    const Topology& topology = collision_.forest().tree(pair.first).topology();
     if (topology.empty() || topology.leaf_size == 1) return;
     open_.assign(1, 0);  // traverses from the root, because changes of geometry leave gaps
     while (!open_.empty()) {
@@ -310,11 +270,10 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   }
 
   /// Appends every primitive pair of two leaves, including pairs that share a vertex.
-  template <class System>
-  void append_leaves(const System& collision, const BodyPair& pair, std::uint32_t leaf_a,
-                     std::uint32_t leaf_b, PairBuffer& out) const {
-    const Topology& a = collision.forest().tree(pair.first).topology();
-    const Topology& b = collision.forest().tree(pair.second).topology();
+  void append_leaves(const BodyPair& pair, std::uint32_t leaf_a, std::uint32_t leaf_b,
+                     PairBuffer& out) const {
+    const Topology& a = collision_.forest().tree(pair.first).topology();
+    const Topology& b = collision_.forest().tree(pair.second).topology();
     const TopologyNode na = a.nodes[leaf_a], nb = b.nodes[leaf_b];
     const std::size_t before = out.size();
     for (std::uint32_t i = na.first(); i < na.first() + na.count(); ++i)
@@ -326,12 +285,12 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   }
 
   /// Appends every primitive pair of two leaves with the time span in which the leaves overlap.
-  template <class System, class LeafPair>
-  void append_spans(const System& collision, std::uint32_t body_pair, const LeafPair& leaf, double t0,
-                    double end, SpanBuffer& out) const {
-    const BodyPair& pair = collision.list().body_pair(body_pair);
-    const Topology& a = collision.forest().tree(pair.first).topology();
-    const Topology& b = collision.forest().tree(pair.second).topology();
+  template <class LeafPair>
+  void append_spans(std::uint32_t body_pair, const LeafPair& leaf, double t0, double end,
+                    SpanBuffer& out) const {
+    const BodyPair& pair = collision_.list().body_pair(body_pair);
+    const Topology& a = collision_.forest().tree(pair.first).topology();
+    const Topology& b = collision_.forest().tree(pair.second).topology();
     const TopologyNode na = a.nodes[leaf.a], nb = b.nodes[leaf.b];
     for (std::uint32_t i = na.first(); i < na.first() + na.count(); ++i)
       for (std::uint32_t j = nb.first(); j < nb.first() + nb.count(); ++j) {
@@ -346,12 +305,10 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
 
   std::vector<SweptLeaves> swept_leaves_;
   mutable std::vector<std::uint32_t> open_;  ///< nodes of a traversal
-  std::variant<std::unique_ptr<Collision<SegmentHeapEventQueue>>,
-               std::unique_ptr<Collision<AvlOrHeapEventQueue>>>
-      collision_;
+  bool by_rows_;                             ///< leaves have several primitives
+  KineticCollision<S, AnyEventQueue, Count> collision_;
   ClipMotion<S> motion_;
-  bool by_rows_ = false;                ///< leaves have several primitives
-  bool notes_changes_ = false;          ///< the list's leaves are the candidates
+  bool notes_changes_;                  ///< the list's leaves are the candidates
   KineticRowsQuery<S> rows_;            ///< empty unless by_rows_
   std::vector<BoxCache<S>> ray_boxes_;  ///< [body], made at the first request for rays
   std::vector<RayNode<std::uint32_t>> ray_stack_;

@@ -45,7 +45,7 @@ template <class S>
 class ShortSightedQueue : public SegmentHeapQueue<S> {
  public:
   using SegmentHeapQueue<S>::SegmentHeapQueue;
-  static constexpr std::size_t look_ahead = 1;
+  static constexpr std::size_t look_ahead() { return 1; }
 };
 
 /// All queues over one play: their logs must be one, which is then proved.

@@ -47,6 +47,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
 
   /// Returns the cost of all searches; counted only if `Count` counts.
   SearchCost& search_cost() { return search_cost_; }
+  const SearchCost& search_cost() const { return search_cost_; }
 
   /// Handles a failure that was popped from the queue. The loser becomes the realiser of this bound, and of
   /// the bounds of the certificates above while the winner realises them. O(depth) searches of up to O(nodes)

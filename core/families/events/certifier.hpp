@@ -46,8 +46,7 @@ class Certifier {
     std::optional<Crossing<S>> own_crossing, earliest_crossing;
     Event earliest;
     bool found = false;
-    double horizon = never;
-    if constexpr (Queue::look_ahead > 0) horizon = clock_->horizon(event.body, now, Queue::look_ahead);
+    double horizon = horizon_after(event.body, now);
     for (;;) {
       double until = horizon;
       for (const std::uint32_t challenger : candidates) {
@@ -113,15 +112,23 @@ class Certifier {
     count_->add(Counter::queue_operations);
     count_->peak(Counter::queue_peak, queue_->size());
   }
+  /// Returns the time up to which a search from `now` on looks for a failure; infinite if the queue has no
+  /// reviews.
+  double horizon_after(std::uint32_t body, const Instant<S>& now) const {
+    if constexpr (requires { clock_->horizon(body, now, queue_->look_ahead()); })
+      if (const std::size_t keyframes = queue_->look_ahead(); keyframes > 0)
+        return clock_->horizon(body, now, keyframes);
+    return never;
+  }
   bool review_at(const Event& event, double time) {
-    if constexpr (Queue::look_ahead > 0)
+    if constexpr (requires { queue_->review(event, time); })
       return queue_->review(event, time);
     else
       return false;
   }
   /// Returns the time of the next review of a certificate without a scheduled failure, if there is one.
   std::optional<double> review_time(std::uint32_t slot) const {
-    if constexpr (Queue::look_ahead > 0)
+    if constexpr (requires { queue_->reviewing(slot); })
       if (queue_->reviewing(slot)) return queue_->event(slot).begin;
     return {};
   }
@@ -129,8 +136,7 @@ class Certifier {
   /// Implements `certify` for a body without per-vertex plans.
   void certify_keyframed(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates) {
     if (clock_->keyframe_count(event.body) < 2) return;
-    double horizon = never;
-    if constexpr (Queue::look_ahead > 0) horizon = clock_->horizon(event.body, now, Queue::look_ahead);
+    const double horizon = horizon_after(event.body, now);
     if (find_failure(event, clock_->keyframe_search(event.body, event.side, now, horizon), candidates))
       return schedule(event);
     if (horizon == never) return;

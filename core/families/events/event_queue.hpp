@@ -3,11 +3,8 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <string_view>
-#include <variant>
 #include <vector>
 
-#include "core/base/assert.hpp"
 #include "core/base/counters.hpp"
 #include "core/families/events/event.hpp"
 #include "core/families/events/segment_queue.hpp"
@@ -23,7 +20,7 @@ namespace kbvh {
 ///   grow(slots)       makes room for slots below this number, amortised O(1) each; events stay scheduled
 ///   slots()           number of slots that fit
 ///   ClockType         the clock: EventClock, except in contestants that round times
-///   look_ahead        0, or the number of keyframes of one search for a failure. If not 0, there is
+///   look_ahead()      0, or the number of keyframes of one search for a failure. If not 0, there is
 ///                     review(event, time), for certificates that are known to hold until that time
 /// Optional:
 ///   due(t)            whether the earliest event, if there is one, happens at or before t
@@ -52,7 +49,7 @@ class AvlEventQueue {
  public:
   using ClockType = Clock;
   static constexpr const char* name = "avl";
-  static constexpr std::size_t look_ahead = 0;
+  static constexpr std::size_t look_ahead() { return 0; }
   AvlEventQueue(const Clock& clock, std::uint32_t slots)
       : steps_(std::make_unique<std::uint64_t>(0)), nodes_(slots), tree_(Less{&clock, steps_.get()}) {}
   ~AvlEventQueue() { tree_.clear(); }
@@ -116,7 +113,7 @@ class BinaryHeapEventQueue {
  public:
   using ClockType = Clock;
   static constexpr const char* name = "binary_heap";
-  static constexpr std::size_t look_ahead = 0;
+  static constexpr std::size_t look_ahead() { return 0; }
   BinaryHeapEventQueue(const Clock& clock, std::uint32_t slots)
       : clock_(&clock), events_(slots), place_(slots, none) {
     heap_.reserve(slots);
@@ -209,93 +206,11 @@ class BinaryHeapEventQueue {
   std::uint64_t steps_ = 0;
 };
 
-/// An AVL tree or a binary heap, chosen at run time: structures are compiled once for both. The operations
-/// that compare events are calls, not inlined.
-template <class Clock>
-class AvlOrHeapEventQueue {
-  using Event = typename Clock::Event;
-  using Avl = AvlEventQueue<Clock>;
-  using Heap = BinaryHeapEventQueue<Clock>;
-
- public:
-  using ClockType = Clock;
-  static constexpr std::size_t look_ahead = 0;
-  AvlOrHeapEventQueue(const Clock& clock, std::uint32_t slots)
-      : clock_(&clock), queue_(std::in_place_type<Avl>, clock, slots) {}
-
-  /// Chooses the kind by its name: Avl::name (as at the start) or Heap::name. The queue must be empty.
-  void choose(std::string_view name) {
-    KBVH_ASSERT(empty());
-    const std::uint32_t wanted = slots();
-    if (name == Heap::name)
-      queue_.template emplace<Heap>(*clock_, wanted);
-    else
-      queue_.template emplace<Avl>(*clock_, wanted);
-  }
-
-  [[gnu::noinline]] void schedule(const Event& event) {
-    on_queue([&](auto& queue) { queue.schedule(event); });
-  }
-  [[gnu::noinline]] bool cancel(std::uint32_t slot) {
-    return on_queue([&](auto& queue) { return queue.cancel(slot); });
-  }
-  [[gnu::noinline]] void pop() {
-    on_queue([](auto& queue) { queue.pop(); });
-  }
-  [[gnu::noinline]] void grow(std::uint32_t slots) {
-    on_queue([&](auto& queue) { queue.grow(slots); });
-  }
-  [[gnu::noinline]] void clear() {
-    on_queue([](auto& queue) { queue.clear(); });
-  }
-  bool scheduled(std::uint32_t slot) const {
-    return on_queue([&](auto& queue) { return queue.scheduled(slot); });
-  }
-  const Event& event(std::uint32_t slot) const {
-    return on_queue([&](auto& queue) -> const Event& { return queue.event(slot); });
-  }
-  const Event& top() const {
-    return on_queue([](auto& queue) -> const Event& { return queue.top(); });
-  }
-  bool empty() const {
-    return on_queue([](auto& queue) { return queue.empty(); });
-  }
-  std::size_t size() const {
-    return on_queue([](auto& queue) { return queue.size(); });
-  }
-  std::uint32_t slots() const {
-    return on_queue([](auto& queue) { return queue.slots(); });
-  }
-  std::uint64_t steps() const {
-    return on_queue([](auto& queue) { return queue.steps(); });
-  }
-  std::size_t bytes() const {
-    return on_queue([](auto& queue) { return queue.bytes(); });
-  }
-
- private:
-  template <class Work>
-  decltype(auto) on_queue(Work&& work) {
-    if (Avl* avl = std::get_if<Avl>(&queue_)) return work(*avl);
-    return work(*std::get_if<Heap>(&queue_));
-  }
-  template <class Work>
-  decltype(auto) on_queue(Work&& work) const {
-    if (const Avl* avl = std::get_if<Avl>(&queue_)) return work(*avl);
-    return work(*std::get_if<Heap>(&queue_));
-  }
-
-  const Clock* clock_;
-  std::variant<Avl, Heap> queue_;
-};
-
 /// The event queues of kinetic trees.
 template <class S>
 using AvlQueue = AvlEventQueue<EventClock<S>>;
 template <class S>
 using BinaryHeapQueue = BinaryHeapEventQueue<EventClock<S>>;
-template <class S>
-using AvlOrHeapQueue = AvlOrHeapEventQueue<EventClock<S>>;
 template <class S>
 using SegmentHeapQueue = SegmentHeapEventQueue<EventClock<S>>;
 

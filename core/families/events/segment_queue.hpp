@@ -49,7 +49,7 @@ class SegmentHeapEventQueue {
   static constexpr const char* name = "segment_heap";
   /// The number of keyframes of one search. Certificates seldom last to the clip's end. 64 keyframes of one
   /// vertex fill a few cache lines.
-  static constexpr std::size_t look_ahead = 64;
+  static constexpr std::size_t look_ahead() { return 64; }
   SegmentHeapEventQueue(const Clock& clock, std::uint32_t slots)
       : clock_(&clock), records_(slots), segments_(1) {}
 

@@ -23,8 +23,10 @@ class KineticCollision {
   using Forest = KineticForest<S, Queue<EventClock<S>>, Count, WatchedBoxes<S>>;
   using List = SeparationList<S, Queue, Count>;
 
+  /// `queue` names the kind of both queues, where `Queue` offers a choice.
   KineticCollision(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
-                   Count& count, int look_ahead = OverlapClock<S>::usual_look_ahead)
+                   Count& count, int look_ahead = OverlapClock<S>::usual_look_ahead,
+                   std::string_view queue = {})
       : motion_(motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         body_pairs_(scene.pairs()),
@@ -32,18 +34,14 @@ class KineticCollision {
         forest_(scene, motion, std::move(topologies), count,
                 WatchedBoxes<S>{{&changed_, &nodes_}, {&watch_}}),
         list_(scene, forest_, count, look_ahead,
-              near_bodies_.searches() ? List::BodyPairs::none : List::BodyPairs::all),
+              near_bodies_.searches() ? List::BodyPairs::none : List::BodyPairs::all, queue),
         number_of_(near_bodies_.searches() ? body_pairs_.size() : 0, List::none) {
+    if (!queue.empty()) forest_.choose_queue(queue);
     if constexpr (requires { forest_.queue().serve(*this); }) forest_.queue().serve(*this);
   }
   KineticCollision(const KineticCollision&) = delete;  // the trees point to `changed_` and `nodes_`
   KineticCollision& operator=(const KineticCollision&) = delete;
 
-  /// Chooses the kind of both queues, where `Queue` offers a choice; before the first reset.
-  void choose_queue(std::string_view name) {
-    forest_.choose_queue(name);
-    list_.choose_queue(name);
-  }
   void reset(double t) {
     forest_.reset(t);
     changed_.clear();

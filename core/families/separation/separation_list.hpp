@@ -66,14 +66,18 @@ class SeparationList {
   /// The body pairs with which a list begins.
   enum class BodyPairs : std::uint8_t { all, none };
 
+  /// `queue` names the kind of queue, where `Queue` offers a choice.
   template <class Forest>
   SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count, int look_ahead,
-                 BodyPairs pairs)
+                 BodyPairs pairs, std::string_view queue = {})
       : tree_(forest_topologies(scene, forest), scene.pairs()),
-        outlook_(scene, forest, tree_, by_segments ? LookAhead::segment : LookAhead::pieces, look_ahead),
+        outlook_(scene, forest, tree_, by_segments(queue) ? LookAhead::segment : LookAhead::pieces,
+                 look_ahead),
         queue_(outlook_.clock(), 0),
         count_(&count) {
-    if constexpr (by_segments) {
+    if constexpr (requires { queue_.choose(queue); })
+      if (!queue.empty()) queue_.choose(queue);
+    if constexpr (requires { queue_.serve(*this); }) {
       queue_.split_at(forest.clock().keyframe_times());
       queue_.serve(*this);
     }
@@ -84,10 +88,6 @@ class SeparationList {
   SeparationList(const SeparationList&) = delete;
   SeparationList& operator=(const SeparationList&) = delete;
 
-  /// Chooses the kind of queue, where `Queue` offers a choice; before the first reset.
-  void choose_queue(std::string_view name) {
-    if constexpr (requires { queue_.choose(name); }) queue_.choose(name);
-  }
   /// Restarts at t, by one traversal per body pair.
   void reset(double t) {
     clear(t);
@@ -292,10 +292,14 @@ class SeparationList {
  private:
   using State = typename PairOutlook<S>::State;
   using Outlook = typename PairOutlook<S>::Outlook;
-  /// Whether the queue stores waiting events by segments.
-  static constexpr bool by_segments = requires(Queue<OverlapClock<S>> queue) {
-    queue.split_at(std::span<const double>());
-  };
+  /// Returns whether the queue stores waiting events by segments.
+  static bool by_segments(std::string_view name) {
+    using Chosen = Queue<OverlapClock<S>>;
+    if constexpr (requires { Chosen::by_segments(name); })
+      return name.empty() || Chosen::by_segments(name);
+    else
+      return Chosen::look_ahead() > 0;
+  }
 
   template <class Forest>
   static std::vector<const Topology*> forest_topologies(const SceneView<S>& scene, const Forest& forest) {
