@@ -9,7 +9,8 @@ from __future__ import annotations
 import json
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Optional
 
@@ -57,6 +58,7 @@ class Study:
     runs: pd.DataFrame
     repetitions: pd.DataFrame
     notes: list[str]
+    _times: dict[tuple[str, ...], dict[int, np.ndarray]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def groups(self) -> list[pd.DataFrame]:
         """Returns the runs of each group, in the order of a report: scenes as in the file, then size, scalar and l."""
@@ -65,6 +67,20 @@ class Study:
             ["first", "primitives", "doubles", "scalar", "l", "group", "run"], kind="stable"
         )
         return [rows.drop(columns=["first", "doubles"]) for _, rows in ordered.groupby("group", sort=False)]
+
+    @cached_property
+    def sessions(self) -> dict[int, Any]:
+        """The session of each run."""
+        return dict(zip(map(int, self.runs["run"]), self.runs["session"]))
+
+    def times(self, phases: tuple[str, ...]) -> dict[int, np.ndarray]:
+        """Returns the time per frame in ms of each repetition of each run, over some phases; added up once for all callers."""
+        if phases not in self._times:
+            rows = self.repetitions.sort_values(["run", "repetition"])
+            sums = rows[list(phases)].sum(axis=1).to_numpy(dtype=float)
+            runs, starts = np.unique(rows["run"].to_numpy(), return_index=True)
+            self._times[phases] = {int(run): part for run, part in zip(runs, np.split(sums, starts[1:]))}
+        return self._times[phases]
 
     @property
     def timed(self) -> pd.DataFrame:
@@ -429,11 +445,9 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     medians["spread"] = (extremes["max"] - extremes["min"]) / medians["total_motion"].where(medians["total_motion"] > 0)
     medians["repetitions"] = extremes["count"]
     # The repetition in the middle (the lower one of two), whose phases add up to its total.
-    middle = sums.sort_values(["run", "total_motion", "repetition"]).groupby("run")
-    if len(sums):
-        middle = middle.apply(lambda rows: rows.iloc[(len(rows) - 1) // 2][list(PHASES)])
-    else:
-        middle = medians[list(PHASES)]
+    ordered = sums.sort_values(["run", "total_motion", "repetition"])
+    same = ordered.groupby("run")["run"]
+    middle = ordered[same.cumcount() == (same.transform("size") - 1) // 2].set_index("run")[list(PHASES)]
     medians = medians.join(middle.add_prefix("middle_").astype(float))
     joined = runs.merge(medians, how="left", left_on="run", right_index=True)
     joined["repetitions"] = joined["repetitions"].fillna(0).astype(int)

@@ -40,8 +40,7 @@ class Ratio:
 
 def times_of(study: Study, run: int, scope: str) -> np.ndarray:
     """Returns the time per frame in ms of each repetition of a run, over the phases of a scope."""
-    rows = study.repetitions[study.repetitions["run"] == run].sort_values("repetition")
-    return rows[list(SCOPES[scope])].sum(axis=1).to_numpy(dtype=float)
+    return study.times(SCOPES[scope]).get(run, np.empty(0))
 
 
 def best_refit(study: Study, group: pd.DataFrame, scope: str) -> Optional[int]:
@@ -57,8 +56,7 @@ def ratio(study: Study, run: int, reference: int, scope: str) -> Optional[Ratio]
     other = times_of(study, reference, scope)
     if not len(own) or not len(other) or own.min() <= 0:
         return None
-    sessions = study.runs.set_index("run")["session"]
-    if len(own) == len(other) and sessions[run] == sessions[reference]:
+    if len(own) == len(other) and study.sessions[run] == study.sessions[reference]:
         quotients = other / own
         return Ratio(float(np.median(quotients)), float(quotients.min()), float(quotients.max()), True, reference)
     return Ratio(
