@@ -35,7 +35,7 @@ class KeyLines(Enum):
 def settle(figure: Figure) -> None:
     """Lays a figure out once, with rounded digits, because the solver's last digits vary between runs."""
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    figure.set_layout_engine(None)  # not "none", with which savefig would draw everything twice
     for axes in figure.axes:
         axes.set_position([round(value, 4) for value in axes.get_position().bounds])
 

@@ -1,8 +1,10 @@
 #pragma once
 #include <map>
 #include <memory>
+#include <string_view>
 
 #include "core/families/boxtree/kinetic_boxtree.hpp"
+#include "core/families/events/any_queue.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
@@ -63,6 +65,7 @@ struct BoxTreePlay {
   double start_after = 0;          ///< fraction of the clip that is skipped
   std::uint64_t rebuild_seed = 0;  ///< not 0: at every frame, parts chosen at random are rebuilt
   BoxTreeConstruction construction{};
+  std::string_view queue = AvlQueue<float>::name;  ///< for an AnyQueue
 };
 
 struct BoxTreeReport {
@@ -100,6 +103,7 @@ class BoxTreeProof {
     forest_ = std::make_unique<Forest>(view_, ClipMotion<S>(playback_),
                                        build_topologies(view_, playback_, play.builder), count_,
                                        BoxTreeRecorder<S>{&log_});
+    forest_->choose_queue(play.queue);
     for (const auto& body : test.scene.bodies) plans_.push_back(stored_plans(body.plans));
     for (std::uint32_t body = 0; body < view_.body_count(); ++body)
       forest_->tree(body).construct_as(play.construction);

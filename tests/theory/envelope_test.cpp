@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "core/families/events/any_queue.hpp"
 #include "core/families/events/kinetic_tree_strategy.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
@@ -18,19 +19,39 @@ namespace {
 
 using namespace kbvh::theory;
 
-/// Records kinetic AABB trees on a given event queue.
-template <class S, template <class> class Queue>
-Recording<S> record(const TestScene<S>& test, const Play& play) {
-  using Recorded = ExactKineticAabbStrategy<S, Counting, Queue<S>>;
+template <class S, class Queue>
+using TreesOn = ExactKineticAabbStrategy<S, Counting, Queue>;
+
+/// Kinetic AABB trees on an event queue of a kind.
+template <class S>
+class TreesOnAnyQueue : public TreesOn<S, AnyQueue<S>> {
+ public:
+  TreesOnAnyQueue(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+                  std::string_view queue)
+      : TreesOn<S, AnyQueue<S>>(scene, motion, std::move(topologies), 0, KineticQuery::node_pairs) {
+    this->on_forest([&](auto& forest) { forest.choose_queue(queue); });
+  }
+};
+
+template <class Strategy, class S, class... Arguments>
+Recording<S> record_strategy(const TestScene<S>& test, const Play& play, const Arguments&... arguments) {
   Play with_frames = play;
   if (!test.script.steps.empty()) with_frames.frames = test.frames;  // changes are at frames
   return record_events(
       test.scene, test.script, with_frames,
-      [](const SceneView<S>& view, Playback<S>& playback, const Topologies& topologies) {
-        return std::make_unique<Recorded>(view, ClipMotion<S>(playback), topologies, 0,
-                                          KineticQuery::node_pairs);
+      [&](const SceneView<S>& view, Playback<S>& playback, const Topologies& topologies) {
+        return std::make_unique<Strategy>(view, ClipMotion<S>(playback), topologies, arguments...);
       },
       NoWatcher{});
+}
+/// Records kinetic AABB trees on an event queue of a kind, or on a queue of this test.
+template <class S>
+Recording<S> record(const TestScene<S>& test, const Play& play, std::string_view queue = AvlQueue<S>::name) {
+  return record_strategy<TreesOnAnyQueue<S>>(test, play, queue);
+}
+template <class S, template <class> class Queue>
+Recording<S> record_on(const TestScene<S>& test, const Play& play) {
+  return record_strategy<TreesOn<S, Queue<S>>>(test, play, std::size_t(0), KineticQuery::node_pairs);
 }
 
 std::string summary(const EnvelopeReport& r) {
@@ -51,10 +72,11 @@ class ShortSightedQueue : public SegmentHeapQueue<S> {
 /// All queues over one play: their logs must be one, which is then proved.
 template <class S>
 EnvelopeReport prove(const TestScene<S>& test, const Play& play) {
-  const auto recording = test::record<S, AvlQueue>(test, play);
-  EXPECT_EQ(recording.log(), (record<S, BinaryHeapQueue>(test, play).log())) << "queues differ";
-  EXPECT_EQ(recording.log(), (record<S, SegmentHeapQueue>(test, play).log())) << "queues differ";
-  EXPECT_EQ(recording.log(), (record<S, ShortSightedQueue>(test, play).log())) << "looks one keyframe ahead";
+  const auto recording = test::record(test, play);
+  for (const char* queue : {BinaryHeapQueue<S>::name, SegmentHeapQueue<S>::name})
+    EXPECT_EQ(recording.log(), test::record(test, play, queue).log()) << queue;
+  EXPECT_EQ(recording.log(), (record_on<S, ShortSightedQueue>(test, play).log()))
+      << "looks one keyframe ahead";
   const EnvelopeReport report = check(test.scene, recording);
   EXPECT_EQ(report.violation, "");
   EXPECT_EQ(report.net, report.envelope);
@@ -103,11 +125,11 @@ TEST(Envelopes, EventsDoNotDependOnTheNumberOfFrames) {
   for (const char* name : {"soups", "integer_ties", "keyframes_a_millionth_apart"}) {
     const auto test = synthetic_scene<float>(name);
     const BuilderConfig builder{.width = 2, .leaf_size = 1};
-    const auto at_keyframes = record<float, AvlQueue>(test, {builder, 1});
+    const auto at_keyframes = test::record(test, {builder, 1});
     std::printf("%s: l = 1: %llu events, %llu values\n", name, (unsigned long long)at_keyframes.events,
                 (unsigned long long)at_keyframes.values_written);
     for (std::uint32_t l : {7u, 100u}) {
-      const auto finer = record<float, AvlQueue>(test, {builder, l});
+      const auto finer = test::record(test, {builder, l});
       std::printf("%s: l = %u: %llu events, %llu values\n", name, l, (unsigned long long)finer.events,
                   (unsigned long long)finer.values_written);
       EXPECT_EQ(at_keyframes.events, finer.events);
@@ -121,7 +143,7 @@ TEST(Envelopes, EventsDoNotDependOnTheNumberOfFrames) {
 
 Case faultless() {
   static const auto test = synthetic_scene<float>("soups");
-  static const auto recording = record<float, AvlQueue>(test, {{.width = 2, .leaf_size = 1}});
+  static const auto recording = test::record(test, {{.width = 2, .leaf_size = 1}});
   return make_case(test.scene, recording, recording.epochs[0], 0);
 }
 /// The next entry of the same bound, or the log's end.
@@ -205,12 +227,12 @@ TEST(EnvelopeFaults, NeedlessEntries) {
 
 TEST(EnvelopeFaults, QueueThatLosesEvents) {
   const auto test = synthetic_scene<float>("soups");
-  EXPECT_FALSE(check(test.scene, record<float, LossyQueue>(test, {{.width = 2, .leaf_size = 1}})).holds());
+  EXPECT_FALSE(check(test.scene, record_on<float, LossyQueue>(test, {{.width = 2, .leaf_size = 1}})).holds());
 }
 
 TEST(EnvelopeFaults, OtherPlansThanThoseOfTheLog) {
   const auto test = synthetic_scene<float>("soups");
-  auto recording = record<float, AvlQueue>(test, {{.width = 2, .leaf_size = 1}});
+  auto recording = test::record(test, {{.width = 2, .leaf_size = 1}});
   // One coordinate of one keyframe, by one unit in the last place.
   // The vertex realises a bound of its leaf whose change the log has.
   const Notice<float>& notice = recording.epochs[0].events.front();

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/contract/registry.hpp"
+#include "core/families/events/any_queue.hpp"
 #include "core/families/separation/kinetic_collision.hpp"
 #include "experiments/theory/kinetic_log.hpp"
 #include "tests/support/synthetic_scenes.hpp"
@@ -118,16 +119,18 @@ class Auditor {
   SceneView<S> scene_;
 };
 
+constexpr std::string_view avl = AvlQueue<float>::name, segment_heap = SegmentHeapQueue<float>::name;
+
 struct Kinds {
   std::uint64_t overlap = 0, fathers = 0, leaves = 0, changes = 0, geometry = 0;
   bool operator==(const Kinds&) const = default;
 };
 
-/// Plays a scene event by event and audits some `audits` times.
-template <class S, template <class> class Queue>
+/// Plays a scene event by event on queues of a kind (AnyEventQueue) and audits some `audits` times.
+template <class S>
 Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t audits,
-           int look_ahead = OverlapClock<S>::usual_look_ahead) {
-  using Collision = KineticCollision<S, Queue, Counting>;
+           std::string_view queue, int look_ahead = OverlapClock<S>::usual_look_ahead) {
+  using Collision = KineticCollision<S, AnyEventQueue, Counting>;
   const auto test = synthetic_scene<S>(name, 2);
   const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 2) : test.frames;
   Kinds kinds;
@@ -141,7 +144,7 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
     playback.seek(frames.front());
     Counting count;
     Collision collision(view, ClipMotion<S>(playback), build_topologies(view, playback, builder), count,
-                        look_ahead);
+                        look_ahead, queue);
     collision.reset(frames.front());
     count.table = {};
     Auditor<S, Collision> auditor(collision, view);
@@ -203,12 +206,12 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
 class SeparationLists : public testing::TestWithParam<std::string> {};
 
 TEST_P(SeparationLists, EqualATraversalBetweenEvents) {
-  const Kinds kinds = play<float, AvlEventQueue>(GetParam(), {.width = 2, .leaf_size = 1}, 40);
-  play<double, BinaryHeapEventQueue>(GetParam(), {.width = 4, .leaf_size = 3}, 20);
-  EXPECT_EQ(kinds, (play<float, SegmentHeapEventQueue>(GetParam(), {.width = 2, .leaf_size = 1}, 40)));
+  const BuilderConfig binary{.width = 2, .leaf_size = 1};
+  const Kinds kinds = play<float>(GetParam(), binary, 40, avl);
+  play<double>(GetParam(), {.width = 4, .leaf_size = 3}, 20, BinaryHeapQueue<double>::name);
+  EXPECT_EQ(kinds, play<float>(GetParam(), binary, 40, segment_heap));
   // Who looks less far ahead sees the same.
-  for (const int look_ahead : {1, 2})
-    EXPECT_EQ(kinds, (play<float, AvlEventQueue>(GetParam(), {.width = 2, .leaf_size = 1}, 20, look_ahead)));
+  for (const int look_ahead : {1, 2}) EXPECT_EQ(kinds, play<float>(GetParam(), binary, 20, avl, look_ahead));
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, SeparationLists, testing::ValuesIn(synthetic_scene_names()),
                          [](const auto& param_info) { return param_info.param; });
@@ -220,8 +223,8 @@ TEST_P(SeparationListsOfChangingGeometry, EqualATraversal) {
   for (const std::uint32_t width : {2u, 4u})
     for (const std::uint32_t leaf_size : {1u, 3u}) {
       const BuilderConfig builder{.width = width, .leaf_size = leaf_size};
-      EXPECT_GT((play<float, AvlEventQueue>(GetParam(), builder, 40).geometry), 0u);
-      EXPECT_GT((play<double, SegmentHeapEventQueue>(GetParam(), builder, 20).geometry), 0u);
+      EXPECT_GT(play<float>(GetParam(), builder, 40, avl).geometry, 0u);
+      EXPECT_GT(play<double>(GetParam(), builder, 20, segment_heap).geometry, 0u);
     }
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, SeparationListsOfChangingGeometry, testing::ValuesIn(geometry_scene_names()),
@@ -259,16 +262,17 @@ struct Locality {
 /// Triangles of either sheet whose boxes meet the other sheet's are taken out, one at a time, and inserted
 /// again on their vertices.
 Locality locality(std::uint32_t n) {
-  using Collision = KineticCollision<float, AvlEventQueue, Silent>;
+  using Collision = KineticCollision<float, AnyEventQueue, Counting>;
   const Scene<float> scene = crossing_sheets(n);
   ChangingScene<float> changing(scene);
   const SceneView<float> view(changing.scene());
   Playback<float> playback(scene);
   const double t = 0.53;  // when no two corners meet
   playback.seek(t);
-  Silent count;
+  Counting count;
   Collision collision(view, ClipMotion<float>(playback),
-                      build_topologies(view, playback, {.width = 2, .leaf_size = 1}), count);
+                      build_topologies(view, playback, {.width = 2, .leaf_size = 1}), count,
+                      OverlapClock<float>::usual_look_ahead, avl);
   collision.reset(t);
   Auditor<float, Collision> auditor(collision, view);
   Random random(n);
@@ -317,7 +321,7 @@ TEST(SeparationListGeometry, ChangesAreLocal) {
 TEST(SeparationListEvents, EachKindHappensOftenInTheTestScenes) {
   Kinds all;
   for (const char* name : {"soups", "sheets", "plan_changes"}) {
-    const Kinds kinds = play<float, AvlEventQueue>(name, {.width = 2, .leaf_size = 1}, 1);
+    const Kinds kinds = play<float>(name, {.width = 2, .leaf_size = 1}, 1, avl);
     all.overlap += kinds.overlap;
     all.fathers += kinds.fathers;
     all.leaves += kinds.leaves;
@@ -333,12 +337,13 @@ TEST(SeparationListEvents, EachKindHappensOftenInTheTestScenes) {
 TEST(SeparationListFaults, MissedNotices) {
   const auto test = synthetic_scene<float>("sheets");
   const SceneView<float> view(test.scene);
-  using Collision = KineticCollision<float, AvlEventQueue, Silent>;
+  using Collision = KineticCollision<float, AnyEventQueue, Counting>;
   for (const std::uint64_t missed : {1u, 10u, 50u}) {  // every such notice
     Playback<float> playback(test.scene);
-    Silent count;
+    Counting count;
     Collision collision(view, ClipMotion<float>(playback),
-                        build_topologies(view, playback, {.width = 2, .leaf_size = 1}), count);
+                        build_topologies(view, playback, {.width = 2, .leaf_size = 1}), count,
+                        OverlapClock<float>::usual_look_ahead, avl);
     collision.reset(0);
     Auditor<float, Collision> auditor(collision, view);
     bool found = false;
