@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
+#include <set>
+#include <string>
 
 #include "core/contract/registry.hpp"
 #include "core/families/events/any_queue.hpp"
@@ -256,8 +258,9 @@ TEST(GeometryChange, KineticTreeRepairsLocally) {
 // ---- Queues
 // ------------------------------------------------------------------------------------------------
 
+/// Returns the number of comparisons.
 template <class Queue>
-void expect_growth_keeps_order(std::string_view kind = {}) {
+std::uint64_t expect_growth_keeps_order(std::string_view kind = {}) {
   const auto test = synthetic_scene<double>("soups");
   Playback<double> playback(test.scene);
   EventClock<double> clock({&playback.plans(0), &playback.plans(1)});
@@ -293,14 +296,20 @@ void expect_growth_keeps_order(std::string_view kind = {}) {
   }
   EXPECT_EQ(popped, order);
   EXPECT_GT(order.size(), 20u);
+  return queue.steps();
 }
 TEST(GeometryChange, QueuesGrow) {
-  expect_growth_keeps_order<AvlQueue<double>>();
-  expect_growth_keeps_order<BinaryHeapQueue<double>>();
-  expect_growth_keeps_order<SegmentHeapQueue<double>>();
-  for (const char* name :
-       {SegmentHeapQueue<double>::name, AvlQueue<double>::name, BinaryHeapQueue<double>::name})
-    expect_growth_keeps_order<AnyQueue<double>>(name);
+  const std::map<std::string, std::uint64_t> steps{
+      {SegmentHeapQueue<double>::name, expect_growth_keeps_order<SegmentHeapQueue<double>>()},
+      {AvlQueue<double>::name, expect_growth_keeps_order<AvlQueue<double>>()},
+      {BinaryHeapQueue<double>::name, expect_growth_keeps_order<BinaryHeapQueue<double>>()}};
+  // A queue whose kind was chosen compares as often as that kind, and all kinds differ.
+  std::set<std::uint64_t> different;
+  for (const auto& [kind, compared] : steps) {
+    EXPECT_EQ(expect_growth_keeps_order<AnyQueue<double>>(kind), compared) << kind;
+    different.insert(compared);
+  }
+  EXPECT_EQ(different.size(), steps.size());
 }
 
 }  // namespace
