@@ -28,9 +28,9 @@ class AnyEventQueue {
       : clock_(&clock), queue_(std::in_place_type<Segments>, clock, slots) {}
 
   /// Returns whether the kind of this name stores waiting events by segments.
-  static bool by_segments(std::string_view name) { return name == Segments::name; }
-  /// Chooses the kind by its name, once and before the first event. Without a choice the queue is a segment
-  /// heap.
+  static bool by_segments(std::string_view name) { return name.empty() || name == Segments::name; }
+  /// Chooses the kind by its name, once and before the first event. Without a choice, or with an empty name,
+  /// the queue is a segment heap.
   void choose(std::string_view name) {
     KBVH_ASSERT(segments() != nullptr && empty());
     const std::uint32_t wanted = slots();
@@ -139,6 +139,7 @@ class AnyEventQueue {
   std::variant<Segments, Avl, Heap> queue_;
 };
 
+/// The event queue of kinetic trees whose kind is chosen at run time.
 template <class S>
 using AnyQueue = AnyEventQueue<EventClock<S>>;
 

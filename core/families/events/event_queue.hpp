@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "core/base/counters.hpp"
@@ -25,6 +26,7 @@ namespace kbvh {
 /// Optional:
 ///   due(t)            whether the earliest event, if there is one, happens at or before t
 ///   split_at(times)   suggests times at which to divide the events
+///   choose(name)      chooses the kind of queue, before the first event (AnyEventQueue)
 /// `steps()` counts comparisons. Events and their order come from a clock: Clock::Event has a `slot`, and
 /// clock.earlier(a, b) orders by exact time first (EventClock, OverlapClock).
 
@@ -205,6 +207,16 @@ class BinaryHeapEventQueue {
   std::vector<std::uint32_t> heap_;
   std::uint64_t steps_ = 0;
 };
+
+/// Returns whether a queue stores waiting events by segments. `kind` names its kind, where it offers a
+/// choice.
+template <class Queue>
+bool stores_by_segments(std::string_view kind) {
+  if constexpr (requires { Queue::by_segments(kind); })
+    return Queue::by_segments(kind);
+  else
+    return Queue::look_ahead() > 0;
+}
 
 /// The event queues of kinetic trees.
 template <class S>

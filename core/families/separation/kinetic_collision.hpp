@@ -36,7 +36,7 @@ class KineticCollision {
         list_(scene, forest_, count, look_ahead,
               near_bodies_.searches() ? List::BodyPairs::none : List::BodyPairs::all, queue),
         number_of_(near_bodies_.searches() ? body_pairs_.size() : 0, List::none) {
-    if (!queue.empty()) forest_.choose_queue(queue);
+    forest_.choose_queue(queue);
     if constexpr (requires { forest_.queue().serve(*this); }) forest_.queue().serve(*this);
   }
   KineticCollision(const KineticCollision&) = delete;  // the trees point to `changed_` and `nodes_`

@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <string_view>
 #include <vector>
 
 #include "core/base/assert.hpp"
+#include "core/families/events/event_queue.hpp"
 #include "core/families/events/kinetic_forest.hpp"
 #include "core/families/separation/overlapping_leaves.hpp"
 #include "core/families/separation/pair_events.hpp"
@@ -71,12 +73,12 @@ class SeparationList {
   SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count, int look_ahead,
                  BodyPairs pairs, std::string_view queue = {})
       : tree_(forest_topologies(scene, forest), scene.pairs()),
-        outlook_(scene, forest, tree_, by_segments(queue) ? LookAhead::segment : LookAhead::pieces,
+        outlook_(scene, forest, tree_,
+                 stores_by_segments<Queue<OverlapClock<S>>>(queue) ? LookAhead::segment : LookAhead::pieces,
                  look_ahead),
         queue_(outlook_.clock(), 0),
         count_(&count) {
-    if constexpr (requires { queue_.choose(queue); })
-      if (!queue.empty()) queue_.choose(queue);
+    if constexpr (requires { queue_.choose(queue); }) queue_.choose(queue);
     if constexpr (requires { queue_.serve(*this); }) {
       queue_.split_at(forest.clock().keyframe_times());
       queue_.serve(*this);
@@ -292,14 +294,6 @@ class SeparationList {
  private:
   using State = typename PairOutlook<S>::State;
   using Outlook = typename PairOutlook<S>::Outlook;
-  /// Returns whether the queue stores waiting events by segments.
-  static bool by_segments(std::string_view name) {
-    using Chosen = Queue<OverlapClock<S>>;
-    if constexpr (requires { Chosen::by_segments(name); })
-      return name.empty() || Chosen::by_segments(name);
-    else
-      return Chosen::look_ahead() > 0;
-  }
 
   template <class Forest>
   static std::vector<const Topology*> forest_topologies(const SceneView<S>& scene, const Forest& forest) {
