@@ -52,8 +52,6 @@ set(KBVH_JUDGE_OPTIMISATION "" CACHE STRING
   "optimisation level of the rooms in which a comparison with brute force spends its time; empty: as all")
 set(kbvh_judging_rooms base geometry scene motion contract judge)
 set(kbvh_reading_rooms base contract)  # parameters are text
-# Rooms of the program that compute themselves.
-set(kbvh_computing_rooms scenes stress theory)
 
 # kbvh_room(NAME SOURCES file... [KERNELS file...] [USES room...]): the folder that calls it is a room, the library
 # kbvh_NAME. Its headers are staged alone, under the path that #include spells, so that a file sees the rooms that its
@@ -87,9 +85,7 @@ function(kbvh_room name)
     set(optimisation "")
     if(path MATCHES "^experiments/")
       set(kind program)
-      if(NOT name IN_LIST kbvh_computing_rooms)
-        set(optimisation ${KBVH_OUTER_OPTIMISATION})
-      endif()
+      set(optimisation ${KBVH_OUTER_OPTIMISATION})
     elseif(name IN_LIST kbvh_judging_rooms)
       set(optimisation ${KBVH_JUDGE_OPTIMISATION})
     endif()
