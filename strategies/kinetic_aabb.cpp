@@ -36,11 +36,7 @@ KBVH_STRATEGY(kinetic_aabb) {
       .positions = PositionUse::fetched,
       .declares = {.continuous = true, .time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
-      .parameters = {{"queue",
-                      "segment_heap",
-                      {"segment_heap", "avl", "binary_heap"},
-                      "event queue: lists by segment and a heap of what comes next, the paper's AVL tree, or "
-                      "an indexed binary heap"},
+      .parameters = {queue_parameter(),
                      {"query",
                       "rows",
                       {"rows", "nodes"},

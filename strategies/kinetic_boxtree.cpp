@@ -271,11 +271,7 @@ KBVH_STRATEGY(kinetic_boxtree) {
                    .time_budget = true},
       .topology = {.widths = {2}, .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 16}},
       .parameters =
-          {{"queue",
-            "segment_heap",
-            {"segment_heap", "avl", "binary_heap"},
-            "event queue: lists by segment and a heap of what comes next, the paper's AVL tree, or "
-            "an indexed binary heap"},
+          {queue_parameter(),
            {"planes",
             "clip",
             {"clip", "start"},

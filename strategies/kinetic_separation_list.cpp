@@ -331,11 +331,7 @@ KBVH_STRATEGY(kinetic_separation_list) {
       .positions = PositionUse::varying,
       .declares = {.continuous = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 16}},
-      .parameters = {{"queue",
-                      "segment_heap",
-                      {"segment_heap", "avl", "binary_heap"},
-                      "event queue: lists by segment and a heap of what comes next, the paper's AVL tree, or "
-                      "an indexed binary heap"},
+      .parameters = {queue_parameter(),
                      {"look_ahead",
                       "32",
                       {"1", "32", "1000000"},

@@ -34,7 +34,8 @@ BoxTreeReport prove(const TestScene<S>& test, const BoxTreePlay& play) {
 template <class S>
 BoxTreeReport prove_with_all_queues(const TestScene<S>& test, const BoxTreePlay& play) {
   const BoxTreeReport report = prove(test, play);
-  for (const char* queue : {BinaryHeapQueue<S>::name, SegmentHeapQueue<S>::name}) {
+  for (const std::string& queue : AnyQueue<S>::names()) {
+    if (queue == play.queue) continue;
     BoxTreePlay on_other = play;
     on_other.queue = queue;
     const BoxTreeReport other = BoxTreeProof<S, AnyQueue>::run(test, on_other);

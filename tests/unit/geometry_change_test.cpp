@@ -303,6 +303,7 @@ TEST(GeometryChange, QueuesGrow) {
       {SegmentHeapQueue<double>::name, expect_growth_keeps_order<SegmentHeapQueue<double>>()},
       {AvlQueue<double>::name, expect_growth_keeps_order<AvlQueue<double>>()},
       {BinaryHeapQueue<double>::name, expect_growth_keeps_order<BinaryHeapQueue<double>>()}};
+  EXPECT_EQ(steps.size(), AnyQueue<double>::names().size());
   // A queue whose kind was chosen compares as often as that kind, and all kinds differ.
   std::set<std::uint64_t> different;
   for (const auto& [kind, compared] : steps) {

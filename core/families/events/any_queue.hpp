@@ -1,25 +1,28 @@
 #pragma once
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "core/base/assert.hpp"
+#include "core/base/params.hpp"
 #include "core/families/events/event_queue.hpp"
 #include "core/families/events/segment_queue.hpp"
 
 namespace kbvh {
 
-/// An event queue (event_queue.hpp) whose kind is chosen at run time: a SegmentHeapEventQueue, an
-/// AvlEventQueue or a BinaryHeapEventQueue. Structures are compiled once for all of them. The operations of
-/// the segment heap are inlined behind one predictable branch; those of the others are calls.
+/// An event queue (event_queue.hpp) whose kind is chosen at run time among those that Queues lists.
+/// Structures are compiled once for all of them. The operations of the segment heap are inlined behind one
+/// predictable branch; those of the others are calls.
 template <class Clock>
 class AnyEventQueue {
   using Event = typename Clock::Event;
   using Segments = SegmentHeapEventQueue<Clock>;
-  using Avl = AvlEventQueue<Clock>;
-  using Heap = BinaryHeapEventQueue<Clock>;
+  using Queues = std::variant<Segments, AvlEventQueue<Clock>, BinaryHeapEventQueue<Clock>>;
   using Returned = decltype(std::declval<const Segments&>().top());
 
  public:
@@ -34,8 +37,15 @@ class AnyEventQueue {
   void choose(std::string_view name) {
     KBVH_ASSERT(segments() != nullptr && empty());
     const std::uint32_t wanted = slots();
-    if (name == Avl::name) queue_.template emplace<Avl>(*clock_, wanted);
-    if (name == Heap::name) queue_.template emplace<Heap>(*clock_, wanted);
+    for_each(std::type_identity<Queues>{}, [&]<class Queue>(std::type_identity<Queue>) {
+      if (name == Queue::name) queue_.template emplace<Queue>(*clock_, wanted);
+    });
+  }
+  /// Returns the names of all kinds, the default first.
+  static std::vector<std::string> names() {
+    std::vector<std::string> all;
+    for_each(std::type_identity<Queues>{}, [&]<class Queue>(std::type_identity<Queue>) { all.emplace_back(Queue::name); });
+    return all;
   }
 
   void schedule(const Event& event) {
@@ -129,18 +139,24 @@ class AnyEventQueue {
       return work(*queue);
     return on_other(queue_, work);
   }
-  template <class Queues, class Work>
-  [[gnu::noinline]] static decltype(auto) on_other(Queues& queues, const Work& work) {
-    if (auto* queue = std::get_if<Avl>(&queues)) return work(*queue);
-    return work(*std::get_if<Heap>(&queues));
+  template <class Held, class Work>
+  [[gnu::noinline]] static decltype(auto) on_other(Held& queues, const Work& work) {
+    return std::visit(work, queues);
+  }
+  template <class Work, class... Kinds>
+  static void for_each(std::type_identity<std::variant<Kinds...>>, const Work& work) {
+    (work(std::type_identity<Kinds>{}), ...);
   }
 
   const Clock* clock_;
-  std::variant<Segments, Avl, Heap> queue_;
+  Queues queue_;
 };
 
 /// The event queue of kinetic trees whose kind is chosen at run time.
 template <class S>
 using AnyQueue = AnyEventQueue<EventClock<S>>;
+
+/// Returns the parameter `queue` of a kinetic strategy: the name of its event queue's kind.
+Parameter queue_parameter();
 
 }  // namespace kbvh
