@@ -44,7 +44,8 @@ class AnyEventQueue {
   /// Returns the names of all kinds, the default first.
   static std::vector<std::string> names() {
     std::vector<std::string> all;
-    for_each(std::type_identity<Queues>{}, [&]<class Queue>(std::type_identity<Queue>) { all.emplace_back(Queue::name); });
+    for_each(std::type_identity<Queues>{},
+             [&]<class Queue>(std::type_identity<Queue>) { all.emplace_back(Queue::name); });
     return all;
   }
 
