@@ -36,6 +36,7 @@ class AnyEventQueue {
   /// the queue is a segment heap.
   void choose(std::string_view name) {
     KBVH_ASSERT(segments() != nullptr && empty());
+    if (by_segments(name)) return;  // it may have been divided already
     const std::uint32_t wanted = slots();
     for_each(std::type_identity<Queues>{}, [&]<class Queue>(std::type_identity<Queue>) {
       if (name == Queue::name) queue_.template emplace<Queue>(*clock_, wanted);
