@@ -1,13 +1,15 @@
 #pragma once
-// The shared part of both contestants of Bullet 3.24 (Coumans). Both are float, as in Debian's Bullet, and
-// accept float scenes only. btOptimizedBvh takes triangles, btDbvt boxes.
+// The shared part of both contestants of Bullet (Coumans). Both compute in float, as Debian's Bullet does,
+// and accept float scenes only. btOptimizedBvh takes triangles, btDbvt boxes.
 #include <LinearMath/btVector3.h>
 
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
+#include "instructions.hpp"
 
 #ifdef BT_USE_DOUBLE_PRECISION
 #error "these adapters are for Bullet in float"
@@ -90,7 +92,10 @@ inline Info info(const char* id, const char* title) {
   made.id = id;
   made.title = title;
   made.family = "bullet";
-  made.citation = "Coumans, Bullet 3.24";
+  made.citation = "Coumans, Bullet Physics";
+  made.version =
+      "Bullet " + std::to_string(btGetVersion() / 100) + "." + std::to_string(btGetVersion() % 100);
+  made.instructions = compiled_instructions();
   made.guarantee = Guarantee::candidate_superset;
   made.positions = PositionUse::all;
   made.topology.own = true;

@@ -1,25 +1,21 @@
-// Bullet's quantised triangle-mesh hierarchy (Coumans, Bullet 3.24) as a contestant: btOptimizedBvh, kept up
-// to date by refit().
+// Bullet's quantised hierarchy of a triangle mesh (Coumans) as a contestant: btOptimizedBvh, updated by
+// refit().
 //
-// - Without quantisation refit() silently does nothing, so the hierarchy is always quantised.
-// - refit() enlarges the quantised bounds by 1.0, whatever the unit. A mesh of a few centimetres is then a
-//   handful of
-//   cells wide and returns thousands of false pairs. By default the mesh's own scaling (setScaling) is
-//   therefore a power of two, which is exact, that makes the scene 32768 to 65536 units wide. `scale=none`
-//   shows the unscaled behaviour.
-// - All bodies are quantised in one grid, so that cells of different bodies can be compared. Quantisation is
-//   monotone;
-//   lower bounds go to even and upper ones to odd cells, so boxes that touch have cells that overlap: no pair
-//   is lost. The grid has a slack of 1/8. It is laid again, for all bodies, when the scene leaves it or
-//   shrinks to a quarter of it. Finding the scene's bounds is part of the update.
-// - Bullet's own query is a box against a tree (reportAabbOverlappingNodex): `query=primitives` runs it for
-//   each primitive
-//   of the smaller body. Its walk of two trees is not public. The default `query=trees` therefore descends
-//   both of Bullet's node arrays here, which is faster; the overlap test is Bullet's.
-// - A primitive index has 21 bits.
-// - A primitive of more than 3 vertices is passed as the triangle (lower, upper, first vertex), which has the
-//   polygon's
-//   box.
+// - The hierarchy is always quantised: without quantisation refit() does nothing, and does not say so.
+// - refit() enlarges the quantised bounds by 1.0, whatever the unit of the scene. A mesh of a few centimetres
+//   is then a handful of cells wide, and thousands of its pairs are false. By default the adapter therefore
+//   sets the mesh's own scaling (setScaling) to a power of two, which rounds nothing, so that the scene is
+//   32768 to 65536 units wide. `scale=none` shows Bullet without scaling.
+// - All bodies share one grid, so that cells of different bodies can be compared. Quantisation is monotone,
+//   lower bounds go to even cells and upper bounds to odd cells, so the cells of touching boxes overlap: no
+//   pair is lost. The grid extends 1/8 beyond the scene. The adapter lays it anew, for all bodies, when the
+//   scene leaves it or shrinks to a quarter of it. Finding the scene's bounds is part of the update.
+// - Bullet's own query is a box against a tree (reportAabbOverlappingNodex). `query=primitives` asks it for
+//   each primitive of the smaller body. Bullet's walk of two trees is not public. The default `query=trees`
+//   therefore descends both of Bullet's arrays of nodes here, which is faster; the overlap test is Bullet's.
+// - Bullet stores a primitive's index in 21 bits.
+// - The adapter passes a primitive of more than three vertices as the triangle (lower, upper, first vertex),
+//   which has the polygon's box.
 #include "bullet.hpp"
 
 #include <BulletCollision/CollisionShapes/btOptimizedBvh.h>

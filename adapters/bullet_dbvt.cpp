@@ -1,12 +1,12 @@
-// Bullet's dynamic tree (Coumans, Bullet 3.24) as a contestant: btDbvt with one leaf per primitive, tree by
-// optimizeTopDown(), queries by collideTT.
+// Bullet's dynamic tree (Coumans) as a contestant: btDbvt with one leaf per primitive, its tree made by
+// optimizeTopDown(), its queries by collideTT.
 //
-// - Bullet updates the tree leaf by leaf (`update=leaves`): each leaf is removed and inserted again, which
-//   also changes
-//   the tree. The default `update=refit` instead recomputes the volumes of all nodes, children first, by
-//   Bullet's Merge. That loop is not part of Bullet, but an order of magnitude faster. Boxes are tight in
+// - Bullet updates the tree leaf by leaf (`update=leaves`): it removes each leaf and inserts it again, which
+//   also changes the tree. The default `update=refit` instead recomputes the volumes of all nodes, children
+//   first, with Bullet's Merge. That loop is not part of Bullet, but ten times faster. Boxes are tight in
 //   both cases.
-// - The tree is first built by insertion: identical boxes make a list of it before it is optimised.
+// - Insertions build the first tree. Insertion makes a list of identical boxes, which optimizeTopDown()
+//   divides.
 #include "bullet.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btDbvt.h>

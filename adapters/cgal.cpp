@@ -1,4 +1,4 @@
-// CGAL's box intersection (Zomorodian & Edelsbrunner 2000; CGAL 5.5) as a contestant: no hierarchy is kept.
+// CGAL's box intersection (Zomorodian & Edelsbrunner 2000) as a contestant: no hierarchy is kept.
 // Each frame sorts and divides the boxes of single primitives along a segment tree that exists only as the
 // recursion, and scans short lists. CGAL's package for it may be used under the GPL 3 or a commercial
 // licence: a program linked with this contestant is under one of the two, and kbvh's own MIT licence applies
@@ -17,6 +17,7 @@
 // The update computes the boxes; the query is CGAL's. There is no hierarchy to audit, and no count of box
 // tests.
 #include <CGAL/box_intersection_d.h>
+#include <CGAL/version.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -26,6 +27,7 @@
 #include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/scene/self_pairs.hpp"
+#include "instructions.hpp"
 
 namespace kbvh {
 namespace {
@@ -159,7 +161,9 @@ KBVH_STRATEGY(cgal) {
   info.id = "cgal_box_intersection";
   info.title = "CGAL box intersection";
   info.family = "cgal";
-  info.citation = "Zomorodian & Edelsbrunner 2000 (CGAL 5.5, GPL 3 or commercial licence)";
+  info.citation = "Zomorodian & Edelsbrunner 2000 (CGAL, GPL 3 or commercial licence)";
+  info.version = "CGAL " CGAL_VERSION_STR;
+  info.instructions = compiled_instructions();
   info.tightness = Tightness::none;
   info.guarantee = Guarantee::candidate_superset;
   info.positions = PositionUse::all;

@@ -1,44 +1,50 @@
-// Embree 3.13 (Wald et al. 2014) as a contestant: one scene per body, refitted, and rtcCollide.
+// Embree 3 (Wald et al. 2014) as a contestant: one scene per body, refitted, and rtcCollide.
 //
-// Refit. RTC_BUILD_QUALITY_REFIT of a geometry is ignored (a full rebuild, 30 times dearer) unless its scene
-// is both RTC_BUILD_QUALITY_LOW and RTC_SCENE_FLAG_DYNAMIC. Any non-default tri_accel or object_accel of the
-// device disables it, too. Compact scenes refit fastest: their leaves hold indices, and only nodes are
-// written. Robust scenes, other instruction sets and vertices of 16 bytes gain nothing.
+// Refit. Embree refits a geometry of RTC_BUILD_QUALITY_REFIT only if its scene is both RTC_BUILD_QUALITY_LOW
+// and RTC_SCENE_FLAG_DYNAMIC; otherwise it rebuilds, which takes 30 times as long. Any non-default tri_accel
+// or object_accel of the device disables the refit, too. Robust scenes, other instruction sets and vertices
+// of 16 bytes gain nothing.
 //
 // Geometry. rtcCollide accepts user geometry only, and a refit of user geometry calls back for every
-// primitive. Embree refits triangle geometry by itself and faster, but cannot query it by rtcCollide. Hence
+// primitive. Embree refits triangle geometry by itself and faster, but rtcCollide does not accept it. Hence
 // the parameter `geometry`:
-// - user: the update refits user geometry and the query collides it: one hierarchy, and both times are
-//   Embree's.
-// - triangles: the update refits triangle geometry over shared buffers, which is Embree's fastest refit, but
-//   no query
-//   reads it. The query first refits user geometry: ITS TIME INCLUDES A SECOND REFIT AND MUST NOT BE QUOTED.
-//   Bodies with primitives other than triangles are given one triangle (lower, upper, lower) per primitive,
-//   which has the primitive's box; writing these triangles is part of their update.
+// - user: the update refits user geometry, and the query collides it. There is one hierarchy, and both times
+//   are Embree's.
+// - triangles: the update refits triangle geometry over shared buffers, which is Embree's fastest refit. No
+//   query of pairs reads it: the query first refits user geometry, so ITS TIME INCLUDES A SECOND REFIT AND
+//   MUST NOT BE QUOTED. A body with other primitives than triangles gets one triangle (lower, upper, lower)
+//   per primitive, which has the primitive's box; writing these triangles is part of the update.
+// Comparisons therefore take the update from `triangles`, and query and total from `user`. Rays read
+// triangles in either case.
+//
+// Layout. Compact scenes (`layout=compact`) refit fastest: their leaves hold indices, so a refit writes nodes
+// only. Embree's default scenes (`layout=default`) copy the triangles into the leaves, and answer rays
+// faster.
 //
 // Threads. A device that is made with a number of threads limits TBB in the whole process while it exists:
-// with one thread, every other contestant of a run would have one, too. The device is therefore made without
-// a number (threads=0), and every call is made within as many threads as the parameter asks for
+// with one thread, every other contestant of a run would have one, too. The adapter therefore makes the
+// device without a number (threads=0), and makes every call within as many threads as the parameter asks for
 // (LibraryThreads). rtcCollide calls back from all of them. Each thread collects pairs in a list of its own,
-// so their order differs from call to call; triangles are tested on the same number of kbvh's threads.
+// so the order of pairs differs from call to call. kbvh's threads, as many, test the triangles.
 //
-// Candidates. rtcCollide compares node boxes, and therefore the boxes of primitives with a leaf of their own.
-// For larger leaves it reports all pairs: these come several at a time, and are filtered by their boxes.
+// Candidates. rtcCollide compares the boxes of nodes, and so the box of each primitive that has a leaf of its
+// own. For larger leaves it reports all pairs, several at a time; the adapter filters these by the
+// primitives' boxes.
 //
-// Denormals. Embree flushes them. Denormal bounds are widened to the smallest normal number, so that flushing
-// cannot lose a pair. Bounds beyond 1.8e18, which Embree treats as invalid, are clamped. Both operations are
-// monotone, like flushing: boxes that touch still touch. kbvh's own test follows after the floating-point
-// state is restored. Upper bounds are an ulp or two larger, because Embree's builder asserts that the box of
-// all primitives is not a point.
+// Denormals. Embree flushes them. The adapter widens denormal bounds to the smallest normal number, so that
+// flushing cannot lose a pair, and clamps bounds beyond 1.8e18, which Embree treats as invalid. Both
+// operations are monotone, like flushing: boxes that touch still touch. kbvh's own test follows after the
+// floating-point state is restored. Upper bounds are an ulp or two larger, because Embree's builder asserts
+// that the box of all primitives is not a point.
 //
-// Rays. rtcIntersect1 and rtcOccluded1 on triangle geometry, body after body: the fan of each polygon in a
-// compact scene that is refitted like the others (with geometry=triangles and bodies of triangles, by the
-// update itself; otherwise at the first rays of a frame that enter the body, so the time of rays then
-// includes that refit). Bodies are entered front to back, and not at all behind the closest hit so far.
-// Embree decides in float without a bound on its error, and may miss rays through edges and corners: its
-// answers are Embree's own, marked approximate, and their differences from the truth are counted.
+// Rays. rtcIntersect1 and rtcOccluded1 on triangle geometry, body after body: the fans of all polygons in a
+// scene that is refitted like the others. With geometry=triangles and bodies of triangles the update itself
+// refits it. Otherwise the first ray of a frame that enters the body does, so the time of rays includes that
+// refit. Bodies are entered front to back, and not at all behind the closest hit so far. Embree decides in
+// float, with no bound on its error, and may miss rays through edges and corners: its answers are marked
+// approximate, and their differences from the truth are counted.
 //
-// The hierarchy is not visible, so there is no audit. Float scenes only.
+// Embree does not show its hierarchy, so there is no audit. Float scenes only.
 #include <Eigen/Core>
 #include <atomic>
 #include <cmath>
@@ -71,6 +77,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
               const Params& params)
       : CountedStrategy<S, Count>(scene, motion),
         refits_(params.word("geometry") == "triangles" ? Refits::triangles : Refits::boxes),
+        layout_(params.word("layout") == "compact" ? SceneLayout::compact : SceneLayout::usual),
         threads_(threads_of(params)),
         bodies_(scene.body_count()),
         near_bodies_(scene.pairs(), scene.body_count()) {
@@ -244,7 +251,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     state.only_triangles = true;
     for (std::uint32_t p = 0; p <= count; ++p)
       state.only_triangles = state.only_triangles && primitives.offsets[p] == 3 * p;
-    RTCGeometry geometry = state.boxes.make(device_.get(), RTC_GEOMETRY_TYPE_USER);
+    RTCGeometry geometry = state.boxes.make(device_.get(), RTC_GEOMETRY_TYPE_USER, layout_);
     rtcSetGeometryUserPrimitiveCount(geometry, count);
     rtcSetGeometryUserData(geometry, &state);
     rtcSetGeometryBoundsFunction(
@@ -252,7 +259,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     state.boxes.build();
     if (refits_ == Refits::boxes) return;
 
-    geometry = state.triangles.make(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
+    geometry = state.triangles.make(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE, layout_);
     const std::uint32_t* indices = primitives.vertices.data();
     if (!state.only_triangles) {
       state.own_vertices.resize(std::size_t(9) * count + 1);
@@ -321,7 +328,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     if (state.fans_are_triangles) return;
     const bool fresh = !state.own_fans.scene;
     if (fresh) {
-      RTCGeometry geometry = state.own_fans.make(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
+      RTCGeometry geometry = state.own_fans.make(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE, layout_);
       if (!state.only_triangles) list_fans(state);
       const auto& indices = state.only_triangles ? primitives.vertices : state.fan_indices;
       rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices.data(), 0,
@@ -451,6 +458,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   }
 
   Refits refits_;
+  SceneLayout layout_;
   LibraryThreads threads_;
   std::atomic<std::int64_t> memory_{0};  // must outlive the device
   DevicePointer device_;
@@ -470,7 +478,14 @@ KBVH_STRATEGY(embree) {
   info.id = "embree_refit";
   info.title = "Embree, refit";
   info.family = "embree";
-  info.citation = "Wald et al. 2014 (Embree 3.13)";
+  info.citation = "Wald et al. 2014";
+  const EmbreeFacts embree = embree_facts();
+  info.version = embree.version;
+  info.instructions = embree.instructions;
+  info.remark =
+      "its update at its best is that of geometry=triangles, which rtcCollide cannot query; its query and "
+      "total are "
+      "those of geometry=user, whose refit calls back for each primitive";
   info.tightness = Tightness::conservative;
   info.guarantee = Guarantee::candidate_superset;
   info.rays_guarantee = Guarantee::approximate;
@@ -483,6 +498,10 @@ KBVH_STRATEGY(embree) {
                       "geometry that the update refits: user geometry, which the query collides; or triangle "
                       "geometry, Embree's fastest refit, which Embree cannot collide: the query then refits "
                       "user geometry first, and its time must not be quoted"},
+                     {"layout",
+                      "compact",
+                      {"compact", "default"},
+                      "Embree's scene: compact refits fastest, its default answers rays faster"},
                      threads_parameter("positions, refit, query and triangle tests")};
   std::vector<StrategyEntry> entries;
   entries.push_back(make_entry<EmbreeRefit, Scalars::float_only>(std::move(info)));

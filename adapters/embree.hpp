@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <memory>
+#include <string>
 #include <type_traits>
 #if defined(__SSE__)
 #include <xmmintrin.h>
@@ -47,15 +48,40 @@ using DevicePointer = std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseD
 using ScenePointer = std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene>;
 using GeometryPointer = std::unique_ptr<std::remove_pointer_t<RTCGeometry>, ReleaseGeometry>;
 
+/// What the library states about itself.
+struct EmbreeFacts {
+  std::string version, instructions;
+};
+
+/// Asks a device of default configuration for the version of the library and for the widest instruction set
+/// that it runs here. An unknown version is empty.
+inline EmbreeFacts embree_facts() {
+  const KeepFloatingPointState keep;
+  const DevicePointer device(rtcNewDevice("threads=0,set_affinity=0"));
+  if (!device) return {};
+  const auto ask = [&](RTCDeviceProperty property) { return rtcGetDeviceProperty(device.get(), property); };
+  const auto number = [&](RTCDeviceProperty property) { return std::to_string(ask(property)); };
+  return {"Embree " + number(RTC_DEVICE_PROPERTY_VERSION_MAJOR) + "." +
+              number(RTC_DEVICE_PROPERTY_VERSION_MINOR) + "." + number(RTC_DEVICE_PROPERTY_VERSION_PATCH),
+          ask(RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0  ? "avx512"
+          : ask(RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0 ? "avx"
+                                                                : "sse"};
+}
+
+/// How a scene stores its leaves.
+enum class SceneLayout : std::uint8_t { compact, usual };
+
 /// A scene of one geometry that is refitted at each commit.
 struct RefitScene {
   ScenePointer scene;  // none for an empty body
   GeometryPointer geometry;
 
-  RTCGeometry make(RTCDevice device, RTCGeometryType type) {
+  RTCGeometry make(RTCDevice device, RTCGeometryType type, SceneLayout layout) {
     scene.reset(rtcNewScene(device));
     rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_LOW);
-    rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_COMPACT);
+    rtcSetSceneFlags(scene.get(), layout == SceneLayout::compact
+                                      ? RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_COMPACT
+                                      : RTC_SCENE_FLAG_DYNAMIC);
     geometry.reset(rtcNewGeometry(device, type));
     rtcSetGeometryBuildQuality(geometry.get(), RTC_BUILD_QUALITY_REFIT);
     return geometry.get();

@@ -1,33 +1,29 @@
-// FCL 0.7 (Pan et al. 2012) as contestants: its BVHModel of boxes or 18-DOPs and its mesh traversal, in float
+// FCL (Pan et al. 2012) as contestants: its BVHModel of boxes or of 18-DOPs and its mesh traversal, in float
 // and in double.
 //
 // How FCL is driven:
-// - Frames are passed by beginReplaceModel / endReplaceModel(refit, bottomup). begin/endUpdateModel would fit
-//   boxes to the
-//   previous and the current frame together: right for continuous tests, wrong for discrete ones.
-// - The traversal node is driven directly. fcl::collide() copies both models on every call.
-// - leafTesting only collects primitive ids; kbvh's exact test then confirms them, as for all contestants.
-//   The contestants
-//   `fcl_*_own_verdict` confirm with FCL's separating-axis test in floating point instead, so they are
-//   approximate. They confirm after the traversal, not within it, so that the two phases are timed
-//   separately.
-// - Copies of a model share splitter and fitter, so each body's model is created separately.
-// - FCL supports triangles only, one per leaf. A primitive of fewer vertices is a degenerate triangle. A
-//   primitive of more
-//   vertices is passed as the triangle (lower, upper, first vertex) over two vertices that follow the body's
-//   own. That triangle has the polygon's box, so leaves are primitives, points and control nets are answered,
-//   too, and no pair is reported twice. It favours FCL over fanning polygons, which would need more leaves.
-//   18-DOPs would need more than that triangle: `fcl_*_kdop18` fans polygons, drops repeated pairs, and takes
-//   no control nets.
-// - FCL rounds the sides of its 18-DOPs to nearest. Each is a sum of two coordinates, so that rounding is
-// monotone in the
-//   exact sum: what overlaps still overlaps, but a vertex may lie half a unit in the last place outside.
-//   Hence no audit.
-// - FCL's AABB overlap is closed, and its boxes are unions of vertices: tight, to the last bit.
-// - FCL recurses in its mean-split tree and in its traversal; the depth is bounded by the number of
-//   primitives, not by
-//   log n.
-// - The float version does not accept double scenes: rounding positions would lose pairs.
+// - Each frame is passed by beginReplaceModel and endReplaceModel(refit, bottomup). begin/endUpdateModel
+//   would fit boxes to the previous and the current frame together, which suits continuous tests only.
+// - The adapter drives FCL's traversal node itself, because fcl::collide() copies both models on every call.
+// - leafTesting only collects primitive ids. kbvh's exact test confirms them, as for all contestants. The
+//   contestants `fcl_*_own_verdict` confirm with FCL's separating-axis test in floating point instead, so
+//   they are approximate. They confirm after the traversal, not within it, so that both phases have their own
+//   times.
+// - Copies of a model share splitter and fitter, so the adapter creates the model of each body separately.
+// - FCL takes triangles only, one per leaf. The adapter passes a primitive of fewer vertices as a degenerate
+//   triangle, and a primitive of more vertices as the triangle (lower, upper, first vertex) over two vertices
+//   that follow the body's own. That triangle has the polygon's box, so a leaf is a primitive, points and
+//   control nets are answered, and no pair is reported twice. Fans of polygons would need more leaves: this
+//   choice favours FCL. An 18-DOP does not follow from that triangle, so `fcl_*_kdop18` fans polygons, drops
+//   repeated pairs, and takes no control nets.
+// - FCL rounds the sides of its 18-DOPs to nearest. Each side is a sum of two coordinates, and its rounding
+//   is monotone in the exact sum: bodies that overlap still overlap, but a vertex may lie half a unit in the
+//   last place outside of its 18-DOP. Hence there is no audit of 18-DOPs.
+// - FCL's test of two AABBs is closed, and its AABBs are unions of vertices: they are tight to the last bit.
+// - FCL recurses in its mean-split tree and in its traversal. The number of primitives bounds the depth, not
+//   its logarithm.
+// - The float version does not accept double scenes: rounding the positions would lose pairs.
+#include <fcl/config.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/bv/AABB.h>
 #include <fcl/math/bv/kDOP.h>
@@ -44,6 +40,7 @@
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/lane_box.hpp"
+#include "instructions.hpp"
 
 namespace kbvh {
 namespace {
@@ -386,7 +383,9 @@ StrategyEntry entry(const std::string& name, const std::string& title) {
   info.id = "fcl_" + info.own_scalar + "_" + name;
   info.title = "FCL " + info.own_scalar + ", " + title;
   info.family = "fcl";
-  info.citation = "Pan, Chitta & Manocha 2012 (FCL 0.7)";
+  info.citation = "Pan, Chitta & Manocha 2012";
+  info.version = "FCL " FCL_VERSION;
+  info.instructions = compiled_instructions();
   info.tightness = boxes ? Tightness::tight : Tightness::none;
   if (!boxes) info.primitives = {PrimitiveKind::polygons, PrimitiveKind::points};
   info.guarantee = verdict == Verdict::own ? Guarantee::approximate : Guarantee::candidate_superset;

@@ -43,11 +43,22 @@ def times_of(study: Study, run: int, scope: str) -> np.ndarray:
     return study.times(SCOPES[scope]).get(run, np.empty(0))
 
 
-def best_refit(study: Study, group: pd.DataFrame, scope: str) -> Optional[int]:
-    """Returns the run of the fastest verified baseline of a group, by the median over repetitions; None without one."""
+def clip_total(study: Study, run: int) -> float:
+    """Returns the time of a run's whole clip, in ms per frame, by which the best refit is chosen: the median over repetitions of all
+    phases. The evaluation of positions counts: some baselines fetch them in their own phases. `clip_total` of
+    experiments/results/table.hpp and `clipTotal` of the explorer are the same number; tests compare the choices.
+    """
+    return float(np.median(times_of(study, run, "with_motion")))
+
+
+def best_refit(study: Study, group: pd.DataFrame) -> Optional[int]:
+    """Returns the run of the verified baseline of a group with the smallest `clip_total`, the first of equal ones; None without one.
+
+    It is the one denominator of the group: its phases are the denominators of ratios of phases.
+    """
     refits = group[group["baseline"] & (group["guarantee"] != "approximate") & (group["refused"] == "")]
-    medians = {int(run): float(np.median(times_of(study, int(run), scope))) for run in refits["run"]}
-    return min(medians, key=lambda run: (medians[run], run)) if medians else None
+    totals = {int(run): clip_total(study, int(run)) for run in refits["run"]}
+    return min(totals, key=lambda run: (totals[run], run)) if totals else None
 
 
 def ratio(study: Study, run: int, reference: int, scope: str) -> Optional[Ratio]:
@@ -127,7 +138,7 @@ def ratios(study: Study, scope: str) -> dict[int, Ratio]:
     """Returns ratios of all timed runs to the best refit of the same group, commit and state of the tree."""
     result: dict[int, Ratio] = {}
     for _, group in study.timed.groupby(["group", "commit", "dirty"]):
-        reference = best_refit(study, group, scope)
+        reference = best_refit(study, group)
         if reference is None:
             continue
         for run in group["run"]:
@@ -163,9 +174,9 @@ def fastest_configurations(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def best_refit_line(rows: pd.DataFrame, column: str, x: str) -> Optional[pd.Series]:
-    """Returns the smallest time of any baseline at each x."""
-    refits = rows[rows["baseline"] & (rows["guarantee"] != "approximate")]
-    best = refits.groupby(x)[column].min()
+    """Returns the time of the best refit at each x: of the baseline whose clip takes the shortest time."""
+    refits = rows[rows["baseline"] & (rows["guarantee"] != "approximate")].sort_values(["total_motion", "run"])
+    best = refits.drop_duplicates(x).set_index(x)[column].sort_index()
     best = best[best > 0]
     return best if len(best) else None
 

@@ -7,15 +7,15 @@ from typing import Any
 
 import pandas as pd
 
-#: The end of a scene's name that tells what was asked instead of pairs at frames.
-ANSWER = re.compile(r"( \((contacts|changes of (candidates|pairs)|(in)?coherent rays(, any)?)\))?$")
+#: The end of a scene's name that tells what was asked instead of pairs at frames, and the kernels that a study holds kbvh to.
+ANSWER = re.compile(r"( \((contacts|changes of (candidates|pairs)|(in)?coherent rays(, any)?|\w+ kernels)\))*$")
 
 
 def family(name: str, bodies: Any) -> str:
     """Removes the numbers of primitives from a scene's name, so that its sizes belong together.
 
     `tablecloth-2048-200` is `tablecloth` if its bodies have 2048 and 200 primitives. The kind of answer stays: "(contacts)",
-    "(changes of pairs)", "(coherent rays)".
+    "(changes of pairs)", "(coherent rays)", "(sse kernels)".
     """
     answer = ANSWER.search(name)[0]
     name = name.removesuffix(answer)

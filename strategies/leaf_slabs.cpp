@@ -5,13 +5,11 @@
 // thin: of surfaces that lie on each other, as cloth does on a body, hardly a pair is left, and of surfaces
 // that cross, those near the curve of intersection. Slabs are made where a query needs them, which costs two
 // thirds as much as the boxes of a leaf's triangles. Needs no foresight; bodies that are not made of
-// triangles are queried by boxes.
+// triangles are queried by boxes. It is a declared baseline: it refits, and knows nothing of the future.
 //
-// When it wins: with exact tests and without interpolation (l = 1), against `bottom_up`: 2.3 to 2.9 times on
-// a recorded tablecloth and a dancer's skirt, 1.5 on garments of 65k triangles, 1.2 to 1.6 on five captured
-// or animated figures with a sphere in them (Zen 5, float). It gains least on a tablecloth of 65k triangles
-// that cuts into its table (1.06 to 1.17) and on a morph stress test (1.03 to 1.08), whose leaves are rough.
-// Update and candidates alone take 0.5 to 1.2 of the refit's time.
+// When it wins: with exact tests and without interpolation (l = 1). By plan `motion` (e1bc2ef, Intel Xeon,
+// float) it is 0.9 to 2.3 times as fast as `bottom_up`: most on a dancer's skirt and a recorded tablecloth,
+// least on a morph stress test, whose leaves are rough.
 #include "core/contract/registry.hpp"
 #include "core/families/slabs/slab_query.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
@@ -127,6 +125,7 @@ KBVH_STRATEGY(leaf_slabs) {
       .title = "refit with slabs at the leaves",
       .family = "refit",
       .citation = "kbvh; slabs after Kay & Kajiya 1986",
+      .baseline = true,
       .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
   })};

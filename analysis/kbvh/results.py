@@ -63,7 +63,8 @@ class Results:
 
     def ratios(self, against: Optional[str] = None, measure: str = "with_motion") -> pd.DataFrame:
         """Returns how many times as fast each timed run is as a reference that was measured with it, on the same scene, in the same
-        scalar, at the same l: the best refit, or the fastest run of the strategy `against`. Above 1 is faster than the reference.
+        scalar, at the same l: the best refit, or the fastest run of the strategy `against`, both by the time of the whole clip, whatever
+        the measure. Above 1 is faster than the reference.
 
         `ratio` is the median over repetitions, `low` and `high` are the ends of its 95 % interval (an exact bootstrap over
         repetitions; nan for a single one), `paired` says whether repetitions ran next to each other, `reference` is the
@@ -76,7 +77,7 @@ class Results:
         rows = []
         for _, group in self._study.timed.groupby(["group", "commit", "dirty"], sort=False):
             mine = group if against is None else group[group["id"] == against].assign(baseline=True, guarantee="")
-            reference = rules.best_refit(self._study, mine, measure)
+            reference = rules.best_refit(self._study, mine)
             if reference is None:
                 continue
             theirs = rules.times_of(self._study, reference, measure)

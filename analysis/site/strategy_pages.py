@@ -105,7 +105,7 @@ def page(
     rows: list[list[object]] = [
         ["source", f"`{source_of(root, info['id'])}`"],
         ["publication", info["citation"]],
-        ["family", info["family"] + (" (a baseline: ratios are against the fastest of these)" if info["baseline"] else "")],
+        ["family", info["family"] + (" (a baseline: ratios are against the one of these with the shortest clip)" if info["baseline"] else "")],
         ["foresight", info["foresight"].replace("_", " ")],
         ["guarantee", info["guarantee"].replace("_", " ")],
         ["bounds", "no declared tightness" if info["tightness"] == "none" else info["tightness"]],

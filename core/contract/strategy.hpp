@@ -81,7 +81,8 @@ struct Info {
   std::string
       family;  ///< decides colour and marker: refit, kinetic, rebuild, oracle, fcl, bullet, embree, ...
   std::string citation;  ///< the publication that the strategy implements
-  /// Marks a baseline: ratios are against the fastest verified baseline of a table.
+  /// Marks a baseline. Ratios are against the best refit of a table: the verified baseline with the smallest
+  /// time of the whole clip. Every strategy of family refit without foresight is a baseline (tested).
   bool baseline = false;
   Tightness tightness = Tightness::tight;
   Guarantee guarantee = Guarantee::exact;
@@ -102,6 +103,13 @@ struct Info {
   /// Calls a peer library's own, uncertified test of two moving features (core/continuous/impact.hpp) and
   /// returns whether it reports contact. `kbvh ccd` compares it with the exact test. Null: there is none.
   bool (*own_impact)(Contact::Kind kind, const MovingPoints& points) = nullptr;
+  /// The version of a peer library, as the library states it; empty for strategies of kbvh.
+  std::string version{};
+  /// The instruction set of a peer library's code ("sse2", "avx512"); empty for strategies that run kbvh's
+  /// kernels, whose set is chosen at run time (core/kernels/kernel_set.hpp).
+  std::string instructions{};
+  /// A sentence that tables print with the times of this contestant; empty for most.
+  std::string remark{};
   // Filled in by the registration from the class:
   Capabilities can{};
   Foresight foresight = Foresight::none;

@@ -177,7 +177,7 @@ struct WorldStrategy {
   bool has_float32 = false, has_float64 = false;
   std::vector<std::uint32_t> widths;  ///< of the nodes of the trees that it takes; empty if it builds its own
   std::vector<WorldParameter> parameters;
-  bool baseline = false;                ///< ratios are against the fastest baseline
+  bool baseline = false;                ///< a candidate for the best refit, the denominator of ratios
   std::string guarantee, tightness;     ///< exact, candidate_superset, approximate; tight, conservative, none
   std::vector<std::string> abilities;   ///< events, plan_changes, geometry_changes, spans, self_pairs, ...
   std::vector<std::string> primitives;  ///< polygons, points, control_nets

@@ -91,6 +91,9 @@ json strategy_json(const Info& info) {
                                                                  : "varying"},
           {"scalars", scalars_of(info)},
           {"own_scalar", info.own_scalar},
+          {"version", info.version},
+          {"instructions", info.instructions},
+          {"remark", info.remark},
           {"capabilities", capabilities_of(info)},
           {"primitives", primitives_of(info)},
           {"parameters", parameters},
@@ -137,6 +140,8 @@ void print_strategy(const Info& info) {
                                                     : std::string(word(info.tightness)) + " bounds",
                   word(info.guarantee), joined(scalars_of(info), " and "),
                   info.own_scalar.empty() ? "" : ", keeps bounds in " + info.own_scalar);
+  if (!info.version.empty()) text += "    " + info.version + ", instructions " + info.instructions + "\n";
+  if (!info.remark.empty()) text += wrapped(info.remark, "    ");
   if (info.topology.own)
     text += "    builds its own hierarchy\n";
   else
@@ -144,7 +149,7 @@ void print_strategy(const Info& info) {
                         name(info.topology.preferred.method), info.topology.preferred.width,
                         info.topology.preferred.leaf_size);
   if (const auto words = capabilities_of(info); !words.empty()) text += "    can: " + joined(words) + "\n";
-  if (info.baseline) text += "    a baseline: ratios are against the fastest one\n";
+  if (info.baseline) text += "    a baseline: ratios are against the one with the shortest clip\n";
   if (const auto words = primitives_of(info); words.size() < 3)
     text += "    takes only " + joined(words, " and ") + "\n";
   if (info.max_primitive_pairs > 0)

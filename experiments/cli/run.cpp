@@ -178,6 +178,8 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
       add_text(command, "--rays", o->rays,
                "ask for rays instead of pairs: coherent or incoherent, then :count and :any, as in "
                "incoherent:10000:any"),
+      add_text(command, "--kernels", o->kernels,
+               "hold kbvh to an instruction set: portable, sse, avx2, avx512 (the widest that runs here)"),
       command.add_flag(
           "--self", o->self,
           "also find pairs within every body, of primitives that share no vertex; of one body: self=true"),
@@ -254,6 +256,7 @@ json plan_of(const StudyOptions& options) {
   if (options.continuous) plan["continuous"] = true;
   if (!options.changes.empty()) plan["changes"] = options.changes;
   if (!options.rays.empty()) plan["rays"] = options.rays;
+  if (!options.kernels.empty()) plan["kernels"] = options.kernels;
   set_common(plan, options);
   return plan;
 }

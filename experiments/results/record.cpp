@@ -91,8 +91,7 @@ json again_record(const json& scene_object, const json& scene, const json& strat
             {"repetitions", study.repetitions},
             {"oracle_every", study.oracle_every}};
   if (study.frames_limit > 0) plan["frames_limit"] = study.frames_limit;
-  if (study.continuous) plan["continuous"] = true;
-  if (study.changes) plan["changes"] = answer_word(*study.changes);
+  plan.update(asked_of(study));
   return plan;
 }
 
@@ -116,9 +115,7 @@ std::string configuration_key(Harness harness, const std::string& program, const
            {"machine",
             {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
              machine.at("kernels")}}};
-  if (study.continuous) all["continuous"] = true;
-  if (study.changes) all["changes"] = answer_word(*study.changes);
-  if (study.rays) all["rays"] = text_of(*study.rays);
+  all.update(asked_of(study));
   if (scene.contains("script")) all["script"] = scene.at("script").at("hash");
   return hexadecimal(hash_of(all.dump()));
 }

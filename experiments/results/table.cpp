@@ -116,13 +116,30 @@ bool is_baseline(const json& record) {
   return declared == strategy.end() ? strategy.at("family") == "refit" : declared->get<bool>();
 }
 
-const json* best_refit(const std::vector<json>& records) {
+double clip_total(const json& record) {
+  return median_phase(record, "total_with_motion");
+}
+
+const json* shortest_clip(const std::vector<const json*>& records) {
   const json* best = nullptr;
-  for (const json& record : records) {
-    if (!is_baseline(record) || !has_times(record)) continue;
-    if (best == nullptr || median_phase(record, "total") < median_phase(*best, "total")) best = &record;
-  }
+  for (const json* record : records)
+    if (has_times(*record) && (best == nullptr || clip_total(*record) < clip_total(*best))) best = record;
   return best;
+}
+
+const json* best_refit(const std::vector<json>& records) {
+  std::vector<const json*> baselines;
+  for (const json& record : records)
+    if (is_baseline(record)) baselines.push_back(&record);
+  return shortest_clip(baselines);
+}
+
+std::string instructions_of(const json& record) {
+  const json& strategy = record.at("strategy");
+  if (const std::string own = strategy.value("instructions", ""); !own.empty()) return own;
+  const std::string chosen = strategy.value("params", json::object()).value("kernels", "auto");
+  if (chosen != "auto") return chosen;
+  return record.value("machine", json::object()).value("kernels", "-");
 }
 
 std::string results_table(const std::vector<json>& records) {
@@ -153,10 +170,12 @@ std::string results_table(const std::vector<json>& records) {
                           kind == "points" ? "points" : "control nets");
   const bool as_changes = scene.contains("changes");
   if (as_changes) head.push_back("changes");
+  head.push_back("code");
   for (const char* column : {"x refit", "with motion", "missed", "extra", "protrusion", "looseness"})
     head.push_back(column);
   std::vector<std::vector<std::string>> rows{head};
   std::string refusals, choices, counted_by;
+  std::vector<std::string> peers;
   for (const json& record : records) {
     const json& verified = record.at("verified");
     const std::string label = record.at("strategy").at("label").get<std::string>();
@@ -164,6 +183,7 @@ std::string results_table(const std::vector<json>& records) {
     if (has_times(record)) {
       for (const char* phase : phases) row.push_back(milliseconds(median_phase(record, phase)));
       if (as_changes) row.push_back(changes_per_frame(record));
+      row.push_back(instructions_of(record));
       for (const char* phase : {"total", "total_with_motion"})
         row.push_back(refit == nullptr
                           ? "-"
@@ -181,10 +201,21 @@ std::string results_table(const std::vector<json>& records) {
     rows.push_back(std::move(row));
     if (const std::string own = own_counters(record); !own.empty())
       counted_by += "  " + label + " counted " + own + "\n";
+    const json& strategy = record.at("strategy");
+    if (std::string peer = strategy.value("version", ""); !peer.empty()) {
+      peer = "  " + strategy.at("id").get<std::string>() + " is " + peer;
+      if (const std::string remark = strategy.value("remark", ""); !remark.empty()) peer += ": " + remark;
+      if (std::find(peers.begin(), peers.end(), peer) == peers.end()) peers.push_back(peer);
+    }
     if (record.contains("choice"))
       choices += "  " + label + " chose " + record.at("choice").get<std::string>() + "\n";
   }
-  text += columns(rows) + refusals + choices + counted_by;
+  text += columns(rows);
+  if (refit != nullptr)
+    text += "  x refit and with motion: against " + refit->at("strategy").at("label").get<std::string>() +
+            ", the baseline with the shortest clip\n";
+  for (const std::string& peer : peers) text += peer + "\n";
+  text += refusals + choices + counted_by;
   std::set<std::string> runs;
   for (const json& record : records) runs.insert(record.value("run", std::string()));
   if (runs.size() > 1) text += "  (from several runs: the machine may have differed)\n";

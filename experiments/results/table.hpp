@@ -25,12 +25,28 @@ double median_phase(const nlohmann::json& record, const std::string& phase);
 /// are classified by the family "refit".
 bool is_baseline(const nlohmann::json& record);
 
-/// Returns the fastest verified baseline by update + query among the records, or nullptr.
+/// Returns the time of the contestant's whole clip, in ms per frame, by which the best refit and the best of
+/// several configurations are chosen: the median over repetitions of all phases. The evaluation of positions
+/// counts: some baselines fetch them in their own phases. The record must have times. `clip_total` of
+/// analysis/ratios.py is the same number; tests compare the choices.
+double clip_total(const nlohmann::json& record);
+
+/// Returns the record with the smallest `clip_total`, the first of equal ones; nullptr if none has times.
+const nlohmann::json* shortest_clip(const std::vector<const nlohmann::json*>& records);
+
+/// Returns the best refit among the records of one table: the verified baseline with the smallest
+/// `clip_total`, or nullptr. It is the one denominator of the table: its phases are the denominators of
+/// ratios of phases.
 const nlohmann::json* best_refit(const std::vector<nlohmann::json>& records);
 
+/// Returns the instruction set of the contestant's code: that of a peer library, of the parameter `kernels`,
+/// or of the kernels in use; "-" in records that do not tell.
+std::string instructions_of(const nlohmann::json& record);
+
 /// Formats the table that `run` and `bench` print for records of one scene, l and scalar: times in ms per
-/// frame (medians over repetitions), speed relative to the best refit (above 1 is faster) without and with
-/// motion evaluation, and the results of the verification.
+/// frame (medians over repetitions), the instruction set, speed relative to the best refit (above 1 is
+/// faster) without and with motion evaluation, and the results of the verification. Below it stand the
+/// versions of peer libraries, with a remark about their times.
 std::string results_table(const std::vector<nlohmann::json>& records);
 
 }  // namespace kbvh::experiments

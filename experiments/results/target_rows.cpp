@@ -21,7 +21,7 @@ namespace {
 
 /// The result of a selector in one table.
 struct Side {
-  const json* record = nullptr;  ///< of the fastest configuration
+  const json* record = nullptr;  ///< of the configuration whose clip takes the shortest time
   std::vector<double> times;     ///< of its repetitions, ms per frame
   double middle = 0;
   std::string missing;  ///< why there is none
@@ -30,27 +30,26 @@ struct Side {
 Side side_of(const TargetSelector& selector, const std::vector<json>& records) {
   Side side;
   std::string refused;
+  std::vector<const json*> matching;
   for (const json& record : records) {
     if (!matches(selector, record.at("strategy"))) continue;
-    const std::string label = record.at("strategy").at("label").get<std::string>();
-    if (!has_times(record)) {
-      refused = label + " is refused a time: " + record.value("refused", std::string());
-      continue;
-    }
-    std::vector<double> times = phase_values(record, selector.phase);
-    const double middle = median(times);
-    if (side.record != nullptr && middle >= side.middle) continue;
-    side.record = &record;
-    side.times = std::move(times);
-    side.middle = middle;
-    side.missing = middle > 0 ? "" : label + " spends no time in '" + selector.phase + "'";
+    matching.push_back(&record);
+    if (!has_times(record))
+      refused = record.at("strategy").at("label").get<std::string>() +
+                " is refused a time: " + record.value("refused", std::string());
   }
+  side.record = shortest_clip(matching);
   if (side.record == nullptr) {
-    side.missing = !refused.empty() ? refused
-                   : known_strategy(selector.strategy) == nullptr
-                       ? "this program was built without " + selector.strategy
-                       : described(selector) + " takes no part";
+    side.missing = !refused.empty()      ? refused
+                   : !is_known(selector) ? "this program was built without " + selector.strategy
+                                         : described(selector) + " takes no part";
+    return side;
   }
+  side.times = phase_values(*side.record, selector.phase);
+  side.middle = median(side.times);
+  if (side.middle <= 0)
+    side.missing = side.record->at("strategy").at("label").get<std::string>() + " spends no time in '" +
+                   selector.phase + "'";
   return side;
 }
 
@@ -310,6 +309,8 @@ std::string targets_table(const json& rows) {
     summary.push_back({what, number_text(row.at("measured")), interval_text(row.at("confidence_interval")),
                        number_text(row.at("at_least")), number_text(row.at("aim")), verdict_text(row),
                        scene_text(row)});
+    if (const std::string note = row.value("note", ""); !note.empty())
+      reasons += "  " + what + ": " + note + "\n";
     if (row.contains("reason"))
       reasons += "  " + what + ": not measured: " + row.at("reason").get<std::string>() + "\n";
     several_runs = several_runs || (row.contains("runs") && row.at("runs").size() > 1);

@@ -107,15 +107,14 @@ std::vector<Job> jobs_of(const Plan& plan, std::vector<std::string>& notes) {
           job.per_keyframe = l;
           job.configurations = contestants.size();
           job.threads = threads_of(contestants);
-          const std::string asked = study.changes ? answer_word(*study.changes) : "";
-          const std::string rays = study.rays ? text_of(*study.rays) : "";
           job.id = id_of(name_of(spec) + "-" + scalar +
                              (study.continuous ? "-contacts" : "-l" + std::to_string(l)) +
                              (study.changes ? "-changes"
                               : study.rays  ? "-rays"
-                                            : ""),
+                                            : "") +
+                             (study.kernels ? "-" + std::string(name(*study.kernels)) : ""),
                          {job.scene, scalar, l, study.repetitions, study.frames_limit, study.oracle_every,
-                          study.continuous, asked, rays, content_of(contestants)});
+                          asked_of(study), content_of(contestants)});
           if (known.insert(job.id).second) jobs.push_back(std::move(job));
         }
     }

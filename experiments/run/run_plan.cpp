@@ -80,6 +80,41 @@ class Runner {
   }
 
   void study(const Study& study, const std::vector<ContestantSpec>& contestants) {
+    const KernelSet usual = active_kernel_set();
+    const auto restore = [&] {
+      use_kernel_set(usual);
+      machine_["kernels"] = name(usual);
+    };
+    if (study.kernels) {
+      try {
+        use_kernel_set(*study.kernels);
+      } catch (const std::invalid_argument& problem) {
+        note("note: the study '" + study.name + "' is skipped: " + problem.what());
+        return;
+      }
+      machine_["kernels"] = name(*study.kernels);
+    }
+    try {
+      scenes(study, contestants);
+    } catch (...) {
+      restore();
+      throw;
+    }
+    restore();
+  }
+
+  /// Compares the measurements with the plan's targets.
+  void targets(const Plan& plan) {
+    if (plan.targets.empty()) return;
+    const json rows = target_rows(plan, groups_);
+    print(targets_table(rows) + "\n");
+    if (store_) write_targets(store_->folder(), rows);
+  }
+
+  StudyOutcome outcome() const { return outcome_; }
+
+ private:
+  void scenes(const Study& study, const std::vector<ContestantSpec>& contestants) {
     for (const SceneSpec& spec : study.scenes) {
       if (spec.optional) {
         if (const std::string missing = missing_file(spec); !missing.empty()) {
@@ -103,17 +138,6 @@ class Runner {
     }
   }
 
-  /// Compares the measurements with the plan's targets.
-  void targets(const Plan& plan) {
-    if (plan.targets.empty()) return;
-    const json rows = target_rows(plan, groups_);
-    print(targets_table(rows) + "\n");
-    if (store_) write_targets(store_->folder(), rows);
-  }
-
-  StudyOutcome outcome() const { return outcome_; }
-
- private:
   void note(const std::string& text) {
     progress_.clear();
     if (said_.insert(text).second) say(text);
@@ -173,9 +197,10 @@ class Runner {
              const Scene<S>& scene, const PlanScript<S>& script, Oracle<S>& oracle, std::uint32_t l,
              const std::vector<double>& frames) {
     json about_scene = scene_record(scene, loaded, l, frames, script);
+    about_scene["name"] = scene.name + suffix_of(study);
     if (study.changes) {
       about_scene["changes"] = answer_word(*study.changes);
-      about_scene["name"] = name_with_changes(scene.name, answer_word(*study.changes));
+      about_scene["name"] = name_with_changes(scene.name + suffix_of(study), answer_word(*study.changes));
     }
     const std::string title = about_scene["name"].get<std::string>() + ", l = " + std::to_string(l);
     if (l > 1 && study.oracle_every % l == 0)
@@ -193,11 +218,11 @@ class Runner {
                  const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script,
                  std::uint32_t l, const std::vector<double>& frames) {
     json about_scene = scene_record(scene, loaded, l, frames, script);
-    about_scene["name"] = scene.name + suffix_of(*study.rays);
+    about_scene["name"] = scene.name + suffix_of(study);
     about_scene["rays"] = text_of(*study.rays);
     RayMeasurement<S> measurement(scene, frames, *study.rays, script.empty() ? nullptr : &script);
     measure_all(study, contestants, loaded, about_scene,
-                scene.name + ", l = " + std::to_string(l) + suffix_of(*study.rays), measurement,
+                scene.name + ", l = " + std::to_string(l) + suffix_of(study), measurement,
                 [&](const Info& info) -> std::string {
                   if (!info.can.rays) return "answers no rays";
                   return unsuitable(info, scene, script);
@@ -225,7 +250,7 @@ class Runner {
     ContactMeasurement<S> measurement(scene, knots, script.empty() ? nullptr : &script);
     json about_scene = scene_record(scene, loaded, 1, std::span<const double>(knots), script);
     about_scene["frames"] = knots.size() - 1;
-    about_scene["name"] = scene.name + " (contacts)";
+    about_scene["name"] = scene.name + suffix_of(study) + " (contacts)";
     about_scene["continuous"] = true;
     measure_all(study, contestants, loaded, about_scene, scene.name + ", contacts", measurement,
                 [&](const Info& info) -> std::string {

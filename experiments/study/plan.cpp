@@ -126,6 +126,13 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
       keys.fail("rays", problem.what());
     }
   }
+  if (const auto kernels = keys.word("kernels")) {
+    try {
+      study.kernels = kernel_set(*kernels);
+    } catch (const std::invalid_argument& problem) {
+      keys.fail("kernels", problem.what());
+    }
+  }
   if (study.rays && (study.continuous || study.changes))
     keys.fail("rays", "a study asks for one of rays, contacts and changes");
   if (const auto every = keys.whole("oracle_every", ranges::positive)) study.oracle_every = *every;
@@ -135,6 +142,20 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
 
 const char* answer_word(Answer answer) {
   return answer == Answer::candidates ? "candidates" : "pairs";
+}
+
+json asked_of(const Study& study) {
+  json asked = json::object();
+  if (study.continuous) asked["continuous"] = true;
+  if (study.changes) asked["changes"] = answer_word(*study.changes);
+  if (study.rays) asked["rays"] = text_of(*study.rays);
+  if (study.kernels) asked["kernels"] = name(*study.kernels);
+  return asked;
+}
+
+std::string suffix_of(const Study& study) {
+  return (study.rays ? suffix_of(*study.rays) : "") +
+         (study.kernels ? " (" + std::string(name(*study.kernels)) + " kernels)" : "");
 }
 
 std::string name_with_changes(const std::string& scene, const std::string& changes) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/contract/queries.hpp"
+#include "core/kernels/kernel_set.hpp"
 #include "experiments/scenes/scene_spec.hpp"
 #include "experiments/study/contestants.hpp"
 #include "experiments/study/ray_measurement.hpp"
@@ -30,17 +31,26 @@ struct Study {
   std::vector<std::uint32_t> per_keyframe{10};  ///< l: frames for each keyframe interval
   std::vector<std::string> scalars{"float"};
   std::uint32_t repetitions = 3;
-  std::uint64_t frames_limit = 0;  ///< only so many first frames; 0: all
-  std::uint64_t oracle_every = 1;  ///< verify every n-th frame (and the last)
-  bool continuous = false;         ///< contacts between keyframes instead of pairs at frames
-  std::optional<Answer> changes;   ///< the changes of this answer instead of pairs at frames
-  std::optional<RayStudy> rays;    ///< rays at frames instead of pairs
+  std::uint64_t frames_limit = 0;    ///< only so many first frames; 0: all
+  std::uint64_t oracle_every = 1;    ///< verify every n-th frame (and the last)
+  bool continuous = false;           ///< contacts between keyframes instead of pairs at frames
+  std::optional<Answer> changes;     ///< the changes of this answer instead of pairs at frames
+  std::optional<RayStudy> rays;      ///< rays at frames instead of pairs
+  std::optional<KernelSet> kernels;  ///< holds everything that kbvh computes to this instruction set
 };
 
 /// Names an answer in plans and results.
 const char* answer_word(Answer answer);
 /// Returns the name of a scene in the tables of a study with `changes`.
 std::string name_with_changes(const std::string& scene, const std::string& changes);
+
+/// Returns what a study asks other than pairs at frames by the widest kernels, as keys of a plan: in this
+/// form it is part of keys, of `again`, and of ids of jobs. A new question is added here, in `read_plan` and
+/// in `suffix_of`.
+nlohmann::json asked_of(const Study& study);
+/// Returns what tables add to the name of a scene for the rays and the kernels of a study: " (coherent
+/// rays)", " (sse kernels)". Changes have `name_with_changes`.
+std::string suffix_of(const Study& study);
 
 /// A plan: one or more studies, run one after the other into the same results.
 struct Plan {

@@ -64,6 +64,9 @@ json strategy_record(const ContestantSpec& spec) {
           {"citation", info.citation},
           {"about", about(info.id)},
           {"own_scalar", info.own_scalar},
+          {"version", info.version},
+          {"instructions", info.instructions},
+          {"remark", info.remark},
           {"params", params},
           {"builder", builder}};
 }

@@ -101,7 +101,7 @@ bool measures(const Study& study, const Target& target) {
 /// Returns the name that targets and tables know a scene by in a study; empty if it has none.
 std::string name_in(const Study& study, const SceneSpec& spec) {
   const std::string name = given_name(spec);
-  return !name.empty() && study.rays ? name + suffix_of(*study.rays) : name;
+  return name.empty() ? name : name + suffix_of(study);
 }
 
 std::string conditions(const Target& target) {
@@ -148,11 +148,19 @@ void check_target_scenes(const Plan& plan) {
 
 // --- which contestants ----------------------------------------------------------------------------------
 
+bool is_known(const TargetSelector& selector) {
+  return selector.strategy == best_refit_word || known_strategy(selector.strategy) != nullptr;
+}
+
 bool matches(const TargetSelector& selector, const json& strategy) {
   const std::string id = strategy.at("id").get<std::string>();
-  if (id != selector.strategy && !has(selector.or_else, id)) return false;
+  const bool any_baseline = selector.strategy == best_refit_word;
+  if (any_baseline ? !strategy.value("baseline", strategy.value("family", "") == "refit")
+                   : id != selector.strategy && !has(selector.or_else, id))
+    return false;
   for (const auto& [key, values] : selector.params)
-    if (!has(values, strategy.at("params").value(key, std::string()))) return false;
+    if (!has(values, strategy.at("params").value(key, any_baseline ? values.front() : std::string())))
+      return false;
   if (selector.builder.empty()) return true;
   const json& builder = strategy.at("builder");
   if (!builder.is_object()) return false;
@@ -176,7 +184,7 @@ std::string described(const TargetSelector& selector) {
   add("width", widths);
   add("leaf_size", sizes);
   for (const auto& [key, values] : selector.params) add(key, values);
-  std::string who = selector.strategy;
+  std::string who = selector.strategy == best_refit_word ? "the best refit" : selector.strategy;
   for (const std::string& other : selector.or_else) who += " or " + other;
   return who + (facts.empty() ? "" : " with " + joined(facts));
 }
@@ -196,6 +204,10 @@ void check_selector(const Plan& plan, const TargetSelector& selector, const std:
     one.strategy = other;
     one.or_else.clear();
     check_selector(plan, one, place);
+  }
+  if (selector.strategy == best_refit_word) {
+    if (!selector.or_else.empty()) throw io::InputError(place + ": or: the best refit has no alternatives");
+    return;
   }
   const StrategyEntry* entry = known_strategy(selector.strategy);
   if (entry == nullptr) {
@@ -224,7 +236,7 @@ void check_target_contestants(const Plan& plan, const std::vector<std::vector<Co
     bool all_here = true;
     for (const TargetSelector* side : sides) {
       check_selector(plan, *side, target.place + (side == sides[0] ? ": numerator" : ": denominator"));
-      all_here = all_here && known_strategy(side->strategy) != nullptr;
+      all_here = all_here && is_known(*side);
     }
     if (!all_here) continue;
     /// Whether a study of the plan measures the sides on one scene.

@@ -10,10 +10,13 @@ namespace kbvh::experiments {
 
 struct Plan;
 
+/// The word by which a selector names the best refit: any declared baseline.
+inline constexpr const char* best_refit_word = "best_refit";
+
 /// Selects contestants by their description, and the phase whose time counts. Several may match (for example
-/// several leaf sizes): the one with the smallest median stands for them all.
+/// several leaf sizes): the one whose clip takes the shortest time stands for them all, in every phase.
 struct TargetSelector {
-  std::string strategy;              ///< id
+  std::string strategy;              ///< id, or `best_refit_word`
   std::vector<std::string> or_else;  ///< ids of alternative strategies
   std::string phase;  ///< "motion", "update", "traversal", "triangle_tests", "query", "candidates", "total",
                       ///< "upkeep", "update_per_event"
@@ -46,8 +49,12 @@ void check_target_scenes(const Plan& plan);
 /// whose two sides are never measured together. `contestants` are those of each study.
 void check_target_contestants(const Plan& plan, const std::vector<std::vector<ContestantSpec>>& contestants);
 
-/// Returns whether the selector matches the contestant, given as the "strategy" of a record.
+/// Returns whether the selector matches the contestant, given as the "strategy" of a record. A baseline
+/// without a parameter that a selector of the best refit fixes matches.
 bool matches(const TargetSelector& selector, const nlohmann::json& strategy);
+
+/// Returns whether this program has the selector's strategy.
+bool is_known(const TargetSelector& selector);
 
 /// Describes a selector: "bottom_up with width 8, leaf_size 1 or 4".
 std::string described(const TargetSelector& selector);

@@ -196,14 +196,16 @@ TEST(Table, RatiosAreAgainstTheBestRefit) {
   const std::vector<json> records{example_record("slow", "refit", 8), example_record("fast", "refit", 4),
                                   example_record("own", "kinetic", 2), broken};
   EXPECT_EQ(best_refit(records), &records[1]);
-  EXPECT_EQ(results_table(records),
-            "s, l = 10, float: 5 frames, 7 primitives\n"
-            "strategy   motion  update  query  x refit  with motion  missed  extra  protrusion  looseness\n"
-            "slow            1      16      0      0.5        0.529       0      1           0       0.25\n"
-            "fast            1       8      0        1            1       0      1           0       0.25\n"
-            "own             1       4      0        2          1.8       0      1           0       0.25\n"
-            "wrong     refused                                            0      1           0       0.25\n"
-            "  wrong is refused a time: it is wrong\n");
+  EXPECT_EQ(
+      results_table(records),
+      "s, l = 10, float: 5 frames, 7 primitives\n"
+      "strategy   motion  update  query  code  x refit  with motion  missed  extra  protrusion  looseness\n"
+      "slow            1      16      0     -      0.5        0.529       0      1           0       0.25\n"
+      "fast            1       8      0     -        1            1       0      1           0       0.25\n"
+      "own             1       4      0     -        2          1.8       0      1           0       0.25\n"
+      "wrong     refused                                                  0      1           0       0.25\n"
+      "  x refit and with motion: against fast, the baseline with the shortest clip\n"
+      "  wrong is refused a time: it is wrong\n");
 }
 
 // A refit of one's own is shown in the table, and no ratio is against it unless it is declared a baseline.
@@ -214,10 +216,37 @@ TEST(Table, OnlyDeclaredBaselinesAreTheDenominator) {
   records[1]["strategy"]["baseline"] = true;
   records[2]["strategy"]["baseline"] = false;
   EXPECT_EQ(best_refit(records), &records[1]);
-  EXPECT_NE(results_table(records).find("\nmine            1       2      0        4"), std::string::npos)
+  EXPECT_NE(results_table(records).find("\nmine            1       2      0     -        4"),
+            std::string::npos)
       << results_table(records);
   records[2]["strategy"]["baseline"] = true;
   EXPECT_EQ(best_refit(records), &records[2]);
+}
+
+// One denominator for all phases: a baseline that does its work in the query, or fetches its positions, does
+// not become the other side of updates alone.
+TEST(Table, TheBestRefitHasTheShortestClip) {
+  std::vector<json> records{example_record("lazy", "refit", 1), example_record("plain", "refit", 4)};
+  for (json& repetition : records[0]["times"]["repetitions"])
+    repetition.update({{"motion", 0.0}, {"traversal", 9.0}});
+  EXPECT_EQ(best_refit(records), &records[1]) << "its update is longer, its clip is shorter";
+  for (json& repetition : records[0]["times"]["repetitions"]) repetition["traversal"] = 6.5;
+  EXPECT_EQ(best_refit(records), &records[0]) << "2 + 6.5 is longer than 8, by less than its positions";
+}
+
+TEST(Table, CodeAndVersionsOfPeersAreShown) {
+  std::vector<json> records{example_record("bottom_up", "refit", 4), example_record("bottom_up", "refit", 4),
+                            example_record("peer", "embree", 8)};
+  for (json& record : records) record["machine"] = {{"kernels", "avx512"}};
+  records[1]["strategy"]["params"] = {{"kernels", "sse"}};
+  records[2]["strategy"].update(
+      {{"version", "Peer 3.2.1"}, {"instructions", "sse2"}, {"remark", "its update lies elsewhere"}});
+  EXPECT_EQ(instructions_of(records[0]), "avx512");
+  EXPECT_EQ(instructions_of(records[1]), "sse");
+  EXPECT_EQ(instructions_of(records[2]), "sse2");
+  const std::string table = results_table(records);
+  EXPECT_NE(table.find("    sse2  "), std::string::npos) << table;
+  EXPECT_NE(table.find("\n  peer is Peer 3.2.1: its update lies elsewhere\n"), std::string::npos) << table;
 }
 
 TEST(Table, CountersOfAStrategysOwnAreShown) {

@@ -239,6 +239,48 @@ TEST(Targets, TheWorstSceneAndTheFastestConfigurationCount) {
   EXPECT_EQ(scenes[2].at("counts"), false);
 }
 
+// One configuration stands for a side in every phase: the one with the shortest clip, not the one that wins a
+// phase.
+TEST(Targets, TheConfigurationWithTheShortestClipCountsInEveryPhase) {
+  auto groups = example_groups();
+  for (json& repetition : groups[0].records[2]["times"]["repetitions"]) repetition["traversal"] = 9.0;
+  const json row = row_of(example_plan(), groups);
+  EXPECT_EQ(row.at("per_scene")[0].at("denominator").at("label"), "bottom_up [leaf=1]");
+  EXPECT_EQ(row.at("per_scene")[0].at("ratio"), 9.0 / 4.0);
+}
+
+TEST(Targets, TheBestRefitIsTheBaselineWithTheShortestClip) {
+  json plan = example_plan();
+  plan["targets"][0]["denominator"] = {
+      {"strategy", "best_refit"}, {"phase", "update"}, {"params", {{"threads", 1}}}};
+  EXPECT_EQ(start_complaint(plan), "nothing was thrown");
+  auto groups = example_groups();
+  for (TargetGroup& group : groups) {
+    for (json& one : group.records) one["strategy"]["baseline"] = one["strategy"]["id"] == "bottom_up";
+    group.records.push_back(record("lazy", 1, {0.5, 0.5, 0.5}));
+    group.records.back()["strategy"]["baseline"] = true;
+    for (json& repetition : group.records.back()["times"]["repetitions"]) repetition["traversal"] = 50.0;
+  }
+  groups[0].records[2]["strategy"]["params"]["threads"] = "2";
+  const json row = row_of(plan, groups);
+  EXPECT_EQ(row.at("per_scene")[0].at("denominator").at("label"), "bottom_up [leaf=1]") << "of one thread";
+  EXPECT_EQ(row.at("per_scene")[0].at("ratio"), 9.0 / 4.0);
+  EXPECT_EQ(row.at("denominator").at("which"), "the best refit with threads 1");
+  for (TargetGroup& group : groups)
+    for (json& one : group.records) one["strategy"]["baseline"] = false;
+  EXPECT_EQ(row_of(plan, groups).at("reason"), "sheet: the best refit with threads 1 takes no part");
+  plan["targets"][0]["denominator"]["or"] = {"hybrid"};
+  EXPECT_NE(start_complaint(plan).find("the best refit has no alternatives"), std::string::npos);
+}
+
+TEST(Targets, NotesStandBelowTheTable) {
+  json plan = example_plan();
+  plan["targets"][0]["note"] = "counted twice";
+  EXPECT_NE(
+      targets_table(target_rows(read(plan), example_groups())).find("\n  flat over period: counted twice\n"),
+      std::string::npos);
+}
+
 TEST(Targets, GeometricMeansAreOverAllScenesThatCount) {
   json plan = example_plan();
   plan["targets"][0]["over"] = "geometric_mean";
@@ -357,7 +399,7 @@ TEST(Targets, WhatCannotBeMeasuredSaysWhy) {
   EXPECT_EQ(reason(plan, example_groups()), "sheet: this program was built without peer");
   plan = example_plan();
   plan["targets"][0]["denominator"]["phase"] = "motion";
-  EXPECT_EQ(reason(plan, example_groups()), "sheet: bottom_up [leaf=1] spends no time in 'motion'");
+  EXPECT_EQ(reason(plan, example_groups()), "sheet: bottom_up [leaf=4] spends no time in 'motion'");
 }
 
 TEST(Targets, ARefusedConfigurationDoesNotCountTheOthersDo) {

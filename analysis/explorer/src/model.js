@@ -158,18 +158,30 @@ export function seriesOfName(model, state, name) {
   return { name, contestant: first, label: state.per === "each" ? first.label : first.title };
 }
 
+/** Returns the time of a run's whole clip, by which the best refit is chosen: `clip_total` of analysis/ratios.py. */
+export function clipTotal(model, run) {
+  return value(model, run, "with_motion");
+}
+
+/** Returns the best refit among runs, the verified baseline with the smallest `clipTotal`: one for every measure; or null. */
+export function bestRefit(model, runs) {
+  return runs
+    .filter((one) => one.contestant.baseline && one.contestant.guarantee !== "approximate" && clipTotal(model, one) !== null)
+    .reduce((best, one) => (best && clipTotal(model, best) <= clipTotal(model, one) ? best : one), null);
+}
+
 /** Returns the run that others of a cell are compared with: by `against` of the state. */
 export function reference(model, state, cell, run, measure = state.measure) {
   const against = state.against;
   const timed = cell.runs.filter((one) => value(model, one, measure) > 0);
   const fastest = (list) =>
     list.reduce((best, one) => (best && value(model, best, measure) <= value(model, one, measure) ? best : one), null);
-  const baselines = timed.filter((one) => one.contestant.baseline && one.contestant.guarantee !== "approximate");
-  if (against === "baseline") return fastest(baselines);
+  if (against === "baseline") return bestRefit(model, cell.runs);
   if (against === "fastest") return fastest(timed.filter((one) => one.contestant.usual));
   if (against === "tree") {
     const tree = JSON.stringify(run?.contestant.builder ?? null);
-    return tree === "null" ? null : fastest(baselines.filter((one) => JSON.stringify(one.contestant.builder) === tree));
+    const same = cell.runs.filter((one) => JSON.stringify(one.contestant.builder) === tree);
+    return tree === "null" ? null : bestRefit(model, same);
   }
   return fastest(timed.filter((one) => one.contestant.id === against || one.contestant.key === against));
 }
