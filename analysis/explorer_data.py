@@ -174,11 +174,21 @@ def _cell(row: pd.Series, machines: dict[str, int], commits: list[dict[str, Any]
         "frames": number(row["frames"]),
         "keyframes": number(row["keyframes"]),
         "continuous": bool(row["continuous"]),
-        "changes": str(row["again"].get("changes", "")),
+        "asked": _asked(row),
         "machine": machines[row["machine"]],
         "commit": commit,
         "again": _again(row),
     }
+
+
+def _asked(row: pd.Series) -> dict[str, Any]:
+    """Returns what a run was asked other than pairs at frames, as keys of a plan; options of the same names ask it on a command line.
+
+    Read from the scene, because records of rays from before `asked_of` (experiments/study/plan.hpp) lack it in `again`.
+    """
+    asked = {"continuous": bool(row["continuous"]), "changes": row["answer"], "rays": row["rays"],
+             "kernels": row["again"].get("kernels", "")}  # fmt: skip
+    return {key: value for key, value in asked.items() if value}
 
 
 def _again(row: pd.Series) -> dict[str, Any]:

@@ -113,11 +113,24 @@ def _extent(runs: pd.DataFrame) -> tuple[str, str]:
 def _machine(runs: pd.DataFrame) -> tuple[str, str]:
     machines = runs["machine"].nunique()
     words = [f"{machines} machines; ratios are only formed within one machine." if machines > 1 else "One machine."]
+    scaling = "" if (runs["threads"] > 1).any() else "scaling over cores, "
+    said = threads_said(runs)
     words.append(
-        "Everything ran on one thread; scaling over cores, GPUs, energy and hardware counters (cache misses, mispredicted "
-        "branches) were not measured."
+        f"{said[0].upper()}{said[1:]}; {scaling}GPUs, energy and hardware counters (cache misses, mispredicted branches) were "
+        "not measured."
     )
     return "Machine", " ".join(words)
+
+
+def threads_said(runs: pd.DataFrame) -> str:
+    """Says on how many threads the contestants of a study ran, without a capital letter."""
+    several = runs[runs["threads"] > 1]
+    if several.empty:
+        return "every contestant ran on one thread"
+    counts = text.listing([f"{count}" for count in sorted(several["threads"].unique())])
+    some = "every contestant" if len(several) == len(runs) else text.listing(sorted(several["title"].unique()))
+    rest = "" if len(several) == len(runs) else ", everything else on one"
+    return f"{some} ran on {counts} threads{rest}"
 
 
 def _hidden(runs: pd.DataFrame) -> tuple[str, str]:

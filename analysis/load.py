@@ -244,6 +244,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "origin": record.text("scene.origin", ""),
         "changes": _changes(record),
         "answer": record.text("scene.changes", ""),
+        "rays": record.text("scene.rays", ""),
         "changed_per_frame": _changed_per_frame(record),
         "hash": str(record.get("scene.hash", "")),
         "card": str(record.get("scene.card", "")),
@@ -271,6 +272,9 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "continuous": record.flag("scene.continuous", False),
         "choice": record.text("choice", ""),
         "own_scalar": record.text("strategy.own_scalar", ""),
+        "version": record.text("strategy.version", ""),
+        "instructions": _instructions(record, params, machine),
+        "remark": record.text("strategy.remark", ""),
         "params": params,
         "threads": _threads(params),
         "builder": builder,
@@ -382,6 +386,12 @@ def _repetitions(record: _Record, index: int, row: dict[str, Any]) -> list[dict[
         values["plan_changes"] += one.number("geometry_changes", 0.0)
         result.append({"run": index, "repetition": number, **values})
     return result
+
+
+def _instructions(record: _Record, params: dict[str, Any], machine: dict[str, str]) -> str:
+    """Returns the instruction set of a contestant's code: a peer's own, the one it was held to, or that of kbvh's kernels in use."""
+    chosen = str(params.get("kernels", "auto"))
+    return record.text("strategy.instructions", "") or (chosen if chosen != "auto" else machine["kernels"])
 
 
 def _threads(params: dict[str, Any]) -> int:

@@ -19,6 +19,7 @@ from typing import Any, Iterator
 #: Measured on one core of an AMD EPYC (tablecloths of 4k and 16k over tables of 2k triangles).
 COSTS: dict[str, tuple[float, float]] = {
     "bottom_up": (0.02, 0), "bottom_up_period": (0.06, 0), "bottom_up_recursive": (0.06, 0), "hybrid": (0.02, 0),
+    "leaf_slabs": (0.02, 0), "front": (0.02, 0),
     "inflated_lazy": (0.02, 0), "top_down": (0.07, 0), "rebuild": (0.25, 0), "kinetic_aabb": (0.015, 0.04),
     "kinetic_boxtree": (0.03, 0.03), "kinetic_separation_list": (0.015, 0.15), "kinetic_kdop": (0.06, 0.12),
     "kinetic_aabb avl": (0.06, 1), "kinetic_boxtree avl": (0.4, 0.6), "kinetic_separation_list avl": (0.02, 3.3),

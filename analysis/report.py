@@ -35,7 +35,7 @@ import theory_figures
 from canvas import Picture, picture
 from claim_points import ClaimError, Table
 from colours import Look, looks, symbol
-from limits import limits
+from limits import limits, threads_said
 from load import ONE_OF_EACH_COMMIT, ResultError, Study, load
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
@@ -256,7 +256,7 @@ def _machine(study: Study) -> list[tuple[str, str]]:
     runs = study.runs
     memory = _values(runs["memory_gb"])
     return [
-        ("Processor", f"{_values(runs['cpu'])}; {_values(runs['cores'])} cores, of which 1 was used"),
+        ("Processor", f"{_values(runs['cpu'])}; {_values(runs['cores'])} cores; {threads_said(runs)}"),
         ("Memory", memory if memory == "not recorded" else f"{memory} GB"),
         ("System", _values(runs["os"])),
         ("Compiler", f"{_values(runs['compiler'])}, {_values(runs['build_type'])}"),

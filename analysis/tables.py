@@ -33,6 +33,7 @@ class Row:
     contestant: str
     label: str
     note: str
+    instructions: str
     guarantee: str
     motion: str
     update: str
@@ -143,8 +144,10 @@ def _row(row: object, all_ratios: Ratios) -> Row:
         note=text.listing(
             ([f"computes in {own}"] if own and own != row.scalar else [])
             + ([f"{row.threads} threads"] if row.threads > 1 else [])
+            + ([row.version] if row.version else [])
             + (["fetches positions itself"] if row.motion == 0 or (row.changes and row.positions_fetched_per_frame > 0) else [])
         ),
+        instructions=row.instructions or text.MISSING,
         guarantee=GUARANTEE_NAMES[row.guarantee],
         motion=text.milliseconds(row.motion),
         update=text.milliseconds(row.updating),
@@ -181,17 +184,9 @@ def shown_ratio(one: Optional[Ratio]) -> Shown:
 
 def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
     notes = []
-    used = {r.reference for r in (*all_ratios.with_motion.values(), *all_ratios.without_motion.values())}
-    with_motion = [run for run in timed["run"] if run in used and all_ratios.with_motion[run].reference == run]
-    without = [run for run in timed["run"] if run in used and all_ratios.without_motion[run].reference == run]
-    names = study.runs.set_index("run")["label"]
+    with_motion = [run for run in timed["run"] if getattr(all_ratios.with_motion.get(run), "reference", None) == run]
     if len(timed) and not with_motion:
         notes.append("No refit was timed here, so there are no ratios.")
-    elif set(with_motion) != set(without):
-        notes.append(
-            f"The best refit is {text.listing([names[r] for r in with_motion])} with motion evaluation and "
-            f"{text.listing([names[r] for r in without])} without it."
-        )
     lost = [row.label for row in timed[["label", "run"]].itertuples() if row.run not in all_ratios.with_motion]
     if with_motion and lost:
         notes.append(f"No ratio for {text.listing(lost)}: measured at another commit than any refit here.")
@@ -200,6 +195,13 @@ def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
     sampled = sorted({int(every) for every in timed["sampled_every"] if every > 1})
     if sampled:
         notes.append(f"Verified on every {text.listing([text.ordinal(s) for s in sampled])} frame and the last.")
+    compared = timed["verified_frames"].dropna()
+    if len(compared) and compared.max() > 0:
+        fewest, most = int(compared.min()), int(compared.max())
+        frames = f"{fewest} to {most} frames" if fewest < most else text.plural(most, "frame")
+        notes.append(f"Missed and extra pairs are those of {frames} that were compared with the oracle.")
+    for row in timed[timed["remark"] != ""].drop_duplicates("id")[["title", "remark"]].itertuples():
+        notes.append(f"{row.title}: {row.remark}.")
     return notes
 
 
@@ -246,14 +248,14 @@ def _first(rows: pd.DataFrame) -> Optional[pd.Series]:
     return rows.iloc[0] if len(rows) else None
 
 
-PLAIN_COLUMNS = ("strategy", "guarantee", "motion", "update", "query", "total", "ratio", "w/o motion", "missed",
+PLAIN_COLUMNS = ("strategy", "guarantee", "code", "motion", "update", "query", "total", "ratio", "w/o motion", "missed",
                  "extra", "protrusion", "looseness", "memory")  # fmt: skip
 
 
 def plain(scene: str, group: Group) -> str:
     """Formats a group as text for a terminal."""
     cells = [PLAIN_COLUMNS] + [
-        (row.label, row.guarantee, row.motion, row.update, row.query, row.total, row.ratio, row.ratio_without_motion,
+        (row.label, row.guarantee, row.instructions, row.motion, row.update, row.query, row.total, row.ratio, row.ratio_without_motion,
          row.missed, row.extra, row.protrusion, row.looseness, row.memory)
         for row in group.rows
     ]  # fmt: skip

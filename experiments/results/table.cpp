@@ -130,7 +130,8 @@ const json* shortest_clip(const std::vector<const json*>& records) {
 const json* best_refit(const std::vector<json>& records) {
   std::vector<const json*> baselines;
   for (const json& record : records)
-    if (is_baseline(record)) baselines.push_back(&record);
+    if (is_baseline(record) && record.at("strategy").value("guarantee", "") != "approximate")
+      baselines.push_back(&record);
   return shortest_clip(baselines);
 }
 

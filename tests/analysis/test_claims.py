@@ -217,14 +217,21 @@ class TestVerdicts(ClaimsCase):
         self.assertEqual(rows["E3"].verdict, claims.FAILS)
         self.assertEqual(rows["E8"].verdict, claims.HOLDS)
 
-    def test_the_hybrid_refit_is_no_baseline_for_updates(self) -> None:
-        lines = world()
-        for one in [copy.deepcopy(one) for one in filter(of("bottom_up"), lines)]:
-            one["strategy"].update(id="hybrid", title="hybrid")
-            for repetition in one["times"]["repetitions"]:
-                repetition.update(update=1e-12, motion=0.0)
-            lines.append(one)
-        self.assertEqual(self.rows(lines)["E3"].verdict, claims.HOLDS)
+    def test_the_best_refit_is_one_run_for_all_quantities(self) -> None:
+        def with_lazy(query: float) -> list[Line]:
+            """Adds a refit without updates whose query takes so many times as long as that of the other."""
+            lines = world()
+            for one in [copy.deepcopy(one) for one in filter(of("bottom_up"), lines)]:
+                one["strategy"].update(id="hybrid", title="hybrid")
+                for repetition in one["times"]["repetitions"]:
+                    repetition.update(update=1e-12, motion=0.0, traversal=query * sum(repetition[name] for name in load.PHASES))
+                lines.append(one)
+            return lines
+
+        self.assertEqual(self.rows(with_lazy(1.1))["E3"].verdict, claims.HOLDS, "it wins updates, but no clip")
+        row = self.rows(with_lazy(0.01))["E3"]
+        self.assertEqual(row.verdict, claims.CONDITION, "it wins the clip: its update is the other side")
+        self.assertNotIn("against the best refit", row.condition)
 
     def test_commits_are_not_compared_with_one_another(self) -> None:
         lines = world()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import shutil
+import subprocess
 import tempfile
 import unittest
 from pathlib import Path
@@ -137,6 +139,33 @@ class TestData(Folder):
         self.assertEqual(data["runs"]["looseness"], [None, 0])
         self.assertEqual(data["runs"]["refused"], ["", "too slow"])
         self.assertEqual(data["runs"]["times"][1], [])
+
+
+@unittest.skipIf(shutil.which("node") is None, "there is no node (experiments/setup --lab installs it)")
+class TestProgram(Folder):
+    """The page's own computations, in Node.js; tests/browser has the rest."""
+
+    def answer(self, program: str) -> Any:
+        """Returns what a module prints as JSON; `data` is the data of the page, `src` the folder of the page's modules."""
+        src = (Path(explore.__file__).parent / "explorer" / "src").as_uri()
+        data = json.dumps(explorer_data.data(load.load(self.folder), "", None, self.folder))
+        text = f"const data = {data};\n" + program.replace("SRC", src)
+        told = subprocess.run(["node", "--input-type=module"], input=text, capture_output=True, text=True)
+        self.assertEqual(told.returncode, 0, told.stderr)
+        return json.loads(told.stdout)
+
+    def test_the_best_refit_is_that_of_the_program_on_the_same_file(self) -> None:
+        # tests/program/results_test.cpp and test_ratios.py read the same two files.
+        results = Path(__file__).resolve().parents[1] / "support" / "results"
+        shutil.copy(results / "denominators.jsonl", self.folder / "results.jsonl")
+        found = self.answer("""
+            import { model, reference } from "SRC/model.js";
+            const made = model(data);
+            const chosen = (cell, measure) => reference(made, { against: "baseline", measure }, cell, null)?.contestant.id ?? null;
+            const of = (measure) => Object.fromEntries(made.cells.map((cell) => [cell.l, chosen(cell, measure)]));
+            console.log(JSON.stringify([of("with_motion"), of("update"), of("worst")]));""")
+        expected = json.loads((results / "denominators.json").read_text())
+        self.assertEqual(found, [expected] * 3)
 
 
 class TestPage(Folder):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import shutil
 import tempfile
 import unittest
 from pathlib import Path
@@ -13,6 +15,7 @@ import synthetic
 
 import load
 import numpy as np
+import pandas as pd
 import ratios
 
 
@@ -50,10 +53,26 @@ class TestRatios(unittest.TestCase):
         found = ratios_of(lines, "with_motion")
         self.assertEqual({name: one.middle for name, one in found.items()}, {"slow": 1 / 3, "fast": 1.0, "r": 0.5})
 
-    def test_reference_may_differ_with_and_without_motion(self) -> None:
+    def test_the_reference_is_one_for_all_phases(self) -> None:
+        # Positions count: one baseline fetches them in its update, the other one has them evaluated.
         fetching, plain = line("fetching", "refit", [0], [4]), line("plain", "refit", [3], [2])
         self.assertEqual(ratios_of([fetching, plain], "with_motion")["fetching"].middle, 1.0)
-        self.assertEqual(ratios_of([fetching, plain], "without_motion")["plain"].middle, 1.0)
+        self.assertEqual(ratios_of([fetching, plain], "without_motion")["plain"].middle, 2.0)
+        self.assertEqual(ratios_of([fetching, plain], "update")["plain"].middle, 2.0)
+
+    def test_a_lazy_refit_does_not_win_the_update_alone(self) -> None:
+        lazy, plain = line("lazy", "refit", [0], [1]), line("plain", "refit", [0], [4])
+        lazy["times"]["repetitions"][0]["traversal"] = 9.0
+        found = ratios_of([lazy, plain, line("k", "kinetic", [0], [2])], "update")
+        self.assertEqual({name: one.middle for name, one in found.items()}, {"lazy": 4.0, "plain": 1.0, "k": 2.0})
+
+    def test_the_line_of_the_best_refit_is_of_one_run_at_each_x(self) -> None:
+        rows = pd.DataFrame({
+            "run": [0, 1, 2, 3], "baseline": [True] * 4, "guarantee": ["exact"] * 4, "l": [1, 1, 10, 10],
+            "updating": [1.0, 4.0, 2.0, 3.0], "total_motion": [9.0, 5.0, 6.0, 7.0],
+        })  # fmt: skip
+        found = ratios.best_refit_line(rows, "updating", "l")
+        self.assertEqual(dict(found), {1: 4.0, 10: 2.0})
 
     def test_other_libraries_and_approximate_refits_are_no_reference(self) -> None:
         lines = [line("f", "fcl", [0], [1]), line("sloppy", "refit", [0], [1], guarantee="approximate"), line("a", "refit", [0], [2])]
@@ -90,6 +109,22 @@ class TestRatios(unittest.TestCase):
         lines = [line("a", "refit", [0], [4]), line("k", "kinetic", [0], [1])]
         lines[1]["times"]["repetitions"][0]["plan_changes"] = 1.0
         self.assertEqual(ratios_of(lines, "update")["k"].middle, 2.0)
+
+
+class TestOneDenominator(unittest.TestCase):
+    def test_is_that_of_the_program_on_the_same_file(self) -> None:
+        # tests/program/results_test.cpp and test_explore.py read the same two files.
+        results = Path(__file__).resolve().parents[1] / "support" / "results"
+        expected = {float(l): id for l, id in json.loads((results / "denominators.json").read_text()).items()}
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as folder:
+            shutil.copy(results / "denominators.jsonl", Path(folder) / "results.jsonl")
+            study = load.load(Path(folder))
+        ids = study.runs.set_index("run")["id"]
+        found = {}
+        for _, group in study.timed.groupby("group"):
+            best = ratios.best_refit(study, group)
+            found[float(group["l"].iloc[0])] = None if best is None else ids[best]
+        self.assertEqual(found, expected)
 
 
 class TestPareto(unittest.TestCase):

@@ -1,6 +1,10 @@
 // Result files, keys, times and tables.
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+#include <map>
+
 #include "complaint.hpp"
 #include "experiments/results/record.hpp"
 #include "experiments/results/results.hpp"
@@ -232,6 +236,24 @@ TEST(Table, TheBestRefitHasTheShortestClip) {
   EXPECT_EQ(best_refit(records), &records[1]) << "its update is longer, its clip is shorter";
   for (json& repetition : records[0]["times"]["repetitions"]) repetition["traversal"] = 6.5;
   EXPECT_EQ(best_refit(records), &records[0]) << "2 + 6.5 is longer than 8, by less than its positions";
+}
+
+// The program, the analysis and the explorer choose the same denominator from the same file: the two others
+// are held to it by tests/analysis/test_ratios.py and test_explore.py.
+TEST(Table, TheBestRefitIsThatOfTheAnalysis) {
+  const std::filesystem::path folder = std::filesystem::path(KBVH_PLANS) / "../../tests/support/results";
+  std::map<std::string, std::vector<json>> tables;
+  std::ifstream file(folder / "denominators.jsonl");
+  for (std::string line; std::getline(file, line);) {
+    json record = json::parse(line);
+    tables[std::to_string(record.at("scene").at("per_keyframe").get<int>())].push_back(std::move(record));
+  }
+  const json expected = json::parse(std::ifstream(folder / "denominators.json"));
+  ASSERT_EQ(tables.size(), expected.size());
+  for (const auto& [l, records] : tables) {
+    const json* found = best_refit(records);
+    EXPECT_EQ(found == nullptr ? json() : found->at("strategy").at("id"), expected.at(l)) << "l = " << l;
+  }
 }
 
 TEST(Table, CodeAndVersionsOfPeersAreShown) {

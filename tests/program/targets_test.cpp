@@ -1,8 +1,10 @@
 // Targets of plans: what is refused before anything is measured, and what the rows say of given records.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "complaint.hpp"
 #include "experiments/common/json_reader.hpp"
@@ -88,6 +90,52 @@ TEST(Targets, ThoseOfShippedPlansAreMeasured) {
     targets += plan.targets.size();
   }
   EXPECT_GT(targets, 0u);
+}
+
+/// Returns what a plan's best refits lack: "TARGET: STUDY has no ID". The best refit of a table is one of
+/// those that take part, so all that can be the fastest must; bottom_up_recursive and top_down refit the
+/// boxes of bottom_up by slower loops.
+std::vector<std::string> missing_baselines(const Plan& plan) {
+  std::vector<std::string> notes, found;
+  for (const Target& target : plan.targets) {
+    if (target.numerator.strategy != best_refit_word && target.denominator.strategy != best_refit_word)
+      continue;
+    const TargetSelector& other =
+        target.numerator.strategy == best_refit_word ? target.denominator : target.numerator;
+    const auto has = [](const auto& list, const auto& value) {
+      return std::find(list.begin(), list.end(), value) != list.end();
+    };
+    for (const Study& study : plan.studies) {
+      const auto named = [&](const SceneSpec& spec) {
+        return has(target.scenes, given_name(spec) + suffix_of(study));
+      };
+      if (!has(study.scalars, target.scalar) || !has(study.per_keyframe, target.per_keyframe) ||
+          target.changes != (study.changes ? answer_word(*study.changes) : "") ||
+          std::none_of(study.scenes.begin(), study.scenes.end(), named))
+        continue;
+      std::set<std::string> ids;
+      for (const ContestantSpec& spec : expand(study.strategies, study.params, study.builder, notes))
+        ids.insert(spec.entry->info.id);
+      if (!ids.contains(other.strategy)) continue;
+      for (const char* id : {"bottom_up", "hybrid", "leaf_slabs", "front"})
+        if (!ids.contains(id)) found.push_back(target.what + ": " + study.name + " has no " + id);
+    }
+  }
+  return found;
+}
+
+TEST(Targets, BestRefitsOfShippedPlansLackNoFastBaseline) {
+  std::size_t targets = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(KBVH_PLANS)) {
+    if (entry.path().extension() != ".json") continue;
+    const Plan plan = load_plan(entry.path());
+    EXPECT_EQ(missing_baselines(plan), std::vector<std::string>{}) << entry.path();
+    for (const Target& target : plan.targets) targets += target.numerator.strategy == best_refit_word ? 1 : 0;
+  }
+  EXPECT_GT(targets, 20U);
+  json poor = example_plan();
+  poor["targets"][0]["numerator"]["strategy"] = "best_refit";
+  EXPECT_EQ(missing_baselines(read(poor)).size(), 3U) << "the example has bottom_up alone";
 }
 
 TEST(Targets, ErrorsNameFileTargetAndKey) {

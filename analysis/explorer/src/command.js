@@ -19,8 +19,9 @@ export function command(run) {
     for (const [key, value] of Object.entries(contestant.params)) words.push("--param", quoted(`${key}=${value}`));
     const { builder } = contestant;
     if (builder) words.push("--builder", builder.method, "--width", builder.width, "--leaf-size", builder.leaf_size);
-    words.push("--scalar", cell.scalar, cell.continuous ? "--continuous" : `--l ${cell.l}`);
-    if (cell.changes) words.push("--changes", cell.changes);
+    words.push("--scalar", cell.scalar);
+    if (!cell.continuous) words.push("--l", cell.l);
+    for (const [key, value] of Object.entries(cell.asked)) words.push(`--${key}`, ...(value === true ? [] : [quoted(value)]));
     words.push("--repetitions", Math.max(run.repetitions, 1), "--oracle-every", run.every ?? 1);
     if (run.limit) words.push("--frames-limit", run.limit);
     lines.push(`${words.join(" ")} --out again`);
@@ -35,8 +36,7 @@ export function command(run) {
       repetitions: Math.max(run.repetitions, 1),
       oracle_every: run.every ?? 1,
       ...(run.limit && { frames_limit: run.limit }),
-      ...(cell.continuous && { continuous: true }),
-      ...(cell.changes && { changes: cell.changes }),
+      ...cell.asked,
     };
     lines.push("cat > again.json <<'PLAN'", JSON.stringify(plan, null, 1), "PLAN");
     lines.push(`kbvh ${run.kind === "bench" ? "bench" : "run"} --plan again.json --out again`);
