@@ -14,6 +14,8 @@ import subprocess
 import sys
 import time
 
+import skipped
+
 LONGEST_FILTER = 100_000  # of one argument; Linux takes 131,072 characters
 
 
@@ -78,10 +80,11 @@ def main():
                   key=lambda batch: (-before.get(batch[0], 0), -batch[1]))
     if not work:
         sys.exit("no test is chosen")
-    failed, cases, times = [], 0, []
+    failed, cases, times, left_out = [], 0, [], []
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count() or 2) as pool:
         for name, count, code, output, seconds in pool.map(run, work):
             cases += count
+            left_out += skipped.in_output(output)
             times.append((seconds, name))
             if code != 0:
                 failed.append(name)
@@ -91,6 +94,7 @@ def main():
     os.replace(past + ".new", past)
     for seconds, name in sorted(times, reverse=True)[:8]:
         print(f"{seconds:7.1f} s  {name}")
+    print(skipped.summary(left_out))
     print(f"{cases} cases of {len(work)} suites in {time.monotonic() - begin:.0f} s, "
           + (f"{len(failed)} failed: " + ", ".join(failed) if failed else "all passed"))
     sys.exit(1 if failed else 0)
