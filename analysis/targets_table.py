@@ -185,6 +185,9 @@ def markdown(targets: list[Target]) -> str:
         measured = f"{times(target.measured)} {within(target.interval)}".rstrip()
         verdict = VERDICTS[target.verdict] + (f": {target.reason}" if target.reason else "")
         lines.append(_row([target.what, measured, wanted(target.at_least), wanted(target.aim), verdict]))
+    noted = dict.fromkeys(f"{target.what}: {target.note}." for target in targets if target.note)
+    if noted:
+        lines += ["", "Notes.", *(f"- {note}" for note in noted)]
     names = columns(targets)
     meaning = (
         "A number is the speed of the side named first over that of the other, on the scenes that count: their geometric mean "

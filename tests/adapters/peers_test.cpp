@@ -207,14 +207,16 @@ TEST(Embree, RefitsEitherGeometryOfLargerBodies) {
   Oracle<float> oracle(scene);
   const auto frames = frame_times(scene, 4);
   std::vector<Verification> results;
-  for (const char* geometry : {"user", "triangles"}) {
-    SCOPED_TRACE(geometry);
-    Session<float> session(scene, {&*found, {{"geometry", geometry}}, {}}, CountingPolicy::counting);
-    results.push_back(verify<float>(session, frames, oracle));
-    EXPECT_TRUE(results.back().holds()) << results.back().first_violation;
-    EXPECT_GT(results.back().pairs, 1000u);
-  }
-  EXPECT_EQ(results[0].candidates, results[1].candidates);
+  for (const char* geometry : {"user", "triangles"})
+    for (const char* layout : {"compact", "default"}) {
+      SCOPED_TRACE(std::string(geometry) + ", " + layout);
+      Session<float> session(scene, {&*found, {{"geometry", geometry}, {"layout", layout}}, {}},
+                             CountingPolicy::counting);
+      results.push_back(verify<float>(session, frames, oracle));
+      EXPECT_TRUE(results.back().holds()) << results.back().first_violation;
+      EXPECT_GT(results.back().pairs, 1000u);
+      EXPECT_EQ(results.back().candidates, results.front().candidates);
+    }
 }
 
 /// Embree flushes denormals; nobody after it may notice.

@@ -145,7 +145,7 @@ class TestShownValues(ReportCase):
 
         def ratio(text: str) -> float:
             row = next(row for row in text.splitlines() if row.startswith("Kinetic AABB tree (queue avl)"))
-            return float(re.split(r"\s{2,}", row)[6].split()[0])
+            return float(re.split(r"\s{2,}", row)[7].split()[0])
 
         self.assertLess(ratio(self.table(lines)), 1)
         for repetition in kinetic["times"]["repetitions"]:
@@ -175,11 +175,11 @@ class TestShownValues(ReportCase):
 
     def test_missed_and_extra_are_shown(self) -> None:
         row = next(r for r in self.table(small()).splitlines() if r.startswith("FCL with its own"))
-        self.assertEqual(re.split(r"\s{2,}", row)[8:10], ["3", "41"])
+        self.assertEqual(re.split(r"\s{2,}", row)[9:11], ["3", "41"])
 
     def test_looseness_of_hidden_boxes_is_unknown(self) -> None:
         row = next(r for r in self.table(small()).splitlines() if r.startswith("FCL with its own"))
-        self.assertEqual(re.split(r"\s{2,}", row)[10:12], ["–", "–"])
+        self.assertEqual(re.split(r"\s{2,}", row)[11:13], ["–", "–"])
 
 
 class TestLimits(ReportCase):
@@ -191,6 +191,27 @@ class TestLimits(ReportCase):
         self.assertIn("uncommitted changes", page)
         self.assertIn("2 commits", page)
         self.assertIn("compared with the oracle on every 3rd frame only", page)
+
+    def test_threads_are_those_that_ran(self) -> None:
+        lines = synthetic.study()
+        self.assertIn("every contestant ran on one thread", self.page(lines))
+        for line in lines:
+            if line["strategy"]["id"] == "bottom_up":
+                line["strategy"]["params"] = {"threads": "4"}
+        page = self.page(lines)
+        self.assertIn("Bottom-up refit ran on 4 threads, everything else on one", page)
+        self.assertNotIn("of which 1 was used", page)
+        self.assertNotIn("scaling over cores", page)
+
+    def test_code_and_versions_of_peers_and_compared_frames_are_told(self) -> None:
+        lines = synthetic.study()
+        for line in lines:
+            line["machine"] = {**line["machine"], "kernels": "avx512"}
+            if line["strategy"]["id"].startswith("fcl"):
+                line["strategy"].update(version="FCL 1.2.3", instructions="sse2", remark="its own test is not timed")
+        page = self.page(lines)
+        for words in ("<td>avx512</td>", "<td>sse2</td>", "FCL 1.2.3", "its own test is not timed.", "were compared with the oracle"):
+            self.assertIn(words, page)
 
     def test_single_repetition_has_no_noise(self) -> None:
         lines = small()

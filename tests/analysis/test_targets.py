@@ -75,6 +75,13 @@ class TestMarkdown(TargetsCase):
         self.assertEqual(lines[11], "| query | – | **19.9x** | 21.0x |")
         self.assertEqual(lines[12], "| peer | – | **–** | – |")
 
+    def test_notes_stand_between_the_tables(self) -> None:
+        noted = rows()
+        noted[0]["note"] = "triangles, which cannot be collided"
+        _, out, _ = self.run_main(noted)
+        self.assertIn("\n- refit over FCL: triangles, which cannot be collided.\n", out)
+        self.assertNotIn("Notes.", self.run_main(rows())[1])
+
     def test_cells_cannot_break_the_table(self) -> None:
         lines = rows()
         lines[0]["what"] = "a | b\nc"
