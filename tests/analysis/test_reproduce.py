@@ -40,6 +40,20 @@ class WrongUse(unittest.TestCase):
         self.assertIn("there is no plan 'no/plan.json'", self.refused("--plan", "no/plan.json"))
 
 
+class Presets(unittest.TestCase):
+    def test_builds_that_measure_keep_every_kernel(self) -> None:
+        # A study that holds kbvh to SSE needs these kernels in the program that is measured.
+        presets = {one["name"]: one for one in json.loads((ROOT / "CMakePresets.json").read_text())["configurePresets"]}
+        for name in ("release", "bench"):
+            chain = []
+            while name:
+                chain.append(presets[name])
+                name = presets[name].get("inherits")
+            values = {key: value for one in reversed(chain) for key, value in one.get("cacheVariables", {}).items()}
+            self.assertNotEqual(values.get("KBVH_KERNELS_HERE", "OFF"), "ON", chain[0]["name"])
+            self.assertEqual(values["CMAKE_BUILD_TYPE"], "Release")
+
+
 class Pieces(unittest.TestCase):
     def test_help_names_every_option(self) -> None:
         code, said, _ = run(REPRODUCE, "--help")
