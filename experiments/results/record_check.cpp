@@ -80,7 +80,9 @@ std::string wrong_scene(const json& scene) {
   if (scene.contains("continuous") && !scene.at("continuous").is_boolean())
     return "scene.continuous is not true or false";
   if (scene.contains("changes") && !scene.at("changes").is_string()) return "scene.changes is not a text";
-  if (scene.contains("rays") && !scene.at("rays").is_string()) return "scene.rays is not a text";
+  for (const char* asked : {"rays", "kernels"})
+    if (scene.contains(asked) && !scene.at(asked).is_string())
+      return std::string("scene.") + asked + " is not a text";
   if (!scene.contains("script")) return {};
   if (!scene.at("script").is_object()) return "scene.script is not an object";
   return wrong(scene.at("script"), "scene.script.", {{"steps", Kind::whole}, {"changes", Kind::whole}});

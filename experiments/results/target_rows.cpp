@@ -161,8 +161,9 @@ json scene_rows(const Target& target, const std::vector<TargetGroup>& groups) {
   std::vector<std::pair<std::string, json>> rows;  // by hash of the scene
   for (const TargetGroup& group : groups) {
     if (!is_measured_as(target, group)) continue;
-    // One scene may be asked for pairs and for rays.
-    const std::string hash = group.scene.at("hash").get<std::string>() + group.scene.value("rays", "");
+    // One scene may be asked for pairs and for rays, and by other kernels.
+    const std::string hash = group.scene.at("hash").get<std::string>() + group.scene.value("rays", "") +
+                             group.scene.value("kernels", "");
     const auto known =
         std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == hash; });
     if (known == rows.end())

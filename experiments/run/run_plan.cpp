@@ -197,11 +197,9 @@ class Runner {
              const Scene<S>& scene, const PlanScript<S>& script, Oracle<S>& oracle, std::uint32_t l,
              const std::vector<double>& frames) {
     json about_scene = scene_record(scene, loaded, l, frames, script);
-    about_scene["name"] = scene.name + suffix_of(study);
-    if (study.changes) {
-      about_scene["changes"] = answer_word(*study.changes);
-      about_scene["name"] = name_with_changes(scene.name + suffix_of(study), answer_word(*study.changes));
-    }
+    about_scene.update(asked_of(study));
+    about_scene["name"] =
+        name_with_changes(scene.name + suffix_of(study), study.changes ? answer_word(*study.changes) : "");
     const std::string title = about_scene["name"].get<std::string>() + ", l = " + std::to_string(l);
     if (l > 1 && study.oracle_every % l == 0)
       note("warning: with oracle_every " + std::to_string(study.oracle_every) +
@@ -218,8 +216,8 @@ class Runner {
                  const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script,
                  std::uint32_t l, const std::vector<double>& frames) {
     json about_scene = scene_record(scene, loaded, l, frames, script);
+    about_scene.update(asked_of(study));
     about_scene["name"] = scene.name + suffix_of(study);
-    about_scene["rays"] = text_of(*study.rays);
     RayMeasurement<S> measurement(scene, frames, *study.rays, script.empty() ? nullptr : &script);
     measure_all(study, contestants, loaded, about_scene,
                 scene.name + ", l = " + std::to_string(l) + suffix_of(study), measurement,
@@ -250,8 +248,8 @@ class Runner {
     ContactMeasurement<S> measurement(scene, knots, script.empty() ? nullptr : &script);
     json about_scene = scene_record(scene, loaded, 1, std::span<const double>(knots), script);
     about_scene["frames"] = knots.size() - 1;
+    about_scene.update(asked_of(study));
     about_scene["name"] = scene.name + suffix_of(study) + " (contacts)";
-    about_scene["continuous"] = true;
     measure_all(study, contestants, loaded, about_scene, scene.name + ", contacts", measurement,
                 [&](const Info& info) -> std::string {
                   if (!info.can.contacts) return "finds no contacts between keyframes";

@@ -465,6 +465,25 @@ TEST(Targets, BothSidesComeFromOneStudy) {
   EXPECT_EQ(row.at("per_scene").size(), 3u);
 }
 
+// One scene by other kernels is another row, although its hash is the same.
+TEST(Targets, OtherKernelsDoNotMix) {
+  json plan = example_plan();
+  json held = {{"name", "held"}, {"kernels", "portable"}};
+  plan["studies"] = {json{{"name", "free"}}, held};
+  plan["targets"][0]["scenes"] = {"sheet (portable kernels)"};
+  EXPECT_EQ(start_complaint(plan), "nothing was thrown");
+  auto groups = example_groups();
+  TargetGroup slow = groups[0];
+  slow.scene["name"] = "sheet (portable kernels)";
+  slow.scene["kernels"] = "portable";
+  for (json& repetition : slow.records[2]["times"]["repetitions"]) repetition["update"] = 6.0;
+  slow.records.erase(slow.records.begin() + 1);
+  groups.push_back(slow);
+  const json row = row_of(plan, groups);
+  EXPECT_EQ(row.at("measured"), 9.0 / 6.0);
+  EXPECT_EQ(row.at("scene"), "sheet (portable kernels)");
+}
+
 TEST(Targets, OtherScalarsAndFramesDoNotMix) {
   auto groups = example_groups();
   groups[0].scene["per_keyframe"] = 1;
