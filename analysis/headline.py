@@ -207,7 +207,8 @@ def by_case(all_cases: list[Case]) -> str:
         lines.append(_row(cells))
     said = (
         f"ms: a frame of the best refit, positions included; update and query: their shares of it. The other columns: times as fast as the best "
-        f"refit, over the whole clip. {TUNED}: `auto` was tuned on the scene. {text.MISSING}: not measured, or cannot answer: pairs of a body with "
+        f"refit, over the whole clip [95 % interval]; Embree by user geometry, the only one that it can collide, whose refit calls back for each "
+        f"primitive. {TUNED}: `auto` was tuned on the scene. {text.MISSING}: not measured, or cannot answer: pairs of a body with "
         f"itself are those of refits only."
     )
     return "\n".join([*lines, "", f"{said} {facts(all_cases)}"]) + "\n"
