@@ -143,6 +143,7 @@ def facts(all_cases: list[Case]) -> str:
     first = rows.iloc[0]
     state = " with uncommitted changes" if first["dirty"] else ""
     repetitions = sorted({int(count) for count in rows["repetitions"]})
+    few = " (brackets are ranges: fewer than five repetitions)" if repetitions[0] < 5 else ""
     counts = f"{repetitions[0]}" if len(repetitions) == 1 else f"{repetitions[0]} to {repetitions[-1]}"
     frames = int(rows["verified_frames"].fillna(0).sum())
     wrong = {name: int(rows[name].fillna(0).sum()) for name in ("missed", "extra")}
@@ -151,7 +152,7 @@ def facts(all_cases: list[Case]) -> str:
     boxes = "no box was too small" if not protruding else f"{text.plural(protruding, 'contestant')} had a box that was too small"
     kernels = text.listing(sorted({str(word) for word in rows["kernels"] if word}))
     return (
-        f"One thread of {first['cpu'] or 'an unknown processor'} ({kernels or 'unknown'} kernels), float, medians of {counts} repetitions, commit "
+        f"One thread of {first['cpu'] or 'an unknown processor'} ({kernels or 'unknown'} kernels), float, medians of {counts} repetitions{few}, commit "
         f"{str(first['commit'])[:12] or 'unknown'}{state}, {str(first['when'])[:10] or 'undated'}. In the "
         f"{text.count(frames)} frames that were compared with the oracle, summed over contestants and scenes, {found}; {boxes} where boxes can be seen."
     )

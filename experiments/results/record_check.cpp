@@ -62,6 +62,15 @@ std::string wrong(const json& object, const std::string& place, std::initializer
   return {};
 }
 
+/// Returns the first field of another type; fields that older records lack may be missing.
+std::string wrong_if_there(const json& object, const std::string& place,
+                           std::initializer_list<Field> fields) {
+  for (const Field& field : fields)
+    if (object.contains(field.name))
+      if (std::string what = wrong(object, place, {field}); !what.empty()) return what;
+  return {};
+}
+
 std::string wrong_scene(const json& scene) {
   std::string what = wrong(scene, "scene.",
                            {{"name", Kind::text},
@@ -80,9 +89,8 @@ std::string wrong_scene(const json& scene) {
   if (scene.contains("continuous") && !scene.at("continuous").is_boolean())
     return "scene.continuous is not true or false";
   if (scene.contains("changes") && !scene.at("changes").is_string()) return "scene.changes is not a text";
-  for (const char* asked : {"rays", "kernels"})
-    if (scene.contains(asked) && !scene.at(asked).is_string())
-      return std::string("scene.") + asked + " is not a text";
+  what = wrong_if_there(scene, "scene.", {{"rays", Kind::text}, {"kernels", Kind::text}});
+  if (!what.empty()) return what;
   if (!scene.contains("script")) return {};
   if (!scene.at("script").is_object()) return "scene.script is not an object";
   return wrong(scene.at("script"), "scene.script.", {{"steps", Kind::whole}, {"changes", Kind::whole}});
@@ -118,6 +126,17 @@ std::string unusable(const json& record) {
     what =
         wrong(record.at("strategy"), "strategy.",
               {{"id", Kind::text}, {"label", Kind::text}, {"family", Kind::text}, {"params", Kind::object}});
+  if (what.empty())
+    what = wrong_if_there(record.at("strategy"), "strategy.",
+                          {{"guarantee", Kind::text},
+                           {"version", Kind::text},
+                           {"instructions", Kind::text},
+                           {"remark", Kind::text}});
+  if (what.empty())
+    what = wrong_if_there(record.at("strategy").at("params"), "strategy.params.", {{"kernels", Kind::text}});
+  if (what.empty()) what = wrong_if_there(record, "", {{"machine", Kind::object}});
+  if (what.empty() && record.contains("machine"))
+    what = wrong_if_there(record.at("machine"), "machine.", {{"kernels", Kind::text}});
   // Records from before baselines were declared have no such field.
   if (what.empty() && !record.at("strategy").value("baseline", json(false)).is_boolean())
     what = "strategy.baseline is not true or false";

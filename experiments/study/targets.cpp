@@ -199,15 +199,15 @@ bool asked_for_if_there(const Plan& plan, const std::string& id) {
 }
 
 void check_selector(const Plan& plan, const TargetSelector& selector, const std::string& place) {
+  if (selector.strategy == best_refit_word) {
+    if (!selector.or_else.empty()) throw io::InputError(place + ": or: the best refit has no alternatives");
+    return;
+  }
   for (const std::string& other : selector.or_else) {
     TargetSelector one = selector;
     one.strategy = other;
     one.or_else.clear();
     check_selector(plan, one, place);
-  }
-  if (selector.strategy == best_refit_word) {
-    if (!selector.or_else.empty()) throw io::InputError(place + ": or: the best refit has no alternatives");
-    return;
   }
   const StrategyEntry* entry = known_strategy(selector.strategy);
   if (entry == nullptr) {

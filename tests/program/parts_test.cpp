@@ -166,7 +166,7 @@ TEST(Plan, ErrorsNameFileKeyAndValue) {
   EXPECT_EQ(
       plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
       "p.json: there is no key 'repetition'; known are builder, changes, continuous, description, "
-      "frames_limit, l, name, "
+      "frames_limit, kernels, l, name, "
       "oracle_every, params, rays, repetitions, scalars, scenes, strategies, studies, targets; did you mean "
       "'repetitions'?");
   EXPECT_TRUE(contains(plan_complaint("{\n  \"scenes\": ]\n}"), "p.json: line 2, column 13"));
