@@ -41,7 +41,7 @@ class Contestant:
 
 
 EMBREE = Contestant("Embree, refit and `rtcCollide`", "embree_refit", {"geometry": "user"}, None, {"geometry": "triangles"})
-AUTO = Contestant("automatic choice (`auto`)", "auto")
+AUTO = Contestant("automatic choice (`auto`): may use the next keyframe", "auto")
 JOIN = Contestant("interval join (`interval_join`): needs the next keyframe", "interval_join")
 DRIFT = Contestant("drifting boxes (`drift_boxes`): no foresight", "drift_boxes")
 ENVELOPE = Contestant("kinetic AABB tree by envelopes (`kinetic_envelope`)", "kinetic_envelope")
