@@ -180,7 +180,8 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
                "incoherent:10000:any"),
       command.add_flag(
           "--self", o->self,
-          "also find pairs within every body, of primitives that share no vertex; of one body: self=true"),
+          "also find pairs within every body, of primitives that share no vertex (vertices with the same "
+          "positions at every keyframe are one: weld=false keeps them apart); of one body: self=true"),
       add_words(command, "--order", o->orders, "vertex order: given, shuffled, renumbered; a list sweeps"),
       add_words(command, "--strategies", o->strategies,
                 "ids, family:NAME, default (all with a guarantee) or all; !x: without x"),
