@@ -139,6 +139,9 @@ class Parser {
     if (!json.is_object()) root.reject_value("an object");
     check_version(root);
     check_extensions(root);
+    if (container_.bytes_behind > 0)
+      document_.notes.push_back(std::to_string(container_.bytes_behind) +
+                                " bytes beyond the length that its header states are skipped");
     for (const Value& v : root.items("buffers")) parse_buffer(v);
     for (const Value& v : root.items("bufferViews")) parse_view(v);
     for (const Value& v : root.items("accessors")) parse_accessor(v);

@@ -261,6 +261,28 @@ TEST_F(Binary, NeighboursAtASeamAreNoPair) {
   EXPECT_NE(refused.err.find("glTF files are always welded"), std::string::npos) << refused.err;
 }
 
+TEST_F(Binary, ContactsAtASeamAreFoundOnce) {
+  // A plate of two triangles, once with the vertices of their common edge stored twice.
+  write_text(folder_ / "seam.obj",
+             "v -1 -1 0\nv 1 -1 0\nv -1 1 0\nv 1 -1 0\nv -1 1 0\nv 1 1 0\nf 1 2 3\nf 4 6 5\n");
+  write_text(folder_ / "plain.obj", "v -1 -1 0\nv 1 -1 0\nv -1 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n");
+  const auto contacts = [&](const std::string& body) {
+    const Outcome run =
+        kbvh("run --body " + body +
+             " --body sphere:triangles=80,keyframes=2,step=0:0:-2,"
+             "centre=0.1:0.07:1.5,radius=0.6 --continuous --repetitions 1 --strategies bottom_up --out " +
+             body + ".out");
+    EXPECT_EQ(run.code, 0) << run.err;
+    const auto found = records(body + ".out/results.jsonl");
+    EXPECT_EQ(found.size(), 1u);
+    return found.empty() ? 0 : found[0].at("verified").at("pairs").get<int>();
+  };
+  const int plain = contacts("plain.obj");
+  EXPECT_GT(plain, 0);
+  EXPECT_EQ(contacts("seam.obj"), plain);
+  EXPECT_GT(contacts("seam.obj,weld=false"), plain);
+}
+
 /// The middle of the times that a record has for a phase.
 double middle(const json& record, const std::string& phase) {
   std::vector<double> values;

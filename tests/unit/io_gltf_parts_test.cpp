@@ -99,6 +99,14 @@ TEST_F(IoGltfParts, ChannelsThatMoveNoNodeAreCounted) {
   EXPECT_TRUE(load(b.json(scene(solid, animation(moves)))).notes.empty());
 }
 
+TEST_F(IoGltfParts, BytesBehindTheEndAreNoted) {
+  const GltfBuilder b = triangle();
+  const std::string good = b.glb(scene(solid));
+  EXPECT_TRUE(load_animated_mesh({write("a.glb", good), "", "", 0}).notes.empty());
+  expect_words(joined(load_animated_mesh({write("a.glb", good + "1234"), "", "", 0}).notes),
+               {"4 bytes beyond"});
+}
+
 TEST_F(IoGltfParts, FallbackBuffersAreNamed) {
   const std::string good = triangle().json(scene(solid));
   for (const std::string name : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
