@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from dataclasses import dataclass, field
 from typing import Any, Mapping, Optional, Sequence, Union
 
@@ -148,12 +149,17 @@ def scene(description: Union[str, Mapping[str, Any]], folder: PathLike = ".", **
 
 def load(file: PathLike, motion: Optional[PathLike] = None, **keys: Any) -> Body:
     """Reads a body from a file (.obj .ply .gltf .glb, or a folder of numbered frames), moved by a point cache (.pc2) if `motion`
-    names one. `keys` are those of a plan's body: clip, fps, name, scale, rotate, translate, as, self. Raises InputError.
+    names one. `keys` are those of a plan's body: clip, fps, name, scale, rotate, translate, as, self, weld. Faces on the two
+    sides of a seam use one vertex; weld=False lets each use its own, to move vertices by the numbers of the file. Warns of what
+    the reader skipped or repaired. Raises InputError.
     """
     description = {"file": os.path.abspath(os.fspath(file)), **keys}
     if motion is not None:
         description["motion"] = os.path.abspath(os.fspath(motion))
-    return scene({"bodies": [description]}).bodies[0]
+    made = scene({"bodies": [description]})
+    for note in made.notes:
+        warnings.warn(note, stacklevel=2)
+    return made.bodies[0]
 
 
 def builtin_scenes() -> dict[str, str]:

@@ -23,7 +23,7 @@ constexpr const char* run_examples = R"(Examples:
   kbvh run --body cloth.obj,motion=cloth.pc2 --body sphere:triangles=2000,centre=0:0:1,radius=0.4 --out results
   kbvh run --scene waving_sheet --strategies bottom_up,rebuild --leaf-size 1,4 --scalar float,double
 A body is a file (.obj .ply .gltf .glb, or a folder of numbered frames) or a shape, followed by key=value pairs
-separated by commas: motion clip fps (files), name scale rotate=axis:degrees translate=x:y:z as=triangles|points
+separated by commas: motion clip fps weld=false (files), name scale rotate=axis:degrees translate=x:y:z as=triangles|points
 (all); `kbvh list` shows the shapes.
 Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input, 3 other error.)";
 
@@ -182,7 +182,8 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
                "hold kbvh to an instruction set: portable, sse, avx2, avx512 (the widest that runs here)"),
       command.add_flag(
           "--self", o->self,
-          "also find pairs within every body, of primitives that share no vertex; of one body: self=true"),
+          "also find pairs within every body, of primitives that share no vertex (vertices with the same "
+          "positions at every keyframe are one: weld=false keeps them apart); of one body: self=true"),
       add_words(command, "--order", o->orders, "vertex order: given, shuffled, renumbered; a list sweeps"),
       add_words(command, "--strategies", o->strategies,
                 "ids, family:NAME, default (all with a guarantee) or all; !x: without x"),

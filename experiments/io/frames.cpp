@@ -122,11 +122,14 @@ AnimatedMesh read_frames(const fs::path& folder, double frames_per_second) {
   if (frames_per_second == 0) frames_per_second = default_frames_per_second;
   AnimatedMesh all = read_mesh_file(files[0]);
   finish(all, files[0]);  // each by itself, so that an error in a coordinate names its own file
+  for (std::string& text : all.notes) text = name_of(files[0]) + ": " + text;
   all.name = folder.has_filename() ? name_of(folder) : name_of(folder.parent_path());
   for (std::size_t i = 1; i < files.size(); ++i) {
     AnimatedMesh frame = read_mesh_file(files[i]);
     finish(frame, files[i]);
     check_same_faces(all, files[0], frame, files[i]);
+    if (all.notes.empty())
+      for (const std::string& text : frame.notes) all.notes.push_back(name_of(files[i]) + ": " + text);
     all.positions.insert(all.positions.end(), frame.positions.begin(), frame.positions.end());
     all.keyframe_times.push_back(static_cast<double>(i) / frames_per_second);
   }

@@ -67,25 +67,18 @@ class Baker {
       : document_(document), animation_(animation), pose_(document, animation) {}
 
   AnimatedMesh bake(std::vector<double> times) {
-    for (std::uint32_t node : document_.in_scene) {
-      if (!document_.nodes[node].mesh) continue;
-      for (const Primitive& p : document_.meshes[*document_.nodes[node].mesh].primitives) add_part(node, p);
-    }
-    if (corners_.empty()) fail(document_.file, "", "holds no triangles in its scene");
-    if (corners_.size() > std::numeric_limits<std::uint32_t>::max())
-      fail(document_.file, "", "has too many triangles");
-    for (const Skin& skin : document_.skins) read_inverse_binds(skin);
-
     AnimatedMesh mesh;
     mesh.name = document_.file.stem().string();
-    if (animation_ != nullptr && pose_.times().empty()) {
-      fail(document_.file, "", "the animation " + printable(animation_->name) + " has no keyframes");
-    }
+    mesh.notes = document_.notes;
+    add_parts(mesh);
+    for (const Skin& skin : document_.skins) read_inverse_binds(skin);
+    check_animation(mesh);
     if (times.empty()) times = animation_ != nullptr ? chosen_times(mesh) : std::vector<double>{0.0};
     mesh.keyframe_times = std::move(times);
     mesh.vertex_count = static_cast<std::uint32_t>(vertices_);
     mesh.primitive_vertices = std::move(corners_);
-    for (std::size_t c = 3; c <= mesh.primitive_vertices.size(); c += 3) {
+    const std::size_t each = mesh.kind == MeshKind::points ? 1 : 3;
+    for (std::size_t c = each; c <= mesh.primitive_vertices.size(); c += each) {
       mesh.primitive_offsets.push_back(static_cast<std::uint32_t>(c));
     }
     const std::uint64_t numbers = std::uint64_t{3} * vertices_ * mesh.keyframe_times.size();
@@ -100,14 +93,61 @@ class Baker {
       pose_.evaluate(mesh.keyframe_times[k]);
       bake_keyframe(mesh.positions.data() + k * 3 * vertices_);
     }
-    weld(mesh, rest);
+    if (mesh.kind == MeshKind::polygons) mesh.welded_vertices = weld(mesh, rest);
+    drop_unused_vertices(mesh);
     mesh.merged_keyframes = pose_.merged_keyframes();
     return mesh;
   }
 
  private:
+  /// Takes all triangles of the scene; if there are none, its points.
+  void add_parts(AnimatedMesh& mesh) {
+    std::vector<std::pair<std::uint32_t, const Primitive*>> found;
+    for (const std::uint32_t node : document_.in_scene) {
+      if (!document_.nodes[node].mesh) continue;
+      for (const Primitive& p : document_.meshes[*document_.nodes[node].mesh].primitives)
+        found.emplace_back(node, &p);
+    }
+    const auto count = [&](auto is) {
+      return std::count_if(found.begin(), found.end(), [&](const auto& one) { return is(one.second->mode); });
+    };
+    const auto triangles = count([](Mode mode) { return mode >= Mode::triangles; }),
+               points = count([](Mode mode) { return mode == Mode::points; }),
+               lines = std::ptrdiff_t(found.size()) - triangles - points;
+    if (triangles == 0 && points > 0) mesh.kind = MeshKind::points;
+    for (const auto& [node, primitive] : found) {
+      const bool wanted =
+          triangles > 0 ? primitive->mode >= Mode::triangles : primitive->mode == Mode::points;
+      if (wanted) add_part(node, *primitive);
+    }
+    const auto note = [&](std::ptrdiff_t skipped, const std::string& of) {
+      if (skipped == 0) return;
+      mesh.notes.push_back("skipped " + std::to_string(skipped) +
+                           (skipped == 1 ? " primitive" : " primitives") + " of " + of);
+    };
+    note(triangles > 0 ? points : 0, "points");
+    note(lines, "lines");
+    if (corners_.empty()) fail(document_.file, "", "holds no triangles and no points in its scene");
+    if (corners_.size() > std::numeric_limits<std::uint32_t>::max())
+      fail(document_.file, "", "has too many triangles or points");
+  }
+
+  void check_animation(AnimatedMesh& mesh) const {
+    if (animation_ == nullptr) return;
+    const std::string name = "the animation " + printable(animation_->name);
+    const std::string others = std::to_string(animation_->others) +
+                               (animation_->others == 1 ? " channel sets" : " channels set") +
+                               " other properties, or nodes by pointers (KHR_animation_pointer), ";
+    if (pose_.times().empty())
+      fail(document_.file, "",
+           name + (animation_->others > 0 ? " moves no node: " + others + "which is not supported"
+                                          : " has no keyframes"));
+    if (animation_->others > 0)
+      mesh.notes.push_back(name + ": " + others + "and " + (animation_->others == 1 ? "is" : "are") +
+                           " skipped");
+  }
+
   void add_part(std::uint32_t node, const Primitive& primitive) {
-    if (primitive.mode < Mode::triangles) return;
     if (!primitive.position) fail(document_.file, primitive.place + ".attributes", "has no POSITION");
     Part part;
     part.node = node;
@@ -126,7 +166,7 @@ class Baker {
       if (target) check_count(*target, n, primitive.place);
     }
     if (document_.nodes[node].skin && !primitive.joints.empty()) read_influences(part, primitive);
-    add_triangles(primitive, n);
+    add_primitives(primitive, n);
     vertices_ += n;
     parts_.push_back(std::move(part));
   }
@@ -179,7 +219,7 @@ class Baker {
     }
   }
 
-  void add_triangles(const Primitive& primitive, std::size_t n) {
+  void add_primitives(const Primitive& primitive, std::size_t n) {
     std::vector<std::uint32_t> list;
     if (primitive.indices) {
       list = read_unsigned(document_, *primitive.indices, 1);
@@ -197,6 +237,10 @@ class Baker {
     const auto push = [&](std::size_t a, std::size_t b, std::size_t c) {
       for (std::size_t i : {a, b, c}) corners_.push_back(static_cast<std::uint32_t>(vertices_ + list[i]));
     };
+    if (primitive.mode == Mode::points) {
+      for (const std::uint32_t v : list) corners_.push_back(static_cast<std::uint32_t>(vertices_ + v));
+      return;
+    }
     if (primitive.mode == Mode::triangles) {
       if (list.size() % 3 != 0) {
         fail(document_.file, primitive.place,

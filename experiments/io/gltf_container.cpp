@@ -61,7 +61,7 @@ std::string decode_percent(const std::filesystem::path& file, const std::string&
 
 Container read_container(const std::filesystem::path& file) {
   std::string bytes = read_file(file);
-  if (!bytes.starts_with("glTF")) return {std::move(bytes), "", false};
+  if (!bytes.starts_with("glTF")) return {std::move(bytes), "", false, 0};
 
   const auto complain = [&](const std::string& place, const std::string& what) { fail(file, place, what); };
   const std::string size_text = std::to_string(bytes.size());
@@ -73,6 +73,7 @@ Container read_container(const std::filesystem::path& file) {
     complain("header", "the length is " + std::to_string(length) + " bytes, but the file has " + size_text);
   }
   Container container;
+  container.bytes_behind = bytes.size() - length;
   std::size_t at = 12;
   for (int chunk = 0; at < length; ++chunk) {
     const std::string place = "chunk " + std::to_string(chunk);

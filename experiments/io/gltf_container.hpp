@@ -8,6 +8,7 @@ namespace kbvh::io::gltf {
 struct Container {
   std::string json, binary;
   bool has_binary = false;
+  std::size_t bytes_behind = 0;  ///< of the file, beyond the length that its header states
 };
 
 /// Reads a .gltf (all text) or a .glb (recognised by its first four bytes, not by its name). Throws

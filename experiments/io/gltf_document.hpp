@@ -87,6 +87,7 @@ struct Channel {
 struct Animation {
   std::string name;
   std::vector<Channel> channels;  ///< channels that move a node
+  std::size_t others = 0;         ///< channels that do not, or by a pointer
 };
 
 struct Document {
@@ -101,6 +102,7 @@ struct Document {
   std::vector<std::uint32_t> order;     ///< all nodes, parents before children
   std::vector<Index> parent;            ///< of each node
   std::vector<std::uint32_t> in_scene;  ///< nodes of the default scene, parents before children
+  std::vector<std::string> notes;       ///< about parts of the file that are not read
 };
 
 /// Reads and checks a .gltf or .glb with its buffers. Throws InputError with the JSON path and the value.

@@ -139,6 +139,9 @@ class Parser {
     if (!json.is_object()) root.reject_value("an object");
     check_version(root);
     check_extensions(root);
+    if (container_.bytes_behind > 0)
+      document_.notes.push_back(std::to_string(container_.bytes_behind) +
+                                " bytes beyond the length that its header states are skipped");
     for (const Value& v : root.items("buffers")) parse_buffer(v);
     for (const Value& v : root.items("bufferViews")) parse_view(v);
     for (const Value& v : root.items("accessors")) parse_accessor(v);
@@ -159,15 +162,37 @@ class Parser {
     if (!version.text().starts_with("2.")) version.reject(printable(version.text()) + ", only 2.x is known");
   }
 
-  void check_extensions(const Value& root) const {
+  void check_extensions(const Value& root) {
     // Extensions that do not change the shape may be required; others would silently be read wrongly.
+    const auto harmless = [](const std::string& name) {
+      return name == "KHR_mesh_quantization" || name.starts_with("KHR_materials_") ||
+             name.starts_with("KHR_texture_") || name.starts_with("EXT_texture_") ||
+             name.starts_with("KHR_lights_") || name.starts_with("KHR_xmp");
+    };
     for (const Value& v : root.items("extensionsRequired")) {
       const std::string name = v.text();
-      const bool harmless = name == "KHR_mesh_quantization" || name.starts_with("KHR_materials_") ||
-                            name.starts_with("KHR_texture_") || name.starts_with("EXT_texture_") ||
-                            name.starts_with("KHR_lights_") || name.starts_with("KHR_xmp");
-      if (!harmless) v.reject("the extension " + printable(name) + " is required, but not supported");
+      if (!harmless(name)) v.reject("the extension " + printable(name) + " is required, but not supported");
     }
+    // Compressed geometry is refused where it has no uncompressed copy; the others have notes of their own.
+    const std::array<std::string_view, 5> handled{"KHR_draco_mesh_compression", "EXT_meshopt_compression",
+                                                  "KHR_meshopt_compression", "EXT_mesh_gpu_instancing",
+                                                  "KHR_animation_pointer"};
+    for (const Value& v : root.items("extensionsUsed")) {
+      const std::string name = v.text();
+      if (!harmless(name) && std::find(handled.begin(), handled.end(), name) == handled.end())
+        document_.notes.push_back("the extension " + printable(name) +
+                                  " is not supported: its data are skipped");
+    }
+  }
+
+  /// Returns the extension whose decoder would fill the buffer; none: null.
+  static const char* is_fallback(const Value& buffer) {
+    const std::optional<Value> extensions = buffer.find("extensions");
+    if (!extensions) return nullptr;
+    for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"})
+      if (const std::optional<Value> found = extensions->find(name); found && found->flag("fallback"))
+        return name;
+    return nullptr;
   }
 
   void parse_buffer(const Value& v) {
@@ -175,6 +200,9 @@ class Parser {
     std::string bytes;
     if (const std::optional<Value> uri = v.find("uri")) {
       bytes = read_uri(document_.file, uri->path(), uri->text());
+    } else if (const char* name = is_fallback(v)) {
+      v.reject(std::string("is the empty fallback of ") + name +
+               ": the geometry is compressed, which is not supported");
     } else if (document_.buffers.empty() && container_.has_binary) {
       bytes = std::move(container_.binary);
     } else {
@@ -304,6 +332,12 @@ class Parser {
     node.rotation = v.numbers<4>("rotation", node.rotation);
     node.scale = v.numbers<3>("scale", node.scale);
     node.weights = v.numbers("weights");
+    if (const auto extensions = v.find("extensions"); node.mesh && extensions)
+      if (extensions->find("EXT_mesh_gpu_instancing"))
+        document_.notes.push_back(
+            v.path() +
+            " has instances (EXT_mesh_gpu_instancing), which are not supported: its mesh is "
+            "read once, at the node's own place");
     document_.nodes.push_back(std::move(node));
   }
 
@@ -365,7 +399,10 @@ class Parser {
       const std::string path = target.at("path").text();
       const std::array<const char*, 4> paths{"translation", "rotation", "scale", "weights"};
       const auto known = std::find(paths.begin(), paths.end(), path);
-      if (!node || known == paths.end()) continue;  // extensions animate other properties, such as materials
+      if (!node || known == paths.end()) {  // extensions animate other properties, such as materials
+        ++animation.others;
+        continue;
+      }
       const Value sampler = samplers[c.at("sampler").index(samplers.size(), "samplers")];
       Channel channel;
       channel.place = c.path();

@@ -1,5 +1,6 @@
 #include "experiments/io/number_text.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -43,6 +44,18 @@ std::optional<std::int64_t> parse_integer(std::string_view token) {
   std::int64_t value = 0;
   if (parse_all(without_plus(token), value) != std::errc{}) return std::nullopt;
   return value;
+}
+
+std::optional<std::int64_t> parse_corner(std::string_view token) {
+  const std::optional<std::int64_t> index = parse_integer(token.substr(0, token.find('/')));
+  token.remove_prefix(std::min(token.find('/'), token.size()));
+  for (int more = 0; !token.empty(); ++more) {
+    token.remove_prefix(1);  // the slash
+    const std::string_view part = token.substr(0, token.find('/'));
+    if (more == 2 || (!part.empty() && !parse_integer(part))) return std::nullopt;
+    token.remove_prefix(part.size());
+  }
+  return index;
 }
 
 std::string_view next_token(std::string_view& line) {

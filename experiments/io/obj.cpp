@@ -1,8 +1,9 @@
 #include "experiments/io/obj.hpp"
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,28 @@
 namespace kbvh::io {
 namespace {
 
+/// Tests for statements whose arguments are numbers. Only these go on in the next line after a backslash: a
+/// name may end in one.
+bool has_numbers(std::string_view word) {
+  static const std::set<std::string_view> words{"v",     "vt",   "vn",   "vp",   "p",    "l",    "f",
+                                                "fo",    "curv", "surf", "parm", "trim", "hole", "scrv",
+                                                "curv2", "sp",   "con",  "deg",  "bmat", "step"};
+  return words.contains(word);
+}
+
+/// Tests for statements that say nothing about the shape of polygons, or belong to curves.
+bool may_be_skipped(std::string_view word) {
+  static const std::set<std::string_view> words{
+      "vt",       "vn",       "vp",     "g",     "s",          "o",         "mg",  "usemtl",
+      "mtllib",   "usemap",   "maplib", "bevel", "shadow_obj", "trace_obj", "lod", "stech",
+      "c_interp", "d_interp", "ctech",  "bmat",  "step",       "con",       "end"};
+  return words.contains(word);
+}
+
+std::string_view without_comment(std::string_view line) {
+  return line.substr(0, line.find('#'));
+}
+
 class ObjReader {
  public:
   explicit ObjReader(const std::filesystem::path& file)
@@ -21,22 +44,9 @@ class ObjReader {
 
   AnimatedMesh read() {
     std::string_view rest = bytes_;
-    std::size_t next_line = 1;
-    std::string joined;
     while (!rest.empty()) {
-      line_ = next_line;
-      std::string_view line = cut_line(rest, next_line);
-      if (ends_in_backslash(line)) {
-        joined.clear();
-        while (ends_in_backslash(line)) {
-          line.remove_suffix(1);
-          joined.append(line).push_back(' ');
-          line = cut_line(rest, next_line);
-        }
-        joined.append(line);
-        line = joined;
-      }
-      read_statement(line.substr(0, line.find('#')));
+      line_ = next_line_;
+      read_statement(next_statement(rest));
     }
     check_forward_indices();
     if (mesh_.vertex_count == 0) fail(file_, "", "holds no vertices (no 'v' line)");
@@ -47,15 +57,50 @@ class ObjReader {
   }
 
  private:
-  static std::string_view cut_line(std::string_view& rest, std::size_t& line_number) {
+  std::string_view cut_line(std::string_view& rest) {
     const std::size_t end = rest.find('\n');
     const std::string_view line = rest.substr(0, end);
     rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
-    ++line_number;
+    ++next_line_;
     return line;
   }
 
-  static bool ends_in_backslash(std::string_view line) { return line.ends_with('\\'); }
+  /// Removes the backslash with which a line says that it goes on in the next one, and returns whether there
+  /// was one. Comments do not go on.
+  static bool take_backslash(std::string_view& line) {
+    const std::size_t last = line.find_last_not_of(" \t\v\f");
+    if (last == std::string_view::npos || line[last] != '\\' || line.find('#') != std::string_view::npos)
+      return false;
+    line = line.substr(0, last);
+    return true;
+  }
+
+  /// Cuts off the next statement, without its comment: a line, and the lines in which its numbers go on.
+  std::string_view next_statement(std::string_view& rest) {
+    const std::string_view first = cut_line(rest);
+    std::string_view line = first, words = first;
+    if (!take_backslash(line)) return without_comment(first);
+    words = line;
+    if (!has_numbers(next_token(words))) return first;
+    joined_.clear();
+    bool goes_on = true;
+    while (goes_on) {
+      joined_.append(line).push_back(' ');
+      if (rest.empty()) fail(file_, place(), "ends in '\\', but no line follows");
+      const std::size_t here = next_line_;
+      line = cut_line(rest);
+      goes_on = take_backslash(line);
+      line = without_comment(line);
+      words = line;
+      const std::string_view token = next_token(words);
+      if (!token.empty() && std::string_view("0123456789+-.").find(token[0]) == std::string_view::npos)
+        fail(file_, "line " + std::to_string(here),
+             "begins with " + printable(token) +
+                 ", but the line before it ends in '\\', so numbers go on here");
+    }
+    joined_.append(line);
+    return joined_;
+  }
 
   std::string place() const { return "line " + std::to_string(line_); }
 
@@ -65,16 +110,30 @@ class ObjReader {
       read_vertex(line);
     } else if (word == "f" || word == "fo") {
       read_face(line);
+    } else if (word == "p") {
+      read_points(line);
     } else if (word == "l") {
-      has_lines_ = true;
-    } else if (!surfaces_.take(word, line, line_, mesh_.vertex_count)) {
-      // Any other word is skipped, so that vendors' statements do no harm; a word that is not text means that
-      // this is not an OBJ file.
-      for (char c : word) {
-        if (static_cast<unsigned char>(c) < 32 || c == 127)
-          fail(file_, place(), printable(word) + " is not text");
-      }
+      ++lines_;
+    } else if (word == "call") {
+      fail(file_, place(), "'call' includes another file, which is not supported");
+    } else if (!word.empty()) {
+      if (word == "curv" || word == "curv2") ++curves_;
+      if (!surfaces_.take(word, line, line_, mesh_.vertex_count) && !may_be_skipped(word)) skip_unknown(word);
     }
+  }
+
+  /// Skips a statement of a vendor. What does not begin with a word of letters is no statement: a damaged
+  /// line, or another kind of file.
+  void skip_unknown(std::string_view word) {
+    const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; };
+    const auto is_letter = [](char c) {
+      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+    };
+    if (std::any_of(word.begin(), word.end(), is_control))
+      fail(file_, place(), printable(word) + " is not text");
+    if (!std::all_of(word.begin(), word.end(), is_letter))
+      fail(file_, place(), "begins with " + printable(word) + ", which is not a statement of OBJ");
+    if (unknown_++ == 0) first_unknown_ = printable(word) + " in " + place();
   }
 
   void read_vertex(std::string_view line) {
@@ -92,24 +151,57 @@ class ObjReader {
       mesh_.positions.push_back(*value);
     }
     // A fourth number alone is a weight; three or four more are a colour.
-    const std::string_view weight = next_token(line);
-    if (!weight.empty() && next_token(line).empty()) {
-      const std::optional<double> value = parse_double(weight);
-      if (!value || !(*value > 0) || !std::isfinite(*value)) surfaces_.bad_weight(mesh_.vertex_count);
+    std::size_t more = 0;
+    double weight = 1;
+    for (std::string_view token = next_token(line); !token.empty(); token = next_token(line), ++more) {
+      const std::optional<double> value = parse_double(token);
+      if (!value) fail(file_, place(), printable(token) + " behind the coordinates is not a number");
+      if (more == 0) weight = *value;
     }
+    if (more == 2 || more > 4)
+      fail(file_, place(),
+           "a vertex of " + std::to_string(3 + more) +
+               " numbers (3 are a position, 4 have a weight, 6 or 7 a colour)");
+    if (more == 1 && (!(weight > 0) || !std::isfinite(weight))) surfaces_.bad_weight(mesh_.vertex_count);
     ++mesh_.vertex_count;
   }
 
-  /// Sets the primitives: faces, or surfaces, or, without both, a cloud of points.
+  /// Sets the primitives: faces, or surfaces, or points; without any, every vertex is a point.
   void finish_primitives() {
-    if (!surfaces_.empty()) {
-      if (mesh_.primitive_count() > 0)
-        fail(file_, "", "holds faces and surfaces; the primitives of a body are of one kind");
-      surfaces_.add_to(mesh_);
-    } else if (mesh_.primitive_count() == 0) {
-      if (has_lines_) fail(file_, "", "holds lines, but no faces (no 'f' line)");
+    const bool has_faces = mesh_.primitive_count() > 0;
+    if (has_faces && !surfaces_.empty())
+      fail(file_, "", "holds faces and surfaces; the primitives of a body are of one kind");
+    if (!has_faces && surfaces_.empty() && points_.empty()) {
+      if (lines_ > 0) fail(file_, "", "holds lines, but no faces (no 'f' line)");
       make_points(mesh_);
+    } else if (!has_faces && surfaces_.empty()) {
+      mesh_.kind = MeshKind::points;
+      mesh_.primitive_vertices = std::move(points_);
+      for (std::size_t p = 1; p <= mesh_.primitive_vertices.size(); ++p)
+        mesh_.primitive_offsets.push_back(static_cast<std::uint32_t>(p));
+    } else {
+      if (!surfaces_.empty()) surfaces_.add_to(mesh_);
+      note_skipped(points_.size(), "point", "p");
     }
+    note_skipped(lines_, "polyline", "l");
+    note_skipped(curves_, "curve", "curv");
+    if (unknown_ > 0)
+      mesh_.notes.push_back("skipped " + std::to_string(unknown_) + (unknown_ == 1 ? " line" : " lines") +
+                            " of unknown statements, first " + first_unknown_);
+  }
+
+  void note_skipped(std::size_t count, const std::string& what, const std::string& word) {
+    if (count == 0) return;
+    mesh_.notes.push_back("skipped " + std::to_string(count) + " " + what + (count == 1 ? "" : "s") + " (" +
+                          word + ")");
+  }
+
+  void read_points(std::string_view line) {
+    std::size_t count = 0;
+    for (std::string_view token = next_token(line); !token.empty(); token = next_token(line), ++count)
+      points_.push_back(read_corner(token));
+    if (count == 0) fail(file_, place(), "a 'p' statement without a vertex");
+    if (points_.size() > std::numeric_limits<std::uint32_t>::max()) fail(file_, place(), "too many points");
   }
 
   void read_face(std::string_view line) {
@@ -126,12 +218,8 @@ class ObjReader {
   }
 
   std::uint32_t read_corner(std::string_view token) {
-    const std::size_t slash = token.find('/');
-    const std::optional<std::int64_t> index = parse_integer(token.substr(0, slash));
-    if (!index || (slash != std::string_view::npos &&
-                   token.substr(slash).find_first_not_of("/+-0123456789") != std::string_view::npos)) {
-      fail(file_, place(), printable(token) + " is not a vertex index");
-    }
+    const std::optional<std::int64_t> index = parse_corner(token);
+    if (!index) fail(file_, place(), printable(token) + " is not a vertex index");
     if (*index == 0) fail(file_, place(), "vertex index 0 (they count from 1)");
     const std::int64_t known = mesh_.vertex_count;
     if (*index < -known || *index > std::numeric_limits<std::uint32_t>::max()) out_of_range(line_, *index);
@@ -158,10 +246,13 @@ class ObjReader {
 
   std::filesystem::path file_;
   std::string bytes_;
-  std::size_t line_ = 0;
-  std::vector<Forward> forward_;  // indices of vertices that follow later: legal, checked at the end
+  std::size_t line_ = 0, next_line_ = 1;  // of the current statement, of the next one
+  std::string joined_;                    // a statement of several lines
+  std::vector<Forward> forward_;          // indices of vertices that follow later: legal, checked at the end
   ObjSurfaces surfaces_;
-  bool has_lines_ = false;
+  std::vector<std::uint32_t> points_;  // of 'p' statements
+  std::size_t lines_ = 0, curves_ = 0, unknown_ = 0;
+  std::string first_unknown_;
   AnimatedMesh mesh_;
 };
 

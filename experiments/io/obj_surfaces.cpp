@@ -77,7 +77,7 @@ void ObjSurfaces::begin(std::string_view words, std::size_t line, std::uint32_t 
     *bound = *value;
   }
   for (auto token = next_token(words); !token.empty(); token = next_token(words)) {
-    const auto index = parse_integer(token.substr(0, token.find('/')));
+    const auto index = parse_corner(token);
     if (!index || *index == 0) fail(file_, at(line), printable(token) + " is not a vertex index");
     surface.indices.push_back(*index < 0 ? *index + std::int64_t{vertices_so_far} + 1 : *index);
   }

@@ -45,7 +45,11 @@ void read_pc2(AnimatedMesh& mesh, const std::filesystem::path& mesh_file, const 
   if (!std::isfinite(frames_per_sample) || frames_per_sample < 0) {
     fail(file, "header", "sample rate is " + text_of(frames_per_sample));
   }
-  if (frames_per_sample == 0) frames_per_sample = 1;
+  if (frames_per_sample == 0) {
+    frames_per_sample = 1;
+    mesh.notes.push_back("the header's sample rate is 0; read as 1 frame per sample");
+  }
+  if (samples == 1) mesh.notes.push_back("has one sample, so nothing moves");
 
   const std::uint64_t coordinates = std::uint64_t{3} * mesh.vertex_count;
   const std::uint64_t sample_bytes = 4 * coordinates;

@@ -9,157 +9,57 @@
 
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/number_text.hpp"
+#include "experiments/io/ply_header.hpp"
 #include "experiments/io/primitives.hpp"
 
 namespace kbvh::io {
 namespace {
 
-enum class Format { ascii, binary_little_endian, binary_big_endian };
-enum class Type { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
+using namespace ply;
 
-constexpr std::array<std::size_t, 8> type_bytes{1, 1, 2, 2, 4, 4, 4, 8};
-
-struct Property {
-  std::string name;
-  Type type = Type::float32;
-  bool is_list = false;
-  Type count_type = Type::uint8;  // of lists
-};
-
-struct Element {
-  std::string name;
-  std::uint64_t count = 0;
-  std::vector<Property> properties;
-};
-
-std::optional<Type> type_named(std::string_view name) {
-  static constexpr std::array<std::array<std::string_view, 2>, 8> names{{{"char", "int8"},
-                                                                         {"uchar", "uint8"},
-                                                                         {"short", "int16"},
-                                                                         {"ushort", "uint16"},
-                                                                         {"int", "int32"},
-                                                                         {"uint", "uint32"},
-                                                                         {"float", "float32"},
-                                                                         {"double", "float64"}}};
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (name == names[i][0] || name == names[i][1]) return static_cast<Type>(i);
-  }
-  return std::nullopt;
+bool fits(Type type, double value) {
+  if (type >= Type::float32) return true;
+  const bool is_signed = type == Type::int8 || type == Type::int16 || type == Type::int32;
+  const int bits = 8 * int(type_bytes[static_cast<std::size_t>(type)]) - (is_signed ? 1 : 0);
+  const double end = std::ldexp(1.0, bits);
+  return value == std::floor(value) && value < end && value >= (is_signed ? -end : 0);
 }
 
 class PlyReader {
  public:
-  explicit PlyReader(const std::filesystem::path& file) : file_(file), bytes_(read_file(file)) {}
+  explicit PlyReader(const std::filesystem::path& file)
+      : file_(file), bytes_(read_file(file)), header_(read_header(file, bytes_)) {}
 
   AnimatedMesh read() {
-    read_header();
-    for (const Element& element : elements_) read_element(element);
+    for (const Element& element : header_.elements) read_element(element);
     check_end();
     if (mesh_.vertex_count == 0) fail(file_, "", "holds no vertices");
-    if (mesh_.primitive_count() == 0) make_points(mesh_);
+    if (mesh_.primitive_count() == 0) {
+      for (const Element& e : header_.elements)
+        if (e.count > 0 && (e.name == "edge" || e.name == "tristrips"))
+          fail(file_, "", "holds " + e.name + (e.name == "edge" ? "s" : "") + ", but no face");
+      make_points(mesh_);
+    }
     check_indices();
+    add_notes();
     mesh_.name = file_.stem().string();
     mesh_.keyframe_times = {0.0};
     return std::move(mesh_);
   }
 
  private:
-  // ---- header
-
-  void read_header() {
-    std::size_t number = 0;
-    bool has_format = false;
-    if (bytes_.starts_with("\xEF\xBB\xBFply")) at_ = 3;  // a byte order mark
-    if (at_ == 0 && !bytes_.starts_with("ply")) refuse_utf16(bytes_, file_.string());
-    // The first line decides the line ends. The byte after the last header line may be any: it is data.
-    const std::size_t after = at_ + 3;
-    if (after + 1 < bytes_.size() && bytes_[after] == '\r' && bytes_[after + 1] != '\n') line_end_ = '\r';
-    for (;;) {
-      const std::size_t end = bytes_.find(line_end_, at_);
-      const std::string place = "line " + std::to_string(++number);
-      if (number == 1 && !std::string_view(bytes_).substr(at_).starts_with("ply")) {
-        fail(file_, place,
-             printable(std::string_view(bytes_).substr(0, std::min<std::size_t>(end, 8))) +
-                 " instead of 'ply'");
-      }
-      if (end == std::string::npos) fail(file_, place, "the header ends without 'end_header'");
-      std::string_view line = std::string_view(bytes_).substr(at_, end - at_);
-      at_ = end + 1;
-      const std::string_view whole = line;
-      const std::string_view word = next_token(line);
-      if (word == "end_header") {
-        if (!has_format) fail(file_, place, "the header has no 'format' line");
-        line_ = number + 1;
-        return;
-      }
-      if (word == "format") {
-        const std::string_view name = next_token(line);
-        if (has_format) fail(file_, place, "a second 'format' line");
-        read_format(place, name, next_token(line));
-        has_format = true;
-      } else if (word == "element") {
-        const std::string_view name = next_token(line), count_text = next_token(line);
-        const std::optional<std::int64_t> count = parse_integer(count_text);
-        if (!count || *count < 0)
-          fail(file_, place, "element " + printable(name) + " has the count " + printable(count_text));
-        elements_.push_back({std::string(name), static_cast<std::uint64_t>(*count), {}});
-      } else if (word == "property") {
-        if (elements_.empty()) fail(file_, place, "a property before the first element: " + printable(whole));
-        elements_.back().properties.push_back(read_property(place, line));
-      } else if (!word.empty() && word != "ply" && word != "comment" && word != "obj_info") {
-        fail(file_, place, "unknown word " + printable(word) + " in the header");
-      }
-    }
-  }
-
-  void read_format(const std::string& place, std::string_view name, std::string_view version) {
-    if (name == "ascii") {
-      format_ = Format::ascii;
-    } else if (name == "binary_little_endian") {
-      format_ = Format::binary_little_endian;
-    } else if (name == "binary_big_endian") {
-      format_ = Format::binary_big_endian;
-    } else {
-      fail(file_, place, "unknown format " + printable(name));
-    }
-    if (version != "1.0")
-      fail(file_, place, "format version is " + printable(version) + ", only 1.0 is known");
-  }
-
-  Property read_property(const std::string& place, std::string_view line) const {
-    const auto type_of = [&](std::string_view name) {
-      const std::optional<Type> type = type_named(name);
-      if (!type) fail(file_, place, "unknown type " + printable(name));
-      return *type;
-    };
-    Property property;
-    std::string_view word = next_token(line);
-    if (word == "list") {
-      property.is_list = true;
-      const std::string_view count_name = next_token(line);
-      property.count_type = type_of(count_name);
-      if (property.count_type >= Type::float32)
-        fail(file_, place, "a list counted in " + printable(count_name));
-      word = next_token(line);
-    }
-    property.type = type_of(word);
-    property.name = next_token(line);
-    if (property.name.empty()) fail(file_, place, "a property without a name");
-    return property;
-  }
-
   // ---- body
 
   std::string place_of(const Element& element, std::uint64_t i) const {
     const std::string place = element.name + " " + std::to_string(i);
-    return format_ == Format::ascii ? "line " + std::to_string(line_) + ", " + place : place;
+    return header_.format == Format::ascii ? "line " + std::to_string(line_) + ", " + place : place;
   }
 
   void check_room(const Element& element) const {
     // Checked before any allocation: the elements promised by the header need at least this many bytes.
     std::uint64_t least = 0;
     for (const Property& p : element.properties) {
-      least += format_ == Format::ascii
+      least += header_.format == Format::ascii
                    ? 1
                    : type_bytes[static_cast<std::size_t>(p.is_list ? p.count_type : p.type)];
     }
@@ -184,6 +84,7 @@ class PlyReader {
       read_strips(element);
     } else if (!element.properties.empty()) {
       for (std::uint64_t i = 0; i < element.count; ++i) {
+        begin_row(element, i);
         for (const Property& p : element.properties) skip(p, element, i);
       }
     }
@@ -207,7 +108,7 @@ class PlyReader {
     mesh_.vertex_count = static_cast<std::uint32_t>(element.count);
     mesh_.positions.resize(3 * element.count);
     for (std::uint64_t i = 0; i < element.count; ++i) {
-      begin_row();
+      begin_row(element, i);
       for (std::size_t p = 0; p < axis_of.size(); ++p) {
         const Property& property = element.properties[p];
         if (axis_of[p] < 0) {
@@ -222,6 +123,14 @@ class PlyReader {
     }
   }
 
+  static std::string names_of(const std::vector<Property>& properties) {
+    if (properties.empty()) return "nothing";
+    std::string names;
+    for (const Property& p : properties)
+      names += (names.empty() ? "" : ", ") + std::string(p.is_list ? "the list " : "the number ") + p.name;
+    return names;
+  }
+
   bool is_index_list(const Property& p) const {
     return p.is_list && (p.name == "vertex_indices" || p.name == "vertex_index");
   }
@@ -232,10 +141,12 @@ class PlyReader {
     const auto lists = std::count_if(element.properties.begin(), element.properties.end(),
                                      [&](const Property& p) { return is_index_list(p); });
     if (lists > 1) fail(file_, "element " + element.name, "has two lists of vertex indices");
-    if (lists == 0 && element.count > 0) fail(file_, "element " + element.name, "has no list vertex_indices");
+    if (lists == 0 && element.count > 0)
+      fail(file_, "element " + element.name,
+           "has no list vertex_indices, only " + names_of(element.properties));
     std::vector<std::int64_t> list;
     for (std::uint64_t i = 0; i < element.count; ++i) {
-      begin_row();
+      begin_row(element, i);
       for (const Property& p : element.properties) {
         if (!is_index_list(p)) {
           skip(p, element, i);
@@ -262,9 +173,15 @@ class PlyReader {
   void read_strips(const Element& element) {
     read_lists(element, [&](std::uint64_t i, const std::vector<std::int64_t>& list) {
       std::size_t start = 0;
-      for (std::size_t k = 0; k < list.size(); ++k) {
-        if (list[k] == -1) start = k + 1;
-        if (k < start + 2 || list[k] == -1) continue;
+      for (std::size_t k = 0; k <= list.size(); ++k) {
+        if (k == list.size() || list[k] == -1) {
+          if (k > start && k < start + 3)
+            fail(file_, place_of(element, i),
+                 "a strip of " + std::to_string(k - start) + " vertices (3 are needed)");
+          start = k + 1;
+          continue;
+        }
+        if (k < start + 2) continue;
         const bool odd = (k - start) % 2 == 1;  // every second triangle of a strip has reversed orientation
         push_corner(element, i, list[odd ? k - 1 : k - 2]);
         push_corner(element, i, list[odd ? k - 2 : k - 1]);
@@ -306,26 +223,47 @@ class PlyReader {
     const std::string_view blanks(" \t\r\n\v\f\0", 7);
     const std::size_t more = bytes_.find_first_not_of(blanks, at_);
     if (more == std::string::npos) return;
-    fail(file_, format_ == Format::ascii ? place_in_text(bytes_, more) : "byte " + std::to_string(more),
+    fail(file_,
+         header_.format == Format::ascii ? place_in_text(bytes_, more) : "byte " + std::to_string(more),
          "data behind the last element that the header counts");
+  }
+
+  void add_notes() {
+    const auto note = [&](std::uint64_t count, const std::string& what) {
+      if (count > 0) mesh_.notes.push_back(std::to_string(count) + " " + what);
+    };
+    for (const Element& e : header_.elements)
+      if (e.name != "vertex" && e.name != "face" && e.name != "tristrips" && !e.properties.empty())
+        note(e.count, "of its elements " + printable(e.name) + " skipped");
+    note(several_lines_, "of its elements written over several lines");
+    note(misfits_, "of its numbers do not fit the types that its header declares; read as written");
   }
 
   // ---- numbers
 
-  /// In text a vertex or a face is a line: missing or additional values would shift all following ones.
-  void begin_row() {
-    last_row_ = row_;
-    row_ = 0;
+  /// In text an element begins on a line of its own. It may go on in the next lines, but nothing may follow
+  /// it on its last one: then a value is missing or too many somewhere, and all the following ones would
+  /// shift.
+  void begin_row(const Element& element, std::uint64_t i) {
+    if (row_.last_line > 0) before_ = row_;
+    row_ = {&element, i, 0, 0};
   }
-  void check_row(const Element& element, std::uint64_t i) {
-    if (element.name != "vertex" && element.name != "face") return;
-    if (row_ == 0 && line_ == last_row_)
-      fail(file_, place_of(element, i), "begins on the line of the one before it, which has too many values");
-    if (row_ != 0 && line_ != row_) {
-      line_ = row_;
-      fail(file_, place_of(element, i), "the line ends before all its values");
+  void check_row() {
+    if (row_.last_line == 0) {
+      row_.first_line = line_;
+      if (line_ == before_.last_line && before_.first_line == before_.last_line)
+        fail(file_, place_of(*row_.element, row_.i),
+             "begins on the line of the one before it, which has too many values");
+      if (line_ == before_.last_line) {
+        line_ = before_.first_line;
+        fail(file_, place_of(*before_.element, before_.i),
+             "the line ends before all its values, and line " + std::to_string(before_.last_line) +
+                 " has more than the rest of them");
+      }
+    } else if (line_ != row_.last_line && row_.first_line == row_.last_line) {
+      ++several_lines_;
     }
-    row_ = line_;
+    row_.last_line = line_;
   }
 
   [[noreturn]] void truncated(const Element& element, std::uint64_t i) const {
@@ -343,10 +281,10 @@ class PlyReader {
   std::string_view take_token(const Element& element, std::uint64_t i) {
     constexpr std::string_view blanks = " \t\r\n\v\f";
     while (at_ < bytes_.size() && blanks.find(bytes_[at_]) != std::string_view::npos) {
-      if (bytes_[at_++] == line_end_) ++line_;
+      if (bytes_[at_++] == header_.line_end) ++line_;
     }
     if (at_ == bytes_.size()) truncated(element, i);
-    check_row(element, i);
+    check_row();
     const std::size_t begin = at_;
     while (at_ < bytes_.size() && blanks.find(bytes_[at_]) == std::string_view::npos) ++at_;
     return std::string_view(bytes_).substr(begin, at_ - begin);
@@ -355,16 +293,17 @@ class PlyReader {
   template <class T>
   double binary(const Element& element, std::uint64_t i) {
     const char* raw = take(sizeof(T), element, i);
-    return static_cast<double>(format_ == Format::binary_big_endian ? load_big_endian<T>(raw)
-                                                                    : load_little_endian<T>(raw));
+    return static_cast<double>(header_.format == Format::binary_big_endian ? load_big_endian<T>(raw)
+                                                                           : load_little_endian<T>(raw));
   }
 
   double read_number(Type type, const Element& element, std::uint64_t i) {
-    if (format_ == Format::ascii) {
+    if (header_.format == Format::ascii) {
       const std::string_view token = take_token(element, i);
       const std::optional<double> value = parse_double(token);
       if (!value)
         fail(file_, place_of(element, i), printable(token) + " is not a number that a double can hold");
+      if (!fits(type, *value)) ++misfits_;
       return *value;
     }
     switch (type) {
@@ -399,7 +338,7 @@ class PlyReader {
   std::size_t read_count(const Property& property, const Element& element, std::uint64_t i) {
     const double count = read_number(property.count_type, element, i);
     const std::size_t each =
-        format_ == Format::ascii ? 1 : type_bytes[static_cast<std::size_t>(property.type)];
+        header_.format == Format::ascii ? 1 : type_bytes[static_cast<std::size_t>(property.type)];
     if (!(count >= 0) || count != std::floor(count)) {
       fail(file_, place_of(element, i), "the list " + property.name + " has the length " + text_of(count));
     }
@@ -416,7 +355,7 @@ class PlyReader {
 
   void skip(const Property& property, const Element& element, std::uint64_t i) {
     const std::size_t n = property.is_list ? read_count(property, element, i) : 1;
-    if (format_ == Format::ascii) {
+    if (header_.format == Format::ascii) {
       for (std::size_t k = 0; k < n; ++k) take_token(element, i);
     } else {
       take(n * type_bytes[static_cast<std::size_t>(property.type)], element, i);
@@ -425,12 +364,15 @@ class PlyReader {
 
   std::filesystem::path file_;
   std::string bytes_;
-  std::size_t at_ = 0;
-  char line_end_ = '\n';                // of "\r\n" the second character
-  std::size_t line_ = 1;                // of ascii bodies
-  std::size_t row_ = 0, last_row_ = 0;  // lines of the current element, and of the preceding one; 0: none
-  Format format_ = Format::ascii;
-  std::vector<Element> elements_;
+  Header header_;
+  std::size_t at_ = header_.body_at;
+  std::size_t line_ = header_.body_line;  // of ascii bodies
+  struct Row {
+    const Element* element = nullptr;
+    std::uint64_t i = 0;
+    std::size_t first_line = 0, last_line = 0;  // of its values so far; 0: none
+  } row_, before_;                              // of the current element, and of the last one that has values
+  std::uint64_t several_lines_ = 0, misfits_ = 0;  // counts of elements and of numbers, for notes
   AnimatedMesh mesh_;
 };
 

@@ -9,6 +9,7 @@
 #include "experiments/common/json_reader.hpp"
 #include "experiments/common/names.hpp"
 #include "experiments/common/text.hpp"
+#include "experiments/io/frames.hpp"
 #include "experiments/io/load.hpp"
 #include "experiments/scenes/shape_bodies.hpp"
 
@@ -113,6 +114,9 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
   body.clip = keys.word("clip").value_or("");
   body.frames_per_second = keys.number("fps").value_or(0);
   if (body.frames_per_second < 0) keys.fail("fps", "must not be negative");
+  body.weld = keys.truth("weld");
+  if (body.weld == false && io::lower_extension(body.file).starts_with(".gl"))
+    keys.fail("weld", "glTF files are always welded: their vertices have no numbers outside");
   keys.finish();
   return body;
 }
@@ -213,7 +217,7 @@ json body_from_text(const std::string& text) {
       continue;
     }
     if (body.contains(key)) throw io::InputError(at + ": is given twice");
-    if (key == "self") {
+    if (key == "self" || key == "weld") {
       if (value != "true" && value != "false")
         throw io::InputError(at + ": expected true or false, got '" + value + "'");
       body[key] = value == "true";
@@ -339,7 +343,9 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     } else {
       if (progress) progress("reading " + body.file.string(), 0);
       loaded.origin = SceneOrigin::files;
-      mesh = io::load_animated_mesh({body.file, body.motion, body.clip, body.frames_per_second});
+      using Seams = io::LoadRequest::Seams;
+      mesh = io::load_animated_mesh({body.file, body.motion, body.clip, body.frames_per_second,
+                                     body.weld.value_or(!spec.script) ? Seams::weld : Seams::keep_apart});
     }
     mesh.name = body.name.empty() ? readable(mesh.name) : body.name;
     io::take_as(mesh, body.as);
@@ -347,6 +353,10 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     if (mesh.degenerate_primitives > 0)
       loaded.notes.push_back(source + ": " + counted(mesh.degenerate_primitives, "degenerate primitive") +
                              " at the first keyframe, kept");
+    if (mesh.welded_vertices > 0)
+      loaded.notes.push_back(source + ": welded " + counted(mesh.welded_vertices, "vertex") +
+                             " to others that have the same positions at every keyframe");
+    for (const std::string& text : mesh.notes) loaded.notes.push_back(source + ": " + text);
     if (mesh.merged_keyframes > 0)
       loaded.notes.push_back(source + ": merged " + counted(mesh.merged_keyframes, "keyframe") +
                              " with time and positions of the one before");

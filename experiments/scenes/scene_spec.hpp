@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,9 @@ struct BodySpec {
   nlohmann::json shape;  ///< for make_shape; null for files
   io::TakeAs as = io::TakeAs::given;
   Placement placement;
-  bool self = false;  ///< pairs within it are requested, too
-  std::string place;  ///< for messages
+  bool self = false;         ///< pairs within it are requested, too
+  std::optional<bool> weld;  ///< of files (io/weld.hpp); by default where no script changes single vertices
+  std::string place;         ///< for messages
 };
 
 /// The order in which a scene stores its vertices (and, renumbered, its primitives).

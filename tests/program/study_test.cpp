@@ -1,6 +1,7 @@
 // Small studies by the kbvh binary, from end to end: what is measured, recorded, refused and not measured
 // again.
 #include <algorithm>
+#include <array>
 #include <map>
 
 #include "binary.hpp"
@@ -199,6 +200,87 @@ TEST_F(Binary, PairsWithinBodiesAreCountedWhereTheyAreAskedFor) {
   EXPECT_EQ(one.at("verified").at("pairs"), 0);
   EXPECT_EQ(one.at("scene").at("bodies").at(0).at("self"), false);
   EXPECT_EQ(one.at("scene").at("bodies").at(1).at("self"), true);
+}
+
+// A cube whose sides have four vertices each, as exporters write it for the sake of normals.
+TEST_F(Binary, NeighboursAtASeamAreNoPair) {
+  std::string vertices, ply_vertices, obj_faces, ply_faces;
+  for (int side = 0; side < 6; ++side) {
+    for (int i = 0; i < 4; ++i) {
+      int p[3];
+      p[side / 2] = side % 2;
+      p[(side / 2 + 1) % 3] = i % 2;
+      p[(side / 2 + 2) % 3] = i / 2;
+      const std::string text =
+          std::to_string(p[0]) + " " + std::to_string(p[1]) + " " + std::to_string(p[2]) + "\n";
+      vertices += "v " + text;
+      ply_vertices += text;
+    }
+    for (const std::array<int, 3> f : {std::array{0, 1, 2}, std::array{2, 1, 3}}) {
+      obj_faces += "f";
+      ply_faces += "3";
+      for (const int i : f) {
+        obj_faces += " " + std::to_string(4 * side + i + 1);
+        ply_faces += " " + std::to_string(4 * side + i);
+      }
+      obj_faces += "\n";
+      ply_faces += "\n";
+    }
+  }
+  write_text(folder_ / "cube.obj", vertices + obj_faces);
+  write_text(
+      folder_ / "cube.ply",
+      "ply\nformat ascii 1.0\nelement vertex 24\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 12\nproperty list uchar int vertex_indices\nend_header\n" +
+          ply_vertices + ply_faces);
+  write_text(folder_ / "script.json",
+             R"([{"time": 0.01, "changes": [{"vertex": 3, "velocity": [0, 0, 1]}]}])");
+  int number = 0;
+  const auto pairs = [&](const std::string& body, const std::string& note, const std::string& more = "") {
+    const std::string out = "out" + std::to_string(++number);
+    const Outcome run = kbvh("run --body " + body +
+                             " --body sphere:triangles=20,keyframes=2,step=0:0:0.1,centre=9:9:9 "
+                             "--self --l 1 --repetitions 1 --strategies bottom_up --out " +
+                             out + more);
+    EXPECT_EQ(run.code, 0) << run.err;
+    EXPECT_NE(run.err.find(note), std::string::npos) << run.err;
+    const auto found = records(out + "/results.jsonl");
+    EXPECT_EQ(found.size(), 1u);
+    return found.empty() ? json() : found[0].at("verified").at("pairs");
+  };
+  for (const std::string file : {"cube.obj", "cube.ply"}) {
+    EXPECT_EQ(pairs(file, "note: " + file + ": welded 16 vertices"), 0);
+    EXPECT_GT(pairs(file + ",weld=false", "16 of its vertices"), 0);
+    // A script moves vertices by their numbers in the file, copies too.
+    EXPECT_GT(pairs(file, "16 of its vertices", " --script script.json"), 0);
+    EXPECT_EQ(pairs(file + ",weld=true", "welded 16 vertices", " --script script.json"), 0);
+  }
+  write_text(folder_ / "a.gltf", "{}");
+  const Outcome refused = kbvh("run --self --body a.gltf,weld=false");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("glTF files are always welded"), std::string::npos) << refused.err;
+}
+
+TEST_F(Binary, ContactsAtASeamAreFoundOnce) {
+  // A plate of two triangles, once with the vertices of their common edge stored twice.
+  write_text(folder_ / "seam.obj",
+             "v -1 -1 0\nv 1 -1 0\nv -1 1 0\nv 1 -1 0\nv -1 1 0\nv 1 1 0\nf 1 2 3\nf 4 6 5\n");
+  write_text(folder_ / "plain.obj", "v -1 -1 0\nv 1 -1 0\nv -1 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n");
+  const auto contacts = [&](const std::string& body) {
+    const Outcome run =
+        kbvh("run --body " + body +
+             " --body sphere:triangles=80,keyframes=2,step=0:0:-2,"
+             "centre=0.1:0.07:1.5,radius=0.6 --continuous --repetitions 1 --strategies bottom_up --out " +
+             body + ".out");
+    EXPECT_EQ(run.code, 0) << run.err;
+    const auto found = records(body + ".out/results.jsonl");
+    EXPECT_EQ(found.size(), 1u);
+    return found.empty() ? 0 : found[0].at("verified").at("pairs").get<int>();
+  };
+  const int plain = contacts("plain.obj");
+  EXPECT_GT(plain, 0);
+  EXPECT_EQ(contacts("seam.obj"), plain);
+  EXPECT_GT(contacts("seam.obj,weld=false"), plain);
 }
 
 /// The middle of the times that a record has for a phase.

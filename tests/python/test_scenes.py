@@ -48,6 +48,21 @@ class Files(unittest.TestCase):
                 seen += len(first.pairs())
         self.assertGreater(seen, 0)
 
+    def test_seams_are_welded_and_readers_warn(self):
+        (self.folder / "seam.obj").write_text(
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 4 6 5\nl 1 2\n"
+        )
+        with self.assertWarns(UserWarning) as caught:
+            welded = kbvh.load(self.folder / "seam.obj")
+        said = [str(one.message) for one in caught.warnings]
+        self.assertTrue(any("welded 2 vertices" in note for note in said), said)
+        self.assertTrue(any("skipped 1 polyline" in note for note in said), said)
+        self.assertEqual(np.asarray(welded.indices).tolist(), [0, 1, 2, 1, 5, 2])
+        self.assertEqual(welded.vertices, 6)
+        with self.assertWarnsRegex(UserWarning, "not welded"):
+            apart = kbvh.load(self.folder / "seam.obj", weld=False)
+        self.assertEqual(np.asarray(apart.indices).tolist(), [0, 1, 2, 3, 5, 4])
+
     def test_wrong_files(self):
         (self.folder / "bad.obj").write_text("v 0 0 0\nf 1 2 9\n")
         with self.assertRaisesRegex(kbvh.InputError, "bad.obj"):
