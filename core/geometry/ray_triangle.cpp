@@ -279,6 +279,7 @@ bool ray_meets_triangle(const RayLine& ray, const double* corners, RayMeeting& m
     return verdict == Verdict::meets;
   }
   ++stats.exact;
+  ++stats.ray_decisions;
   const ScaledPair pair(ray, corners);
   if (pair.misses_by_signs()) return false;
   const std::optional<Fraction> found = ExactPair(pair).meeting();
