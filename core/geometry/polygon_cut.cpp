@@ -108,18 +108,39 @@ class PolygonCutter::Work {
     return true;
   }
 
+  /// Sorts corners that are not cut off by one coordinate.
+  void sort_corners() {
+    sorted_.clear();
+    for (std::size_t i = 0; i < ids_.size(); ++i)
+      if (!is_cut_off_[i]) sorted_.push_back(std::uint32_t(i));
+    std::sort(sorted_.begin(), sorted_.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return std::pair(polygon_.along(a), a) < std::pair(polygon_.along(b), b);
+    });
+  }
+
   /// Returns whether certainly no two edges meet but neighbours at their common corner. Then every triangle
-  /// of a corner that turns with the polygon lies inside if it is free of edges, and stays an ear.
+  /// of a corner that turns with the polygon lies inside if no corner does, and stays an ear. Compares edges
+  /// that overlap in one coordinate.
   bool is_simple() {
     const std::size_t n = ids_.size();
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::size_t a = i, b = (i + 1) % n;
-      if (turn(a, b, (b + 1) % n) == 0) return false;
-      for (std::size_t j = i + 2; j < n; ++j) {
-        const std::size_t c = j, d = (j + 1) % n;
-        if (d == a || polygon_.boxes_apart(a, b, c, d)) continue;
-        if (turn(a, b, c) * turn(a, b, d) <= 0 && turn(c, d, a) * turn(c, d, b) <= 0) return false;
+    for (std::size_t i = 0; i < n; ++i)
+      if (turn(i, (i + 1) % n, (i + 2) % n) == 0) return false;
+    // An edge is listed at the corner where it begins in this coordinate.
+    const auto meets_a_later_edge = [&](std::size_t place, std::size_t a, std::size_t b) {
+      const double end = std::max(polygon_.along(a), polygon_.along(b)) + 2 * polygon_.slack();
+      for (; place < n && !(polygon_.along(sorted_[place]) > end); ++place) {
+        const std::size_t c = sorted_[place];
+        for (const std::size_t d : {next_[c], previous_[c]}) {
+          if (c == a || c == b || d == a || d == b || polygon_.boxes_apart(a, b, c, d)) continue;
+          if (turn(a, b, c) * turn(a, b, d) <= 0 && turn(c, d, a) * turn(c, d, b) <= 0) return true;
+        }
       }
+      return false;
+    };
+    for (std::size_t place = 0; place < n; ++place) {
+      const std::size_t a = sorted_[place];
+      for (const std::size_t b : {next_[a], previous_[a]})
+        if (!(polygon_.along(b) < polygon_.along(a)) && meets_a_later_edge(place, a, b)) return false;
     }
     return true;
   }
@@ -127,8 +148,8 @@ class PolygonCutter::Work {
   // ---- Ears
   // -------------------------------------------------------------------------------------------------
 
-  /// The sides of a triangle on whose outer side or line a corner lies: bits 0 to 2 (bits 3 to 5: on the
-  /// outer side).
+  /// Returns the sides of a triangle on whose outer side or line a corner lies: bits 0 to 2 (bits 3 to 5: on
+  /// the outer side).
   unsigned sides(const std::size_t (&t)[3], std::size_t corner) {
     unsigned bits = 0;
     for (unsigned side = 0; side < 3; ++side) {
@@ -144,6 +165,28 @@ class PolygonCutter::Work {
     const int way = turn(t[0], t[1], t[2]);
     if (way <= 0) return way == 0 ? Rank::flat : Rank::any;
     polygon_.bound(t);
+    return simple_ ? rank_among_corners(t) : rank_among_edges(t);
+  }
+
+  /// Where no edges cross, one that enters a triangle has an end in it.
+  Rank rank_among_corners(const std::size_t (&t)[3]) {
+    auto next =
+        std::lower_bound(sorted_.begin(), sorted_.end(), polygon_.bound_begin(),
+                         [&](std::uint32_t corner, double at) { return polygon_.along(corner) < at; });
+    Rank rank = Rank::clean;
+    for (; next != sorted_.end() && !(polygon_.along(*next) > polygon_.bound_end()); ++next) {
+      const std::size_t corner = *next;
+      if (is_cut_off_[corner] || corner == t[0] || corner == t[1] || corner == t[2] ||
+          polygon_.beyond_bound(corner, corner))
+        continue;
+      const unsigned bits = sides(t, corner);
+      if (bits == 0) return Rank::convex;
+      if (bits < 8) rank = Rank::touched;
+    }
+    return rank;
+  }
+
+  Rank rank_among_edges(const std::size_t (&t)[3]) {
     bool touched = false;
     for (std::size_t a = t[2]; a != t[0]; a = next_[a]) {
       const std::size_t b = next_[a];
@@ -159,7 +202,7 @@ class PolygonCutter::Work {
       }
       if (left != 0 && right != 0) return Rank::convex;
     }
-    if (!simple_ && !is_inside(t)) return Rank::convex;
+    if (!is_inside(t)) return Rank::convex;
     return touched ? Rank::touched : Rank::clean;
   }
 
@@ -214,6 +257,8 @@ class PolygonCutter::Work {
       next_[i] = (i + 1) % n;
       previous_[i] = (i + n - 1) % n;
     }
+    is_cut_off_.assign(n, false);
+    sort_corners();
     simple_ = is_simple();
     consider_all(0);
     bool crosses = false, all_are_new = true;
@@ -240,7 +285,9 @@ class PolygonCutter::Work {
       next_[before] = after;
       previous_[after] = before;
       ++version_[best.tip];
+      is_cut_off_[best.tip] = true;
       all_are_new = false;
+      if (2 * left < sorted_.size()) sort_corners();
       if (--left == 3) {
         add_triangle(before, after, next_[after]);
         break;
@@ -258,6 +305,8 @@ class PolygonCutter::Work {
   std::vector<std::size_t> next_, previous_;
   std::vector<std::uint32_t> version_;  ///< [corner]: of its newest candidate; older ones do not count
   std::vector<Candidate> heap_;
+  std::vector<bool> is_cut_off_;
+  std::vector<std::uint32_t> sorted_;  ///< corners by ProjectedPolygon::along; may hold some that are cut off
   bool simple_ = false;
 };
 

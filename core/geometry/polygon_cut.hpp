@@ -29,8 +29,9 @@ struct PolygonCut {
 /// The result depends neither on the first corner nor on the direction of the list, and all decisions are
 /// those of real arithmetic on the given numbers (a filter first, then Boost.Multiprecision), for coordinates
 /// up to admissible_magnitude<double>. For a simple planar polygon the union of the triangles is the polygon.
-/// Ids and places may be repeated. O(k) for convex polygons, O(k^2) for all others. Keeps its memory from
-/// call to call.
+/// Ids and places may be repeated. O(k) for convex polygons. For simple ones, O(k) times the number of
+/// corners and edges that overlap an ear or an edge in one coordinate; O(k^2) for all others. Keeps its
+/// memory from call to call.
 class PolygonCutter {
  public:
   PolygonCutter();

@@ -28,11 +28,17 @@ class ProjectedPolygon {
   /// Returns the turn of three corners as the polygon's own area turns: left (+1), right (-1), or none (0).
   int turn(std::size_t a, std::size_t b, std::size_t c);
 
+  /// Returns a coordinate of a corner, off by at most `slack`.
+  double along(std::size_t corner) const { return seen_[0][corner]; }
+  double slack() const { return slack_; }
   /// Returns whether the edges ab and cd are certainly apart, by their boxes.
   bool boxes_apart(std::size_t a, std::size_t b, std::size_t c, std::size_t d) const;
-  /// Remembers the box of a triangle; `beyond_bound` returns whether an edge is certainly apart from it.
+  /// Remembers the box of a triangle; `beyond_bound` returns whether an edge is certainly apart from it. Of
+  /// `along`, it reaches from `bound_begin` to `bound_end`.
   void bound(const std::size_t (&triangle)[3]);
   bool beyond_bound(std::size_t a, std::size_t b) const;
+  double bound_begin() const { return bound_[0].lower; }
+  double bound_end() const { return bound_[0].upper; }
   /// Returns whether a corner is at the place of one of a triangle's.
   bool coincides(std::size_t corner, const std::size_t (&triangle)[3]) const;
 

@@ -18,8 +18,17 @@ bool RaySearch<S>::offer(std::uint32_t body, std::uint32_t primitive, const Poly
       for (std::size_t axis = 0; axis < 3; ++axis)
         corners[3 * c + axis] = double(positions[std::size_t(3) * vertices[c] + axis]);
     RayMeeting meeting;
-    if (!ray_meets_triangle(line_, corners, meeting, stats)) continue;
-    if (hit_) {
+    // Equal meetings need no arithmetic: the smaller (body, primitive) wins.
+    RayMeeting known;
+    const bool same = hit_ && meets_at_same_corners(line_, corners_, best_, corners, known);
+    const bool smaller = std::tie(body, primitive) < std::tie(hit_.body, hit_.primitive);
+    if (same && !smaller) {
+      ++stats.tests;
+      ++stats.filtered;
+      continue;
+    }
+    if (!ray_meets_triangle(line_, corners, meeting, stats, same ? &known : nullptr)) continue;
+    if (hit_ && !same) {
       int order = 0;
       if (meeting.parameter + meeting.error < best_.parameter - best_.error)
         order = -1;
@@ -29,8 +38,7 @@ bool RaySearch<S>::offer(std::uint32_t body, std::uint32_t primitive, const Poly
         ++stats.ray_decisions;
         order = compare_meetings(line_, corners, corners_);
       }
-      if (order > 0) continue;
-      if (order == 0 && std::tie(hit_.body, hit_.primitive) <= std::tie(body, primitive)) continue;
+      if (order > 0 || (order == 0 && !smaller)) continue;
     }
     hit_ = {body, primitive, meeting.parameter};
     best_ = meeting;

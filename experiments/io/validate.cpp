@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <span>
 
-#include "core/geometry/polygon_cut.hpp"
 #include "experiments/io/bytes.hpp"
 
 namespace kbvh::io {
@@ -160,34 +158,26 @@ void merge_equal_times(AnimatedMesh& mesh, const std::filesystem::path& file) {
   mesh.positions.resize(kept * stride);
 }
 
-bool has_no_area(std::span<const std::uint32_t> triangles, const double* positions) {
-  const auto at = [&](std::size_t i) { return positions + std::size_t{3} * triangles[i]; };
-  for (std::size_t i = 0; i + 2 < triangles.size(); i += 3) {
-    const double *a = at(i), *b = at(i + 1), *c = at(i + 2);
+}  // namespace
+
+bool is_degenerate(const std::uint32_t* vertices, std::size_t count, const double* positions) {
+  const auto at = [&](std::size_t i) { return positions + std::size_t{3} * vertices[i]; };
+  std::size_t other = 1;
+  while (other < count && std::equal(at(0), at(0) + 3, at(other))) ++other;
+  for (std::size_t i = other + 1; i < count; ++i) {
+    const double *a = at(0), *b = at(other), *c = at(i);
     if (!cross_is_zero(a, b, c, 0, 1) || !cross_is_zero(a, b, c, 1, 2) || !cross_is_zero(a, b, c, 2, 0))
       return false;
   }
   return true;
 }
 
-bool is_degenerate(PolygonCutter& cutter, std::span<const std::uint32_t> polygon, const double* positions) {
-  return has_no_area(polygon.size() > 3 ? cutter.cut(polygon, positions).corners : polygon, positions);
-}
-
-}  // namespace
-
-bool is_degenerate(const std::uint32_t* vertices, std::size_t count, const double* positions) {
-  PolygonCutter cutter;
-  return is_degenerate(cutter, {vertices, count}, positions);
-}
-
 void count_degenerate(AnimatedMesh& mesh) {
   mesh.degenerate_primitives = 0;
   if (mesh.kind != MeshKind::polygons) return;  // other primitives have no area
-  PolygonCutter cutter;
   for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
     const std::uint32_t begin = mesh.primitive_offsets[p], end = mesh.primitive_offsets[p + 1];
-    if (is_degenerate(cutter, {&mesh.primitive_vertices[begin], end - begin}, mesh.positions.data()))
+    if (is_degenerate(&mesh.primitive_vertices[begin], end - begin, mesh.positions.data()))
       ++mesh.degenerate_primitives;
   }
 }

@@ -322,7 +322,7 @@ void add_notes_on_polygons(const io::AnimatedMesh& mesh, const std::string& sour
   CutFindings found;
   for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
     const std::uint32_t begin = mesh.primitive_offsets[p], corners = mesh.primitive_offsets[p + 1] - begin;
-    if (corners > 3)
+    if (corners > 3 && corners <= most_corners)
       found.add(
           cutter.cut(std::span(mesh.primitive_vertices).subspan(begin, corners), mesh.positions.data()));
   }

@@ -324,6 +324,68 @@ TEST(RaySearch, DecidesFewOfEqualFacesExactly) {
   }
 }
 
+/// Triangles over few places, so that many are met at shared corners and edges, equal, degenerate or in the
+/// plane of the ray: the answer is the first in real arithmetic, of several the smallest, in every order, to
+/// the last bit.
+TEST(RaySearch, AnswersDoNotDependOnTheOrder) {
+  std::uint64_t ties = 0, hits = 0;
+  TriangleTestStats stats;
+  for (int kind = 0; kind < 3; ++kind) {
+    std::mt19937 random(std::uint32_t(kind) + 3);
+    const auto below = [&](std::uint32_t n) { return std::uint32_t(random() % n); };
+    // Whole numbers; the same in units that are not powers of two; with full mantissas.
+    const auto place = [&](std::uint32_t i) {
+      const double x = double(i);
+      return kind == 0 ? x : kind == 1 ? 0.1 * x + 0.7 : std::sqrt(x + 0.3);
+    };
+    for (int round = 0; round < 150; ++round) {
+      std::vector<double> positions;
+      for (int i = 0; i < 27; ++i)
+        for (const int axis : {i % 3, i / 3 % 3, i / 9}) positions.push_back(place(std::uint32_t(axis)));
+      std::vector<std::vector<std::uint32_t>> triangles;
+      for (int i = 0; i < 24; ++i) {
+        triangles.push_back({below(27), below(27), below(27)});
+        if (i % 3 == 0) triangles.push_back({triangles.back()[2], triangles.back()[0], triangles.back()[1]});
+        if (i % 5 == 0) triangles.push_back({triangles.back()[1], triangles.back()[0], triangles.back()[2]});
+      }
+      Ray<double> ray{};
+      const double *from = &positions[3 * below(27)], *to = &positions[3 * below(27)];
+      for (int axis = 0; axis < 3; ++axis) {
+        ray.origin[axis] = round % 2 == 0 ? from[axis] - 2 * (to[axis] - from[axis]) : place(below(7)) - 2;
+        ray.direction[axis] = to[axis] - ray.origin[axis];
+      }
+      if (round % 5 == 0) ray.length = 1;
+      const RayLine line = RaySearch<double>(ray, RayQuery::closest).line();
+      std::optional<Rational> first;
+      std::uint32_t truth = RayHit::none;
+      for (std::uint32_t p = 0; p < triangles.size(); ++p) {
+        double corners[9];
+        for (std::size_t c = 0; c < 3; ++c) std::copy_n(&positions[3 * triangles[p][c]], 3, corners + 3 * c);
+        const auto found = first_meeting(line, corners);
+        if (found && first && *found == *first) ++ties;
+        if (!found || (first && *found >= *first)) continue;
+        first = found;
+        truth = p;
+      }
+      std::vector<std::uint32_t> order(triangles.size());
+      for (std::uint32_t p = 0; p < order.size(); ++p) order[p] = p;
+      RayHit hit;
+      for (int shuffle = 0; shuffle < 8; ++shuffle) {
+        RaySearch<double> search(ray, RayQuery::closest);
+        for (const std::uint32_t p : order)
+          search.offer(0, p, PolygonTriangles(triangles[p]), positions.data(), stats);
+        if (shuffle == 0) hit = search.hit();
+        ASSERT_EQ(search.hit(), hit) << "kind " << kind << ", round " << round << ", order " << shuffle;
+        std::shuffle(order.begin(), order.end(), random);
+      }
+      ASSERT_EQ(hit.primitive, truth) << "kind " << kind << ", round " << round;
+      hits += hit ? 1 : 0;
+    }
+  }
+  EXPECT_GT(hits, 200U);
+  EXPECT_GT(ties, 300U);
+}
+
 TEST(CheckRays, NamesTheRayAndTheValue) {
   const float nan = std::nanf(""), infinity = HUGE_VALF;
   const auto message = [](const Ray<float>& ray) -> std::string {
