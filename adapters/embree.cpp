@@ -37,8 +37,8 @@
 // floating-point state is restored. Upper bounds are an ulp or two larger, because Embree's builder asserts
 // that the box of all primitives is not a point.
 //
-// Rays. rtcIntersect1 and rtcOccluded1 on triangle geometry, body after body: the fans of all polygons in a
-// scene that is refitted like the others. With geometry=triangles and bodies of triangles the update itself
+// Rays. rtcIntersect1 and rtcOccluded1 on triangle geometry, body after body: the triangles of all
+// polygons in a scene that is refitted like the others. With geometry=triangles and bodies of triangles the update itself
 // refits it. Otherwise the first ray of a frame that enters the body does, so the time of rays includes that
 // refit. Bodies are entered front to back, and not at all behind the closest hit so far. Embree decides in
 // float, with no bound on its error, and may miss rays through edges and corners: its answers are marked
@@ -124,7 +124,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
                         collected_.found.bytes() + shared_confirmation_.bytes();
     for (const BodyState& state : bodies_)
       total += state.own_vertices.size() * sizeof(float) +
-               (state.own_indices.size() + state.fan_indices.size() + state.fan_primitives.size()) *
+               (state.own_indices.size() + state.cut_indices.size() + state.cut_primitives.size()) *
                    sizeof(std::uint32_t);
     return total;
   }
@@ -145,12 +145,12 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
         own_vertices;  // three per primitive and padding, for bodies with primitives other than triangles
     std::vector<std::uint32_t> own_indices;
     // For rays, made at the first of them.
-    RefitScene own_fans;  // unless `triangles` serves
-    bool fans_are_triangles = false, fans_are_old = true;
-    const float* fan_vertices = nullptr;
-    std::vector<std::uint32_t> fan_indices, fan_primitives;  // empty for bodies of triangles
+    RefitScene own_cuts;  // unless `triangles` serves
+    bool cuts_are_triangles = false, cuts_are_old = true;
+    const float* cut_vertices = nullptr;
+    std::vector<std::uint32_t> cut_indices, cut_primitives;  // empty for bodies of triangles
 
-    RefitScene& fans() { return fans_are_triangles ? triangles : own_fans; }
+    RefitScene& cuts() { return cuts_are_triangles ? triangles : own_cuts; }
   };
   struct Collected {
     BodyPair bodies{};
@@ -202,8 +202,8 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   Box<float> box_for_rays(BodyState& state) {
     if (state.primitives->kind != PrimitiveKind::polygons || !state.boxes.scene) return {};
     if (!state.boxes_are_old) return bounds_of_scene(state.boxes);
-    bring_fans_up_to_date(state);
-    return bounds_of_scene(state.fans());
+    bring_cuts_up_to_date(state);
+    return bounds_of_scene(state.cuts());
   }
 
   void trace(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) {
@@ -217,20 +217,20 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
       const auto limit = [&] { return double(found.ray.tfar); };
       tests += ray_order_.follow(RaySearch<S>(rays[i], query).line(), limit, [&](std::uint32_t body, bool) {
         BodyState& state = bodies_[body];
-        bring_fans_up_to_date(state);
+        bring_cuts_up_to_date(state);
         RTCIntersectContext context;
         rtcInitIntersectContext(&context);
         if (query == RayQuery::any) {
-          rtcOccluded1(state.fans().scene.get(), &context, &found.ray);
+          rtcOccluded1(state.cuts().scene.get(), &context, &found.ray);
           if (found.ray.tfar >= 0) return false;
           hits[i] = {state.body, RayHit::none, std::numeric_limits<double>::quiet_NaN()};
           return true;
         }
         found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        rtcIntersect1(state.fans().scene.get(), &context, &found);
+        rtcIntersect1(state.cuts().scene.get(), &context, &found);
         if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-        const std::uint32_t fan = found.hit.primID;
-        hits[i] = {state.body, state.fan_primitives.empty() ? fan : state.fan_primitives[fan],
+        const std::uint32_t triangle = found.hit.primID;
+        hits[i] = {state.body, state.cut_primitives.empty() ? triangle : state.cut_primitives[triangle],
                    double(found.ray.tfar)};
         return false;
       });
@@ -298,7 +298,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   void update(BodyState& state) {
     if (!state.boxes.scene) return;
     const KeepFloatingPointState keep;
-    state.fans_are_old = true;
+    state.cuts_are_old = true;
     if (refits_ == Refits::triangles) {
       state.positions = this->sampled_.positions(state.body);
       share_vertices(state);
@@ -319,38 +319,36 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   }
 
   /// Makes or refits the triangles that rays meet.
-  void bring_fans_up_to_date(BodyState& state) {
+  void bring_cuts_up_to_date(BodyState& state) {
     const Primitives& primitives = *state.primitives;
-    if (!state.boxes.scene || primitives.kind != PrimitiveKind::polygons || !state.fans_are_old) return;
-    state.fans_are_old = false;
+    if (!state.boxes.scene || primitives.kind != PrimitiveKind::polygons || !state.cuts_are_old) return;
+    state.cuts_are_old = false;
     state.positions = this->sampled_.positions(state.body);
-    state.fans_are_triangles = refits_ == Refits::triangles && state.only_triangles;
-    if (state.fans_are_triangles) return;
-    const bool fresh = !state.own_fans.scene;
+    state.cuts_are_triangles = refits_ == Refits::triangles && state.only_triangles;
+    if (state.cuts_are_triangles) return;
+    const bool fresh = !state.own_cuts.scene;
     if (fresh) {
-      RTCGeometry geometry = state.own_fans.make(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE, layout_);
-      if (!state.only_triangles) list_fans(state);
-      const auto& indices = state.only_triangles ? primitives.vertices : state.fan_indices;
+      RTCGeometry geometry = state.own_cuts.make(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE, layout_);
+      if (!state.only_triangles) list_cuts(state);
+      const auto& indices = state.only_triangles ? primitives.vertices : state.cut_indices;
       rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices.data(), 0,
                                  3 * sizeof(std::uint32_t), indices.size() / 3);
     }
-    if (state.positions != state.fan_vertices)
-      rtcSetSharedGeometryBuffer(state.own_fans.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+    if (state.positions != state.cut_vertices)
+      rtcSetSharedGeometryBuffer(state.own_cuts.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                  state.positions, 0, 3 * sizeof(float),
                                  this->scene_.vertex_count(state.body));
     else
-      rtcUpdateGeometryBuffer(state.own_fans.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0);
-    state.fan_vertices = state.positions;
-    fresh ? state.own_fans.build() : state.own_fans.refit();
+      rtcUpdateGeometryBuffer(state.own_cuts.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0);
+    state.cut_vertices = state.positions;
+    fresh ? state.own_cuts.build() : state.own_cuts.refit();
   }
-  static void list_fans(BodyState& state) {
+  static void list_cuts(BodyState& state) {
     for (std::uint32_t p = 0; p < state.primitives->count(); ++p) {
-      const auto vertices = (*state.primitives)[p];
-      const std::size_t last = vertices.size() - 1, triangles = last < 2 ? 1 : last - 1;
-      for (std::size_t i = 0; i < triangles; ++i) {
-        for (const std::size_t corner : {std::size_t(0), i + 1, i + 2})
-          state.fan_indices.push_back(vertices[std::min(corner, last)]);
-        state.fan_primitives.push_back(p);
+      const PolygonTriangles triangles = state.primitives->triangles(p);
+      for (std::uint32_t i = 0; i < triangles.count(); ++i) {
+        for (const std::uint32_t vertex : triangles[i]) state.cut_indices.push_back(vertex);
+        state.cut_primitives.push_back(p);
       }
     }
   }

@@ -13,9 +13,9 @@
 // - FCL takes triangles only, one per leaf. The adapter passes a primitive of fewer vertices as a degenerate
 //   triangle, and a primitive of more vertices as the triangle (lower, upper, first vertex) over two vertices
 //   that follow the body's own. That triangle has the polygon's box, so a leaf is a primitive, points and
-//   control nets are answered, and no pair is reported twice. Fans of polygons would need more leaves: this
-//   choice favours FCL. An 18-DOP does not follow from that triangle, so `fcl_*_kdop18` fans polygons, drops
-//   repeated pairs, and takes no control nets.
+//   control nets are answered, and no pair is reported twice. Cutting polygons would need more leaves: this
+//   choice favours FCL. An 18-DOP does not follow from that triangle, so `fcl_*_kdop18` has the triangles of
+//   polygons as leaves, drops repeated pairs, and takes no control nets.
 // - FCL rounds the sides of its 18-DOPs to nearest. Each side is a sum of two coordinates, and its rounding
 //   is monotone in the exact sum: bodies that overlap still overlap, but a vertex may lie half a unit in the
 //   last place outside of its 18-DOP. Hence there is no audit of 18-DOPs.
@@ -192,7 +192,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
   struct BodyState {
     std::unique_ptr<Model> model;           // none for a body without primitives: FCL refuses empty models
     std::vector<std::uint32_t> polygons;    // primitives of more than 3 vertices, passed as boxes
-    std::vector<std::uint32_t> primitives;  // of triangles, where polygons are fans
+    std::vector<std::uint32_t> primitives;  // of triangles, where polygons are cut
     std::uint64_t fitted_vertices = 0;      // vertex reads of a refit
     bool moves = false;
   };
@@ -254,8 +254,10 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
         triangles.emplace_back(v[0], v[v.size() / 2], v.back());
         owners.push_back(p);
       } else if (!boxes) {
-        for (std::size_t i = 1; i + 1 < v.size(); ++i) {
-          triangles.emplace_back(v[0], v[i], v[i + 1]);
+        const PolygonTriangles cut = primitives.triangles(p);
+        for (std::uint32_t i = 0; i < cut.count(); ++i) {
+          const auto corners = cut[i];
+          triangles.emplace_back(corners[0], corners[1], corners[2]);
           owners.push_back(p);
         }
       } else {
@@ -305,19 +307,20 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
                                std::to_string(status));
   }
 
-  /// Performs FCL's triangle test. Polygons are fans; FCL would compare only triangles whose boxes overlap.
+  /// Performs FCL's triangle test on the triangles of polygons; FCL would compare only triangles whose boxes
+  /// overlap.
   bool own_verdict(const PrimitivePair& pair) {
     const Primitives& primitives_a = this->scene_.primitives(pair.body_a);
     const Primitives& primitives_b = this->scene_.primitives(pair.body_b);
     if (primitives_a.kind != PrimitiveKind::polygons || primitives_b.kind != PrimitiveKind::polygons)
       return true;
-    const auto a = primitives_a[pair.primitive_a], b = primitives_b[pair.primitive_b];
-    const auto fan = [](std::span<const std::uint32_t> p) { return p.size() < 3 ? 1 : p.size() - 2; };
-    for (std::size_t i = 0; i < fan(a); ++i)
-      for (std::size_t j = 0; j < fan(b); ++j) {
-        const auto p = fan_triangle(pair.body_a, a, i), q = fan_triangle(pair.body_b, b, j);
+    const PolygonTriangles a = primitives_a.triangles(pair.primitive_a),
+                           b = primitives_b.triangles(pair.primitive_b);
+    for (std::uint32_t i = 0; i < a.count(); ++i)
+      for (std::uint32_t j = 0; j < b.count(); ++j) {
+        const auto p = corners_of(pair.body_a, a[i]), q = corners_of(pair.body_b, b[j]);
         // Single triangles: the boxes have been compared already.
-        if (fan(a) * fan(b) > 1 &&
+        if (a.count() * b.count() > 1 &&
             !fcl::AABB<Own>(p[0], p[1], p[2]).overlap(fcl::AABB<Own>(q[0], q[1], q[2])))
           continue;
         ++this->triangle_stats_.tests;
@@ -326,13 +329,10 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     return false;
   }
 
-  std::array<Vector, 3> fan_triangle(std::uint32_t body, std::span<const std::uint32_t> polygon,
-                                     std::size_t i) const {
+  std::array<Vector, 3> corners_of(std::uint32_t body, const std::array<std::uint32_t, 3>& triangle) const {
     const S* positions = this->sampled_.positions(body);
-    const auto corner = [&](std::size_t k) {
-      return vector(positions + std::size_t(3) * polygon[std::min(k, polygon.size() - 1)]);
-    };
-    return {corner(0), corner(i + 1), corner(i + 2)};
+    const auto corner = [&](std::size_t i) { return vector(positions + std::size_t(3) * triangle[i]); };
+    return {corner(0), corner(1), corner(2)};
   }
 
   std::vector<BodyState> bodies_;

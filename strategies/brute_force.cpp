@@ -103,7 +103,8 @@ class BruteForce final : public CountedStrategy<S, Count>,
     double near = 0;
     for (std::uint32_t p = 0; p < boxes_[body].size(); ++p)
       if (primitives.alive(p) && slabs.meet(boxes_[body][p], search.limit(), near) &&
-          search.offer(body, p, primitives[p], this->sampled_.positions(body), this->triangle_stats_))
+          search.offer(body, p, primitives.triangles(p), this->sampled_.positions(body),
+                       this->triangle_stats_))
         return true;
     return false;
   }

@@ -25,7 +25,9 @@ class Body:
     `positions` is [keyframe][vertex][3] with keyframes at `times` (seconds, increasing), between which vertices move on straight
     lines; or [vertex][3] for a body at rest, or for one whose motion is unknown (`known` is False): its positions are then set
     frame by frame. `indices` is [triangle][3], or a flat list of vertices that `offsets` cuts into primitives: primitive p has
-    indices[offsets[p]:offsets[p + 1]]. Arrays are used as they are: nothing is copied before a world is made.
+    indices[offsets[p]:offsets[p + 1]]. A polygon of more than three corners is cut into triangles once, at its first positions,
+    whatever its first corner; from then on it is the union of these triangles. Arrays are used as they are: nothing is copied
+    before a world is made.
 
     >>> import numpy as np
     >>> kbvh.Body([[0, 1, 2]], np.zeros((2, 3, 3)), times=[0, 1]).keyframes

@@ -29,6 +29,8 @@ namespace kbvh {
   X(box_tests, "box-box overlap tests of the query, primitive pre-tests included")                   \
   X(triangle_tests, "exact triangle tests")                                                          \
   X(triangle_tests_exact, "exact triangle tests that the filter left to exact arithmetic")           \
+  X(ray_decisions_exact,                                                                             \
+    "exact decisions of rays: tests left to exact arithmetic, and exact comparisons of hits")        \
   X(span_tests, "attempts to decide a pair of triangles for a span of time")                         \
   X(span_verdicts, "pairs that a frame reported as intersecting by the verdict of an earlier frame") \
   X(bodies_skipped, "bodies for which a frame read at most one box")                                 \

@@ -299,6 +299,7 @@ class Strategy {
     Counters table = counted();
     table[Counter::triangle_tests] += triangle_stats_.tests;
     table[Counter::triangle_tests_exact] += triangle_stats_.exact;
+    table[Counter::ray_decisions_exact] += triangle_stats_.ray_decisions;
     table[Counter::bytes] = bytes() + histories_[0].bytes() + histories_[1].bytes();
     return table;
   }

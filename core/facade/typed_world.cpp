@@ -7,6 +7,7 @@
 #include "core/facade/implementation.hpp"
 #include "core/facade/judgement.hpp"
 #include "core/motion/admissible.hpp"
+#include "core/scene/cut_polygons.hpp"
 
 namespace kbvh {
 namespace {
@@ -344,6 +345,7 @@ class TypedWorld final : public detail::WorldImplementation {
     Scene<S> alone;
     alone.bodies.push_back({name, primitives_of(connectivity), std::move(plans)});
     validate(alone);
+    cut_polygons(alone);
     scene_.bodies.push_back(std::move(alone.bodies[0]));
     return std::uint32_t(scene_.bodies.size() - 1);
   }

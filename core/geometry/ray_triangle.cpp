@@ -66,7 +66,7 @@ Verdict filtered(const RayLine& ray, const double* corners, RayMeeting& meeting)
   if (!(error <= 0x1p-42 * parameter)) return Verdict::open;
   if (parameter - error > ray.length) return Verdict::miss;
   if (!(parameter + error < ray.length) && ray.length < HUGE_VAL) return Verdict::open;
-  meeting = {parameter, error};
+  meeting = {parameter, error, 7, false};
   return Verdict::meets;
 }
 
@@ -113,13 +113,20 @@ int compare(const Fraction& a, const Fraction& b) {
   if (b.exponent > a.exponent) right <<= unsigned(b.exponent - a.exponent);
   return left.compare(right);
 }
-/// Rounds a fraction that is not negative.
+/// Rounds a fraction that is not negative to nearest, whatever common factor its parts have: equal fractions
+/// are rounded alike.
 double rounded(const Fraction& x) {
   if (x.numerator.is_zero()) return 0;
   const int shift = 64 - (int(msb(x.numerator)) - int(msb(x.denominator)));
-  const Integer quotient = shift >= 0 ? Integer((x.numerator << unsigned(shift)) / x.denominator)
-                                      : Integer(x.numerator / (x.denominator << unsigned(-shift)));
-  return std::ldexp(quotient.convert_to<double>(), x.exponent - shift);
+  Integer quotient, remainder;
+  if (shift >= 0)
+    divide_qr(Integer(x.numerator << unsigned(shift)), x.denominator, quotient, remainder);
+  else
+    divide_qr(x.numerator, Integer(x.denominator << unsigned(-shift)), quotient, remainder);
+  // 64 or 65 bits: below the rounding, the last one stands for all that follow.
+  auto bits = static_cast<std::uint64_t>(quotient >> 1);
+  if (!remainder.is_zero() || (quotient & 1) != 0) bits |= 1;
+  return std::ldexp(double(bits), x.exponent - shift + 1);
 }
 
 /// A ray and a triangle: points in units of 2^points.lowest, and the direction in units of its own.
@@ -208,15 +215,17 @@ struct ExactPair {
     exponent = pair.points.width == 0 || pair.along.width == 0 ? 0 : pair.points.lowest - pair.along.lowest;
   }
 
-  /// Returns the first parameter at which they meet, whatever the ray's length.
-  std::optional<Fraction> meeting() const {
+  /// Returns the first parameter at which they meet, whatever the ray's length; sets RayMeeting::corners.
+  std::optional<Fraction> meeting(std::uint8_t& corners) const {
     const Vector &a = corner[0], &b = corner[1], &c = corner[2];
     const Integer volumes[3] = {dot(direction, cross(b, c)), dot(direction, cross(c, a)),
                                 dot(direction, cross(a, b))};
     bool positive = false, negative = false;
-    for (const Integer& volume : volumes) {
-      positive = positive || volume.sign() > 0;
-      negative = negative || volume.sign() < 0;
+    corners = 0;
+    for (int i = 0; i < 3; ++i) {
+      positive = positive || volumes[i].sign() > 0;
+      negative = negative || volumes[i].sign() < 0;
+      if (!volumes[i].is_zero()) corners = std::uint8_t(corners | 1U << i);
     }
     if (positive && negative) return {};
     if (!positive && !negative) return in_plane();
@@ -272,28 +281,60 @@ struct ExactPair {
 }  // namespace
 
 bool ray_meets_triangle(const RayLine& ray, const double* corners, RayMeeting& meeting,
-                        TriangleTestStats& stats) {
+                        TriangleTestStats& stats, const RayMeeting* known) {
   ++stats.tests;
   if (const Verdict verdict = filtered(ray, corners, meeting); verdict != Verdict::open) {
     ++stats.filtered;
     return verdict == Verdict::meets;
   }
+  if (known != nullptr && known->rounded) {
+    ++stats.filtered;
+    meeting = *known;
+    return true;
+  }
   ++stats.exact;
+  ++stats.ray_decisions;
   const ScaledPair pair(ray, corners);
   if (pair.misses_by_signs()) return false;
-  const std::optional<Fraction> found = ExactPair(pair).meeting();
+  std::uint8_t bits = 0;
+  const std::optional<Fraction> found = ExactPair(pair).meeting(bits);
   if (!found) return false;
   if (ray.length < HUGE_VAL) {
     const scaled::OddMultiple length = scaled::odd_multiple(ray.length);
     if (compare(*found, {Integer(length.mantissa), Integer(1), length.exponent}) > 0) return false;
   }
   const double parameter = rounded(*found);
-  meeting = {parameter, parameter == 0 ? 0 : parameter * 0x1p-51 + 0x1p-1073};
+  meeting = {parameter, parameter == 0 ? 0 : parameter * 0x1p-51 + 0x1p-1073, bits, true};
   return true;
 }
 
+bool meets_at_same_corners(const RayLine& ray, const double* met, const RayMeeting& meeting,
+                           const double* other, RayMeeting& known) {
+  unsigned shared = 0, also = 0;  // corners of the one that the other has, and the other way round
+  known = meeting;
+  known.corners = 0;
+  for (int c = 0; c < 3; ++c)
+    for (int d = 0; d < 3; ++d) {
+      if (!std::equal(met + 3 * c, met + 3 * c + 3, other + 3 * d)) continue;
+      shared |= 1U << c;
+      also |= 1U << d;
+      if ((meeting.corners >> c & 1) != 0) known.corners = std::uint8_t(known.corners | 1U << d);
+    }
+  if (shared == 7 && also == 7) return true;
+  if (meeting.corners == 0 || (meeting.corners & ~shared) != 0) return false;
+  double edge[2][3];
+  for (int axis = 0; axis < 3; ++axis) {
+    edge[0][axis] = other[axis] - other[6 + axis];
+    edge[1][axis] = other[3 + axis] - other[axis];
+  }
+  return volume(ray.direction, edge[0], edge[1]).sign() != undecided_sign;
+}
+
 int compare_meetings(const RayLine& ray, const double* first, const double* second) {
-  const auto meeting = [&](const double* corners) { return *ExactPair(ScaledPair(ray, corners)).meeting(); };
+  const auto meeting = [&](const double* corners) {
+    std::uint8_t ignored = 0;
+    return *ExactPair(ScaledPair(ray, corners)).meeting(ignored);
+  };
   return compare(meeting(first), meeting(second));
 }
 

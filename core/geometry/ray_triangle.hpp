@@ -12,6 +12,10 @@ struct RayLine {
 /// The first parameter of a ray at which it meets a triangle, and a bound on its error.
 struct RayMeeting {
   double parameter = 0, error = 0;
+  /// Bit c: corner c is one of the fewest whose hull contains the meeting point, where the ray crosses the
+  /// plane; 0: not known.
+  std::uint8_t corners = 0;
+  bool rounded = false;  ///< the parameter is the exact one, correctly rounded
 };
 
 /// Tests whether a ray meets a closed triangle, and where first. The answer is that of real arithmetic on the
@@ -21,10 +25,19 @@ struct RayMeeting {
 /// [corner][3]. Floats are converted to double without any loss.
 ///
 /// `meeting` is set if they meet; its error is at most 2^-42 of the parameter. Most tests cost three filtered
-/// volumes (Segura & Feito 2001). Allocates only if exact integers exceed 1024 bits. Needs the default
-/// floating-point environment, like the predicates.
+/// volumes (Segura & Feito 2001). If the meeting with another triangle is `known` to be at the same
+/// parameter, a test that the filter leaves open takes it over from there, unless it has been filtered.
+/// Allocates only if exact integers exceed 1024 bits. Needs the default floating-point environment, like the
+/// predicates.
 bool ray_meets_triangle(const RayLine& ray, const double* corners, RayMeeting& meeting,
-                        TriangleTestStats& stats);
+                        TriangleTestStats& stats, const RayMeeting* known = nullptr);
+
+/// Returns whether a ray that meets a triangle certainly meets another one first at the same point, because
+/// of equal coordinates: both have the same corners, or the ray crosses the planes of both where the other
+/// has the corners, too, whose hull the meeting point lies in. Sets `known` to the meeting, with its corners
+/// in the other triangle. Computes no more than a filter.
+bool meets_at_same_corners(const RayLine& ray, const double* met, const RayMeeting& meeting,
+                           const double* other, RayMeeting& known);
 
 /// Compares the parameters at which a ray first meets two triangles, exactly: negative, zero or positive as
 /// the first one is smaller, equal or larger. The ray must meet both. Microseconds.

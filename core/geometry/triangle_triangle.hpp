@@ -10,6 +10,9 @@ struct TriangleTestStats {
   std::uint64_t tests = 0;     ///< calls
   std::uint64_t filtered = 0;  ///< decided by floating-point filters and comparisons alone
   std::uint64_t exact = 0;  ///< reached the exact stage: coplanar, degenerate, or too close for the filters
+  /// Exact decisions about rays: tests of a ray and a triangle that reached the exact stage, and comparisons
+  /// of two meetings in exact arithmetic. A part of neither `tests` nor `exact`.
+  std::uint64_t ray_decisions = 0;
 };
 
 /// Tests whether two closed triangles share a point. The test is exact: the answer is that of real arithmetic

@@ -2,6 +2,7 @@
 
 #include "core/base/hasher.hpp"
 #include "core/geometry/lane_box.hpp"
+#include "core/judge/polygon_region.hpp"
 #include "core/judge/sort_pairs.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "core/topology/builders.hpp"
@@ -16,17 +17,38 @@ namespace kbvh {
 
 namespace {
 
+/// The exact test of two primitives. A polygon is the union of its triangles. Where these have just been
+/// made, simple planar polygons are decided by even-odd, without them.
 template <class S>
-bool truly_meet(const Body<S>& a, std::uint32_t primitive_a, const S* positions_a, const Body<S>& b,
-                std::uint32_t primitive_b, const S* positions_b) {
-  const auto polygon_a = a.primitives[primitive_a], polygon_b = b.primitives[primitive_b];
-  if (a.primitives.kind != PrimitiveKind::polygons || b.primitives.kind != PrimitiveKind::polygons)
-    return overlap(primitive_box(polygon_a, positions_a), primitive_box(polygon_b, positions_b));
-  TriangleTestStats stats;
-  return polygons_intersect<S>(
-      polygon_a, [&](std::uint32_t v) { return positions_a + std::size_t(3) * v; }, polygon_b,
-      [&](std::uint32_t v) { return positions_b + std::size_t(3) * v; }, stats);
-}
+class TrueMeeting {
+ public:
+  TrueMeeting(const Scene<S>& scene, const Playback<S>& playback)
+      : scene_(&scene), playback_(&playback), regions_(scene, playback) {}
+
+  bool operator()(std::uint32_t body_a, std::uint32_t primitive_a, std::uint32_t body_b,
+                  std::uint32_t primitive_b) {
+    const Primitives &a = scene_->bodies[body_a].primitives, &b = scene_->bodies[body_b].primitives;
+    const S *x = playback_->positions(body_a), *y = playback_->positions(body_b);
+    if (a.kind != PrimitiveKind::polygons || b.kind != PrimitiveKind::polygons)
+      return overlap(primitive_box(a[primitive_a], x), primitive_box(b[primitive_b], y));
+    const bool cut_a = regions_.decides(body_a, primitive_a), cut_b = regions_.decides(body_b, primitive_b);
+    if ((cut_a || cut_b) && (cut_a || a[primitive_a].size() == 3) && (cut_b || b[primitive_b].size() == 3)) {
+      const PolygonRegion* const region_a = regions_.region(body_a, primitive_a);
+      const PolygonRegion* const region_b =
+          region_a == nullptr ? nullptr : regions_.region(body_b, primitive_b);
+      if (region_b != nullptr) return region_a->meets(*region_b);
+    }
+    TriangleTestStats stats;
+    return polygons_intersect<S>(
+        a.triangles(primitive_a), [x](std::uint32_t v) { return x + std::size_t(3) * v; },
+        b.triangles(primitive_b), [y](std::uint32_t v) { return y + std::size_t(3) * v; }, stats);
+  }
+
+ private:
+  const Scene<S>* scene_;
+  const Playback<S>* playback_;
+  PolygonRegions<S> regions_;
+};
 
 }  // namespace
 
@@ -34,6 +56,7 @@ template <class S>
 PairBuffer brute_force_pairs(const Scene<S>& scene, Playback<S>& playback) {
   playback.evaluate_all();
   PairBuffer result;
+  TrueMeeting<S> truly_meet(scene, playback);
   for (const BodyPair& pair : scene.pairs) {
     const Body<S>&a = scene.bodies[pair.first], &b = scene.bodies[pair.second];
     const bool within = pair.first == pair.second;
@@ -41,7 +64,7 @@ PairBuffer brute_force_pairs(const Scene<S>& scene, Playback<S>& playback) {
       for (std::uint32_t j = within ? i + 1 : 0; j < b.primitives.count(); ++j)
         if (a.primitives.alive(i) && b.primitives.alive(j) &&
             !(within && share_vertex(a.primitives[i], a.primitives[j])) &&
-            truly_meet(a, i, playback.positions(pair.first), b, j, playback.positions(pair.second)))
+            truly_meet(pair.first, i, pair.second, j))
           result.push_back({pair.first, i, pair.second, j});
   }
   sort_pairs(result);
@@ -52,6 +75,7 @@ template <class S>
 PairBuffer sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
   playback.evaluate_all();
   PairBuffer result;
+  TrueMeeting<S> truly_meet(scene, playback);
   struct Item {
     Box<S> box;
     std::uint32_t primitive;
@@ -74,9 +98,7 @@ PairBuffer sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
   for (const BodyPair& pair : scene.pairs) {
     const Box<S>&whole_a = whole[pair.first], &whole_b = whole[pair.second];
     if (!overlap(whole_a, whole_b)) continue;
-    const Body<S>&a = scene.bodies[pair.first], &b = scene.bodies[pair.second];
-    const S* positions_a = playback.positions(pair.first);
-    const S* positions_b = playback.positions(pair.second);
+    const Body<S>& a = scene.bodies[pair.first];
     int axis = 0;
     for (int d = 1; d < 3; ++d)
       if (double(whole_a.upper[d]) - double(whole_a.lower[d]) >
@@ -88,7 +110,7 @@ PairBuffer sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
       if (pair.first == pair.second &&
           (x.primitive >= y.primitive || share_vertex(a.primitives[x.primitive], a.primitives[y.primitive])))
         return;  // each of these pairs is found twice: from both lists
-      if (overlap(x.box, y.box) && truly_meet(a, x.primitive, positions_a, b, y.primitive, positions_b))
+      if (overlap(x.box, y.box) && truly_meet(pair.first, x.primitive, pair.second, y.primitive))
         result.push_back({pair.first, x.primitive, pair.second, y.primitive});
     };
     // Two sorted lists: the item that starts first scans ahead in the other list. Equal starts are handled
@@ -114,7 +136,7 @@ PairBuffer sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
 
 namespace {
 constexpr std::uint64_t cache_magic =
-    0x6b62766f72633032ull;  // "kbvorc02": change it with the format or the test
+    0x6b62766f72633033ull;  // "kbvorc03": change it with the format or the test
 }
 
 template <class S>

@@ -11,8 +11,9 @@
 namespace kbvh {
 
 /// Returns all intersecting primitive pairs of the scene's body pairs at the playback's current time, sorted,
-/// by testing every pair exactly: no boxes, no sweep; it shares only the triangle test with strategies.
-/// O(primitives^2).
+/// by testing every pair exactly: no boxes, no sweep; it shares the triangle test with strategies, and the
+/// triangles of polygons. At the time at which polygons are cut, simple planar ones are decided by even-odd,
+/// without their triangles (polygon_region.hpp). O(primitives^2).
 template <class S>
 PairBuffer brute_force_pairs(const Scene<S>& scene, Playback<S>& playback);
 

@@ -1,6 +1,9 @@
 #include "core/judge/ray_oracle.hpp"
 
+#include <limits>
 #include <vector>
+
+#include "core/judge/polygon_region.hpp"
 
 namespace kbvh {
 
@@ -22,8 +25,8 @@ RayHit alone(const Scene<S>& scene, const Playback<S>& playback, const Ray<S>& r
     return {};
   TriangleTestStats stats;
   RaySearch<S> search(ray, RayQuery::any);
-  search.offer(found.body, found.primitive, primitives[found.primitive], playback.positions(found.body),
-               stats);
+  search.offer(found.body, found.primitive, primitives.triangles(found.primitive),
+               playback.positions(found.body), stats);
   return search.hit();
 }
 
@@ -34,16 +37,27 @@ void brute_force_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery que
                       std::span<const Ray<S>> rays, std::span<RayHit> hits) {
   playback.evaluate_all();
   TriangleTestStats stats;
+  PolygonRegions<S> regions(scene, playback);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     RaySearch<S> search(rays[i], query);
+    RayHit wrongly_cut;
     bool over = false;
     for (std::uint32_t body = 0; body < scene.bodies.size() && !over; ++body) {
       const Primitives& primitives = scene.bodies[body].primitives;
       if (primitives.kind != PrimitiveKind::polygons) continue;
-      for (std::uint32_t p = 0; p < primitives.count() && !over; ++p)
-        over = primitives.alive(p) && search.offer(body, p, primitives[p], playback.positions(body), stats);
+      for (std::uint32_t p = 0; p < primitives.count() && !over; ++p) {
+        if (!primitives.alive(p)) continue;
+        const PolygonRegion* const region = regions.decides(body, p) ? regions.region(body, p) : nullptr;
+        if (region != nullptr) {
+          RaySearch<S> alone(rays[i], RayQuery::any);
+          const bool met = alone.offer(body, p, primitives.triangles(p), playback.positions(body), stats);
+          if (met != region->meets(search.line()))
+            wrongly_cut = {body, p, std::numeric_limits<double>::quiet_NaN()};
+        }
+        over = search.offer(body, p, primitives.triangles(p), playback.positions(body), stats);
+      }
     }
-    hits[i] = search.hit();
+    hits[i] = wrongly_cut ? wrongly_cut : search.hit();
   }
 }
 

@@ -9,7 +9,9 @@
 namespace kbvh {
 
 /// Answers rays at the playback's current time by testing every living polygon exactly: no boxes; it shares
-/// only the exact test and comparison with strategies. O(rays x primitives).
+/// the exact test and comparison with strategies, and the triangles of polygons. At the time at which
+/// polygons are cut, it is even-odd that decides which simple planar ones a ray meets (polygon_region.hpp);
+/// where the triangles disagree, the ray has a hit without a parameter. O(rays x primitives).
 template <class S>
 void brute_force_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
                       std::span<const Ray<S>> rays, std::span<RayHit> hits);

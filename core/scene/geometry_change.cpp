@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/motion/admissible.hpp"
+#include "core/scene/cut_polygons.hpp"
 
 namespace kbvh {
 
@@ -124,7 +125,12 @@ void ChangingScene<S>::apply(const GeometryChange<S>& change, Playback<S>& playb
     if (!uses.empty()) uses.push_back(0);
   }
   for (const auto& primitive : change.primitives) {
-    scene_.bodies[primitive.body].primitives.add(primitive.vertices);
+    Primitives& primitives = scene_.bodies[primitive.body].primitives;
+    primitives.add(primitive.vertices);
+    if (primitives.kind == PrimitiveKind::polygons && primitive.vertices.size() > 3) {
+      playback.fetch(primitive.body, primitive.vertices);
+      cut_polygon(primitives, primitives.count() - 1, playback.positions(primitive.body), playback.time());
+    }
     auto& uses = bodies_[primitive.body].uses;
     if (!uses.empty())
       for (std::uint32_t v : primitive.vertices) ++uses[v];

@@ -43,7 +43,8 @@ class ChangingScene {
 
   const Scene<S>& scene() const { return scene_; }
 
-  /// Applies the change to the scene and to the playback, at the playback's time. Throws
+  /// Applies the change to the scene and to the playback, at the playback's time; polygons are cut at their
+  /// positions then. Throws
   /// std::invalid_argument that names the first error, and changes nothing: bodies, vertices or primitives
   /// that do not exist or were removed, primitives without vertices, removed vertices that a primitive uses,
   /// items removed twice, numbers that are not finite or not admissible. Amortised O(change), but O(body) at

@@ -16,8 +16,9 @@ struct PairedBody {
       : body(id),
         polygons(scene.primitives(id).kind == PrimitiveKind::polygons),
         current(motion.all_current(id)),
-        offsets(scene.primitives(id).offsets.data()),
-        vertices(scene.primitives(id).vertices.data()),
+        primitives(&scene.primitives(id)),
+        offsets(primitives->offsets.data()),
+        vertices(primitives->vertices.data()),
         positions(motion.positions(id)) {}
 
   std::span<const std::uint32_t> operator[](std::uint32_t primitive) const {
@@ -28,6 +29,7 @@ struct PairedBody {
   std::uint32_t body;
   bool polygons;
   bool current;  ///< no position has to be fetched
+  const Primitives* primitives;
   const std::uint32_t* offsets;
   const std::uint32_t* vertices;
   const S* positions;
@@ -96,16 +98,18 @@ class CandidateBlock {
         places_[size] = std::uint8_t(i);
         ++size;
       } else {
-        intersect_[i] = one_by_one(p, a, q, b, polygons) ? 1 : 0;
+        intersect_[i] = one_by_one(candidates[i], a, b, polygons) ? 1 : 0;
       }
     }
     size_ = size;
   }
 
-  [[gnu::noinline]] bool one_by_one(std::span<const std::uint32_t> p, const PairedBody<S>& a,
-                                    std::span<const std::uint32_t> q, const PairedBody<S>& b, bool polygons) {
-    return polygons ? polygons_intersect<S>(p, a, q, b, *stats_)
-                    : overlap(primitive_box(p, a.positions), primitive_box(q, b.positions));
+  [[gnu::noinline]] bool one_by_one(const PrimitivePair& pair, const PairedBody<S>& a, const PairedBody<S>& b,
+                                    bool polygons) {
+    return polygons ? polygons_intersect<S>(a.primitives->triangles(pair.primitive_a), a,
+                                            b.primitives->triangles(pair.primitive_b), b, *stats_)
+                    : overlap(primitive_box(a[pair.primitive_a], a.positions),
+                              primitive_box(b[pair.primitive_b], b.positions));
   }
 
   const SceneView<S>* scene_;

@@ -8,6 +8,7 @@
 #include "core/base/unfilled_array.hpp"
 #include "core/geometry/triangle_triangle.hpp"
 #include "core/scene/motion_view.hpp"
+#include "core/scene/scene.hpp"
 
 namespace kbvh {
 
@@ -46,22 +47,20 @@ struct Contact {
   double begin, end;  ///< encloses the time of impact
 };
 
-/// Tests exactly whether two polygons share a point. A polygon is a fan of triangles around its first vertex;
-/// with fewer than three vertices it is a segment or point. Each `position(v)` returns 3 scalars.
+/// Tests exactly whether two polygons share a point: whether two of their triangles do. Each `position(v)`
+/// returns 3 scalars.
 template <class S, class PositionA, class PositionB>
-bool polygons_intersect(std::span<const std::uint32_t> a, const PositionA& position_a,
-                        std::span<const std::uint32_t> b, const PositionB& position_b,
-                        TriangleTestStats& stats) {
-  const std::size_t fan_a = a.size() < 3 ? 1 : a.size() - 2, fan_b = b.size() < 3 ? 1 : b.size() - 2;
-  const auto corner = [](std::span<const std::uint32_t> p, std::size_t i) {
-    return p[i < p.size() ? i : p.size() - 1];
-  };
-  for (std::size_t i = 0; i < fan_a; ++i)
-    for (std::size_t j = 0; j < fan_b; ++j)
-      if (triangles_intersect<S>(position_a(a[0]), position_a(corner(a, i + 1)), position_a(corner(a, i + 2)),
-                                 position_b(b[0]), position_b(corner(b, j + 1)), position_b(corner(b, j + 2)),
-                                 &stats))
+bool polygons_intersect(const PolygonTriangles& a, const PositionA& position_a, const PolygonTriangles& b,
+                        const PositionB& position_b, TriangleTestStats& stats) {
+  for (std::uint32_t i = 0; i < a.count(); ++i) {
+    const auto p = a[i];
+    for (std::uint32_t j = 0; j < b.count(); ++j) {
+      const auto q = b[j];
+      if (triangles_intersect<S>(position_a(p[0]), position_a(p[1]), position_a(p[2]), position_b(q[0]),
+                                 position_b(q[1]), position_b(q[2]), &stats))
         return true;
+    }
+  }
   return false;
 }
 

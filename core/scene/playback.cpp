@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/motion/admissible.hpp"
+#include "core/scene/cut_polygons.hpp"
 
 namespace kbvh {
 
@@ -17,6 +18,7 @@ constexpr std::size_t listed_at_once = 256;
 
 template <class S>
 Playback<S>::Playback(const Scene<S>& scene) {
+  check_cut(scene);
   std::size_t largest = 0;
   double start = 0;
   for (const auto& body : scene.bodies) {

@@ -17,6 +17,7 @@ namespace kbvh {
 template <class S>
 class Playback {
  public:
+  /// Throws std::invalid_argument if a polygon has not been cut into triangles (`cut_polygons`).
   explicit Playback(const Scene<S>& scene);
 
   double time() const { return time_; }

@@ -9,29 +9,36 @@
 namespace kbvh {
 
 template <class S>
-bool RaySearch<S>::offer(std::uint32_t body, std::uint32_t primitive, std::span<const std::uint32_t> vertices,
+bool RaySearch<S>::offer(std::uint32_t body, std::uint32_t primitive, const PolygonTriangles& polygon,
                          const S* positions, TriangleTestStats& stats) {
-  // As in polygons_intersect: fewer than three vertices are a segment or a point.
-  const std::size_t triangles = vertices.size() < 3 ? 1 : vertices.size() - 2;
-  for (std::size_t i = 0; i < triangles; ++i) {
+  for (std::uint32_t i = 0; i < polygon.count(); ++i) {
+    const auto vertices = polygon[i];
     double corners[9];
-    for (std::size_t c = 0; c < 3; ++c) {
-      const std::size_t place = c == 0 ? 0 : std::min(i + c, vertices.size() - 1);
+    for (std::size_t c = 0; c < 3; ++c)
       for (std::size_t axis = 0; axis < 3; ++axis)
-        corners[3 * c + axis] = double(positions[std::size_t(3) * vertices[place] + axis]);
-    }
+        corners[3 * c + axis] = double(positions[std::size_t(3) * vertices[c] + axis]);
     RayMeeting meeting;
-    if (!ray_meets_triangle(line_, corners, meeting, stats)) continue;
-    if (hit_) {
+    // Equal meetings need no arithmetic: the smaller (body, primitive) wins.
+    RayMeeting known;
+    const bool same = hit_ && meets_at_same_corners(line_, corners_, best_, corners, known);
+    const bool smaller = std::tie(body, primitive) < std::tie(hit_.body, hit_.primitive);
+    if (same && !smaller) {
+      ++stats.tests;
+      ++stats.filtered;
+      continue;
+    }
+    if (!ray_meets_triangle(line_, corners, meeting, stats, same ? &known : nullptr)) continue;
+    if (hit_ && !same) {
       int order = 0;
       if (meeting.parameter + meeting.error < best_.parameter - best_.error)
         order = -1;
       else if (meeting.parameter - meeting.error > best_.parameter + best_.error)
         order = 1;
-      else
+      else {
+        ++stats.ray_decisions;
         order = compare_meetings(line_, corners, corners_);
-      if (order > 0) continue;
-      if (order == 0 && std::tie(hit_.body, hit_.primitive) <= std::tie(body, primitive)) continue;
+      }
+      if (order > 0 || (order == 0 && !smaller)) continue;
     }
     hit_ = {body, primitive, meeting.parameter};
     best_ = meeting;

@@ -28,8 +28,8 @@ enum class RayQuery : std::uint8_t {
   any,      ///< one of the primitives that the ray meets
 };
 
-/// The answer to one ray. Polygons are closed fans of triangles and are met exactly (core/geometry/
-/// ray_triangle.hpp), in both directions; points and control nets are not met.
+/// The answer to one ray. Polygons are the closed triangles into which they are cut and are met exactly
+/// (core/geometry/ray_triangle.hpp), in both directions; points and control nets are not met.
 struct RayHit {
   static constexpr std::uint32_t none = ~std::uint32_t(0);
   std::uint32_t body = none;       ///< none: a miss
@@ -64,8 +64,8 @@ class RaySearch {
 
   /// Tests a polygon; `positions` are those of its body. Returns whether the search is over: any hit is
   /// wanted, and there is one.
-  bool offer(std::uint32_t body, std::uint32_t primitive, std::span<const std::uint32_t> vertices,
-             const S* positions, TriangleTestStats& stats);
+  bool offer(std::uint32_t body, std::uint32_t primitive, const PolygonTriangles& polygon, const S* positions,
+             TriangleTestStats& stats);
 
   /// Returns a parameter beyond which nothing can be the answer.
   double limit() const { return hit_ ? best_.parameter + best_.error : line_.length; }

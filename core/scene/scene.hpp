@@ -1,10 +1,13 @@
 #pragma once
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/base/assert.hpp"
 #include "core/geometry/box.hpp"
 #include "core/motion/flight_plans.hpp"
 
@@ -12,7 +15,7 @@ namespace kbvh {
 
 /// The kind of a body's primitives; decides how a candidate pair is confirmed.
 enum class PrimitiveKind : std::uint8_t {
-  polygons,      ///< k >= 1 vertices, tested exactly as a fan of triangles
+  polygons,      ///< k >= 1 vertices, tested exactly as the triangles into which each one is cut once
   points,        ///< 1 vertex each; pairs are answered at candidate level (their boxes)
   control_nets,  ///< k control points; conservative by the convex-hull property; candidate level
 };
@@ -20,15 +23,62 @@ enum class PrimitiveKind : std::uint8_t {
 /// Returns the kind in words: polygons, points, control_nets.
 const char* name(PrimitiveKind kind);
 
+/// A polygon as the triangles whose union it is. Up to three corners are one triangle, in which fewer than
+/// three are a segment or a point; more have been cut (cut_polygons.hpp).
+class PolygonTriangles {
+ public:
+  /// Takes a polygon of at most three corners.
+  explicit PolygonTriangles(std::span<const std::uint32_t> corners)
+      : corners_(corners.data()), last_(std::uint32_t(corners.size()) - 1), count_(1) {
+    KBVH_ASSERT(!corners.empty() && corners.size() <= 3);
+  }
+  /// Takes the triangles [count][3] into which a polygon was cut.
+  PolygonTriangles(const std::uint32_t* triangles, std::uint32_t count)
+      : corners_(triangles), last_(2), count_(count) {}
+
+  std::uint32_t count() const { return count_; }
+  /// Returns the vertices of triangle i.
+  std::array<std::uint32_t, 3> operator[](std::uint32_t i) const {
+    const std::uint32_t* const corners = corners_ + std::size_t(3) * i;
+    return {corners[0], corners[std::min(1U, last_)], corners[last_]};
+  }
+  /// Returns the first triangle alone.
+  PolygonTriangles first() const { return {corners_, last_, 1}; }
+
+ private:
+  PolygonTriangles(const std::uint32_t* corners, std::uint32_t last, std::uint32_t count)
+      : corners_(corners), last_(last), count_(count) {}
+  const std::uint32_t* corners_;
+  std::uint32_t last_, count_;
+};
+
+/// The triangles of a body's polygons of more than three corners, each made once.
+struct PolygonCuts {
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> first;    ///< [primitive], of its triangles; none: not cut. May be shorter
+  std::vector<double> times;           ///< [primitive], of the positions by which it was cut
+  std::vector<std::uint32_t> corners;  ///< [triangle][3], vertex ids
+
+  bool contains(std::uint32_t p) const { return p < first.size() && first[p] != none; }
+  void add(std::uint32_t p, std::span<const std::uint32_t> triangles, double time) {
+    first.resize(std::max<std::size_t>(first.size(), p + 1), none);
+    times.resize(first.size());
+    first[p] = std::uint32_t(corners.size() / 3);
+    times[p] = time;
+    corners.insert(corners.end(), triangles.begin(), triangles.end());
+  }
+};
+
 /// Primitives of one body as CSR lists: primitive p has vertices[offsets[p] .. offsets[p + 1]). A primitive
 /// that was removed at run time (geometry_change.hpp) keeps its id and its list, but no hierarchy contains it
-/// and no answer names it.
+/// and no answer names it. A scene is played after `cut_polygons` (cut_polygons.hpp).
 struct Primitives {
   PrimitiveKind kind = PrimitiveKind::polygons;
   std::vector<std::uint32_t> offsets{0};
   std::vector<std::uint32_t> vertices;
   std::vector<std::uint8_t> removed;  ///< 1 for each removed primitive; empty as long as there is none
   std::uint32_t removed_count = 0;
+  PolygonCuts cuts;
 
   /// Returns the number of ids, those of removed primitives included.
   std::uint32_t count() const { return std::uint32_t(offsets.size() - 1); }
@@ -36,6 +86,13 @@ struct Primitives {
   bool alive(std::uint32_t p) const { return removed.empty() || removed[p] == 0; }
   std::span<const std::uint32_t> operator[](std::uint32_t p) const {
     return {vertices.data() + offsets[p], vertices.data() + offsets[p + 1]};
+  }
+  /// Returns the triangles of a polygon. More than three corners must have been cut.
+  PolygonTriangles triangles(std::uint32_t p) const {
+    const std::uint32_t corners = offsets[p + 1] - offsets[p];
+    if (corners <= 3) return PolygonTriangles((*this)[p]);
+    KBVH_ASSERT(cuts.contains(p));
+    return {cuts.corners.data() + std::size_t(3) * cuts.first[p], corners - 2};
   }
   void add(std::span<const std::uint32_t> primitive) {
     vertices.insert(vertices.end(), primitive.begin(), primitive.end());

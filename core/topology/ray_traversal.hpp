@@ -58,7 +58,7 @@ bool follow_ray(const Tree& tree, RaySearch<S>& search, std::uint32_t body, cons
     stack.pop_back();
     if (!RaySlabs::within(top.near, search.limit())) continue;
     const bool is_leaf = tree.leaf(top.node, [&](std::uint32_t primitive) {
-      return over = search.offer(body, primitive, primitives[primitive], positions, stats);
+      return over = search.offer(body, primitive, primitives.triangles(primitive), positions, stats);
     });
     if (is_leaf) continue;
     const std::size_t before = stack.size();

@@ -28,6 +28,14 @@ Body<S> renumbered(const Body<S>& body, std::vector<std::uint32_t> old_primitive
       corners.push_back(new_vertex[v]);
     }
     result.primitives.add(corners);
+    // The cut stays as it is: a new one would decide ties by the new ids.
+    if (const PolygonCuts& cuts = body.primitives.cuts; cuts.contains(p)) {
+      const PolygonTriangles triangles = body.primitives.triangles(p);
+      corners.clear();
+      for (std::uint32_t i = 0; i < triangles.count(); ++i)
+        for (const std::uint32_t v : triangles[i]) corners.push_back(new_vertex[v]);
+      result.primitives.cuts.add(result.primitives.count() - 1, corners, cuts.times[p]);
+    }
   }
   for (std::uint32_t v = 0; v < n; ++v) meet(v);
   const auto times = body.plans.keyframe_times();

@@ -24,7 +24,8 @@ constexpr const char* run_examples = R"(Examples:
   kbvh run --scene waving_sheet --strategies bottom_up,rebuild --leaf-size 1,4 --scalar float,double
 A body is a file (.obj .ply .gltf .glb, or a folder of numbered frames) or a shape, followed by key=value pairs
 separated by commas: motion clip fps weld=false (files), name scale rotate=axis:degrees translate=x:y:z as=triangles|points
-(all); `kbvh list` shows the shapes.
+(all); `kbvh list` shows the shapes. Polygons of more than three corners are cut into triangles once, at the first keyframe,
+whatever their first corner; from then on a polygon is the union of these triangles.
 Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input, 3 other error.)";
 
 constexpr const char* bench_examples = R"(Examples:

@@ -25,7 +25,7 @@ struct AnimatedMesh {
   std::vector<double> positions;                    ///< [keyframe][vertex][3]
 
   // Findings of the reader that were kept or repaired (printed for the user, never an error).
-  std::size_t degenerate_primitives = 0;  ///< zero area or repeated vertex at the first keyframe; kept
+  std::size_t degenerate_primitives = 0;  ///< corners on one line at the first keyframe; kept
   std::size_t merged_keyframes = 0;       ///< equal times with equal positions, merged into one
   std::size_t added_keyframes = 0;        ///< between those of the file, so that chords follow curves
   std::size_t jumps = 0;                  ///< positions that change within one rounding of time

@@ -1,6 +1,10 @@
 #include "experiments/io/primitives.hpp"
 
+#include <algorithm>
 #include <numeric>
+
+#include "core/geometry/polygon_cut.hpp"
+#include "experiments/io/validate.hpp"
 
 namespace kbvh::io {
 
@@ -15,20 +19,22 @@ void make_points(AnimatedMesh& mesh) {
 
 namespace {
 
-void cut_into_fans(AnimatedMesh& mesh) {
+void cut_into_triangles(AnimatedMesh& mesh) {
   if (mesh.primitive_vertices.size() == 3 * mesh.primitive_count()) return;
   std::vector<std::uint32_t> offsets{0}, corners;
+  PolygonCutter cutter;
   for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
-    const std::size_t begin = mesh.primitive_offsets[p], end = mesh.primitive_offsets[p + 1];
-    for (std::size_t c = begin + 1; c + 1 < end; ++c) {
-      corners.insert(corners.end(), {mesh.primitive_vertices[begin], mesh.primitive_vertices[c],
-                                     mesh.primitive_vertices[c + 1]});
-      if (corners.size() > 0xffffffffu) throw InputError(mesh.name + ": too many triangles");
-      offsets.push_back(std::uint32_t(corners.size()));
-    }
+    std::span<const std::uint32_t> triangles(mesh.primitive_vertices);
+    triangles = triangles.subspan(mesh.primitive_offsets[p],
+                                  mesh.primitive_offsets[p + 1] - mesh.primitive_offsets[p]);
+    if (triangles.size() > 3) triangles = cutter.cut(triangles, mesh.positions.data()).corners;
+    corners.insert(corners.end(), triangles.begin(), triangles.end());
+    if (corners.size() > 0xffffffffu) throw InputError(mesh.name + ": too many triangles");
+    while (offsets.back() < corners.size()) offsets.push_back(offsets.back() + 3);
   }
   mesh.primitive_offsets = std::move(offsets);
   mesh.primitive_vertices = std::move(corners);
+  count_degenerate(mesh);
 }
 
 }  // namespace
@@ -39,7 +45,7 @@ void take_as(AnimatedMesh& mesh, TakeAs how) {
   if (mesh.kind != MeshKind::polygons)
     throw InputError(mesh.name + ": as=triangles: " +
                      (mesh.kind == MeshKind::points ? "points have" : "control nets have") + " no triangles");
-  cut_into_fans(mesh);
+  cut_into_triangles(mesh);
 }
 
 std::vector<std::uint32_t> spans_of(const std::vector<double>& knots, std::uint32_t degree, double first,

@@ -9,7 +9,7 @@ namespace kbvh::io {
 /// The interpretation of a mesh's primitives.
 enum class TakeAs : std::uint8_t {
   given,      ///< as in the file: polygons of any number of corners stay whole
-  triangles,  ///< polygons cut into fans around their first corner, in order
+  triangles,  ///< polygons cut by ears (core/geometry/polygon_cut.hpp) at the first keyframe, in order
   points,     ///< every vertex one primitive, in any mesh
 };
 

@@ -158,45 +158,35 @@ void merge_equal_times(AnimatedMesh& mesh, const std::filesystem::path& file) {
   mesh.positions.resize(kept * stride);
 }
 
-bool has_repetition(const std::uint32_t* vertices, std::size_t count) {
-  if (count <= 8) {
-    for (std::size_t i = 0; i < count; ++i) {
-      for (std::size_t j = i + 1; j < count; ++j) {
-        if (vertices[i] == vertices[j]) return true;
-      }
-    }
-    return false;
-  }
-  std::vector<std::uint32_t> sorted(vertices, vertices + count);
-  std::sort(sorted.begin(), sorted.end());
-  return std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end();
-}
-
 }  // namespace
 
 bool is_degenerate(const std::uint32_t* vertices, std::size_t count, const double* positions) {
-  if (has_repetition(vertices, count)) return true;
   const auto at = [&](std::size_t i) { return positions + std::size_t{3} * vertices[i]; };
-  for (std::size_t i = 1; i + 1 < count; ++i) {
-    const double *a = at(0), *b = at(i), *c = at(i + 1);
+  std::size_t other = 1;
+  while (other < count && std::equal(at(0), at(0) + 3, at(other))) ++other;
+  for (std::size_t i = other + 1; i < count; ++i) {
+    const double *a = at(0), *b = at(other), *c = at(i);
     if (!cross_is_zero(a, b, c, 0, 1) || !cross_is_zero(a, b, c, 1, 2) || !cross_is_zero(a, b, c, 2, 0))
       return false;
   }
   return true;
 }
 
-void finish(AnimatedMesh& mesh, const std::filesystem::path& file) {
-  check_structure(mesh, file);
-  check_coordinates(mesh, file);
-  merge_equal_times(mesh, file);
+void count_degenerate(AnimatedMesh& mesh) {
   mesh.degenerate_primitives = 0;
   if (mesh.kind != MeshKind::polygons) return;  // other primitives have no area
   for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
     const std::uint32_t begin = mesh.primitive_offsets[p], end = mesh.primitive_offsets[p + 1];
-    if (is_degenerate(&mesh.primitive_vertices[begin], end - begin, mesh.positions.data())) {
+    if (is_degenerate(&mesh.primitive_vertices[begin], end - begin, mesh.positions.data()))
       ++mesh.degenerate_primitives;
-    }
   }
+}
+
+void finish(AnimatedMesh& mesh, const std::filesystem::path& file) {
+  check_structure(mesh, file);
+  check_coordinates(mesh, file);
+  merge_equal_times(mesh, file);
+  count_degenerate(mesh);
 }
 
 }  // namespace kbvh::io

@@ -17,13 +17,16 @@ inline constexpr double largest_coordinate = 1e30f;
 ///   - keyframe times are finite and increase; neighbours of equal time are merged if all their positions are
 ///   equal, and are
 ///    an error if not (`merged_keyframes` counts);
-/// - polygons of zero area or with a repeated vertex at the first keyframe are counted
-///   (`degenerate_primitives`) and kept. Throws InputError that names `file`, the place and the value. O(size
+/// - polygons whose corners all lie on one line at the first keyframe are counted (`degenerate_primitives`)
+/// and kept. Throws InputError that names `file`, the place and the value. O(size
 ///   of the mesh), and exact arithmetic only for areas near zero.
 void finish(AnimatedMesh& mesh, const std::filesystem::path& file);
 
-/// Returns true if the primitive has a repeated vertex, or if all triangles of its fan have zero area,
-/// decided exactly for coordinates whose products neither overflow nor underflow. `positions` is [vertex][3].
+/// Counts the polygons whose corners lie on one line at the first keyframe (`degenerate_primitives`).
+void count_degenerate(AnimatedMesh& mesh);
+
+/// Returns true if all corners of a polygon lie on one line, decided exactly for coordinates whose products
+/// neither overflow nor underflow. `positions` is [vertex][3].
 bool is_degenerate(const std::uint32_t* vertices, std::size_t count, const double* positions);
 
 }  // namespace kbvh::io

@@ -3,7 +3,9 @@
 #include <functional>
 #include <set>
 
+#include "core/geometry/polygon_cut.hpp"
 #include "core/motion/admissible.hpp"
+#include "core/scene/cut_polygons.hpp"
 #include "core/topology/renumber.hpp"
 #include "experiments/common/environment.hpp"
 #include "experiments/common/json_reader.hpp"
@@ -315,6 +317,30 @@ std::string missing_file(const SceneSpec& spec) {
   return {};
 }
 
+namespace {
+/// Says which polygons of more than three corners are unusual at the first keyframe, by which they are cut.
+void add_notes_on_polygons(const io::AnimatedMesh& mesh, const std::string& source,
+                           std::vector<std::string>& notes) {
+  if (mesh.kind != io::MeshKind::polygons) return;
+  PolygonCutter cutter;
+  CutFindings found;
+  for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
+    const std::uint32_t begin = mesh.primitive_offsets[p], corners = mesh.primitive_offsets[p + 1] - begin;
+    if (corners > 3 && corners <= most_corners)
+      found.add(
+          cutter.cut(std::span(mesh.primitive_vertices).subspan(begin, corners), mesh.positions.data()));
+  }
+  const auto note = [&](std::uint64_t count, const std::string& what) {
+    if (count > 0)
+      notes.push_back(source + ": " + counted(count, "polygon") + " of " + std::to_string(found.cut) +
+                      " with more than three corners " + what +
+                      ", taken as the triangles into which they are cut at the first keyframe");
+  };
+  note(found.bent, "not planar");
+  note(found.crossing, "crossing themselves or without an area vector");
+}
+}  // namespace
+
 LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
   LoadedScene loaded;
   loaded.seed = spec.options.seed;
@@ -348,8 +374,9 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
                                      body.weld.value_or(!spec.script) ? Seams::weld : Seams::keep_apart});
     }
     mesh.name = body.name.empty() ? readable(mesh.name) : body.name;
-    io::take_as(mesh, body.as);
     const std::string source = body.shape.is_null() ? body.file.string() : mesh.name;
+    if (body.as != io::TakeAs::points) add_notes_on_polygons(mesh, source, loaded.notes);
+    io::take_as(mesh, body.as);
     if (mesh.degenerate_primitives > 0)
       loaded.notes.push_back(source + ": " + counted(mesh.degenerate_primitives, "degenerate primitive") +
                              " at the first keyframe, kept");
@@ -445,6 +472,7 @@ Scene<S> assemble(const LoadedScene& loaded) {
   for (std::uint32_t i = 0; i < loaded.self.size(); ++i)
     if (loaded.self[i]) scene.pairs.push_back({i, i});
   validate(scene);
+  cut_polygons(scene);
   if (loaded.order == VertexOrder::renumbered)
     scene = std::move(renumber_in_leaf_order(scene, BuilderConfig{}).scene);
   return scene;

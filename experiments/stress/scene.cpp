@@ -5,6 +5,7 @@
 
 #include "core/judge/range_watch.hpp"
 #include "core/judge/session.hpp"
+#include "core/scene/cut_polygons.hpp"
 #include "experiments/common/json_reader.hpp"
 
 namespace kbvh::experiments::stress {
@@ -64,6 +65,7 @@ Playable<S> playable(const StressScene& stress) {
     }
     result.scene.pairs = all_pairs(result.scene.bodies);
     validate(result.scene);
+    cut_polygons(result.scene);
     for (const StressScene::Step& step : stress.steps) {
       typename PlanScript<S>::Step own{step.time, {}, {}};
       for (const PlanChange<double>& change : step.changes) {

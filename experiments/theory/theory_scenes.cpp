@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "core/scene/cut_polygons.hpp"
 #include "experiments/common/environment.hpp"
 #include "experiments/io/load.hpp"
 #include "experiments/scenes/scene_spec.hpp"
@@ -92,6 +93,7 @@ Scene<float> tangents_scene(std::uint32_t vertices) {
   body.plans = FlightPlans<float>(vertices, {0.0, 1.0}, std::move(positions));
   scene.bodies.push_back(std::move(body));
   validate(scene);
+  cut_polygons(scene);
   return scene;
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/scene/scene.hpp"
+#include "core/scene/cut_polygons.hpp"
 
 namespace adapters_test {
 
@@ -87,6 +87,7 @@ kbvh::Scene<S> scene(std::string name, std::vector<kbvh::Body<S>> bodies) {
   kbvh::Scene<S> result{std::move(name), std::move(bodies), {}};
   result.pairs = kbvh::all_pairs(result.bodies);
   kbvh::validate(result);
+  kbvh::cut_polygons(result);
   return result;
 }
 

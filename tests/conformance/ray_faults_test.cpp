@@ -163,9 +163,9 @@ class Simple : public CountedStrategy<S, Count>,
     TriangleTestStats stats;
     RaySearch<S> search(ray, RayQuery::closest);
     const auto offer = [&](std::uint32_t b, std::uint32_t p) {
-      auto vertices = this->scene_.primitives(b)[p];
-      if (fault == Fault::one_triangle && vertices.size() > 3) vertices = vertices.first(3);
-      search.offer(b, p, vertices, this->sampled_.positions(b), stats);
+      PolygonTriangles polygon = this->scene_.primitives(b).triangles(p);
+      if (fault == Fault::one_triangle) polygon = polygon.first();
+      search.offer(b, p, polygon, this->sampled_.positions(b), stats);
     };
     offer(body, primitive);
     if (!search.hit()) return;

@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/scene/cut_polygons.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/scene/scene.hpp"
 #include "tests/support/synthetic_scenes.hpp"
@@ -38,6 +39,7 @@ Scene<S> polygon_soups(std::uint32_t primitives, Random& random) {
     scene.bodies.push_back(std::move(made));
   }
   scene.pairs = all_pairs(scene.bodies);
+  cut_polygons(scene);
   return scene;
 }
 

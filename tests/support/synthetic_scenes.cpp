@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/geometry/predicates.hpp"
+#include "core/scene/cut_polygons.hpp"
 #include "tests/support/geometry_scripts.hpp"
 
 namespace kbvh::test {
@@ -414,6 +415,7 @@ TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_k
   result.scene.pairs = all_pairs(result.scene.bodies);
   for (const std::uint32_t body : raw.self) result.scene.pairs.push_back({body, body});
   validate(result.scene);
+  cut_polygons(result.scene);
   result.frames = frame_times(result.scene, frames_per_keyframe);
   if (raw.script == Script::takes_off) {
     result.frames.clear();

@@ -117,7 +117,7 @@ void check_stacked_squares() {
           ++followed[body];
           const Primitives& primitives = view.primitives(body);
           for (std::uint32_t p = 0; p < primitives.count(); ++p)
-            if (search.offer(body, p, primitives[p], playback.positions(body), stats)) return true;
+            if (search.offer(body, p, primitives.triangles(p), playback.positions(body), stats)) return true;
           return false;
         });
     EXPECT_TRUE(check_hits<S>(scene, playback, query, std::span<const Ray<S>>(rays), found).holds());

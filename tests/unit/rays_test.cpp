@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <random>
 
@@ -237,11 +238,152 @@ TEST(RaySearch, OfEqualHitsTheSmallestCounts) {
   const Ray<float> ray{{0.5F, 0.5F, 0}, {0, 0, 2}};
   RaySearch<float> search(ray, RayQuery::closest);
   for (const auto& [body, primitive] : {std::pair(1U, 3U), {1U, 2U}, {2U, 0U}, {1U, 4U}})
-    EXPECT_FALSE(search.offer(body, primitive, triangle, positions, stats));
+    EXPECT_FALSE(search.offer(body, primitive, PolygonTriangles(triangle), positions, stats));
   EXPECT_EQ(search.hit(), (RayHit{1, 2, 0.5}));
   RaySearch<float> any(ray, RayQuery::any);
-  EXPECT_TRUE(any.offer(4, 4, triangle, positions, stats));
+  EXPECT_TRUE(any.offer(4, 4, PolygonTriangles(triangle), positions, stats));
   EXPECT_EQ(any.hit(), (RayHit{4, 4, 0.5}));
+}
+
+/// Triangles on shared vertices, several times: `sides` lists each face once more with another first corner
+/// and in the other direction, `copies` are bodies with vertices of their own.
+Scene<float> flat_grid(std::uint32_t n, std::uint32_t sides, std::uint32_t copies) {
+  Scene<float> scene;
+  for (std::uint32_t copy = 0; copy < copies; ++copy) {
+    Body<float> body;
+    std::vector<float> positions;
+    for (std::uint32_t y = 0; y <= n; ++y)
+      for (std::uint32_t x = 0; x <= n; ++x)
+        positions.insert(positions.end(), {0.3F * float(x), 0.7F * float(y), 0.1F});
+    for (std::uint32_t side = 0; side < sides; ++side)
+      for (std::uint32_t y = 0; y < n; ++y)
+        for (std::uint32_t x = 0; x < n; ++x) {
+          const std::uint32_t a = y * (n + 1) + x, b = a + 1, c = a + n + 1, d = c + 1;
+          for (const auto& [p, q, r] : {std::tuple(a, b, c), {b, d, c}})
+            body.primitives.add(side % 2 == 0 ? std::vector{p, q, r} : std::vector{q, p, r});
+        }
+    body.plans = FlightPlans<float>((n + 1) * (n + 1), {0}, std::move(positions));
+    scene.bodies.push_back(std::move(body));
+  }
+  return scene;
+}
+
+/// Answers a ray by all faces in some order, and counts exact decisions.
+RayHit hit_by_all(const Scene<float>& scene, const Ray<float>& ray, std::uint32_t seed,
+                  TriangleTestStats& stats) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> faces;
+  for (std::uint32_t body = 0; body < scene.bodies.size(); ++body)
+    for (std::uint32_t p = 0; p < scene.bodies[body].primitives.count(); ++p) faces.emplace_back(body, p);
+  if (seed == 1) std::reverse(faces.begin(), faces.end());
+  if (seed > 1) std::shuffle(faces.begin(), faces.end(), std::mt19937(seed));
+  RaySearch<float> search(ray, RayQuery::closest);
+  for (const auto& [body, p] : faces)
+    search.offer(body, p, scene.bodies[body].primitives.triangles(p), scene.bodies[body].plans.keyframe(0),
+                 stats);
+  return search.hit();
+}
+
+/// Faces that are met at the same place because they share its corners need no arithmetic.
+TEST(RaySearch, DecidesFewOfEqualFacesExactly) {
+  constexpr std::uint32_t n = 6;
+  struct Way {
+    const char* name;
+    std::uint32_t sides, copies;
+  };
+  for (const Way& way :
+       {Way{"one side", 1, 1}, {"two sides", 2, 1}, {"ten copies", 1, 10}, {"ten of two sides", 2, 10}}) {
+    const Scene<float> scene = flat_grid(n, way.sides, way.copies);
+    const float* const positions = scene.bodies[0].plans.keyframe(0);
+    const auto at = [&](std::uint32_t x, std::uint32_t y) {
+      return positions + std::size_t(3) * (y * (n + 1) + x);
+    };
+    std::vector<Ray<float>> rays[4];  // through interiors, edges, vertices; in the plane
+    for (std::uint32_t y = 1; y < n; ++y)
+      for (std::uint32_t x = 1; x < n; ++x) {
+        const float *v = at(x, y), *w = at(x + 1, y);
+        rays[0].push_back({{v[0] + 0.1F, v[1] + 0.1F, 3}, {0.01F, 0.02F, -1}});
+        rays[1].push_back({{v[0] + (w[0] - v[0]) / 2, v[1], 3}, {0.03125F, 0, -1}});
+        rays[2].push_back({{v[0], v[1], 3}, {0, 0, -2}});
+        rays[3].push_back({{-1, v[1], v[2]}, {1, 0, 0}});
+      }
+    for (std::uint32_t kind = 0; kind < 4; ++kind) {
+      TriangleTestStats stats;
+      for (const Ray<float>& ray : rays[kind]) {
+        TriangleTestStats here;
+        const RayHit hit = hit_by_all(scene, ray, 0, kind == 0 ? stats : here);
+        EXPECT_TRUE(hit);
+        EXPECT_EQ(hit.body, 0U);
+        for (std::uint32_t seed = 1; seed < 6; ++seed) EXPECT_EQ(hit_by_all(scene, ray, seed, here), hit);
+        if (kind != 0) hit_by_all(scene, ray, 0, stats);
+      }
+      std::printf("%s, kind %u: %.3g exact decisions a ray\n", way.name, kind,
+                  double(stats.ray_decisions) / double(rays[kind].size()));
+      if (kind == 3) continue;  // each of the faces in the plane is decided on its own
+      EXPECT_LE(stats.ray_decisions, kind == 0 ? 0 : rays[kind].size()) << way.name << ", kind " << kind;
+    }
+  }
+}
+
+/// Triangles over few places, so that many are met at shared corners and edges, equal, degenerate or in the
+/// plane of the ray: the answer is the first in real arithmetic, of several the smallest, in every order, to
+/// the last bit.
+TEST(RaySearch, AnswersDoNotDependOnTheOrder) {
+  std::uint64_t ties = 0, hits = 0;
+  TriangleTestStats stats;
+  for (int kind = 0; kind < 3; ++kind) {
+    std::mt19937 random(std::uint32_t(kind) + 3);
+    const auto below = [&](std::uint32_t n) { return std::uint32_t(random() % n); };
+    // Whole numbers; the same in units that are not powers of two; with full mantissas.
+    const auto place = [&](std::uint32_t i) {
+      const double x = double(i);
+      return kind == 0 ? x : kind == 1 ? 0.1 * x + 0.7 : std::sqrt(x + 0.3);
+    };
+    for (int round = 0; round < 150; ++round) {
+      std::vector<double> positions;
+      for (int i = 0; i < 27; ++i)
+        for (const int axis : {i % 3, i / 3 % 3, i / 9}) positions.push_back(place(std::uint32_t(axis)));
+      std::vector<std::vector<std::uint32_t>> triangles;
+      for (int i = 0; i < 24; ++i) {
+        triangles.push_back({below(27), below(27), below(27)});
+        if (i % 3 == 0) triangles.push_back({triangles.back()[2], triangles.back()[0], triangles.back()[1]});
+        if (i % 5 == 0) triangles.push_back({triangles.back()[1], triangles.back()[0], triangles.back()[2]});
+      }
+      Ray<double> ray{};
+      const double *from = &positions[3 * below(27)], *to = &positions[3 * below(27)];
+      for (int axis = 0; axis < 3; ++axis) {
+        ray.origin[axis] = round % 2 == 0 ? from[axis] - 2 * (to[axis] - from[axis]) : place(below(7)) - 2;
+        ray.direction[axis] = to[axis] - ray.origin[axis];
+      }
+      if (round % 5 == 0) ray.length = 1;
+      const RayLine line = RaySearch<double>(ray, RayQuery::closest).line();
+      std::optional<Rational> first;
+      std::uint32_t truth = RayHit::none;
+      for (std::uint32_t p = 0; p < triangles.size(); ++p) {
+        double corners[9];
+        for (std::size_t c = 0; c < 3; ++c) std::copy_n(&positions[3 * triangles[p][c]], 3, corners + 3 * c);
+        const auto found = first_meeting(line, corners);
+        if (found && first && *found == *first) ++ties;
+        if (!found || (first && *found >= *first)) continue;
+        first = found;
+        truth = p;
+      }
+      std::vector<std::uint32_t> order(triangles.size());
+      for (std::uint32_t p = 0; p < order.size(); ++p) order[p] = p;
+      RayHit hit;
+      for (int shuffle = 0; shuffle < 8; ++shuffle) {
+        RaySearch<double> search(ray, RayQuery::closest);
+        for (const std::uint32_t p : order)
+          search.offer(0, p, PolygonTriangles(triangles[p]), positions.data(), stats);
+        if (shuffle == 0) hit = search.hit();
+        ASSERT_EQ(search.hit(), hit) << "kind " << kind << ", round " << round << ", order " << shuffle;
+        std::shuffle(order.begin(), order.end(), random);
+      }
+      ASSERT_EQ(hit.primitive, truth) << "kind " << kind << ", round " << round;
+      hits += hit ? 1 : 0;
+    }
+  }
+  EXPECT_GT(hits, 200U);
+  EXPECT_GT(ties, 300U);
 }
 
 TEST(CheckRays, NamesTheRayAndTheValue) {

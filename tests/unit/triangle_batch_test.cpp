@@ -318,6 +318,7 @@ Scene<S> mixed_scene(Random& random) {
     scene.bodies.push_back(std::move(body));
   }
   scene.pairs = all_pairs(scene.bodies);
+  cut_polygons(scene);
   return scene;
 }
 
@@ -333,7 +334,9 @@ PairBuffer meeting(const Scene<S>& scene, const Playback<S>& playback, const Pai
     const S *x = playback.positions(pair.body_a), *y = playback.positions(pair.body_b);
     const bool polygons = in_a.kind == PrimitiveKind::polygons && in_b.kind == PrimitiveKind::polygons;
     const bool meet = polygons ? polygons_intersect<S>(
-                                     a, [x](std::uint32_t v) { return x + std::size_t(3) * v; }, b,
+                                     in_a.triangles(pair.primitive_a),
+                                     [x](std::uint32_t v) { return x + std::size_t(3) * v; },
+                                     in_b.triangles(pair.primitive_b),
                                      [y](std::uint32_t v) { return y + std::size_t(3) * v; }, stats)
                                : overlap(primitive_box(a, x), primitive_box(b, y));
     if (meet) result.push_back(pair);

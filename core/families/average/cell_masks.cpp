@@ -73,13 +73,15 @@ void CellMasks<S>::sample(WideHierarchy<S>& hierarchy, const Primitives& primiti
               grid.areas[grid.cell_of(positions + std::size_t(3) * v)] += certain;
             continue;
           }
-          for (std::size_t k = 1; k + 1 < corners.size(); ++k) {
-            const S* const triangle[3] = {positions + std::size_t(3) * corners[0],
-                                          positions + std::size_t(3) * corners[k],
-                                          positions + std::size_t(3) * corners[k + 1]};
+          const PolygonTriangles triangles = primitives.triangles(primitive);
+          for (std::uint32_t i = 0; i < triangles.count(); ++i) {
+            const auto vertices = triangles[i];
+            const S* const triangle[3] = {positions + std::size_t(3) * vertices[0],
+                                          positions + std::size_t(3) * vertices[1],
+                                          positions + std::size_t(3) * vertices[2]};
             S edge[2][3];
             for (int axis = 0; axis < 3; ++axis)
-              for (int i = 0; i < 2; ++i) edge[i][axis] = triangle[i + 1][axis] - triangle[0][axis];
+              for (int e = 0; e < 2; ++e) edge[e][axis] = triangle[e + 1][axis] - triangle[0][axis];
             const S normal[3] = {edge[0][1] * edge[1][2] - edge[0][2] * edge[1][1],
                                  edge[0][2] * edge[1][0] - edge[0][0] * edge[1][2],
                                  edge[0][0] * edge[1][1] - edge[0][1] * edge[1][0]};

@@ -150,7 +150,7 @@ bool WideRays<S>::enter(std::uint32_t body) {
     auto& rays = *static_cast<WideRays*>(context);
     const double limit = rays.search_->limit();
     const bool over =
-        rays.search_->offer(rays.body_, primitive, rays.scene_.primitives(rays.body_)[primitive],
+        rays.search_->offer(rays.body_, primitive, rays.scene_.primitives(rays.body_).triangles(primitive),
                             rays.motion_.positions(rays.body_), *rays.stats_);
     if (rays.search_->limit() != limit) rays.ray_.limit = at_least<S>(rays.search_->limit());
     return over;
