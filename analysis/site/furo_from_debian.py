@@ -1,8 +1,9 @@
 """Sphinx extension: makes Debian's furo work from a folder.
 
-Debian ships furo's sources as they are. Its style sheet imports normalize.css from /javascript of a web server, and its script is a
-module that is loaded as a plain one, so no page has styles that reset, a working theme switch or a marked table of contents. The
-build writes both files again: the imported sheet becomes a neighbour, and the imported script a part of the script.
+Debian compiles furo's sources by other tools than furo. Its style sheet imports normalize.css from /javascript of a web server, and lacks
+the colours for a dark scheme that the reader's system asks for; its script is a module that is loaded as a plain one. So pages stand in
+a white frame, stay bright, and have a dead theme switch. The build writes both files again: the imported sheet becomes a neighbour, the
+dark colours follow the system, and the imported script becomes a part of the script.
 """
 
 from __future__ import annotations
@@ -16,14 +17,21 @@ JAVASCRIPT = Path("/usr/share/javascript")
 
 
 def mended_style(text: str, folder: Path, javascript: Path = JAVASCRIPT) -> str:
-    """Returns a style sheet whose imports from /javascript lie in `folder`, where they are copied to. Raises FileNotFoundError."""
+    """Returns a style sheet whose imports from /javascript lie in `folder`, where they are copied to, and whose dark colours are used
+    where the reader's system asks for them. Raises FileNotFoundError or ValueError."""
 
     def copy(match: re.Match[str]) -> str:
         source = javascript / match.group(1)
         (folder / source.name).write_bytes(source.read_bytes())
         return f'@import url("{source.name}")'
 
-    return re.sub(r"@import url\(/javascript/([^)]+)\)", copy, text)
+    text = re.sub(r"@import url\(/javascript/([^)]+)\)", copy, text)
+    if "prefers-color-scheme" in text:
+        return text
+    dark = re.search(r'body\[data-theme="dark"\] \{(.*?)\}', text, re.S)
+    if not dark:
+        raise ValueError("furo.css has no colours for the dark theme")
+    return f'{text}\n@media screen and (prefers-color-scheme: dark) {{\n  body:not([data-theme="light"]) {{{dark.group(1)}}}\n}}\n'
 
 
 def mended_script(text: str, folder: Path) -> str:

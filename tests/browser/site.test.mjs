@@ -43,11 +43,12 @@ async function open(name, scheme, width = 1280) {
   return { page, wrong };
 }
 
-/** How bright the page's background is, from 0 to 1: of the first element from the body upwards that has one. */
+/** How bright the middle of the page is, from 0 to 1: the background of what stands there, or of the nearest element around that has one. */
 const brightness = (page) => page.evaluate(() => {
-  for (const element of [document.body, document.documentElement]) {
+  for (let element = document.elementFromPoint(innerWidth / 2, 300); element; element = element.parentElement) {
+    if (element.closest('pre, svg, canvas, img, figure')) continue;
     const [r, g, b, a = 1] = getComputedStyle(element).backgroundColor.match(/[\d.]+/g).map(Number);
-    if (a > 0) return (r + g + b) / 765;
+    if (a > 0.5) return (r + g + b) / 765;
   }
   return 1;
 });

@@ -39,9 +39,12 @@
     await load("script", { src: "lab/lab.js" }, document.head);
     const lab = await globalThis.kbvhLab.mountLab(target, state, { compact: true, views: ["transport", "stage", "panels"], panels: ["work"] });
     follow(lab);
-    const look = () => tell(lab.state) || setTimeout(look, 300);
+    // Playing would disturb the measurement.
+    const look = () => {
+      if (!tell(lab.state)) setTimeout(look, 300);
+      else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) lab.play();
+    };
     look();
-    if (!matchMedia("(prefers-reduced-motion: reduce)").matches) lab.play();
   }
 
   start().catch((error) => { finding.textContent = `The comparison could not start: ${error.message}`; });
