@@ -35,9 +35,12 @@ class Page(HTMLParser):
 def dead_links(folder: Path) -> tuple[list[str], int]:
     """Returns a sentence for each dead link, and the number of links."""
     pages = {file.resolve(): Page(file) for file in sorted(folder.rglob("*.html"))}
+
+    def generated(file: Path) -> bool:
+        return file.relative_to(folder.resolve()).parts[0] in ("api", "lab")
+
     dead, count = [], 0
     for file, page in pages.items():
-        generated = file.relative_to(folder.resolve()).parts[0] in ("api", "lab")
         for link in dict.fromkeys(page.links):
             parts = urllib.parse.urlsplit(link)
             if parts.scheme or parts.netloc or link.startswith("javascript:"):
@@ -47,7 +50,7 @@ def dead_links(folder: Path) -> tuple[list[str], int]:
             name = file.relative_to(folder.resolve())
             if not target.exists():
                 dead.append(f"{name}: {link} leads to no file")
-            elif parts.fragment and not generated and target in pages:
+            elif parts.fragment and target in pages and not (generated(file) or generated(target)):
                 if urllib.parse.unquote(parts.fragment) not in pages[target].anchors:
                     dead.append(f"{name}: {link} leads to no such place")
     return dead, count

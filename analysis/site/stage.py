@@ -1,6 +1,7 @@
 """Gathers the pages of the site: the tree's own Markdown, the pages of this folder, and pages made from registry and results.
 
-usage: stage.py LIST_JSON RESULTS_DIR PAGES_DIR COURSE_DIR
+usage: stage.py LIST_JSON RESULTS_DIR PAGES_DIR HTML_DIR NOTEBOOKS_DIR
+HTML_DIR holds what stands beside the pages already: lab, lab/lessons, report. NOTEBOOKS_DIR holds the notebooks that were run.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import claims_page  # noqa: E402
 import lessons_page  # noqa: E402
+import python_pages  # noqa: E402
 import strategy_pages  # noqa: E402
 
 #: Pages of the tree that are part of the site, in their places.
 TREE = [
     "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "core/README.md", "experiments/README.md", "experiments/RESULTS.md",
-    "analysis/reference/README.md",
+    "analysis/reference/README.md", "analysis/kbvh/README.md",
 ]  # fmt: skip
 #: The folder of the site's own pages, which stand at the root of the site.
 PAGES = "analysis/site/pages/"
@@ -66,6 +68,60 @@ def rewritten(page: str, text: str, staged: set[str], pages: Path) -> str:
     return "\n".join(lines)
 
 
+#: The first page's comparison, where the lab is built; site.css and comparison.js belong to it.
+COMPARISON = """<section class="comparison" data-comparison>
+<p class="finding" aria-live="polite">A kinetic tree and a refit, on one cloth. Your browser is measuring both …</p>
+<div class="comparison-lab"></div>
+<p class="what">The project's own C++ runs here, compiled to WebAssembly: a kinetic AABB tree and a bottom-up refit, each a binary tree with one
+triangle in a leaf. Time is update and query together, on your machine. <a href="lab/index.html#scene=cloth-on-box">Open it in the lab.</a></p>
+</section>"""
+#: The ways on from the first page: page, question, answer.
+WAYS = [
+    ("analysis/guides/choosing.html", "What do I take?", "Which strategy suits your motion, and what it costs."),
+    ("claims.html", "Does the paper hold?", "Each claim of 2006, measured, with its verdict."),
+    ("lessons.html", "How does it work?", "A course of nine lessons, with the lab inside."),
+]
+
+
+def first_page(html: Path) -> str:
+    """Returns the comparison, if the lab stands in the site, and the ways on."""
+    lab = COMPARISON if (html / "lab" / "lab.js").exists() else "<p>The lab is not part of this site: <code>experiments/lab</code> builds it.</p>"
+    ways = "".join(f'<li><a href="{page}"><b>{question}</b>{answer}</a></li>' for page, question, answer in WAYS)
+    return "\n".join(["```{raw} html", lab, f'<ul class="ways">{ways}</ul>', "```"])
+
+
+def filled(text: str, html: Path) -> str:
+    """Returns the text of a page of this folder with its marks replaced: {{comparison}}, {{api:PAGE|words}}, {{file:PATH}}."""
+    text = text.replace("{{comparison}}", first_page(html))
+    text = re.sub(r"\{\{api:(\w+)\\?\|([^}]+)\}\}", r'<a href="api/\1.html">\2</a>', text)
+    return re.sub(r"\{\{file:([^}]+)\}\}", lambda match: (ROOT / match.group(1)).read_text().rstrip(), text)
+
+
+def report_page(html: Path, results: Path) -> str:
+    """Returns the page that leads to report and explorer, as far as they stand in the site."""
+    lines = ["# Report and explorer", "", f"Both show the results in `{results.name}`, in one file each that needs no network.", ""]
+    for name, title, about in (
+        ("report.html", "Report", "tables and figures, claim by claim"),
+        ("explorer.html", "Explorer", "every measurement, filtered and drawn as you choose"),
+    ):
+        if (html / "report" / name).exists():
+            lines.append(f'- <a href="report/{name}">{title}</a>: {about}')
+        else:
+            lines.append(f"- {title}: not part of this site")
+    return "\n".join([*lines, "", "Of results of your own, `kbvh report --out DIR` makes the same two pages.", ""])
+
+
+def notebooks(folder: Path, pages: Path) -> str:
+    """Writes a page for each notebook that was run, and returns the list of them."""
+    (pages / "notebooks").mkdir(exist_ok=True)
+    lines = ["# Notebooks", "", "Four notebooks of the Python package, as they ran when this site was built.", "", "```{toctree}", ":maxdepth: 1", ""]
+    for file in sorted(folder.glob("*.ipynb")):
+        name = file.stem
+        (pages / "notebooks" / f"{name}.md").write_text(python_pages.notebook(json.loads(file.read_text())["cells"], name, pages / "notebooks"))
+        lines.append(f"notebooks/{name}")
+    return "\n".join([*lines, "```", ""])
+
+
 def decisions(staged: list[str]) -> str:
     adrs = [page for page in staged if page.startswith("core/adr/")]
     lines = ["# Decisions", "", "Decisions of weight, one page each: what was decided, why, and at which price.", ""]
@@ -74,7 +130,8 @@ def decisions(staged: list[str]) -> str:
 
 
 def main() -> int:
-    listed, results, pages = json.loads(Path(sys.argv[1]).read_text()), Path(sys.argv[2]), Path(sys.argv[3])
+    listed = json.loads(Path(sys.argv[1]).read_text())
+    results, pages, html, run = map(Path, sys.argv[2:])
     pages_of_tree = staged_pages()
     staged = set(pages_of_tree)
     for page in pages_of_tree:
@@ -84,11 +141,18 @@ def main() -> int:
     for file in (HERE / "pages").glob("*.md"):
         # In the tree, links lead from this folder.
         text = file.read_text().replace("](../../../", "](")
-        (pages / file.name).write_text(text.replace("{{api}}", '<a href="api/index.html">C++ interfaces</a>'))
+        text = text.replace("](analysis/site/pages/", "](")
+        (pages / file.name).write_text(filled(text, html))
     (pages / "adr.md").write_text(decisions(pages_of_tree))
     strategy_pages.write(listed, results, ROOT, pages)
     (pages / "claims.md").write_text(claims_page.page(results))
-    built = (Path(sys.argv[4]) / "index.html").exists()
+    (pages / "report.md").write_text(report_page(html, results))
+    (pages / "python.md").write_text(python_pages.reference(ROOT / "analysis" / "kbvh"))
+    (pages / "notebooks.md").write_text(notebooks(run, pages))
+    for picture in (pages / "notebooks").glob("*.png"):  # named by raw HTML, which Sphinx does not read
+        (html / "notebooks").mkdir(exist_ok=True)
+        shutil.move(picture, html / "notebooks" / picture.name)
+    built = (html / "lab" / "lessons" / "index.html").exists()
     (pages / "lessons.md").write_text(lessons_page.page(ROOT / "analysis" / "lessons" / "text", built))
     return 0
 

@@ -10,8 +10,10 @@ import paths
 
 ROOT = paths.HERE.parents[1]
 sys.path.insert(0, str(ROOT / "analysis" / "site"))
+import furo_from_debian  # noqa: E402
 import lessons_page  # noqa: E402
 import links  # noqa: E402
+import python_pages  # noqa: E402
 import stage  # noqa: E402
 import strategy_pages  # noqa: E402
 
@@ -36,6 +38,63 @@ class Links(unittest.TestCase):
     def test_of_doxygen_only_files_count(self):
         self.assertEqual(self.dead(api__a='<a href="b.html#made-by-script">b</a>', api__b=""), [])
         self.assertEqual(len(self.dead(api__a='<a href="c.html">c</a>')), 1)
+
+
+    def test_a_link_to_the_lab_carries_a_state(self):
+        self.assertEqual(self.dead(a='<a href="lab/index.html#scene=cloth">lab</a>', lab__index=""), [])
+        self.assertEqual(len(self.dead(a='<a href="lab/none.html#scene=cloth">lab</a>', lab__index="")), 1)
+
+
+class Furo(unittest.TestCase):
+    """Debian's furo.css imports from a web server's /javascript and has no dark scheme; its furo.js is a module."""
+
+    STYLE = '@import url(/javascript/x.css/x.css);\n@media not print {\n  body[data-theme="dark"] {\n    --a: #111; } }\n'
+
+    def test_what_is_imported_lies_beside_it_and_the_system_chooses_dark(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder, javascript = Path(name, "styles"), Path(name, "javascript")
+            folder.mkdir()
+            (javascript / "x.css").mkdir(parents=True)
+            (javascript / "x.css" / "x.css").write_text("html {}")
+            text = furo_from_debian.mended_style(self.STYLE, folder, javascript)
+            self.assertTrue(text.startswith('@import url("x.css");'))
+            self.assertEqual((folder / "x.css").read_text(), "html {}")
+            self.assertRegex(text, r'prefers-color-scheme: dark\) \{\s*body:not\(\[data-theme="light"\]\) \{\s*--a: #111;')
+            self.assertEqual(furo_from_debian.mended_style(text, folder, javascript), text)
+            with self.assertRaises(FileNotFoundError):
+                furo_from_debian.mended_style("@import url(/javascript/none.css);", folder, javascript)
+
+    def test_an_imported_script_becomes_a_part(self):
+        with tempfile.TemporaryDirectory() as name:
+            (Path(name) / "g.js").write_text("var G = 1;")
+            self.assertEqual(furo_from_debian.mended_script('import G from "./g.js";\nuse(G);', Path(name)), "var G = 1;\nuse(G);")
+            self.assertEqual(furo_from_debian.mended_script("use(1);", Path(name)), "use(1);")
+
+
+class PythonPages(unittest.TestCase):
+    def test_every_public_name_is_on_the_page(self):
+        page = python_pages.reference(ROOT / "analysis" / "kbvh")
+        for name in python_pages.public(ROOT / "analysis" / "kbvh"):
+            self.assertIn(f"\n### {name}\n", page)
+        self.assertIn("#### World.advance\n", page)
+        self.assertNotIn("self", re.findall(r"```python\n(World\(.*?\))\n", page)[0])
+
+    def test_outputs_of_a_notebook(self):
+        cells = [
+            {"cell_type": "markdown", "source": ["# T\n", "text"]},
+            {"cell_type": "code", "source": "f()", "outputs": [
+                {"output_type": "stream", "name": "stdout", "text": "said\n"},
+                {"output_type": "execute_result", "data": {"text/html": "<table border=\"1\"></table>", "text/plain": "t"}},
+                {"output_type": "display_data", "data": {"image/png": "AAAA", "text/plain": "<Figure>"}}]},
+        ]  # fmt: skip
+        with tempfile.TemporaryDirectory() as name:
+            page = python_pages.notebook(cells, "n", Path(name))
+            self.assertEqual([file.name for file in Path(name).iterdir()], ["n-1-2.png"])
+        for part in ("# T\ntext", "```python\nf()\n```", "```text\nsaid\n```", "<table></table>", '<img src="n-1-2.png" alt="&lt;Figure&gt;">'):
+            self.assertIn(part, page)
+        cells[1]["outputs"] = [{"output_type": "error", "ename": "E", "evalue": "v"}]
+        with self.assertRaises(SystemExit):
+            python_pages.notebook(cells, "n", Path("."))
 
 
 class Stage(unittest.TestCase):

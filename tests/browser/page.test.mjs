@@ -23,6 +23,17 @@ const press = async ({ page, settle }, ...keys) => {
 };
 const summary = (lab) => ({ time: lab.state.at.time, events: lab.state.at.eventsDone, history: lab.state.history.length, phase: lab.state.phase, selection: lab.state.selection });
 
+test('a choice that is made while another one loads adds to it', () => withPage({ hash: '#scene=overtake-8' }, async ({ page, lab, settle }) => {
+  await page.evaluate(() => {
+    const [scene, strategy] = document.querySelectorAll('.lab-head select');
+    const choose = (select, value) => { select.value = value; select.dispatchEvent(new Event('change', { bubbles: true })); };
+    choose(strategy, 'bottom_up');
+    choose(scene, 'ties-6');
+  });
+  await settle();
+  assert.deepEqual(await lab(({ state }) => [state.strategy, state.sceneId, state.phase]), ['bottom_up', 'ties-6', 'ready']);
+}));
+
 test('keys alone: frames, events, break points, tree, timeline, panels', () => withPage({ hash: '#scene=overtake-8' }, async (opened) => {
   const { page, lab } = opened;
   await page.focus('[data-view=tree]');

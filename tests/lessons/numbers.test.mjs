@@ -8,10 +8,10 @@ import { fill, format, parse } from "../../analysis/lessons/renderer/text.mjs";
 const numbers = JSON.parse(readFileSync(process.env.KBVH_LESSONS + "/numbers.json", "utf8"));
 
 /// Numbers above ten, in digits or words, and numbers with decimals, that stand in the prose of a text: outside of code,
-/// mathematics, citations, links and the first lines of blocks.
+/// mathematics, citations, links, the first lines of blocks and the expressions before reasons.
 export function typedNumbers(text) {
   const prose = text.replace(/```[\s\S]*?```/g, " ").replace(/\$\$[\s\S]*?\$\$/g, " ").replace(/\$[^$\n]+\$/g, " ").replace(/`[^`]*`/g, " ")
-    .replace(/\{\{[^}]*\}\}/g, " ").replace(/\[@[^\]]*\]/g, " ").replace(/\]\([^)]*\)/g, "]").replace(/^:{3,}.*$/gm, " ");
+    .replace(/\{\{[^}]*\}\}/g, " ").replace(/\[@[^\]]*\]/g, " ").replace(/\]\([^)]*\)/g, "]").replace(/^:{3,}.*$/gm, " ").replace(/^- \[[^\]]*\]/gm, " ");
   const words = /\b(eleven|twelve|thirteen|fourteen|fifteen|sixteen|seventeen|eighteen|nineteen|(?:twen|thir|for|fif|six|seven|eigh|nine)ty)\b/gi;
   return [...(prose.match(/(?<![\w.,])\d[\d,.]*\d(?!\w)/g) ?? []), ...(prose.match(words) ?? [])];
 }
@@ -82,5 +82,9 @@ test("the numbers fit each other", () => {
   assert.ok(n("cloth.time_ratio_2006") > 0.33 && n("cloth.time_ratio_2006") < 0.4 && n("cloth.time_ratio_best") > 1);
   assert.equal(n("theory.search.adversarial.most"), n("theory.search.leaves") + 1);
   assert.equal(n("theory.over_lambda"), 0);
+  // Said in words: "none of them", "each event", "nothing was updated".
+  for (const key of ["silent", "linear_updates", "list.differences", "plan_moved_at_keyframes", "over_lambda"]) assert.equal(n("reference." + key), 0, key);
+  assert.equal(n("reference.translated_far"), n("reference.translated_ties"));
+  assert.ok(n("reference.loose_kinetic_values") < n("reference.linear_values") && n("reference.linear_values") < n("reference.loose_bottom_up_values"));
   assert.equal(n("theory.net"), n("theory.breakpoints"));
 });

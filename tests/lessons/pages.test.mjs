@@ -83,24 +83,25 @@ test("a prediction hides its result until an answer is committed, and remembers 
     const { page } = await open(name + ".html");
     const seen = await page.evaluate(() => [...document.querySelectorAll(".predict")].map((form) => {
       const result = document.querySelector(`[data-result="${form.dataset.predict}"]`), button = form.querySelector("button");
-      const rights = form.querySelectorAll("[data-right]").length, choices = form.querySelectorAll("input").length;
+      const choices = form.querySelectorAll("input").length, right = globalThis.kbvhLessons.unseal(form.dataset.sealed, form.dataset.predict);
       const before = result.hidden && (!result.nextElementSibling || result.nextElementSibling.matches("h2, .predict") || result.nextElementSibling.hidden);
       button.click();
       const unchosen = result.hidden;
       form.querySelector("input").checked = true;
       button.click();
-      return { before, unchosen, after: result.hidden, rights, choices };
+      const marked = [...form.querySelectorAll("li")].findIndex((item) => item.classList.contains("right")) === right;
+      return { before, unchosen, after: result.hidden, marked, choices };
     }));
     assert.ok(seen.length >= 1, name);
     for (const { choices, ...rest } of seen) {
-      assert.deepEqual(rest, { before: true, unchosen: true, after: false, rights: 1 }, name);
+      assert.deepEqual(rest, { before: true, unchosen: true, after: false, marked: true }, name);
       assert.ok(choices >= 3);
     }
     await page.close();
   }
 });
 
-test("questions accept the number and refuse others", async () => {
+test("questions accept the number, and give a reason for every other one", async () => {
   for (const { name } of lessons()) {
     const { page } = await open(name + ".html");
     const answers = await page.evaluate(() => [...document.querySelectorAll(".answer")].map((form) => {
@@ -109,11 +110,74 @@ test("questions accept the number and refuse others", async () => {
         form.querySelector("button").click();
         return form.querySelector("output").textContent;
       };
-      const value = Number(form.dataset.value);
-      return [say(""), say(String(value + 7)), say(String(Math.round(value)))];
+      const { value, known } = globalThis.kbvhLessons.unseal(form.dataset.sealed, form.dataset.answer);
+      return { blank: say(""), less: say(String(value - 1.5)), more: say(String(1000 * value + 1e6)), known: known.map(([wrong]) => say(String(wrong))), right: say(String(Math.round(value))) };
     }));
     assert.ok(answers.length >= 1, name);
-    for (const answer of answers) assert.deepEqual(answer, ["Enter a number.", "Not this number. Try again.", "Right."], name);
+    for (const { blank, right, less, more, known } of answers) {
+      assert.deepEqual([blank, right], ["Enter a number.", "Right."], name);
+      const reasons = [less, more, ...known];
+      for (const reason of reasons) assert.ok(reason.length > 25 && reason !== "Right." && !/try again/i.test(reason), `${name}: '${reason}'`);
+      assert.ok(new Set(reasons).size >= 2, name);
+    }
+    await page.close();
+  }
+});
+
+test("no answer stands in a page's source", () => {
+  for (const { name } of lessons()) {
+    const html = readFileSync(join(folder, name + ".html"), "utf8");
+    for (const mark of ["data-value", "data-right", "[&lt;]", "[&gt;]"]) assert.ok(!html.includes(mark), `${name}: ${mark}`);
+    assert.ok((html.match(/data-sealed="[\w+/=]+"/g) ?? []).length >= 2, name);
+  }
+});
+
+test("the menu of a student has no entry for teachers", () => {
+  for (const name of names.filter((file) => file !== "teacher.html")) {
+    const menu = /<nav class="course"[\s\S]*?<\/nav>/.exec(readFileSync(join(folder, name), "utf8"))[0];
+    assert.ok(!menu.includes("teacher"), name);
+  }
+});
+
+test("answers survive a reload, and the first page counts them", async () => {
+  const { page } = await open("3-certificates.html");
+  const answer = () => page.evaluate(() => {
+    const form = document.querySelector(".answer");
+    return [form.querySelector("input").value, form.querySelector("output").textContent];
+  });
+  await page.evaluate(() => localStorage.clear());
+  await page.reload();
+  assert.deepEqual(await answer(), ["", ""]);
+  await page.evaluate(() => {
+    const form = document.querySelector(".answer");
+    form.querySelector("input").value = "4";
+    form.querySelector("button").click();
+  });
+  await page.reload();
+  assert.deepEqual(await answer(), ["", ""], "a wrong number is not kept");
+  await page.evaluate(() => {
+    const form = document.querySelector(".answer");
+    form.querySelector("input").value = "5";
+    form.querySelector("button").click();
+  });
+  await page.reload();
+  assert.deepEqual(await answer(), ["5", "Right."]);
+  await page.goto("file://" + join(folder, "index.html"));
+  assert.deepEqual(await page.$$eval(".progress", (marks) => marks.map((mark) => mark.textContent).filter(Boolean)), ["1 of 5 solved"]);
+  await page.evaluate(() => localStorage.clear());
+  await page.close();
+});
+
+test("what is cut at 390 pixels is marked, and what is whole is not", async () => {
+  for (const name of names) {
+    const { page } = await open(name);
+    await page.setViewport({ width: 390, height: 844 });
+    await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+    const wrong = await page.evaluate(() => [...document.querySelectorAll("body *")].filter((element) => {
+      const cut = element.clientWidth > 0 && element.scrollWidth > element.clientWidth + 1 && ["auto", "scroll"].includes(getComputedStyle(element).overflowX);
+      return cut !== /right/.test(element.dataset.more ?? "");
+    }).map((element) => element.outerHTML.slice(0, 90)));
+    assert.deepEqual(wrong, [], name);
     await page.close();
   }
 });
@@ -175,25 +239,35 @@ test("the lab opens in every lesson at each prepared state", needsLab, async () 
   }
 });
 
-test("the buttons of an exercise load a solution and check it", needsLab, async () => {
+test("the buttons of an exercise check a scene; only an own solution counts as solved, and that survives a reload", needsLab, async () => {
   const { page, wrong } = await open("3-certificates.html");
-  const verdicts = await page.evaluate(async () => {
+  await page.evaluate(() => localStorage.clear());
+  await page.reload();
+  const push = (button, until) => page.evaluate(async (selector, pattern) => {
     const section = document.querySelector('[data-exercise="twelve-events"]'), output = section.querySelector(".verdict-line");
-    const until = async (test) => {
-      for (let i = 0; i < 400 && !test(); ++i) await new Promise((resolve) => setTimeout(resolve, 50));
-    };
-    section.querySelector(".check-scene").click();
-    await until(() => /event/.test(output.textContent));
-    const first = [output.textContent, output.className];
-    section.querySelector(".show-solution").click();
-    await until(() => !section.querySelector(".lab-note").textContent.startsWith("Loading") && !section.querySelector(".open-lab").disabled);
-    section.querySelector(".check-scene").click();
-    await until(() => /Exactly/.test(output.textContent));
-    return [first, [output.textContent, output.className]];
+    const idle = () => !section.querySelector(".lab-note").textContent.startsWith("Loading") && !section.querySelector(".open-lab").disabled && !section.querySelector(".check-scene").disabled;
+    section.querySelector(selector).click();
+    for (let i = 0; i < 400 && !(new RegExp(pattern).test(output.textContent) && idle()); ++i) await new Promise((resolve) => setTimeout(resolve, 50));
+    return [output.textContent, output.className, section.classList.contains("solved")];
+  }, button, until);
+  const first = await push(".check-scene", "events");
+  assert.match(first[0], /This scene has \d+ events/);
+  assert.deepEqual(first.slice(1), ["verdict-line wrong", false]);
+  await push(".show-solution", "A solution");
+  const loaded = await push(".check-scene", "Exactly");
+  assert.match(loaded[0], /^Exactly twelve events: 6 at lower x, 6 at upper x\. This is the solution that you loaded/);
+  assert.deepEqual(loaded.slice(1), ["verdict-line ", false]);
+  // A scene of one's own: the same order of events at other places.
+  await page.evaluate(async () => {
+    const lab = globalThis.kbvhLessons.mounted.get(document.querySelector('[data-exercise="twelve-events"] .lab')), state = lab.getState();
+    for (const body of state.scene.bodies) body.positions = body.positions.map((row) => Array.from(row, (x, i) => (i % 3 === 0 ? 2 * x : x)));
+    await lab.setState(state);
   });
-  assert.match(verdicts[0][0], /This scene has \d+ events/);
-  assert.equal(verdicts[0][1], "verdict-line wrong");
-  assert.deepEqual(verdicts[1], ["Exactly twelve events: 6 at lower x, 6 at upper x.", "verdict-line right"]);
+  assert.deepEqual(await push(".check-scene", "Exactly"), ["Exactly twelve events: 6 at lower x, 6 at upper x.", "verdict-line right", true]);
+  await page.reload();
+  assert.deepEqual(await page.$eval('[data-exercise="twelve-events"]', (section) => [section.querySelector(".verdict-line").textContent, section.classList.contains("solved")]),
+    ["You have solved this exercise.", true]);
+  await page.evaluate(() => localStorage.clear());
   assert.deepEqual(wrong, []);
   await page.close();
 });

@@ -15,7 +15,7 @@ for (const name of readdirSync(pages).filter((file) => file.endsWith(".html") &&
       await page.setViewport({ width, height: 900 });
       await page.goto("file://" + join(resolve(pages), name));
       if (process.env.ANSWERED) await page.evaluate(() => {
-        for (const form of document.querySelectorAll(".predict")) form.querySelector("[data-right]").click(), form.querySelector("button").click();
+        for (const form of document.querySelectorAll(".predict")) form.querySelectorAll("input")[globalThis.kbvhLessons.unseal(form.dataset.sealed, form.dataset.predict)].click(), form.querySelector("button").click();
       });
       await page.screenshot({ path: join(out, `${name.replace(".html", "")}-${scheme}-${width}.png`), fullPage: true });
       await page.close();

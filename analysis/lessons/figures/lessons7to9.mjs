@@ -80,11 +80,12 @@ export function threeInOne({ tie: { request } }) {
 
 export function rounding() {
   const x = 90, w = 780, { tx, vy, parts } = timeFrame({ x, y: 50, w, h: 390 }, [0, 6], { label: "value" });
-  const exact = [[0.7, 4.6], [2.3, 3.8]], snap = (v) => Math.round(v), steps = 12;
+  // Dots at their heights; two dots with one value stand side by side, for a tie has no order.
+  const exact = [[0.7, 4.6], [2.3, 3.8]], steps = 12, at = (i, k) => Math.round(exact[i][0] + ((exact[i][1] - exact[i][0]) * k) / steps);
   return picture("Two exact plans and their rounded positions at frames: rounding never reverses an order, but it makes ties", parts,
     [0, 1, 2, 3, 4, 5, 6].map((v) => line(x, vy(v), x + w, vy(v), "grid")),
     exact.map(([a, b], i) => [line(tx(0), vy(a), tx(1), vy(b), ["a", "b"][i] + " thick"),
-      ...Array.from({ length: steps + 1 }, (_, k) => circle(tx(k / steps), vy(snap(a + ((b - a) * k) / steps)) + (i ? 5 : -5), 6, ["a", "b"][i] + " solid"))]),
+      ...Array.from({ length: steps + 1 }, (_, k) => circle(tx(k / steps) + (at(0, k) === at(1, k) ? (i ? 7 : -7) : 0), vy(at(i, k)), 6, ["a", "b"][i] + " solid"))]),
     text(tx(0.02), vy(5.3), "lines: exact plans (truth A)", "bold"), text(tx(0.02), vy(4.75), "dots: rounded to the grid (truth B)", "quiet"));
 }
 

@@ -38,6 +38,7 @@ function extract(theory, prefix, source, put) {
   put(prefix + ".over_lambda", sum(exact, (run) => run.over_lambda), source);
   put(prefix + ".net", sum(exact, (run) => run.net), source);
   put(prefix + ".breakpoints", sum(exact, (run) => run.envelope), source);
+  put(prefix + ".tie_changes", sum(exact, (run) => run.logged - run.net), source);
   put(prefix + ".bound_share", most(counts, (run) => run.values / run.breakpoint_bound), source);
   put(prefix + ".events", sum(counts, (run) => run.events), source);
   put(prefix + ".silent", sum(counts, (run) => run.silent_events), source);
@@ -58,9 +59,11 @@ function extract(theory, prefix, source, put) {
   }
   const far = claims.T10.data.find((run) => !run.exact);
   put(prefix + ".translated_far", far.events, source);
+  put(prefix + ".translated_ties", far.separated_ties, source);
   put(prefix + ".translated_vertices", far.vertices, source);
   const plans = claims.T15.data;
-  put(prefix + ".plan_updates", sum(plans, (run) => run.updates), source);
+  put(prefix + ".plan_updates_at_keyframes", sum(plans, (run) => run.updates_at_keyframes), source);
+  put(prefix + ".plan_updates_between", sum(plans, (run) => run.updates - run.updates_at_keyframes), source);
   put(prefix + ".plan_moved_at_keyframes", sum(plans, (run) => run.moved_at_keyframes), source);
   put(prefix + ".plan_moved_between", sum(plans, (run) => run.moved_between), source);
   const loose = claims.T16.data;

@@ -1,4 +1,5 @@
 // The blocks of a lesson: what `::: name rest` becomes.
+import { seal } from "../page/seal.mjs";
 import { escape } from "./text.mjs";
 
 const titled = (kind, title) => (rest, opening) =>
@@ -69,7 +70,7 @@ export function blocks({ figures, states, checkers, numbers }) {
       const [key, options] = words(rest);
       if (!(key in numbers)) throw new Error(`no number '${key}' for an answer`);
       env.answers.push(key);
-      return `<form class="answer" data-value="${numbers[key].value}" data-tolerance="${options.tolerance ?? 0}">
+      return `<form class="answer" data-answer="${key}" data-tolerance="${options.tolerance ?? 0}">
 <h3 class="kind">Question</h3>\n`;
     },
   };
@@ -80,8 +81,41 @@ export function options(html) {
   let question = 0;
   return html.replace(/<form class="predict"[\s\S]*?<\/form>/g, (form) => {
     const id = ++question;
-    return form.replace(/<li>(?:<p>)?\s*\[( |x)\] ([\s\S]*?)(?:<\/p>\s*)?<\/li>/g, (_, mark, text) =>
-      `<li><label><input type="radio" name="predict-${id}"${mark === "x" ? " data-right" : ""}> <span>${text}</span></label></li>`)
-      .replace("<ul>", '<ul class="options">');
+    const name = /data-predict="([^"]*)"/.exec(form)[1], marks = [];
+    const shown = form.replace(/<li>(?:<p>)?\s*\[( |x)\] ([\s\S]*?)(?:<\/p>\s*)?<\/li>/g, (_, mark, text) => {
+      marks.push(mark);
+      return `<li><label><input type="radio" name="predict-${id}"> <span>${text}</span></label></li>`;
+    }).replace("<ul>", '<ul class="options">');
+    if (marks.filter((mark) => mark === "x").length !== 1) throw new Error(`prediction '${name}': mark one answer as [x]`);
+    return shown.replace("<form ", `<form data-sealed="${seal(marks.indexOf("x"), name)}" `);
+  });
+}
+
+/// The value of an expression in numbers of the course: keys, digits, + - * / and parentheses.
+function evaluate(expression, numbers) {
+  const filled = expression.replace(/[a-z]\w*(?:\.\w+)+/gi, (key) => {
+    if (!(key in numbers)) throw new Error(`no number '${key}' in the reasons of an answer`);
+    return `(${numbers[key].value})`;
+  });
+  if (!/^[\d\s.+*/()e-]+$/.test(filled)) throw new Error(`the reasons of an answer: '${expression}' is no expression`);
+  return Function(`return ${filled}`)();
+}
+
+/// Takes the list of reasons out of each question, and seals them with the answer: `- [expression] why this number is wrong`, `- [<] why a
+/// smaller one is`, `- [>] why a larger one is`. The last two are required.
+export function reasons(html, numbers) {
+  return html.replace(/<form class="answer" data-answer="([^"]*)" data-tolerance="([^"]*)">([\s\S]*?)<\/form>/g, (_, key, tolerance, inside) => {
+    const value = numbers[key].value, sealed = { value, tolerance: Number(tolerance), known: [] };
+    const rest = inside.replace(/<ul>([\s\S]*?)<\/ul>/, (list, items) => {
+      for (const [, mark, text] of items.matchAll(/<li>(?:<p>)?\s*\[([^\]]*)\] ([\s\S]*?)(?:<\/p>\s*)?<\/li>/g))
+        if (mark === "&lt;") sealed.less = text;
+        else if (mark === "&gt;") sealed.more = text;
+        else sealed.known.push([evaluate(mark, numbers), text]);
+      return "";
+    });
+    if (!sealed.less || !sealed.more) throw new Error(`the question '${key}' needs a reason for smaller [<] and for larger [>] numbers`);
+    for (const [wrong, text] of sealed.known)
+      if (Math.abs(wrong - value) <= sealed.tolerance) throw new Error(`the question '${key}' calls its answer wrong: ${text}`);
+    return `<form class="answer" data-answer="${key}" data-sealed="${seal(sealed, key)}">${rest}</form>`;
   });
 }

@@ -11,7 +11,7 @@ import { figures as figureMakers } from "../figures/index.mjs";
 import { rules, standalone } from "../figures/svg.mjs";
 import { makeNumbers } from "../numbers/numbers.mjs";
 import { states as preparedStates, exerciseStates } from "../states.mjs";
-import { blocks, options } from "./blocks.mjs";
+import { blocks, options, reasons } from "./blocks.mjs";
 import { contents, page, sourceList } from "./pages.mjs";
 import { escape, fill, parse, renderer } from "./text.mjs";
 
@@ -40,13 +40,14 @@ export function render({ numbers, data }) {
   const states = { ...preparedStates, ...exerciseStates() };
   const links = (current) => [["index.html", "Course", current === "index"],
     ...all.map(({ meta, name }) => [name + ".html", `<b>${meta.lesson}</b> <span>${escape(meta.short)}</span>`, current === name]),
-    ["../index.html", "Lab", false], ["slides.html", "Pictures", current === "slides"], ["teacher.html", "Teacher", current === "teacher"]];
+    ["../index.html", "Lab", false], ["slides.html", "Pictures", current === "slides"],
+    ...(current === "teacher" ? [["teacher.html", "Teacher", true]] : [])];
   const shown = [], notes = [];
   for (const { name, meta, text, file } of all) {
     const env = { order: [], headings: [], predictions: [], figures: [], exercises: [], answers: [] };
     const cited = new Set();
     const md = renderer({ sources: known, cited, blocks: blocks({ figures: drawn, states, checkers, numbers }) });
-    const html = options(md.render(fill(text, numbers, file, used), env));
+    const html = reasons(options(md.render(fill(text, numbers, file, used), env)), numbers);
     const { student, teacher } = divide(html);
     const at = all.findIndex((lesson) => lesson.name === name);
     const neighbour = (lesson, word) => lesson ? `<a class="${word}" href="${lesson.name}.html">${escape(lesson.meta.title)}</a>` : "<span></span>";
@@ -55,17 +56,17 @@ export function render({ numbers, data }) {
 ${contents(env.headings)}<article>${student}</article>
 ${sourceList(env.order, known)}<nav class="neighbours">${neighbour(all[at - 1], "previous")}${neighbour(all[at + 1], "next")}</nav>`;
     pages[name + ".html"] = page({ title: `${meta.title} · kinetic hierarchies`, body, links: links(name) });
-    shown.push({ name, meta, figures: env.figures, exercises: env.exercises });
+    shown.push({ name, meta, figures: env.figures, exercises: env.exercises, answers: env.answers });
     notes.push(`<section class="notes"><h2 id="${name}">Lesson ${meta.lesson}: <a href="${name}.html">${escape(meta.title)}</a></h2>\n${teacher}</section>`);
   }
-  pages["teacher.html"] = page({ title: "Teacher's notes · kinetic hierarchies", kind: "teacher", links: links("teacher"), script: false,
+  pages["teacher.html"] = page({ title: "Teacher's notes · kinetic hierarchies", kind: "teacher", links: links("teacher"),
     body: `<header><h1>Teacher's notes</h1><p class="lead">Timing, answers and stumbling blocks, lesson by lesson. Students do not need this page.</p></header>${notes.join("\n")}` });
-  pages["slides.html"] = page({ title: "Pictures · kinetic hierarchies", kind: "slides", links: links("slides"), script: false,
+  pages["slides.html"] = page({ title: "Pictures · kinetic hierarchies", kind: "slides", links: links("slides"),
     body: `<header><h1>Pictures</h1><p class="lead">Every picture of the course at the size of a slide. Each is a file of its own in the folder <code>pictures</code>; printed in landscape, this page gives one picture a sheet.</p></header>${shown
       .flatMap(({ meta, figures }) => figures.map((figure) => `<figure><p class="number">Lesson ${meta.lesson}</p>${drawn[figure]}<figcaption><a href="pictures/${figure}.svg">${figure}.svg</a></figcaption></figure>`)).join("\n")}` });
-  const rows = shown.map(({ name, meta, exercises }) => `<li><a href="${name}.html"><b>${meta.lesson}. ${escape(meta.title)}</b></a>
-<span class="minutes">${meta.minutes} min, ${exercises.length} exercises that the lab checks</span><p>${escape(meta.lead)}</p></li>`);
-  pages["index.html"] = page({ title: "Kinetic bounding volume hierarchies: a course", kind: "index", links: links("index"), script: false,
+  const rows = shown.map(({ name, meta, exercises, answers }) => `<li data-lesson="${name}.html" data-tasks="${exercises.length + answers.length}"><a href="${name}.html"><b>${meta.lesson}. ${escape(meta.title)}</b></a>
+<span class="minutes">${meta.minutes} min, ${exercises.length} exercises that the lab checks</span> <span class="progress"></span><p>${escape(meta.lead)}</p></li>`);
+  pages["index.html"] = page({ title: "Kinetic bounding volume hierarchies: a course", kind: "index", links: links("index"),
     body: fill(readFileSync(join(root, "text/index.html"), "utf8"), { ...numbers,
       "course.minutes": { value: all.reduce((sum, { meta }) => sum + meta.minutes, 0) }, "course.lessons": { value: all.length } }, "index.html")
       .replace("<!--lessons-->", `<ol class="lessons">${rows.join("\n")}</ol>`) });

@@ -5,7 +5,7 @@ const licence = `Text and pictures: <a href="https://creativecommons.org/license
 the kbvh authors. Programs: MIT licence.`;
 
 /// A whole page. `links` are [address, label, current?].
-export function page({ title, body, links, script = true, kind = "lesson" }) {
+export function page({ title, body, links, kind = "lesson" }) {
   const nav = links.map(([to, label, current]) =>
     `<a href="${to}"${current ? ' aria-current="page"' : ""}>${label}</a>`).join("\n");
   return `<!doctype html>
@@ -28,7 +28,7 @@ ${nav}
 ${body}
 </main>
 <footer><p>${licence}</p></footer>
-${script ? '<script src="lessons.js"></script>' : ""}
+<script src="lessons.js"></script>
 </body>
 </html>
 `;

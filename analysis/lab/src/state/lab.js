@@ -25,6 +25,7 @@ export class Lab {
     this.editing = new Editing(this);
     this.engine = null;
     this.chain = Promise.resolve();
+    this.wanted = null;  // the newest choice that still loads
     this.pendingSeek = null;
     this.target = null;  // the time of the newest seek that has not arrived
     this.listeners = new Map();
@@ -100,8 +101,13 @@ export class Lab {
 
   /** Changes to another strategy at the present time. */
   choose(strategy) {
-    const {scene, at} = this.state;
-    return this.load({strategy, params: {}, topology: this.defaultTopology(strategy, scene)}, {time: at?.time});
+    return this.load({strategy, params: {}, topology: this.defaultTopology(strategy, this.asked.scene)}, {time: this.state.at?.time});
+  }
+
+  /** What was chosen last: what is shown, or what still loads. */
+  get asked() {
+    const {scene, sceneId, strategy, params, topology, precision} = this.wanted ?? this.state;
+    return {scene, sceneId, strategy, params, topology, precision};
   }
 
   /** Where the clip stands, as a frame (any time) and the number of single events after it. */
@@ -122,8 +128,9 @@ export class Lab {
    */
   async load(choice, place = {}, {quiet = false} = {}) {
     const s = this.state;
-    const {scene: given, sceneId, strategy, params, topology, precision} = {
-      scene: s.scene, sceneId: s.sceneId, strategy: s.strategy, params: s.params, topology: s.topology, precision: s.precision, ...choice};
+    // A choice that is made while another one loads adds to it.
+    const wanted = this.wanted = {...this.asked, ...choice};
+    const {scene: given, sceneId, strategy, params, topology, precision} = wanted;
     this.pause();
     const loaded = await this.enqueue(quiet ? null : 'loading', `Loading '${given?.name}' with ${strategy}`, async () => {
       const scene = checkScene(given);
@@ -148,6 +155,7 @@ export class Lab {
       await this.#followHistory();
       if (place.selection) this.store.set({selection: this.#checkedSelection(place.selection, info)});
     });
+    if (this.wanted === wanted) this.wanted = null;
     if (!loaded) return false;
     this.#emit('load', this.state);
     await this.comparison.reload({quiet});

@@ -20,7 +20,7 @@ export function Header({lab, state, compact, onHelp}) {
   const load = (choice) => lab.load(choice, choice.scene ? {} : {time: state.at?.time});
   return html`<header class="lab-head">
     ${!compact && html`<h1>kbvh <span>lab</span></h1>
-    <label>Scene <select value=${sceneId ?? ''} onChange=${(event) => { const id = event.currentTarget.value; if (id.startsWith('study ')) openStudyScene(lab, state.study[Number(id.slice(6))]); else if (builtIn[id]) { lab.editing.forget(); lab.view({up: 'z'}); load({scene: builtIn[id], sceneId: id, topology: lab.defaultTopology(strategy, builtIn[id])}); } }}>
+    <label>Scene <select value=${sceneId ?? ''} onChange=${(event) => { const id = event.currentTarget.value; if (id.startsWith('study ')) openStudyScene(lab, state.study[Number(id.slice(6))]); else if (builtIn[id]) { lab.editing.forget(); lab.view({up: 'z'}); load({scene: builtIn[id], sceneId: id, topology: lab.defaultTopology(lab.asked.strategy, builtIn[id])}); } }}>
       ${!sceneId && html`<option value="">${scene?.name ?? '…'} (changed or own)</option>`}
       ${Object.entries(builtIn).map(([id, each]) => html`<option value=${id}>${each.name}</option>`)}
       ${state.study.length > 0 && html`<optgroup label="Scenes of the study">${state.study.map((each, i) => html`<option value=${`study ${i}`}>${each.name}</option>`)}</optgroup>`}</select></label>`}

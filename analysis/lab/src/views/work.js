@@ -52,8 +52,8 @@ function Multiple({lab, state, metric, a, b}) {
     c.fillStyle = colours.muted; c.textAlign = 'right'; c.textBaseline = 'top';
     c.fillText(text(most), width - 3, 3);
   };
-  return html`<figure class="multiple" title=${metric.about}><figcaption><b>${metric.title}</b><span>${text(totals[0])} : ${text(totals[1])}</span></figcaption>
-    <${Canvas} draw=${draw} role="img" aria-label=${`${metric.title} per frame. Totals: ${text(totals[0])} and ${text(totals[1])}. ${verdict}`}
+  return html`<figure class="multiple" title=${metric.about}><figcaption><b>${metric.title}</b><span>${ready ? `${text(totals[0])} : ${text(totals[1])}` : '…'}</span></figcaption>
+    <${Canvas} draw=${draw} role="img" aria-label=${`${metric.title} per frame. ${ready ? `Totals: ${text(totals[0])} and ${text(totals[1])}. ${verdict}` : 'Still measuring.'}`}
       onPointerDown=${(event) => { const [px] = pointerAt(event), w = event.currentTarget.clientWidth; lab.seek(frames[Math.max(0, Math.min(frames.length - 1, Math.round(px / w * (frames.length - 1))))]); }} />
     <div class="verdict">${verdict || (ready ? 'equal' : '…')}</div></figure>`;
 }

@@ -1,0 +1,115 @@
+// The built site in Chromium, from its folder and without a network, in both colour schemes: no page has an error in its console, asks for
+// a file that is not there or for another machine; colours follow the scheme; no page of the site is wider than a phone. $KBVH_SITE is the
+// folder with index.html.
+import assert from 'node:assert/strict';
+import { existsSync, readFileSync, readdirSync } from 'node:fs';
+import { join, relative, resolve } from 'node:path';
+import { after, before, test } from 'node:test';
+import { pathToFileURL } from 'node:url';
+
+import { startBrowser } from './support/chromium.mjs';
+
+const site = resolve(process.env.KBVH_SITE);
+const schemes = ['light', 'dark'];
+let chromium;
+
+before(async () => { chromium = await startBrowser(); });
+after(() => chromium.close());
+
+/** The pages of a folder, but those of Doxygen: of its thousands only the first one and those that the page cpp.html names. */
+function pagesOf(folder) {
+  const found = readdirSync(folder, { withFileTypes: true }).flatMap((entry) =>
+    entry.isDirectory() ? (entry.name === '_static' || folder === site && entry.name === 'api' ? [] : pagesOf(join(folder, entry.name)))
+      : entry.name.endsWith('.html') ? [relative(site, join(folder, entry.name))] : []);
+  if (folder !== site || !existsSync(join(site, 'cpp.html'))) return found.sort();
+  return [...found, ...new Set(readFileSync(join(site, 'cpp.html'), 'utf8').match(/api\/\w+\.html/g) ?? [])].sort();
+}
+const pages = pagesOf(site);
+/** Pages made by Sphinx: the site's own look. */
+const own = pages.filter((name) => !/^(api|lab|report)\//.test(name));
+
+/** Opens a page; `wrong` collects what goes wrong in it. */
+async function open(name, scheme, width = 1280) {
+  const page = await chromium.browser.newPage(), wrong = [];
+  page.on('console', (message) => message.type() === 'error' && wrong.push(`console: ${message.text()}`));
+  page.on('pageerror', (error) => wrong.push(`error: ${error.message}`));
+  page.on('requestfailed', (request) => wrong.push(`missing: ${request.url().replace(pathToFileURL(site).href, '')}`));
+  page.on('request', (request) => { if (/^(https?|wss?):/.test(request.url())) wrong.push(`asks for ${request.url()}`); });
+  await page.setOfflineMode(true);
+  await page.setViewport({ width, height: 900 });
+  await page.emulateMediaFeatures([{ name: 'prefers-color-scheme', value: scheme }, { name: 'prefers-reduced-motion', value: 'reduce' }]);
+  await page.goto(pathToFileURL(join(site, name)).href, { waitUntil: 'load', timeout: 120000 });
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  return { page, wrong };
+}
+
+/** How bright the middle of the page is, from 0 to 1: the background of what stands there, or of the nearest element around that has one. */
+const brightness = (page) => page.evaluate(() => {
+  for (let element = document.elementFromPoint(innerWidth / 2, 300); element; element = element.parentElement) {
+    if (element.closest('pre, svg, canvas, img, figure')) continue;
+    const [r, g, b, a = 1] = getComputedStyle(element).backgroundColor.match(/[\d.]+/g).map(Number);
+    if (a > 0.5) return (r + g + b) / 765;
+  }
+  return 1;
+});
+
+test('there is a site', () => assert.ok(own.length > 60 && existsSync(join(site, 'index.html')), `${own.length} pages in ${site}`));
+
+for (const scheme of schemes)
+  test(`${pages.length} pages load without an error, ${scheme}`, async () => {
+    const faults = [];
+    for (const name of pages) {
+      const { page, wrong } = await open(name, scheme);
+      const bright = await brightness(page);
+      // Doxygen of Debian 12 knows one scheme only.
+      if (!name.startsWith('api/') && (scheme === 'dark' ? bright > 0.3 : bright < 0.8)) wrong.push(`its background is ${scheme === 'dark' ? 'bright' : 'dark'} (${bright.toFixed(2)})`);
+      if (wrong.length) faults.push(`${name}: ${[...new Set(wrong)].join('; ')}`);
+      await page.close();
+    }
+    assert.deepEqual(faults, []);
+  });
+
+test('at 390 pixels no page of the site scrolls sideways', async () => {
+  const wide = [];
+  for (const name of own) {
+    const { page } = await open(name, 'light', 390);
+    const [whole, window] = await page.evaluate(() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]);
+    if (whole > window + 1) wide.push(`${name}: ${whole}`);
+    await page.close();
+  }
+  assert.deepEqual(wide, []);
+});
+
+test('the switch of colours works', async () => {
+  const { page } = await open('start.html', 'light');
+  const before = await brightness(page);
+  await page.evaluate(() => [...document.querySelectorAll('.theme-toggle')].find((button) => button.offsetParent !== null).click());
+  assert.ok(before > 0.8 && await brightness(page) < 0.3, 'the page stays as it was');
+  await page.close();
+});
+
+test('the first page compares two strategies and says what it found', async () => {
+  for (const scheme of schemes) {
+    const { page, wrong } = await open('index.html', scheme);
+    await page.waitForFunction(() => document.querySelector('[data-comparison]')?.dataset.told, { timeout: 240000 });
+    const { finding, ways, lab } = await page.evaluate(() => ({ finding: document.querySelector('.finding').textContent,
+      ways: [...document.querySelectorAll('.ways a')].map((a) => a.getAttribute('href')), lab: document.querySelectorAll('.comparison-lab canvas').length }));
+    assert.match(finding, /^On this cloth a kinetic AABB tree writes [\d.,]+ times fewer values than a refit, and is [\d.,]+ times (slower|faster)\.$/);
+    assert.equal(ways.length, 3);
+    for (const way of ways) assert.ok(existsSync(join(site, way)), way);
+    assert.ok(lab > 3, `${lab} canvases`);
+    assert.deepEqual(wrong, []);
+    await page.close();
+  }
+});
+
+test('lab, course, report, explorer, Python and C++ are part of the site', () => {
+  for (const name of ['lab/index.html', 'lab/lessons/index.html', 'report/report.html', 'report/explorer.html', 'python.html', 'notebooks.html', 'cpp.html', 'api/index.html'])
+    assert.ok(existsSync(join(site, name)), name);
+  const text = (name) => readFileSync(join(site, name), 'utf8');
+  for (const method of ['World.advance', 'World.pairs', 'World.contacts']) assert.ok(text('python.html').includes(`>${method}<`), method);
+  const notebooks = readdirSync(join(site, 'notebooks')).filter((name) => name.endsWith('.html'));
+  assert.equal(notebooks.length, 4);
+  for (const name of notebooks) assert.match(text(`notebooks/${name}`), /class="output"|highlight-text/, `${name} has no output`);
+  assert.ok((text('cpp.html').match(/href="api\/(class|struct)kbvh/g) ?? []).length >= 12);
+});
