@@ -1,6 +1,9 @@
 // The kinetic BoxTree (Z&W 2006, s.6), with the errata of the reproduction. An inner node has at most two
 // planes; all other sides are inherited. The tree is valid at every time and updated only at events.
 // Degenerated parts can be rebuilt. Queries compute boxes on demand, many at once (BoxTreeRows).
+//
+// As in the paper, a certificate's search may read all nodes. It does where no node owns a side, as of equal
+// boxes, so that inserting n of them takes quadratically many steps.
 
 #include <numeric>
 

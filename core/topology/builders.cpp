@@ -121,7 +121,7 @@ class BinaryBuilder {
     centroid_bounds(begin, end, lower, upper);
     double best_cost = std::numeric_limits<double>::infinity();
     std::size_t best_axis = 3;
-    std::uint32_t best_bin = 0;
+    std::uint32_t best_bin = 0, best_larger = 0;
     const auto bin_of = [&](const BuildItem& item, std::size_t axis) {
       const double scaled = (item.centroid[axis] - lower[axis]) / (upper[axis] - lower[axis]) * bins;
       return std::min(bins - 1, std::uint32_t(std::max(0.0, scaled)));
@@ -149,7 +149,10 @@ class BinaryBuilder {
         n += bins_[b].count;
         if (n == 0 || n == count) continue;
         const double cost = surface_area(box) * n + right_cost_[b + 1];
-        if (cost < best_cost) best_cost = cost, best_axis = axis, best_bin = b;
+        // Of equal costs, as on a line, the most even split.
+        const std::uint32_t larger = std::max(n, count - n);
+        if (cost < best_cost || (cost == best_cost && larger < best_larger))
+          best_cost = cost, best_axis = axis, best_bin = b, best_larger = larger;
       }
     }
     if (best_axis == 3) return count <= config_.leaf_size ? begin : halve(begin, end);

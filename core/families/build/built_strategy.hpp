@@ -14,7 +14,8 @@ namespace kbvh {
 /// and has
 ///   build(BuiltTree&, CurveOrder&, const PrimitiveList&)   over the boxes that the order has taken
 ///   bytes()
-/// Of the given topologies, only the leaf size counts.
+/// and may have searched(): the clusters searched by all builds, which are then counted. Of the given
+/// topologies, only the leaf size counts.
 template <class S, class Count, class Builder>
 class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public AnswersRays<S>, public TellsWork {
   using Base = BuiltEachFrame<S, Count, BuiltTree<S>>;
@@ -86,6 +87,12 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
     last_ray_tests_ = tests;
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) followed(body, rays_.work()[body]);
   }
+  void counts_cleared() override {
+    if constexpr (searches) searched_before_ = builder_.searched();
+  }
+  void add_counts(Counters& table) const override {
+    if constexpr (searches) table.add("clusters_searched", builder_.searched() - searched_before_);
+  }
   /// Computes the boxes of a tree that keeps its shape.
   void refit(std::uint32_t body) {
     take_boxes(body);
@@ -98,6 +105,8 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
   virtual void followed(std::uint32_t /*body*/, const RayWork& /*work*/) {}
 
  private:
+  static constexpr bool searches = requires(const Builder& builder) { builder.searched(); };
+
   void take_boxes(std::uint32_t body) {
     order_.take(this->scene_.primitives(body), lists_[body], this->sampled_.positions(body), this->kernels_);
   }
@@ -111,7 +120,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
   CurveOrder<S> order_;
   WideQuery<S> query_{this->scene_, this->sampled_};
   WideRays<S> rays_{this->scene_, this->sampled_};
-  std::uint64_t last_box_tests_ = 0, last_ray_tests_ = 0;
+  std::uint64_t last_box_tests_ = 0, last_ray_tests_ = 0, searched_before_ = 0;
 };
 
 // Compiled once, in built_strategy.cpp, and not with every strategy.

@@ -11,6 +11,8 @@ namespace kbvh {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
+/// A round in which less than one in this many clusters begins a mutual choice merges others, too.
+constexpr std::uint32_t least_share = 16;
 
 /// Lets a binary tree of clusters be laid out: leaves write their primitives where the last one ended.
 template <class S, class Cluster>
@@ -68,6 +70,7 @@ void LocalClusterBuilder<S>::start(std::uint32_t count) {
   grow(clusters_, 2 * std::size_t(count));
   grow(ids_, count);
   grow(nearest_, count);
+  grow(partner_, count);
   stride_ = (std::size_t(count) + 2 * most_radius + 15) / 16 * 16;
   grow(rows_, 6 * stride_);
   for (std::size_t side = 0; side < 6; ++side) {
@@ -89,28 +92,51 @@ void LocalClusterBuilder<S>::merge_all(KernelSet kernels) {
   const ClusterKernels& table = cluster_kernels(kernels);
   while (active_ > 1) {
     (radius_ == 8 ? table.nearest8 : table.nearest16)({row(0), stride_, active_, nearest_.data()});
+    searched_ += active_;
+    match();
     active_ = merge_round();
     for (std::size_t side = 0; side < 6; ++side) std::fill_n(row(side) + active_, most_radius, -infinity);
   }
 }
 
-/// Merges all clusters that chose each other, in place; returns how many are left.
+/// Chooses who merges: clusters that chose each other. Where sizes grow along the curve, each chooses a
+/// smaller one, and hardly any two choose each other; then a cluster also merges with its choice if that is
+/// still free. No more than 2 * radius clusters choose the same one, so that every round merges a fixed share
+/// of all.
+template <class S>
+void LocalClusterBuilder<S>::match() {
+  std::uint32_t matched = 0;
+  for (std::uint32_t i = 0; i < active_; ++i) {
+    const std::uint32_t other = nearest_[i];
+    const bool mutual = nearest_[other] == i;
+    partner_[i] = mutual ? other : i;
+    matched += mutual ? 1 : 0;
+  }
+  if (matched / 2 * least_share >= active_) return;
+  for (std::uint32_t i = 0; i < active_; ++i) {
+    const std::uint32_t other = nearest_[i];
+    if (partner_[i] != i || partner_[other] != other) continue;
+    partner_[i] = other;
+    partner_[other] = i;
+  }
+}
+
+/// Merges all clusters with their partners, in place; returns how many are left.
 template <class S>
 std::uint32_t LocalClusterBuilder<S>::merge_round() {
   std::uint32_t left = 0;
   float* rows[6];
   for (std::size_t side = 0; side < 6; ++side) rows[side] = row(side);
   for (std::uint32_t i = 0; i < active_; ++i) {
-    const std::uint32_t other = nearest_[i];
-    const bool merges = nearest_[other] == i;
-    if (merges && other < i) continue;
+    const std::uint32_t other = partner_[i];
+    if (other < i) continue;
     float box[6];
     for (std::size_t side = 0; side < 6; ++side) {
-      box[side] = merges ? std::min(rows[side][i], rows[side][other]) : rows[side][i];
+      box[side] = std::min(rows[side][i], rows[side][other]);
       rows[side][left] = box[side];
     }
     std::uint32_t id = ids_[i];
-    if (merges) {
+    if (other != i) {
       const std::uint32_t second = ids_[other];
       const float x = box[0] + box[3], y = box[1] + box[4], z = box[2] + box[5];
       clusters_[made_] = {id, second, clusters_[id].primitives + clusters_[second].primitives,
@@ -126,7 +152,8 @@ std::uint32_t LocalClusterBuilder<S>::merge_round() {
 template <class S>
 std::size_t LocalClusterBuilder<S>::bytes() const {
   return grains_.bytes() + clusters_.capacity() * sizeof(Cluster) + rows_.capacity() * sizeof(float) +
-         (ids_.capacity() + nearest_.capacity() + parts_.capacity() + open_.capacity()) *
+         (ids_.capacity() + nearest_.capacity() + partner_.capacity() + parts_.capacity() +
+          open_.capacity()) *
              sizeof(std::uint32_t);
 }
 
@@ -187,6 +214,7 @@ struct BinnedSource {
   /// Finds the plane of least cost; returns false if all items lie in one bin of each axis.
   bool best_plane(std::uint32_t count, std::uint32_t& best_axis, std::uint32_t& last_bin) const {
     float least = infinity;
+    std::uint32_t least_larger = 0;
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       float right_cost[sah_bins];
       PartBox box = empty_box;
@@ -204,7 +232,10 @@ struct BinnedSource {
         if (in_box == 0) continue;
         if (in_box == count) break;
         const float cost = surface(box) * float(in_box) + right_cost[b + 1];
-        if (cost < least) least = cost, best_axis = axis, last_bin = b;
+        // Of equal costs, as on a line, the most even split.
+        const std::uint32_t larger = std::max(in_box, count - in_box);
+        if (cost < least || (cost == least && larger < least_larger))
+          least = cost, best_axis = axis, last_bin = b, least_larger = larger;
       }
     }
     return least < infinity;

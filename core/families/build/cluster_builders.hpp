@@ -11,7 +11,8 @@ namespace kbvh {
 
 /// Parallel locally-ordered clustering (Meister & Bittner 2018): clusters in the order of a curve search
 /// their best partner among their next neighbours on each side; those that choose each other become one
-/// cluster, until one is left.
+/// cluster, until one is left. If hardly any choose each other, others merge, too: O(n) after the sort,
+/// whatever the boxes are.
 template <class S>
 class LocalClusterBuilder {
  public:
@@ -20,6 +21,8 @@ class LocalClusterBuilder {
   LocalClusterBuilder(std::uint32_t radius, std::uint32_t grain) : radius_(radius), grain_(grain) {}
   void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
   std::size_t bytes() const;
+  /// Returns how many searches for a partner all builds have made.
+  std::uint64_t searched() const { return searched_; }
 
   /// A cluster: an initial one, or the union of two.
   struct Cluster {
@@ -31,6 +34,7 @@ class LocalClusterBuilder {
  private:
   void start(std::uint32_t count);
   void merge_all(KernelSet kernels);
+  void match();
   std::uint32_t merge_round();
   float* row(std::size_t row) { return rows_.data() + row * stride_ + most_radius; }
 
@@ -40,7 +44,8 @@ class LocalClusterBuilder {
   std::size_t stride_ = 0;
   std::uint32_t active_ = 0, made_ = 0;
   AlignedArray<float> rows_;  ///< of the active clusters, see NearestJob
-  std::vector<std::uint32_t> ids_, nearest_, parts_, open_;
+  std::vector<std::uint32_t> ids_, nearest_, partner_, parts_, open_;
+  std::uint64_t searched_ = 0;
 };
 
 /// Binned surface-area heuristic (Wald 2007), top down: each range is split at the best of 15 planes on each

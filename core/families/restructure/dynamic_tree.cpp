@@ -17,6 +17,18 @@ Box<S> joined(const Box<S>& a, const Box<S>& b) {
   return box;
 }
 
+/// Returns four times the squared distance of the centres.
+template <class S>
+double centre_distance(const Box<S>& a, const Box<S>& b) {
+  double sum = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double side =
+        (double(a.lower[axis]) + double(a.upper[axis])) - (double(b.lower[axis]) + double(b.upper[axis]));
+    sum += side * side;
+  }
+  return sum;
+}
+
 }  // namespace
 
 template <class S>
@@ -49,7 +61,9 @@ std::uint32_t DynamicTree<S>::new_node() {
 }
 
 /// Descends to where a new leaf makes the sum of surface areas grow least, greedily: a parent for the leaf
-/// and the node costs their common area, and a step down costs what the node grows by.
+/// and the node costs their common area, and a step down costs what the node grows by. Of children that cost
+/// the same, as both do that contain the leaf, the one with the nearer centre is taken, and of these the
+/// lower one.
 template <class S>
 std::uint32_t DynamicTree<S>::best_sibling(const Box<S>& box) {
   std::uint32_t index = root_;
@@ -65,7 +79,13 @@ std::uint32_t DynamicTree<S>::best_sibling(const Box<S>& box) {
     };
     const double first = below(node.first), second = below(node.second);
     if (together < first && together < second) return index;
-    index = first < second ? node.first : node.second;
+    if (first != second) {
+      index = first < second ? node.first : node.second;
+      continue;
+    }
+    const Node &one = nodes_[node.first], &other = nodes_[node.second];
+    const double near = centre_distance(one.box, box), far = centre_distance(other.box, box);
+    index = near < far || (near == far && one.height < other.height) ? node.first : node.second;
   }
 }
 
@@ -114,8 +134,10 @@ void DynamicTree<S>::remove(std::uint32_t primitive) {
 }
 
 template <class S>
-void DynamicTree<S>::join(std::uint32_t node) {
-  nodes_[node].box = joined(nodes_[nodes_[node].first].box, nodes_[nodes_[node].second].box);
+void DynamicTree<S>::join(std::uint32_t index) {
+  Node& node = nodes_[index];
+  node.box = joined(nodes_[node.first].box, nodes_[node.second].box);
+  node.height = height_above(node.first, node.second);
 }
 
 template <class S>
@@ -123,12 +145,40 @@ void DynamicTree<S>::refit_from(std::uint32_t node) {
   for (; node != none; node = nodes_[node].parent) {
     ++visited_;
     join(node);
+    balance(node);
     rotate(node);
   }
 }
 
+/// Exchanges a child of a node with a child of its other child. The node's own box stays.
+template <class S>
+void DynamicTree<S>::exchange(std::uint32_t node, std::uint32_t down, std::uint32_t up) {
+  const std::uint32_t middle = nodes_[up].parent;
+  (nodes_[node].first == down ? nodes_[node].first : nodes_[node].second) = up;
+  (nodes_[middle].first == up ? nodes_[middle].first : nodes_[middle].second) = down;
+  nodes_[up].parent = node;
+  nodes_[down].parent = middle;
+  join(middle);
+}
+
+/// Lifts the higher child of the higher child until the heights of the children are as close as they have to
+/// be. One exchange suffices after a change by one level; what it puts together may need others.
+template <class S>
+void DynamicTree<S>::balance(std::uint32_t node) {
+  for (;;) {
+    std::uint32_t low = nodes_[node].first, high = nodes_[node].second;
+    if (nodes_[low].height > nodes_[high].height) std::swap(low, high);
+    if (balanced(nodes_[low].height, nodes_[high].height)) return;
+    ++visited_;
+    const std::uint32_t first = nodes_[high].first, second = nodes_[high].second;
+    exchange(node, low, nodes_[first].height > nodes_[second].height ? first : second);
+    balance(high);
+    nodes_[node].height = height_above(nodes_[node].first, nodes_[node].second);
+  }
+}
+
 /// Exchanges a child with a child of the other child if that makes the other child's box smaller; the best of
-/// the four exchanges. The node's own box stays.
+/// the four exchanges, among those that keep the heights close.
 template <class S>
 void DynamicTree<S>::rotate(std::uint32_t node) {
   const std::uint32_t children[2] = {nodes_[node].first, nodes_[node].second};
@@ -140,17 +190,17 @@ void DynamicTree<S>::rotate(std::uint32_t node) {
     const double area = surface_area(nodes_[other].box);
     const std::uint32_t grandchildren[2] = {nodes_[other].first, nodes_[other].second};
     for (int k = 0; k < 2; ++k) {
-      const double gain = area - surface_area(joined(nodes_[child].box, nodes_[grandchildren[1 - k]].box));
-      if (gain > most) most = gain, up = grandchildren[k], down = child;
+      const std::uint32_t stays = grandchildren[1 - k];
+      const double gain = area - surface_area(joined(nodes_[child].box, nodes_[stays].box));
+      if (!(gain > most) || !balanced(nodes_[child].height, nodes_[stays].height) ||
+          !balanced(nodes_[grandchildren[k]].height, height_above(child, stays)))
+        continue;
+      most = gain, up = grandchildren[k], down = child;
     }
   }
   if (up == none) return;
-  const std::uint32_t middle = nodes_[up].parent;
-  (nodes_[node].first == down ? nodes_[node].first : nodes_[node].second) = up;
-  (nodes_[middle].first == up ? nodes_[middle].first : nodes_[middle].second) = down;
-  nodes_[up].parent = node;
-  nodes_[down].parent = middle;
-  join(middle);
+  exchange(node, down, up);
+  nodes_[node].height = height_above(nodes_[node].first, nodes_[node].second);
 }
 
 template <class S>

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -11,15 +12,22 @@ namespace kbvh {
 /// A binary tree over one body's primitives that is never built: primitives are inserted and removed one by
 /// one, and rotations on the way up keep it good (Catto 2019, as in Box2D). Leaves hold boxes that are larger
 /// than their primitives. Ids of nodes are recycled; memory grows only with the number of primitives.
+///
+/// Surface areas alone make a chain of boxes that are equal or lie in each other. So the heights of two
+/// siblings never differ by more than `slack`: the depth is at most 3.6 log2(primitives), up to a constant,
+/// because a tree of height h has at least as many leaves as those of height h - 1 and h - 1 - slack
+/// together.
 template <class S>
 class DynamicTree {
  public:
   static constexpr std::uint32_t none = ~std::uint32_t(0);
+  static constexpr std::uint32_t slack = 8;
   struct Node {
     Box<S> box;
     std::uint32_t parent = none;
     std::uint32_t first = none;   ///< a child; of a leaf, its primitive
     std::uint32_t second = none;  ///< a child; none for a leaf
+    std::uint32_t height = 0;     ///< 0 for a leaf
     bool is_leaf() const { return second == none; }
   };
 
@@ -27,9 +35,9 @@ class DynamicTree {
   void clear(std::uint32_t primitives);
   /// Makes room for more ids.
   void grow(std::uint32_t primitives);
-  /// Adds a primitive that is not in the tree. O(depth).
+  /// Adds a primitive that is not in the tree. O(log n).
   void insert(std::uint32_t primitive, const Box<S>& box);
-  /// Removes a primitive that is in the tree. O(depth).
+  /// Removes a primitive that is in the tree. O(log n).
   void remove(std::uint32_t primitive);
 
   bool contains(std::uint32_t primitive) const {
@@ -91,7 +99,15 @@ class DynamicTree {
   /// Recomputes the boxes from a node upwards, and rotates where that makes a box smaller.
   void refit_from(std::uint32_t node);
   void rotate(std::uint32_t node);
+  void balance(std::uint32_t node);
+  void exchange(std::uint32_t node, std::uint32_t down, std::uint32_t up);
   void join(std::uint32_t node);
+  std::uint32_t height_above(std::uint32_t first, std::uint32_t second) const {
+    return 1 + std::max(nodes_[first].height, nodes_[second].height);
+  }
+  static bool balanced(std::uint32_t height, std::uint32_t other) {
+    return std::max(height, other) - std::min(height, other) <= slack;
+  }
 
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> leaf_of_;  ///< by primitive

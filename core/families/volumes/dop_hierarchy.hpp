@@ -74,8 +74,10 @@ class DopHierarchy {
         job.stack_room = scratch.stack.size();
       }
       a.kernels_->search(K)(job);
+      tests.made = job.tests;  // `on_leaves` adds its own
       for (std::size_t i = 0; i < job.found_count; ++i) on_leaves(job.found[i].a, job.found[i].b);
       job.found_count = 0;
+      job.tests = tests.made;
     }
     tests.made = job.tests;
     return job.depth;

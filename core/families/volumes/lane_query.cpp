@@ -79,7 +79,7 @@ void LaneSearch<S>::append(std::size_t count, PairBuffer& out) {
     append_found({job.out, job.found}, out);
     job.found = 0;
   }
-  box_tests_ += job.tests;
+  state_.tests += job.tests;
 }
 
 template class LaneSearch<float>;

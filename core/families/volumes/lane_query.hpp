@@ -35,11 +35,11 @@ class LaneSearch {
   LaneSearch(const LaneSide<S>& a, const LaneSide<S>& b, KernelSet kernels, LaneScratch& scratch,
              const Budget& budget, std::uint64_t tests_before);
 
-  /// Calls step(state) until nothing is left or the budget is spent; appends the pairs. The volumes of the
-  /// roots must overlap. Returns the pairs of nodes left undone.
+  /// Calls step(state) until nothing is left or the budget is spent; appends the pairs. `roots_overlap` is
+  /// the result of the first test. Returns the pairs of nodes left undone.
   template <class Step>
-  std::size_t run(Step&& step, PairBuffer& out) {
-    state_.stack[state_.depth++] = {0, 0};
+  std::size_t run(bool roots_overlap, Step&& step, PairBuffer& out) {
+    if (roots_overlap) state_.stack[state_.depth++] = {0, 0};
     while (state_.depth > 0 && state_.tests < state_.test_limit) {
       step(state_);
       take_leaves(out);
@@ -49,7 +49,7 @@ class LaneSearch {
     return state_.depth;
   }
   /// Returns the tests of nodes and of primitives' boxes, with those before.
-  std::uint64_t tests() const { return state_.tests + box_tests_; }
+  std::uint64_t tests() const { return state_.tests; }
 
  private:
   void take_leaves(PairBuffer& out);
@@ -62,7 +62,6 @@ class LaneSearch {
   KernelSet kernels_;
   LaneScratch* scratch_;
   WideTraversal state_;
-  std::uint64_t box_tests_ = 0;
 };
 
 extern template class LaneSearch<float>;

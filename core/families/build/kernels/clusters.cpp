@@ -20,6 +20,8 @@ void nearest(const NearestJob& shared) {
     const float* const own = job.rows + i;
     float sides[6];
     for (std::size_t row = 0; row < 6; ++row) sides[row] = own[row * job.stride];
+    // Ranks the places: the other one of clusters 2k and 2k + 1 comes first, that side before the other.
+    const std::int32_t first_place = std::int32_t(radius) - std::int32_t(i & 1U);
     Words best{};
     for (std::int32_t place = 0; place < places; place += std::int32_t(lanes)) {
       const float* const other = own + (place < std::int32_t(radius) ? place - std::int32_t(radius)
@@ -29,16 +31,16 @@ void nearest(const NearestJob& shared) {
         common[row] = smaller(load_lanes<Values>(other + row * job.stride), Values{} + sides[row]);
       const Values x = common[0] + common[3], y = common[1] + common[4], z = common[2] + common[5];
       const Values area = x * y + y * z + z * x;  // of negative lengths
-      // The surface and, in its lowest bits, the place: the sign of a zero is dropped.
+      // The surface and, in its lowest bits, the rank of the place: the sign of a zero is dropped.
       const Words word = (__builtin_bit_cast(Words, area) & std::int32_t(0x7fffffff & ~(places - 1))) |
-                         (lane_numbers + place);
+                         ((lane_numbers + place) ^ first_place);
       best = place == 0 ? word : smaller(best, word);
     }
     std::int32_t each[lanes];
     __builtin_memcpy(each, &best, sizeof each);
     std::int32_t least = each[0];
     for (std::size_t k = 1; k < lanes; ++k) least = smaller(least, each[k]);
-    const std::uint32_t place = std::uint32_t(least) & std::uint32_t(places - 1);
+    const std::uint32_t place = std::uint32_t((least & (places - 1)) ^ first_place);
     job.nearest[i] = place < radius ? i + place - radius : i + place - radius + 1;
   }
 }
