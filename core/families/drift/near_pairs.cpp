@@ -22,7 +22,8 @@ NearLeaves<S> NearPairs<S>::leaves(const NearSide<S>& side) {
     rows.stamp_ = 1;
   }
   NearLeaves<S> result{
-      side.hierarchy->leaf_lists(), rows.rows_.data(), rows.stamps_.data(), rows.stamp_, side.positions, {}};
+      side.hierarchy->leaf_lists(), rows.rows_.data(), rows.stamps_.data(), rows.stamp_, side.positions, {},
+      side.rounding};
   std::copy_n(side.margin, 6, result.margin);
   return result;
 }
