@@ -64,7 +64,7 @@ class DriftStrategy : public CountedStrategy<S, Count>,
       std::fill_n(body.rate_high, 3, 0.0);
       body.watch = may_move(index) ? Watch::drift : Watch::nothing;
       make_boxes(index);
-      body.leaf_size = mean_leaf_side(hierarchies_[index]);
+      body.leaf_size = usual_leaf_side(hierarchies_[index]);
       remember(index);
     }
     // A body that rests again may have been moved by its own plans before.

@@ -3,20 +3,25 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/median.hpp"
+
 namespace kbvh {
 namespace {
 
-/// Returns the mean side of the boxes of leaves.
+/// Returns the median side of the boxes of leaves.
 template <class S>
 double leaf_side(WideHierarchy<S>& hierarchy, const FieldRows<S>& rows) {
   const std::size_t width = hierarchy.width();
   const WideNode* const nodes = hierarchy.arrays().nodes;
-  double sum = 0, leaves = 0;
+  std::vector<double> sides;
   for (std::size_t node = 0; node < hierarchy.node_count(); ++node)
-    for (std::size_t lane = 0; lane < nodes[node].leaf_count; ++lane, ++leaves)
+    for (std::size_t lane = 0; lane < nodes[node].leaf_count; ++lane) {
+      double side = 0;
       for (std::size_t row = 0; row < 6; ++row)  // rows are lower and -upper
-        sum -= double(rows.child_bounds[(node * 6 + row) * width + lane]) / 3;
-  return leaves > 0 ? sum / leaves : 0;
+        side -= double(rows.child_bounds[(node * 6 + row) * width + lane]) / 3;
+      sides.push_back(side);
+    }
+  return median(sides);
 }
 
 template <class S>
@@ -86,12 +91,12 @@ void ReducedBoxes<S>::blend_at(double t, BlendTerms<S>& out) const {
     out.terms[1 + m] = {ranges_.data() + (1 + m) * scalars_, S(std::abs(now_.modes[m])),
                         now_.modes[m] < 0 ? 1U : 0U};
   out.terms[terms - 1] = {ranges_.data() + (terms - 1) * scalars_, S(now_.remainder), 0};
-  // The terms are moved outwards by their own roundings. What is left is half a unit for the offset, and what
-  // double makes of the interpolated coordinates and of the measured remainder. The last sum is rounded like
-  // the frame's position, monotonically.
+  // The terms are moved outwards by their own roundings. What is left is half a unit for the offset, half a
+  // unit of double for the translation, and what double makes of steps, of other coordinates and of the measured
+  // remainder. The last sum is rounded like the frame's position, monotonically.
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double margin = double(std::numeric_limits<S>::epsilon()) * now_.translated[axis] +
-                          double(terms + 8) * 0x1p-52 * (now_.translated[axis] + now_.displaced) +
+    const double margin = 0.625 * (double(std::numeric_limits<S>::epsilon()) + 0x1p-52) * now_.translated[axis] +
+                          double(terms + 8) * 0x1p-52 * now_.displaced +
                           64 * double(terms) * double(std::numeric_limits<S>::min());
     out.offset[axis] = S(now_.translation[axis] - margin);
     out.offset[3 + axis] = S(-now_.translation[axis] - margin);

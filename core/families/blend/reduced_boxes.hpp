@@ -13,7 +13,7 @@ namespace kbvh {
 template <class S>
 class ReducedBoxes : public BlendSource<S> {
  public:
-  /// `tolerance` is a share of the mean side of the leaves' boxes at the first keyframe
+  /// `tolerance` is a share of the median side of the leaves' boxes at the first keyframe
   /// (ReducedModel::Settings).
   /// `roundings`: 1, or less as a fault.
   ReducedBoxes(WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans, std::uint32_t most_modes,

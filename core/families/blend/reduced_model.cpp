@@ -227,8 +227,13 @@ void ReducedModel<S>::at(const FlightPlans<S>& plans, double t, Coordinates& out
     magnitude = std::max(std::abs(first[i]), std::abs(last[i]));
     return (1 - share) * first[i] + share * last[i];
   };
-  for (std::size_t d = 0; d < 3; ++d) out.translation[d] = blend(d, out.translated[d]);
   double size = 0;
+  for (std::size_t d = 0; d < 3; ++d) {
+    out.translation[d] = first[d] + share * (last[d] - first[d]);  // a step is often far smaller
+    out.translated[d] = std::max(std::abs(first[d]), std::abs(last[d]));
+    size = std::max(size, std::abs(last[d] - first[d]));
+  }
+  out.displaced += size;
   out.remainder = blend(3, size);
   out.displaced += size * remainder_largest_;
   out.modes.resize(mode_count);

@@ -27,7 +27,8 @@ struct ReducedModel {
     std::vector<double> modes;
     double remainder;  ///< the remainder of vertex v lies between remainder * low[v] and remainder * high[v]
     double translated[3];  ///< bounds the magnitude of the translation
-    double displaced;      ///< bounds those of all modes' displacements and of the remainder, together
+    /// Bounds those of its step, of all modes' displacements and of the remainder over the segment, together.
+    double displaced;
   };
 
   std::uint32_t mode_count = 0;

@@ -6,6 +6,7 @@
 
 #include "core/families/blend/blend_source.hpp"
 #include "core/families/blend/field_rows.hpp"
+#include "core/motion/precise_quotient.hpp"
 
 namespace kbvh {
 
@@ -36,14 +37,16 @@ class TargetBoxes : public BlendSource<S> {
     out.rounding = 0;
     if (k + 1 == times.size() || !(t > times[k])) return;
     const Target& last = targets_[k + 1];
-    const double length = times[k + 1] - times[k];
+    const auto share = [&](double from, double to) {
+      return S(std::max(precise_quotient(two_diff(to, from), two_diff(times[k + 1], times[k])).hi, 0.0));
+    };
     // Not 0: empty lanes are infinite, and 0 times infinity is no number. The offset covers the difference.
     const S least = std::numeric_limits<S>::min();
-    out.terms[0].weight = std::max(S(std::max(times[k + 1] - t, 0.0) / length), least);
-    out.terms.push_back({last.rows.child_bounds.data(), std::max(S((t - times[k]) / length), least), 0});
-    // Roundings, in shares of the terms: half a unit each for weights, two products and two sums, and three in
-    // double for each weight; the frame's position is rounded like the last sum, monotonically.
-    out.rounding = 3 * std::numeric_limits<S>::epsilon() + S(0x1p-51);
+    out.terms[0].weight = std::max(share(t, times[k + 1]), least);
+    out.terms.push_back({last.rows.child_bounds.data(), std::max(share(times[k], t), least), 0});
+    // Roundings, in shares of the terms: half a unit each for the weight, two products and the sum; the offset is
+    // added like the frame's position is rounded, monotonically.
+    out.rounding = S(2.5) * std::numeric_limits<S>::epsilon();
     std::fill_n(out.offset, 6, -4 * least * std::max({S(1), first.largest, last.largest}));
   }
 

@@ -3,7 +3,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
+#include "core/base/median.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 #include "core/geometry/predicates.hpp"
 
@@ -35,7 +37,7 @@ struct DriftBody {
   double moved = 0;        ///< by the bound on steps: displacement of any vertex since then
   bool bounded = false;    ///< displacements are bounded by steps, not read
   std::uint32_t changes = 0, most_changes = 0;  ///< of plans since then, and those that boxes are made for
-  double leaf_size = 0;            ///< mean side of a leaf's box
+  double leaf_size = 0;            ///< median side of a leaf's box
   Watch watch = Watch::nothing;
   bool near = false;     ///< to another body: it takes part in searches
   bool changed = false;  ///< vertices have their own plans: the body no longer counts as resting
@@ -137,17 +139,18 @@ struct DriftBody {
   void put_box() { box = moved_on(box_then); }
 };
 
-/// Returns the mean side of the boxes of a hierarchy's leaves; 0 without leaves.
+/// Returns the median side of the boxes of a hierarchy's leaves; 0 without leaves.
 template <class S>
-double mean_leaf_side(const WideHierarchy<S>& hierarchy) {
-  double sum = 0, leaves = 0;
+double usual_leaf_side(const WideHierarchy<S>& hierarchy) {
+  std::vector<double> sides;
   for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
     if (!hierarchy.topology().nodes[node].is_leaf()) continue;
     const Box<S> box = hierarchy.box(node);
-    for (int axis = 0; axis < 3; ++axis) sum += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
-    ++leaves;
+    double side = 0;
+    for (int axis = 0; axis < 3; ++axis) side += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
+    sides.push_back(side);
   }
-  return leaves == 0 ? 0 : sum / leaves;
+  return median(sides);
 }
 
 /// Returns an upper bound on the closing of side k of the gap between two bodies (near_pairs.hpp) since then.

@@ -8,8 +8,8 @@
 #include "core/families/linear/swept_root.hpp"
 #include "core/families/wide/kernels/wide_refit.hpp"
 #include "core/geometry/predicates.hpp"
-#include "core/motion/error_free.hpp"
 #include "core/motion/piece.hpp"
+#include "core/motion/precise_quotient.hpp"
 #include "core/motion/round_positions.hpp"
 
 namespace kbvh {
@@ -31,11 +31,7 @@ bool extend(const Piece<S>& piece, double t, S& coordinate) {
   DoubleDouble step{double(piece.x1), 0}, times = two_diff(t, piece.t0);
   if (beyond) {
     step = two_diff(double(piece.x1), double(piece.x0));
-    const DoubleDouble duration = two_diff(piece.t1, piece.t0);
-    const double quotient = times.hi / duration.hi;
-    const DoubleDouble back = two_product(quotient, duration.hi);
-    const double rest = ((times.hi - back.hi) - back.lo) + (times.lo - quotient * duration.lo);
-    times = two_sum(quotient, rest / duration.hi);
+    times = precise_quotient(times, two_diff(piece.t1, piece.t0));
   }
   const DoubleDouble way = two_product(step.hi, times.hi), sum = two_sum(double(piece.x0), way.hi);
   const double value = sum.hi + (sum.lo + (way.lo + (step.hi * times.lo + step.lo * times.hi)));

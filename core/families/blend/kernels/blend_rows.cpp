@@ -29,7 +29,9 @@ template <class S, std::uint32_t width, bool rounds>
   constexpr std::size_t parts = width / lanes;
   using V = Vector<S, lanes>;
   const Blend<S> blend = shared;
-  [[maybe_unused]] const S inwards = 1 - blend.rounding, outwards = 1 + blend.rounding;
+  // Half a unit more above 1, where numbers are not as close.
+  [[maybe_unused]] const S inwards = 1 - blend.rounding,
+                           outwards = 1 + (blend.rounding + (sizeof(S) == 4 ? S(0x1p-24) : S(0x1p-53)));
   for (std::size_t n = 0; n < count; ++n) {
     const std::size_t node = nodes[n], at = node * blend.stride;
     V sums[6][parts];
