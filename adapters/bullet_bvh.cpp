@@ -16,7 +16,8 @@
 //   each primitive
 //   of the smaller body. Its walk of two trees is not public. The default `query=trees` therefore descends
 //   both of Bullet's node arrays here, which is faster; the overlap test is Bullet's.
-// - Cells are a share of the scene, so it takes more than 20 times the box tests of `bottom_up` where one vertex
+// - Cells are a share of the scene, so it takes more than 20 times the box tests of `bottom_up` where one
+// vertex
 //   or triangle is far larger than everything else: the rest lies in a few cells.
 // - A primitive index has 21 bits.
 // - A primitive of more than 3 vertices is passed as the triangle (lower, upper, first vertex), which has the

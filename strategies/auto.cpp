@@ -292,7 +292,8 @@ class Auto final : public Strategy<S>,
   }
   /// Whether the box tests and candidates of the active strategy alone cost more than a refit, whatever the
   /// reason: those of a join where nothing was thought to meet, and in the mean of some frames those of
-  /// drift_boxes, of which one search serves many frames. Refits and new trees are compared by their searches.
+  /// drift_boxes, of which one search serves many frames. Refits and new trees are compared by their
+  /// searches.
   bool overworked() const {
     if (is_active(&join_cost)) return !seen_.near && searched() > gain_ * refit_cost(seen_);
     return is_active(&drift_cost) && frame_ - chosen_at_ >= shortest_stay &&
@@ -304,12 +305,13 @@ class Auto final : public Strategy<S>,
     using Work = costs::Work;
     const TellsWork* work = runners_[active_].work;
     if (is_active(&join_cost))
-      return work == nullptr ? 0
-                             : Work::join_box_test * double(work->last_box_tests()) / seen_.frames_per_segment;
+      return work == nullptr
+                 ? 0
+                 : Work::join_box_test * double(work->last_box_tests()) / seen_.frames_per_segment;
     return Work::plain.of(0, searched_.tests, searched_.candidates) / std::max(1, frame_ - chosen_at_);
   }
-  /// Returns what was seen, with as many candidates as drift_boxes had since; a refit makes more box tests where
-  /// there are more.
+  /// Returns what was seen, with as many candidates as drift_boxes had since; a refit makes more box tests
+  /// where there are more.
   Observed seen_as_searched() const {
     Observed now = seen_;
     now.candidates = searched_.candidates / std::max(1, frame_ - chosen_at_) / seen_.boxed;
@@ -433,7 +435,8 @@ class Auto final : public Strategy<S>,
     const bool known = join_.known();
     see_work(whole);
     if (is_active(&drift_cost))
-      runners_[active_].factor = overworked() ? std::max(1.0, searched() / drift_cost(seen_as_searched())) : 1;
+      runners_[active_].factor =
+          overworked() ? std::max(1.0, searched() / drift_cost(seen_as_searched())) : 1;
     for (std::size_t i = 0; i < runners_.size(); ++i)
       if (i != active_) runners_[i].factor = std::pow(runners_[i].factor, forgets);
     searched_ = {};
@@ -498,9 +501,9 @@ class Auto final : public Strategy<S>,
   double chosen_tests_ = 0;            ///< box tests of the refitted trees in the frame before
   struct Searched {
     double tests = 0, candidates = 0;
-  } searched_;  ///< since the last choice
-  double saved_ = 0;                   ///< nanoseconds, see worth_a_start
-  int weighed_at_ = 0;                 ///< the frame until which
+  } searched_;          ///< since the last choice
+  double saved_ = 0;    ///< nanoseconds, see worth_a_start
+  int weighed_at_ = 0;  ///< the frame until which
   bool tried_ = false;  ///< a strategy answers for the first time whose work decides whether it stays
   ObservedAgeing ageing_;
   bool waits_ = false;         ///< for the next segment, to join it

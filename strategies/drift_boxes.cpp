@@ -384,9 +384,8 @@ class DriftStrategy : public CountedStrategy<S, Count>,
   }
   void widen(std::uint32_t index) {
     auto& hierarchy = hierarchies_[index];
-    near_kernels<S>(kernels_).widen(hierarchy.topology().width)(hierarchy.arrays(), hierarchy.node_count(),
-                                                                bodies_[index].margin,
-                                                                bodies_[index].rounding());
+    near_kernels<S>(kernels_).widen(hierarchy.topology().width)(
+        hierarchy.arrays(), hierarchy.node_count(), bodies_[index].margin, bodies_[index].rounding());
     bodies_[index].widened = !may_move(index);
   }
 

@@ -4,8 +4,8 @@
 // one addition. Without such a bound every frame reads every vertex to find the boxes that vertices left.
 //
 // A body has one margin, of some steps and four roundings of its largest coordinate. So it takes more than 20
-// times the box tests of `bottom_up` where boxes of bodies are apart by less than two margins: sheets that lie
-// over each other without a contact, and bodies far from the origin or with one vertex far away.
+// times the box tests of `bottom_up` where boxes of bodies are apart by less than two margins: sheets that
+// lie over each other without a contact, and bodies far from the origin or with one vertex far away.
 
 #include <algorithm>
 #include <cmath>
@@ -234,8 +234,8 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
 
   // The tuned margin weighs the cost of a check against the query's cost for larger boxes, both by counts, so
   // that it does not depend on a machine or its load. A margin of k steps needs one check in k + 1 frames.
-  // Where surfaces of leaves with median side a meet, boxes that are larger by m on every side cost about (1 +
-  // m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the rest are leaves
+  // Where surfaces of leaves with median side a meet, boxes that are larger by m on every side cost about (1
+  // + m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the rest are leaves
   // opened in vain). Among many small bodies a margin also adds neighbours, in proportion to the growth of
   // the body's box, and a body without contact at the last query may then have some.
 

@@ -11,13 +11,14 @@ StressScene sheets_with_a_gap(Random& random, const FamilySetting& setting, doub
   const double wave = random.among({0.0, 0.4 * gap, 0.4}), shear = 0.05 * random.unit();
   const bool falls = random.one_in(2);
   for (int b = 0; b < 2; ++b)
-    scene.bodies.push_back(sheet(
-        6 + random.below(4), keyframes_for(setting),
-        [&](std::uint32_t x, std::uint32_t y, std::uint32_t k, int axis) {
-          if (axis == 0) return 0.25 * x + (b == 0 ? shear * k * (1 + 0.1 * y) : 0.0);
-          if (axis == 1) return 0.25 * y;
-          return b * gap + wave * std::sin(1.5 * x + y + 0.3 * k) - (b == 0 && falls ? 0.05 * gap * k : 0.0);
-        }));
+    scene.bodies.push_back(sheet(6 + random.below(4), keyframes_for(setting),
+                                 [&](std::uint32_t x, std::uint32_t y, std::uint32_t k, int axis) {
+                                   if (axis == 0)
+                                     return 0.25 * x + (b == 0 ? shear * k * (1 + 0.1 * y) : 0.0);
+                                   if (axis == 1) return 0.25 * y;
+                                   return b * gap + wave * std::sin(1.5 * x + y + 0.3 * k) -
+                                          (b == 0 && falls ? 0.05 * gap * k : 0.0);
+                                 }));
   return scene;
 }
 

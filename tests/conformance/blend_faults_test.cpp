@@ -70,7 +70,7 @@ struct Reduced {
         : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {
       this->make_sources([](std::uint32_t, WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans) {
         return std::make_unique<Faulty<S, ReducedBoxes<S>, fault>>(hierarchy, plans, 3, 0.0,
-                                                                        fault == BlendFault::no_margin ? 0 : 1);
+                                                                   fault == BlendFault::no_margin ? 0 : 1);
       });
     }
   };

@@ -7,14 +7,14 @@
 //
 // Not much more: the join is of linear boxes, the exact ones at both ends of a segment and what lies between.
 // For each side, the gap g between two such boxes is linear in time. The join looks for g <= m, m being at
-// each end 6 u of one of the two coordinates x and y between which the gap is (WideEnds; u is half an epsilon).
-// What it computes of g - m is off by u |x| + u |y| for the stored positions, which are rounded, and by u of
-// the moved side; a difference of floats is off by parts of itself only. Where gaps matter |x| and |y| are
-// alike, so m lies between 5/2 u of the smaller and 10 u of the larger one. Nothing here is relative to other
-// coordinates than these two. Fractions are off by 2 roundings of a quotient and 2 of a float, less than
-// 2^-22, and 2^-20 is taken off and added. A pair without a time in common is kept if its sides open no more
-// than twice that before the last of them closes. So with F(h) the time when the last side comes to g <= h,
-// and U(h) that at which the first leaves it,
+// each end 6 u of one of the two coordinates x and y between which the gap is (WideEnds; u is half an
+// epsilon). What it computes of g - m is off by u |x| + u |y| for the stored positions, which are rounded,
+// and by u of the moved side; a difference of floats is off by parts of itself only. Where gaps matter |x|
+// and |y| are alike, so m lies between 5/2 u of the smaller and 10 u of the larger one. Nothing here is
+// relative to other coordinates than these two. Fractions are off by 2 roundings of a quotient and 2 of a
+// float, less than 2^-22, and 2^-20 is taken off and added. A pair without a time in common is kept if its
+// sides open no more than twice that before the last of them closes. So with F(h) the time when the last side
+// comes to g <= h, and U(h) that at which the first leaves it,
 //   F(10 u) - 5/4 2^-20 <= begin, and begin <= F(5/2 u) - 3/4 2^-20 unless it is 0,
 //   end <= U(10 u) + 5/4 2^-20, and U(5/2 u) + 3/4 2^-20 <= end unless it is 1,
 //   there is a span if F(5/2 u) <= U(5/2 u), and none if F(10 u) > U(10 u) + 5/2 2^-20.

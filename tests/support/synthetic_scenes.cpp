@@ -99,8 +99,8 @@ struct RawScene {
   std::vector<std::uint32_t> self{};  ///< bodies with pairs of their own
 };
 
-/// The scalar's largest admissible coordinate or velocity, the smallest above zero, and the distance from 1 to
-/// the next number.
+/// The scalar's largest admissible coordinate or velocity, the smallest above zero, and the distance from 1
+/// to the next number.
 struct Range {
   double largest, smallest, epsilon;
 };
@@ -116,8 +116,8 @@ struct FarSheet {
   }
 };
 
-/// Two sheets, a gap of 0.1 apart, one over the other, with numbers far beyond their size: what rounding does at
-/// `far` is 0.01. `near` is the same scene without these numbers.
+/// Two sheets, a gap of 0.1 apart, one over the other, with numbers far beyond their size: what rounding does
+/// at `far` is 0.01, and single vertices are still further away. 0: the same scene without these numbers.
 RawScene raw_far_scene(const std::string& name, std::uint32_t n, std::uint32_t keyframes, double far) {
   const bool wavy = name == "far_waves", translates = name == "far_translation";
   const double place = name == "far_sheets" || wavy || translates ? far : 0;
@@ -130,18 +130,22 @@ RawScene raw_far_scene(const std::string& name, std::uint32_t n, std::uint32_t k
       return place + drift + at.at(x, y, k, axis);
     }));
   }
+  const double further = 8 * far;
   RawBody& body = scene.bodies[0];
-  const auto first = [&](std::size_t k) { return body.positions.begin() + std::ptrdiff_t(3 * body.vertex_count * k); };
+  const auto first = [&](std::size_t k) {
+    return body.positions.begin() + std::ptrdiff_t(3 * body.vertex_count * k);
+  };
   if (name == "far_vertex" && far != 0)
     for (std::size_t k = 0; k < keyframes; ++k) {
       double* const corner = &*first(k) + 3 * (body.vertex_count - 1);
-      corner[0] += far;
-      corner[2] -= far;
+      corner[0] += further;
+      corner[2] -= further;
     }
   if (name == "far_ground") {
-    const double half = std::max(far, 2.0);
+    const double half = std::max(further, 2.0);
     const std::vector<double> ground{-half, -half, -1, half, -half, -1, 0, half, -1};
-    for (std::size_t k = keyframes; k-- > 0;) body.positions.insert(first(k + 1), ground.begin(), ground.end());
+    for (std::size_t k = keyframes; k-- > 0;)
+      body.positions.insert(first(k + 1), ground.begin(), ground.end());
     const std::uint32_t corners[3] = {body.vertex_count, body.vertex_count + 1, body.vertex_count + 2};
     body.primitives.add(corners);
     body.vertex_count += 3;

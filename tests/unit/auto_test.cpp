@@ -470,7 +470,9 @@ TEST(Auto, AJoinThatCostsMoreThanARefitIsLeft) {
             << times << " times a refit, " << frames << " frames a segment, near: " << near;
         // What one segment took does not count for ever.
         for (int choice = 0; choice < 40; ++choice) join.forget(seen);
-        if (frames >= 30) EXPECT_LT(join_cost(seen), refit_cost(seen)) << times << ", " << near;
+        if (frames >= 30) {
+          EXPECT_LT(join_cost(seen), refit_cost(seen)) << times << ", " << near;
+        }
       }
 }
 

@@ -60,7 +60,8 @@ std::uint64_t leaves_of(const Scene<S>& scene) {
   return leaves;
 }
 
-/// Returns the comment at the top of the file that registers a strategy, in one line; nothing if there is none.
+/// Returns the comment at the top of the file that registers a strategy, in one line; nothing if there is
+/// none.
 std::string description_of(const std::string& id) {
   for (const char* folder : {"strategies", "adapters"})
     for (const auto& file :
@@ -98,8 +99,9 @@ void expect_bounded_work(const char* scalar) {
       if (entry.factory<S>() == nullptr || entry.info.guarantee == Guarantee::approximate) continue;
       if (entry.info.max_primitive_pairs != 0) continue;  // quadratic, and never run on scenes of some size
       const Work work = work_of(entry, far), without = work_of(entry, near);
-      const std::string where = entry.info.id + " on " + name + " in " + scalar + ", where the same without " +
-                                "large numbers takes " + std::to_string(without.box_tests) + " box tests and " +
+      const std::string where = entry.info.id + " on " + name + " in " + scalar +
+                                ", where the same without " + "large numbers takes " +
+                                std::to_string(without.box_tests) + " box tests and " +
                                 std::to_string(without.candidates) + " candidates";
       if (!admits_it(entry.info.id)) {
         EXPECT_LE(work.box_tests, most) << where;

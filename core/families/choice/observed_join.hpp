@@ -65,7 +65,8 @@ class ObservedJoin {
   bool outdated() const { return outdated_; }
 
  private:
-  /// One segment that took long does not tell that all will. But it is left where it took longer than a refit.
+  /// One segment that took long does not tell that all will. But it is left where it took longer than a
+  /// refit.
   static constexpr double most = 4, dearer = 2;
 
   /// Returns the work over the prediction.

@@ -21,8 +21,8 @@ struct Observed {
   double reads = 0;          ///< vertices that a refit reads
   double primitives = 0;     ///< of moving bodies
   double bodies = 0;         ///< that move
-  double step = 0;           ///< mean step of a vertex per frame relative to another body, in usual leaf sides
-  double slide = 0;          ///< the same for primitives relative to their candidates
+  double step = 0;   ///< mean step of a vertex per frame relative to another body, in usual leaf sides
+  double slide = 0;  ///< the same for primitives relative to their candidates
   bool many_bodies = false;  ///< more than a thousand pairs of bodies
   double spread = 1;         ///< how different the steps are among a body's vertices; 0: all the same
   double join_factor = 1;    ///< cost of the join by its work, over its prediction (ObservedJoin)

@@ -13,12 +13,12 @@ namespace kbvh {
 
 /// One body whose boxes were made at an earlier frame, "then", and the known motion since: per axis an
 /// interval that contains the displacement of every vertex, but for a share of the vertex's own coordinate
-/// then (`rounding`). All roundings err to the safe side, for positions up to `admissible_magnitude`. Sides are
-/// lower x, y, z, upper x, y, z.
+/// then (`rounding`). All roundings err to the safe side, for positions up to `admissible_magnitude`. Sides
+/// are lower x, y, z, upper x, y, z.
 ///
-/// For displacements that are read the share is 0. A bound on steps is one on the plans: positions then and now
-/// are off these by half a unit each, of the coordinate then and of the displacement. Each change of a plan
-/// starts from a stored position, which is off by half a unit more.
+/// For displacements that are read the share is 0. A bound on steps is one on the plans: positions then and
+/// now are off these by half a unit each, of the coordinate then and of the displacement. Each change of a
+/// plan starts from a stored position, which is off by half a unit more.
 template <class S>
 struct DriftBody {
   /// The part of a body that a frame reads.
@@ -34,10 +34,10 @@ struct DriftBody {
   double rate_low[3] = {}, rate_high[3] = {};  ///< the same for one frame, as last observed
   Box<double> box, box_then;                   ///< contain every vertex now, and then
   S margin[6] = {};                            ///< margin by which its boxes exceed the vertices then
-  double moved = 0;        ///< by the bound on steps: displacement of any vertex since then
-  bool bounded = false;    ///< displacements are bounded by steps, not read
+  double moved = 0;      ///< by the bound on steps: displacement of any vertex since then
+  bool bounded = false;  ///< displacements are bounded by steps, not read
   std::uint32_t changes = 0, most_changes = 0;  ///< of plans since then, and those that boxes are made for
-  double leaf_size = 0;            ///< median side of a leaf's box
+  double leaf_size = 0;                         ///< median side of a leaf's box
   Watch watch = Watch::nothing;
   bool near = false;     ///< to another body: it takes part in searches
   bool changed = false;  ///< vertices have their own plans: the body no longer counts as resting

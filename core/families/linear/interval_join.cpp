@@ -74,9 +74,9 @@ void IntervalJoin<S>::begin_bodies() {
 /// Describes the slabs of two bodies, without pairs of leaves.
 template <class S>
 SlabSpanPairs<S> IntervalJoin<S>::slabs_of(const BodySegmentBounds<S>& a, const BodySegmentBounds<S>& b) {
-  // For each leaf, over its largest coordinate: the distance of the lines from positions at the ends, half a unit
-  // for positions at frames, 3.1 for products of directions, whose components add up to 1, and corners; one more
-  // for the sum of bounds and slack, and the rest for its own rounding.
+  // For each leaf, over its largest coordinate: the distance of the lines from positions at the ends, half a
+  // unit for positions at frames, 3.1 for products of directions, whose components add up to 1, and corners;
+  // one more for the sum of bounds and slack, and the rest for its own rounding.
   return {a.hierarchy().arrays(),
           b.hierarchy().arrays(),
           a.slab_leaves(),

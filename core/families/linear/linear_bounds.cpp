@@ -73,7 +73,8 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   at.made = ++body.made;
   if (body.hierarchy.empty()) return {};
   at.excess = 0;
-  // Over an uncut segment a body's boxes may be translated, as long as they are not much larger than tight ones.
+  // Over an uncut segment a body's boxes may be translated, as long as they are not much larger than tight
+  // ones.
   const bool whole =
       end == 1 && segment.begin == motion.lines_begin(index) && segment.end == motion.lines_end(index);
   const auto step = whole ? motion.translation(index) : std::optional<Translation<S>>{};

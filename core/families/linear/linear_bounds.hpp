@@ -181,7 +181,7 @@ class LinearBounds {
   std::vector<std::uint8_t> to_remake_;  ///< [body]
   /// A changed vertex leaves the range of numbers within the segment, or its end is not known well enough.
   bool lost_ = false;
-  std::vector<Knot> knots_;              ///< a heap
+  std::vector<Knot> knots_;  ///< a heap
   Repairs repairs_;
   std::uint64_t leaves_before_ = 0;  ///< of repairs_.leaves, when the segment began
   std::vector<LinearBody<S>> bodies_;

@@ -19,8 +19,8 @@ namespace {
 constexpr auto later = [](const auto& a, const auto& b) { return a.time > b.time; };
 
 /// Computes the coordinate at a time later than the piece's begin, on its line beyond its end, if necessary:
-/// off by half a unit of rounding. Returns false if it is beyond the end a small difference of large numbers, of
-/// which twice the precision of double leaves too little.
+/// off by half a unit of rounding. Returns false if it is beyond the end a small difference of large numbers,
+/// of which twice the precision of double leaves too little.
 template <class S>
 bool extend(const Piece<S>& piece, double t, S& coordinate) {
   const bool beyond = piece.kind == PieceKind::chord && t > piece.t1;
@@ -109,8 +109,8 @@ bool LinearBounds<S>::take_over(std::uint32_t index) {
   return true;
 }
 
-/// Follows a new plan from the present time on. Plans without a knot are read from the change: that costs less
-/// than reading their pieces.
+/// Follows a new plan from the present time on. Plans without a knot are read from the change: that costs
+/// less than reading their pieces.
 template <class S>
 void LinearBounds<S>::follow_change(const PlanChange<S>& change) {
   if (!change.times.empty()) return follow_pieces(change.body, change.vertex);
@@ -140,9 +140,9 @@ void LinearBounds<S>::follow_pieces(std::uint32_t body, std::uint32_t vertex) {
 }
 
 /// Moves a vertex to the line from `from` at time t to `last` at the segment's end, extended back to the
-/// segment's begin, to P = from - (last - from) * back. At a fraction s after t, the line is off by s times the
-/// rounding of `last` and by 1 - s times that of P: half a unit of each, and for P some roundings in double of
-/// (last - from) * back, which is at most 2 |P| + s |last|.
+/// segment's begin, to P = from - (last - from) * back. At a fraction s after t, the line is off by s times
+/// the rounding of `last` and by 1 - s times that of P: half a unit of each, and for P some roundings in
+/// double of (last - from) * back, which is at most 2 |P| + s |last|.
 template <class S>
 void LinearBounds<S>::follow_line(std::uint32_t index, std::uint32_t vertex, double t, const S* from,
                                   const S* last) {

@@ -128,8 +128,8 @@ struct BodySegmentBounds {
     Box<double> box = box_between(node, fraction);
     const Box<S> first = box_at(0, node), last = box_at(1, node);
     const auto margin = [this](double x0, double x1) {
-      return double(rounding + 2 * unit_rounding<S>)*std::abs(x0) +
-             double(rounding + 8 * unit_rounding<S>)*std::abs(x1 - x0) + double(least_margin<S>);
+      return double(rounding + 2 * unit_rounding<S>) * std::abs(x0) +
+             double(rounding + 8 * unit_rounding<S>) * std::abs(x1 - x0) + double(least_margin<S>);
     };
     for (int axis = 0; axis < 3; ++axis) {
       box.lower[axis] -= margin(first.lower[axis], last.lower[axis]);
@@ -140,9 +140,7 @@ struct BodySegmentBounds {
 
  private:
   /// Half a unit of rounding for the position on the line, and one and a half for those of this function.
-  S end_margin(S side) const {
-    return (rounding + 4 * unit_rounding<S>)*std::abs(side) + least_margin<S>;
-  }
+  S end_margin(S side) const { return (rounding + 4 * unit_rounding<S>)*std::abs(side) + least_margin<S>; }
 };
 
 /// All bodies of a scene over a segment in which every vertex stays on one line.

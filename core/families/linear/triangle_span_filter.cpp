@@ -194,7 +194,8 @@ void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const Scene
   S rounding = 0;
   BodyPair last = join.bodies_of(due_[0]);
   const auto take_rounding = [&](const BodyPair& bodies) {
-    rounding = std::max({rounding, segment.sides[bodies.first].rounding, segment.sides[bodies.second].rounding});
+    rounding =
+        std::max({rounding, segment.sides[bodies.first].rounding, segment.sides[bodies.second].rounding});
   };
   take_rounding(last);
   for (const std::uint32_t pair : due_)

@@ -8,10 +8,10 @@
 
 namespace kbvh {
 
-/// Returns the rounding for SpanTestKernels where lines are off the positions at the ends of a segment by this
-/// share (WideEnds). Each of two corners is off by that, by half a unit at a frame, and as interpolated by one
-/// for the difference of its two ends, one for a product and half a unit for the sum; the difference of the
-/// corners by one, and there is one more for products of roundings. A unit is two `unit_rounding`.
+/// Returns the rounding for SpanTestKernels where lines are off the positions at the ends of a segment by
+/// this share (WideEnds). Each of two corners is off by that, by half a unit at a frame, and as interpolated
+/// by one for the difference of its two ends, one for a product and half a unit for the sum; the difference
+/// of the corners by one, and there is one more for products of roundings. A unit is two `unit_rounding`.
 template <class S>
 constexpr S span_rounding(S rounding) {
   return 2 * rounding + 16 * unit_rounding<S>;

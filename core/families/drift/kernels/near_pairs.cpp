@@ -105,9 +105,10 @@ void near(LeafNear<S>& shared) {
     const std::uint32_t count_a = lists_a.end_entry[leaf_a] - begin_a;
     const std::uint32_t count_b = lists_b.end_entry[leaf_b] - begin_b;
     // The leaf box of b is inflated by the margin of b, the rows of a are not.
-    const Bounds<S> box_b = loosened(
-        bounds_of(lane_box(state.b.child_bounds + slot_b.node() * std::size_t(6) * width, width, slot_b.lane())),
-        state.leaves_a.rounding);
+    const Bounds<S> box_b =
+        loosened(bounds_of(lane_box(state.b.child_bounds + slot_b.node() * std::size_t(6) * width, width,
+                                    slot_b.lane())),
+                 state.leaves_a.rounding);
     unsigned first = widened<S, padded>(rows_a, box_b, state.leaves_a.margin);
     state.tests += count_a + std::uint64_t(unsigned(__builtin_popcount(first))) * count_b;
     for (; first != 0; first &= first - 1) {

@@ -7,8 +7,8 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// Two near primitives, with the share of the reach at which their boxes can first meet. 0 if and only if they
-/// overlap already.
+/// Two near primitives, with the share of the reach at which their boxes can first meet. 0 if and only if
+/// they overlap already.
 struct NearPair {
   std::uint32_t primitive_a, primitive_b;
   float ratio;

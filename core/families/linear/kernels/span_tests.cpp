@@ -124,8 +124,7 @@ KBVH_INLINE Words<S> alike(const Sign<S>& a, const Sign<S>& b, const Sign<S>& c)
 /// Returns all bits set where some edge of one triangle certainly passes through the other triangle
 /// throughout.
 template <class S>
-[[gnu::noinline]] Words<S> intersecting(const Corners<S>& first, const Corners<S>& last,
-                                                Values<S> o) {
+[[gnu::noinline]] Words<S> intersecting(const Corners<S>& first, const Corners<S>& last, Values<S> o) {
   const Point<S> zero{};
   const Point<S>* const a0[3] = {&zero, &first.a1, &first.a2};
   const Point<S>* const a1[3] = {&zero, &last.a1, &last.a2};

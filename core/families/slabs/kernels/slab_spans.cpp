@@ -30,7 +30,8 @@ template <class S, std::size_t padded>
                                      leaf.blocks[1][SpanBlock::rows * padded + axis]);
   for (std::size_t end = 0; end < 2; ++end)
     find_extent<S, padded>(leaf.blocks[end], slab.direction, slab.low[end], slab.high[end]);
-  slab.largest = larger(largest_coordinate<S, padded>(leaf.blocks[0]), largest_coordinate<S, padded>(leaf.blocks[1]));
+  slab.largest =
+      larger(largest_coordinate<S, padded>(leaf.blocks[0]), largest_coordinate<S, padded>(leaf.blocks[1]));
 }
 
 template <class S, std::size_t padded>

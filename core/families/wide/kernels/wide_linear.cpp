@@ -93,7 +93,7 @@ struct Reach {
 
 template <class S>
 [[gnu::always_inline]] inline Reach<S> reach_of(const SixSides<S>& first, const SixSides<S>& last,
-                                                 S rounding) {
+                                                S rounding) {
   Reach<S> reach;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     reach.bound[0][axis] = first.upper[axis] + side_margin(first.upper[axis], rounding);

@@ -37,8 +37,8 @@ struct WideEnds {
   /// The largest distance of a vertex's line from its stored position at an end, over that coordinate.
   S rounding;
 };
-/// Half a unit of rounding, over the number that is rounded; and the smallest normal number, which bounds what
-/// underflow loses.
+/// Half a unit of rounding, over the number that is rounded; and the smallest normal number, which bounds
+/// what underflow loses.
 template <class S>
 inline constexpr S unit_rounding = sizeof(S) == 4 ? S(0x1p-24) : S(0x1p-53);
 template <class S>
