@@ -388,7 +388,7 @@ class Auto final : public Strategy<S>,
     if (!is_active(&join_cost)) {
       if (frames >= shortest_stay) join_.forget(seen_);
     } else if (whole && window_.frame != none && frame_ > window_.frame) {
-      join_.joined(joined_work(), joined_candidates_, frame_, seen_);
+      join_.joined(seen_.near ? joined_work() : searched(), joined_candidates_, frame_, seen_);
     }
   }
   /// Returns the work of the join in a frame of its window, which is of whole segments.

@@ -30,12 +30,12 @@ class ObservedJoin {
     compared_ = 0;
   }
   /// Registers the work of the join in a mean frame over whole segments before `frame`, in nanoseconds by its
-  /// counts, and the candidates of the last one.
+  /// counts, and the candidates of the last one. Where bodies are apart it is the work that was not foreseen.
   void joined(double work, double candidates, int frame, Observed& seen) {
     if (!seen.near) {
       // No refit need answer: what one costs where nothing meets is known without.
       seen.apart_factor = 1;
-      seen.apart_factor = std::max(1.0, factor(work, seen));
+      if (work > refit_cost(seen)) seen.apart_factor = std::max(1.0, factor(work, seen));
       return;
     }
     work_ = work;
