@@ -78,6 +78,7 @@ class Auto final : public Strategy<S>,
       runner.strategy->reset(t);
       runner.fresh = true;
       runner.frames = 0;
+      runner.factor = 1;
     }
     retired_ = {};
     active_ = 0;
@@ -102,6 +103,7 @@ class Auto final : public Strategy<S>,
     seen_.bodies = steps_.moving_bodies();
     ageing_.start_over(runners_[0].work != nullptr ? runners_[0].work->surface() : 0);
     chosen_tests_ = 0;
+    searched_ = {};
     saved_ = 0;
     weighed_at_ = 0;
     tried_ = waits_ = refits_first_ = false;
@@ -122,7 +124,7 @@ class Auto final : public Strategy<S>,
                      (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
                      seen_.near != chosen_near_ || seen_.candidates > 2 * chosen_candidates_ ||
                      2 * seen_.candidates < chosen_candidates_ || tried_ || (waits_ && t >= segment_end_) ||
-                     (is_active(&join_cost) && seen_.near && !join_.judged()) ||
+                     (is_active(&join_cost) && seen_.near && !join_.judged()) || overworked() ||
                      (refits() && ageing_.tests() > 1.5 * chosen_tests_);
     if (step_ > 0 && due) choose(t);
     if (active_ != last) {
@@ -237,12 +239,14 @@ class Auto final : public Strategy<S>,
     bool all_positions;
     std::unique_ptr<Strategy<S>> strategy;
     TellsWork* work = nullptr;  ///< the strategy, if it does
+    double factor = 1;          ///< cost over prediction, where it was found to cost more than a refit
     bool fresh = false;         ///< in the state after `reset`
     int frames = 0;             ///< number of frames that it answered
   };
   /// The number of frames after which the choice is reviewed within one segment, and at the start of a new
   /// one; the latter doubles each time that the choice is confirmed.
   static constexpr int longest_stay = 64, shortest_stay = 8;
+  static constexpr double forgets = 0.9;  ///< exponent of what was measured of others, at each choice
 
   static void add(Counters& sum, const Counters& other) {
     for (const Counter peak : {Counter::list_peak, Counter::queue_peak}) {
@@ -283,7 +287,39 @@ class Auto final : public Strategy<S>,
       if (allowed(i) && (best == none_of_them || cost_of(i) < cost_of(best))) best = i;
     return best;
   }
-  double cost_of(std::size_t runner) const { return runners_[runner].candidate->cost(seen_); }
+  double cost_of(std::size_t runner) const {
+    return runners_[runner].factor * runners_[runner].candidate->cost(seen_);
+  }
+  /// Whether the box tests and candidates of the active strategy alone cost more than a refit, whatever the
+  /// reason: those of a join where nothing was thought to meet, and in the mean of some frames those of
+  /// drift_boxes, of which one search serves many frames. Refits and new trees are compared by their
+  /// searches.
+  bool overworked() const {
+    if (is_active(&join_cost)) return !seen_.near && searched() > gain_ * refit_cost(seen_);
+    return is_active(&drift_cost) && frame_ - chosen_at_ >= shortest_stay &&
+           searched() > gain_ * refit_cost(seen_as_searched());
+  }
+  /// Returns the mean cost of box tests and candidates of the active strategy since it was chosen last; of a
+  /// join that of the box tests of its segment.
+  double searched() const {
+    using Work = costs::Work;
+    const TellsWork* work = runners_[active_].work;
+    if (is_active(&join_cost))
+      return work == nullptr
+                 ? 0
+                 : Work::join_box_test * double(work->last_box_tests()) / seen_.frames_per_segment;
+    return Work::plain.of(0, searched_.tests, searched_.candidates) / std::max(1, frame_ - chosen_at_);
+  }
+  /// Returns what was seen, with as many candidates as drift_boxes had since; a refit makes more box tests
+  /// where there are more.
+  Observed seen_as_searched() const {
+    Observed now = seen_;
+    now.candidates = searched_.candidates / std::max(1, frame_ - chosen_at_) / seen_.boxed;
+    const double more = std::max(1.0, now.candidates / std::max(1.0, seen_.candidates));
+    now.slab_tests *= more;
+    now.plain_tests *= more;
+    return now;
+  }
   /// Returns the strategy of least predicted cost among those that are `allowed`, or the active one where
   /// none is cheaper by `gain`.
   template <class Allowed>
@@ -316,10 +352,12 @@ class Auto final : public Strategy<S>,
   /// and shows that bodies are apart.
   void see_candidates(std::size_t count, bool all) {
     pairs_asked_ = pairs_in_frame_ = true;
+    const TellsWork* work = runners_[active_].work;
+    searched_.tests += work != nullptr ? double(work->last_box_tests()) : 0;
+    searched_.candidates += double(count);
     if (count != 0 || is_active(&drift_cost)) seen_.near = count != 0;
     if (!seen_.near) seen_.candidates = double(count);
     if (is_active(&join_cost)) joined_candidates_ = double(count);
-    const TellsWork* work = runners_[active_].work;
     if (is_active(&refit_cost) && work != nullptr)
       slabs_.slabs(double(count), *work, all, frame_, seen_);
     else if (is_active(&plain_cost) && work != nullptr)
@@ -350,7 +388,7 @@ class Auto final : public Strategy<S>,
     if (!is_active(&join_cost)) {
       if (frames >= shortest_stay) join_.forget(seen_);
     } else if (whole && window_.frame != none && frame_ > window_.frame) {
-      join_.joined(joined_work(), joined_candidates_, frame_, seen_);
+      join_.joined(seen_.near ? joined_work() : searched(), joined_candidates_, frame_, seen_);
     }
   }
   /// Returns the work of the join in a frame of its window, which is of whole segments.
@@ -396,6 +434,12 @@ class Auto final : public Strategy<S>,
     if (is_active(&join_cost) && bounded && !whole && frame_ - chosen_at_ < 2 * longest_stay) return;
     const bool known = join_.known();
     see_work(whole);
+    if (is_active(&drift_cost))
+      runners_[active_].factor =
+          overworked() ? std::max(1.0, searched() / drift_cost(seen_as_searched())) : 1;
+    for (std::size_t i = 0; i < runners_.size(); ++i)
+      if (i != active_) runners_[i].factor = std::pow(runners_[i].factor, forgets);
+    searched_ = {};
     chosen_at_ = frame_;
     chosen_candidates_ = seen_.candidates;
     chosen_near_ = seen_.near;
@@ -455,8 +499,11 @@ class Auto final : public Strategy<S>,
   double chosen_candidates_ = 0;       ///< number of candidates at the time of the choice
   bool chosen_near_ = false;           ///< whether bodies met then
   double chosen_tests_ = 0;            ///< box tests of the refitted trees in the frame before
-  double saved_ = 0;                   ///< nanoseconds, see worth_a_start
-  int weighed_at_ = 0;                 ///< the frame until which
+  struct Searched {
+    double tests = 0, candidates = 0;
+  } searched_;          ///< since the last choice
+  double saved_ = 0;    ///< nanoseconds, see worth_a_start
+  int weighed_at_ = 0;  ///< the frame until which
   bool tried_ = false;  ///< a strategy answers for the first time whose work decides whether it stays
   ObservedAgeing ageing_;
   bool waits_ = false;         ///< for the next segment, to join it

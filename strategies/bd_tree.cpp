@@ -59,7 +59,7 @@ KBVH_STRATEGY(bd_tree) {
             "0.0625",
             {},
             "no more modes are taken once the rest of the motion is, in the root mean square, below "
-            "this share of the mean side of the leaves' boxes; 0: all that there are",
+            "this share of the median side of the leaves' boxes; 0: all that there are",
             0}},
   })};
 }

@@ -14,6 +14,7 @@
 #include <numeric>
 
 #include "core/contract/registry.hpp"
+#include "core/contract/tells_work.hpp"
 #include "core/families/drift/drift_body.hpp"
 #include "core/families/drift/drift_model.hpp"
 #include "core/families/drift/drift_rays.hpp"
@@ -26,7 +27,10 @@ namespace kbvh {
 namespace {
 
 template <class S, class Count, class Motion>
-class DriftStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>, public TakesPlanChanges<S> {
+class DriftStrategy : public CountedStrategy<S, Count>,
+                      public AnswersRays<S>,
+                      public TakesPlanChanges<S>,
+                      public TellsWork {
   using Body = DriftBody<S>;
   using Watch = typename Body::Watch;
   static constexpr bool bounded = std::is_same_v<Motion, SteppedMotion<S>>;
@@ -54,12 +58,13 @@ class DriftStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>, p
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
       Body& body = bodies_[index];
       body.changed = body.widened = false;
+      body.bounded = bounded;
       body.near = true;
       std::fill_n(body.rate_low, 3, 0.0);
       std::fill_n(body.rate_high, 3, 0.0);
       body.watch = may_move(index) ? Watch::drift : Watch::nothing;
       make_boxes(index);
-      body.leaf_size = mean_leaf_side(hierarchies_[index]);
+      body.leaf_size = usual_leaf_side(hierarchies_[index]);
       remember(index);
     }
     // A body that rests again may have been moved by its own plans before.
@@ -102,6 +107,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>, p
                    tests);
     }
     if (!listed()) model_.queried(double(tests), double(out.size() - before));
+    last_box_tests_ = tests;
     this->count_.add(Counter::box_tests, tests);
     return {};
   }
@@ -144,6 +150,8 @@ class DriftStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>, p
     view.stale[0] = 0;
     return view;
   }
+
+  std::uint64_t last_box_tests() const override { return last_box_tests_; }
 
   std::size_t bytes() const override {
     std::size_t total = query_.bytes();
@@ -376,8 +384,8 @@ class DriftStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>, p
   }
   void widen(std::uint32_t index) {
     auto& hierarchy = hierarchies_[index];
-    near_kernels<S>(kernels_).widen(hierarchy.topology().width)(hierarchy.arrays(), hierarchy.node_count(),
-                                                                bodies_[index].margin);
+    near_kernels<S>(kernels_).widen(hierarchy.topology().width)(
+        hierarchy.arrays(), hierarchy.node_count(), bodies_[index].margin, bodies_[index].rounding());
     bodies_[index].widened = !may_move(index);
   }
 
@@ -429,7 +437,8 @@ class DriftStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>, p
     search_due_ = false;
   }
   NearSide<S> side(std::uint32_t index) {
-    return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin, &rows_[index]};
+    return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin, &rows_[index],
+            bodies_[index].rounding()};
   }
 
   Motion motion_;
@@ -451,6 +460,7 @@ class DriftStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>, p
   int period_ = 0;      ///< frames that one search lasts; 0: refit and query at every frame
   int plain_left_ = 0;  ///< number of such frames until lists are tried again
   bool search_due_ = false, plans_changed_ = false;
+  std::uint64_t last_box_tests_ = 0;
 };
 
 template <class S, class Count>

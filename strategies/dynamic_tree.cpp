@@ -3,6 +3,7 @@
 // a body at rest costs a look at each box, a body of which all moves costs an insertion for each primitive.
 
 #include "core/families/restructure/dynamic_tree.hpp"
+#include "core/base/median.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_each_frame.hpp"
 #include "core/geometry/lane_box.hpp"
@@ -112,14 +113,15 @@ class Dynamic final : public BuiltEachFrame<S, Count, DynamicBody<S>>, public An
     body.tight.resize(primitives.count());
     for (std::uint32_t p = 0; p < primitives.count(); ++p)
       if (!primitives.alive(p) && body.tree.contains(p)) body.tree.remove(p);
-    double side = 0;
+    std::vector<double> sides;
     for (std::uint32_t p = 0; p < primitives.count(); ++p) {
       if (!primitives.alive(p)) continue;
       const Box<S> box = primitive_box(primitives[p], this->sampled_.positions(index));
-      for (int axis = 0; axis < 3; ++axis)
-        side += (double(box.upper[axis]) - double(box.lower[axis])) / 3 / lists_[index].count;
+      double side = 0;
+      for (int axis = 0; axis < 3; ++axis) side += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
+      sides.push_back(side);
     }
-    body.margin = S(std::min(margin_ * side, double(admissible_magnitude<S>)));
+    body.margin = S(std::min(margin_ * median(sides), double(admissible_magnitude<S>)));
   }
 
   void build(std::uint32_t index) override {
@@ -183,7 +185,7 @@ KBVH_STRATEGY(dynamic_tree) {
       .parameters = {{"margin",
                       "0.1",
                       {},
-                      "margin on every side, as a share of the mean side of the body's "
+                      "margin on every side, as a share of the median side of the body's "
                       "primitives at the reset"},
                      {"ahead", "4", {}, "steps like its last one for which a moving primitive gets room"}},
   })};

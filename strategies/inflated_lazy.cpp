@@ -2,11 +2,16 @@
 // margin, and stay unchanged until a vertex may have moved through it. With a bound on the motion of a body
 // no vertex is read before the margin can have been used up, and no position is evaluated: most frames cost
 // one addition. Without such a bound every frame reads every vertex to find the boxes that vertices left.
+//
+// A body has one margin, of some steps and four roundings of its largest coordinate. So it takes more than 20
+// times the box tests of `bottom_up` where boxes of bodies are apart by less than two margins: sheets that
+// lie over each other without a contact, and bodies far from the origin or with one vertex far away.
 
 #include <algorithm>
 #include <cmath>
 
 #include "core/base/cost_constants.hpp"
+#include "core/base/median.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/wide/kernels/wide_inflate.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
@@ -25,7 +30,7 @@ double above(double value) {
 template <class S>
 struct InflatedBody {
   S margin = 0;          // of the boxes computed last
-  double leaf_size = 0;  // mean side of a leaf's box at the reset, before inflation
+  double leaf_size = 0;  // median side of a leaf's box at the reset, before inflation
   double size = 0;       // the same for the root's box
   double room =
       0;  // minimum distance of every vertex from the sides of all boxes above it, at the last check
@@ -195,20 +200,20 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
   }
 
-  /// Measures the mean side of the leaves' boxes before inflation.
+  /// Measures the median side of the leaves' boxes before inflation.
   void measure_leaves(std::uint32_t index) {
     const auto& hierarchy = this->hierarchies_[index];
-    double sum = 0;
-    std::uint64_t leaves = 0;
+    std::vector<double> sides;
     for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
       if (!hierarchy.topology().nodes[node].is_leaf()) continue;
       const Box<S> box = hierarchy.box(node);
-      for (int axis = 0; axis < 3; ++axis) sum += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
-      ++leaves;
+      double side = 0;
+      for (int axis = 0; axis < 3; ++axis) side += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
+      sides.push_back(side);
     }
-    bodies_[index].leaves = leaves;
-    bodies_[index].leaf_size = leaves == 0 ? 0 : sum / double(leaves);
-    if (leaves == 0) return;
+    bodies_[index].leaves = sides.size();
+    bodies_[index].leaf_size = median(sides);
+    if (sides.empty()) return;
     const Box<S> root = hierarchy.box(0);
     bodies_[index].size = 0;
     for (int axis = 0; axis < 3; ++axis)
@@ -229,8 +234,8 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
 
   // The tuned margin weighs the cost of a check against the query's cost for larger boxes, both by counts, so
   // that it does not depend on a machine or its load. A margin of k steps needs one check in k + 1 frames.
-  // Where surfaces of leaves with mean side a meet, boxes that are larger by m on every side cost about (1 +
-  // m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the rest are leaves
+  // Where surfaces of leaves with median side a meet, boxes that are larger by m on every side cost about (1
+  // + m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the rest are leaves
   // opened in vain). Among many small bodies a margin also adds neighbours, in proportion to the growth of
   // the body's box, and a body without contact at the last query may then have some.
 
@@ -300,7 +305,7 @@ KBVH_STRATEGY(inflated_lazy) {
             "tuned",
             {"tuned", "absolute", "relative"},
             "unit of `margin`: unused, because the margin follows from the motion and the last query's work; "
-            "units of the scene; or a fraction of the mean side of the leaves' boxes at the reset"},
+            "units of the scene; or a fraction of the median side of the leaves' boxes at the reset"},
            {"margin", "0.1", {}, "inflation of leaf boxes on every side"},
            {"bound",
             "step",

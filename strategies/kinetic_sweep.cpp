@@ -176,12 +176,13 @@ class KineticSweep final : public CountedStrategy<S, Count>,
   }
   void take_ends(std::uint32_t body) {
     const BodySegmentBounds<S>& side = bounds_.side(body);
-    const S margin = side.margin;
     for (std::uint32_t box = first_box_[body]; box < first_box_[body + 1]; ++box) {
       const Box<S> first = side.box_at(0, nodes_[box]), last = side.box_at(1, nodes_[box]);
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        overlaps_.order(axis).line(2 * box) = {first.lower[axis] - margin, last.lower[axis] - margin};
-        overlaps_.order(axis).line(2 * box + 1) = {first.upper[axis] + margin, last.upper[axis] + margin};
+        overlaps_.order(axis).line(2 * box) = {side.widened_down(first.lower[axis]),
+                                               side.widened_down(last.lower[axis])};
+        overlaps_.order(axis).line(2 * box + 1) = {side.widened_up(first.upper[axis]),
+                                                   side.widened_up(last.upper[axis])};
       }
     }
   }

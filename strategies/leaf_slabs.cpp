@@ -54,14 +54,12 @@ class LeafSlabs final : public StoredHierarchyStrategy<S, Count>,
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
     std::uint64_t tests = 0;
-    const S reach = largest_coordinate();
     this->for_near_bodies(tests, [&](const BodyPair& pair) {
       if (tests >= budget.box_tests) {
         ++status.pending;
       } else if (accepted_[pair.first] != 0 && accepted_[pair.second] != 0) {
         status.pending +=
-            slabs_
-                .run(slab_side(pair.first), slab_side(pair.second), reach, out, tests, rest_of(budget, tests))
+            slabs_.run(slab_side(pair.first), slab_side(pair.second), out, tests, rest_of(budget, tests))
                 .pending;
       } else {
         status.pending +=
@@ -99,17 +97,6 @@ class LeafSlabs final : public StoredHierarchyStrategy<S, Count>,
           SlabQuery<S>::accepts(this->scene_.primitives(body)) &&
           (this->hierarchies_[body].empty() || this->hierarchies_[body].padded_leaf_size() > 1));
   }
-  S largest_coordinate() const {
-    S largest = 0;
-    for (const WideHierarchy<S>& hierarchy : this->hierarchies_) {
-      if (hierarchy.empty()) continue;
-      const Box<S> box = hierarchy.root_box();
-      for (int axis = 0; axis < 3; ++axis)
-        largest = std::max({largest, std::abs(box.lower[axis]), std::abs(box.upper[axis])});
-    }
-    return largest;
-  }
-
   std::vector<SlabBlocks<S>> blocks_;   ///< [body]
   std::vector<std::uint8_t> accepted_;  ///< [body]
   SlabQuery<S> slabs_;

@@ -235,35 +235,33 @@ std::optional<Translation<S>> FlightPlans<S>::translation(double t) const {
 template <class S>
 std::optional<Translation<S>> FlightPlans<S>::find_translation(std::size_t segment) const {
   constexpr std::size_t block = 3 * 256;
-  const S eps = std::numeric_limits<S>::epsilon();
+  constexpr S infinity = std::numeric_limits<S>::infinity(), eps = std::numeric_limits<S>::epsilon();
   const std::size_t scalars = std::size_t(3) * keyframed_count_;
   const S *from = keyframe(segment), *to = keyframe(segment + 1);
-  Translation<S> all{{to[0] - from[0], to[1] - from[1], to[2] - from[2]}, {}, true};
-  all.upper = all.lower;
-  S largest = 0, rest = 0;
-  const auto differs_by_more_than = [&](S ulps) {
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      if (all.upper[axis] - all.lower[axis] > ulps * eps * largest) return true;
-    return false;
-  };
+  // A stored coordinate is rounded by a share of itself, whatever those of other vertices are.
+  const auto rounding = [&](std::size_t i) { return eps * std::max(std::abs(from[i]), std::abs(to[i])); };
+  const std::array<S, 3> first{to[0] - from[0], to[1] - from[1], to[2] - from[2]};
+  bool exact = true;
+  // The steps that serve all coordinates so far.
+  std::array<S, 3> least{-infinity, -infinity, -infinity}, most{infinity, infinity, infinity};
   for (std::size_t begin = 0; begin < scalars; begin += block) {
     for (std::size_t i = begin; i < std::min(begin + block, scalars); i += 3)
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const TwoPart<S> step = two_diff(to[i + axis], from[i + axis]);
-        all.lower[axis] = std::min(all.lower[axis], step.hi);
-        all.upper[axis] = std::max(all.upper[axis], step.hi);
-        rest = std::max(rest, std::abs(step.lo));
-        largest = std::max({largest, std::abs(to[i + axis]), std::abs(from[i + axis])});
+        least[axis] = std::max(least[axis], step.hi - rounding(i + axis));
+        most[axis] = std::min(most[axis], step.hi + rounding(i + axis));
+        exact = exact && step.hi == first[axis] && step.lo == 0;
       }
-    if (differs_by_more_than(64)) return {};
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (least[axis] > most[axis]) return {};
   }
-  if (differs_by_more_than(4)) return {};
-  all.exact = all.lower == all.upper && rest == 0;
-  for (std::size_t axis = 0; rest != 0 && axis < 3; ++axis) {
-    all.lower[axis] = std::nextafter(all.lower[axis], -std::numeric_limits<S>::infinity());
-    all.upper[axis] = std::nextafter(all.upper[axis], std::numeric_limits<S>::infinity());
-  }
-  return all;
+  if (exact) return Translation<S>{first, first, true};
+  std::array<S, 3> step;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    step[axis] = std::clamp(least[axis] + (most[axis] - least[axis]) / 2, least[axis], most[axis]);
+  for (std::size_t i = 0; i < scalars; ++i)
+    if (std::abs(to[i] - (from[i] + step[i % 3])) > rounding(i)) return {};
+  return Translation<S>{step, step, false};
 }
 
 template <class S>

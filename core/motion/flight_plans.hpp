@@ -24,7 +24,7 @@ struct PlanChange {
   S velocity[3] = {0, 0, 0};  ///< units per second, after the last knot
 };
 
-/// The range, per axis, of the steps of a body's vertices over a segment.
+/// The step of a body's vertices over a segment, but for rounding; `lower` and `upper` are the same.
 template <class S>
 struct Translation {
   std::array<S, 3> lower, upper;
@@ -95,10 +95,10 @@ class FlightPlans {
   double lines_end(double t) const;
   /// Returns whether the body rests from t until `lines_end(t)`. False for bodies with vertices' own plans.
   bool at_rest(double t) const;
-  /// Returns the common translation of the body over the keyframe segment that contains t: the range of the
-  /// steps of its vertices, which differ by no more than the rounding of stored coordinates (4 ulps of the
-  /// largest). Returns nothing if the steps differ by more, without a segment, or with vertices' own plans.
-  /// O(vertices) at the first call per segment; it stops early at the first vertex that differs by much.
+  /// Returns the common translation of the body over the keyframe segment that contains t: a step that, added
+  /// to each coordinate, gives that at the end but for an epsilon of the larger of these two. Returns nothing
+  /// if there is none, without a segment, or with vertices' own plans. O(vertices) at the first call per
+  /// segment; it stops early at the first vertices that differ.
   std::optional<Translation<S>> translation(double t) const;
 
   /// Returns an upper bound of every vertex's speed on the segment that holds at t (units per second), own

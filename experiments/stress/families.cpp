@@ -439,6 +439,8 @@ const std::vector<Family>& families() {
       {"largest", "across the whole admissible range from keyframe to keyframe", largest},
       {"beyond_range", "on both sides of the admissible range", beyond_range},
       {"far_away", "far offset, motion in the last places", far_away},
+      {"far_sheets", "a gap between two sheets, far from the origin", far_sheets},
+      {"far_vertices", "the same, with a far vertex or a large ground in one body", far_vertices},
       {"denormals", "coordinates between zero and the smallest normal number", denormals},
       {"signed_zeros", "zeros of both signs", signed_zeros},
       {"near_parallel", "trajectories whose slopes differ in the last places", near_parallel},

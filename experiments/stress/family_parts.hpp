@@ -104,6 +104,10 @@ inline void for_coordinates(StressScene& scene, const std::function<void(double&
     for (double& x : body.positions) change(x);
 }
 
+/// The families of far_families.cpp.
+StressScene far_sheets(const FamilySetting& setting);
+StressScene far_vertices(const FamilySetting& setting);
+
 /// Scales the scene so that its largest coordinate is `largest`.
 inline void scale_to(StressScene& scene, double largest) {
   double most = 0;

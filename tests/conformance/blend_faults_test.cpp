@@ -51,6 +51,7 @@ class Faulty : public BlendSource<S> {
         const S translation = (out.offset[axis] - out.offset[axis + 3]) / 2;
         out.offset[axis] = translation;
         out.offset[axis + 3] = -translation;
+        out.rounding = 0;
       }
   }
   std::size_t bytes() const override { return source_.bytes(); }
@@ -68,7 +69,8 @@ struct Reduced {
     Strategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params&)
         : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {
       this->make_sources([](std::uint32_t, WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans) {
-        return std::make_unique<Faulty<S, ReducedBoxes<S>, fault>>(hierarchy, plans, 3, 0.0);
+        return std::make_unique<Faulty<S, ReducedBoxes<S>, fault>>(hierarchy, plans, 3, 0.0,
+                                                                   fault == BlendFault::no_margin ? 0 : 1);
       });
     }
   };

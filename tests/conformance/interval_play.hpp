@@ -30,10 +30,9 @@ struct Flight {
   double lower_near[2][3], upper_near[2][3];
 };
 
-/// All primitives of a body over a segment, and its largest coordinate at the ends.
+/// All primitives of a body over a segment.
 struct BodyFlight {
   std::vector<Flight> primitives;
-  Rational largest = 0;
 };
 
 /// A body on its plans between two times that no knot lies between.
@@ -57,7 +56,6 @@ BodyFlight exact_flight(const Body<S>& body, double begin, double end) {
           if (&corner == primitive.corners.data() || x < lower) lower = x;
           if (&corner == primitive.corners.data() || x > upper) upper = x;
         }
-        flight.largest = std::max({flight.largest, Rational(abs(lower)), Rational(abs(upper))});
         primitive.lower_near[end_of][axis] = lower.convert_to<double>();
         primitive.upper_near[end_of][axis] = upper.convert_to<double>();
       }
@@ -75,7 +73,7 @@ std::vector<BodyFlight> exact_flights(const Scene<S>& scene, const LinearBounds<
 }
 
 /// Triangles in parallel planes, one body over the other, with gaps of some ulps that change by some ulps:
-/// here everything is a matter of margins, which are 8 ulps a body.
+/// here everything is a matter of margins, which are some ulps.
 template <class S>
 Scene<S> grazing(S place) {
   Random random(61);

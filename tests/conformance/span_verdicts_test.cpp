@@ -48,10 +48,9 @@ std::vector<SpanVerdict> decide(const Joiner<S>& joiner, const Scene<S>& scene, 
         span.corner[end][c + 3] = b.at[end].positions + 3 * vb;
       }
   }
-  const S margin = a.margin + b.margin;  // and the slack that TriangleSpanFilter makes of it
   std::vector<SpanVerdict> verdicts(spans.size());
   span_test_kernels<S>(joiner.kernels)
-      .decide(spans.data(), spans.size(), {.gap = 2 * margin, .component = margin}, verdicts.data());
+      .decide(spans.data(), spans.size(), span_rounding(std::max(a.rounding, b.rounding)), verdicts.data());
   return verdicts;
 }
 

@@ -1,5 +1,6 @@
 #include "tests/support/synthetic_scenes.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -99,10 +100,59 @@ struct RawScene {
   std::vector<std::uint32_t> self{};  ///< bodies with pairs of their own
 };
 
-/// The scalar's largest admissible coordinate or velocity, and the smallest above zero.
+/// The scalar's largest admissible coordinate or velocity, the smallest above zero, and the distance from 1
+/// to the next number.
 struct Range {
-  double largest, smallest;
+  double largest, smallest, epsilon;
 };
+
+/// One keyframe of a sheet of n x n vertices in the unit square.
+struct FarSheet {
+  std::uint32_t n;
+  double height, wave, shear, fall;
+  double at(int x, int y, int k, int axis) const {
+    const double u = x / double(n - 1), v = y / double(n - 1);
+    if (axis == 0) return u + shear * k * (1 + v);
+    return axis == 1 ? v : height + wave * std::sin(6 * u + 4 * v + 0.3 * k) - fall * k;
+  }
+};
+
+/// Two sheets, a gap of 0.1 apart, one over the other, with numbers far beyond their size: what rounding does
+/// at `far` is 0.01, and single vertices are still further away. 0: the same scene without these numbers.
+RawScene raw_far_scene(const std::string& name, std::uint32_t n, std::uint32_t keyframes, double far) {
+  const bool wavy = name == "far_waves", translates = name == "far_translation";
+  const double place = name == "far_sheets" || wavy || translates ? far : 0;
+  RawScene scene{{}, Script::none};
+  for (int b = 0; b < 2; ++b) {
+    const FarSheet at{n, b == 0 ? 0.0 : 0.1, wavy ? 0.04 : 0.0, b == 0 && !translates ? 0.05 : 0.0,
+                      b == 0 && !wavy ? 0.004 : 0.0};
+    scene.bodies.push_back(sheet(n, keyframes, [&](int x, int y, int k, int axis) {
+      const double drift = translates && b == 0 && axis == 0 ? k * 1.1 / 16 : 0;
+      return place + drift + at.at(x, y, k, axis);
+    }));
+  }
+  const double further = 8 * far;
+  RawBody& body = scene.bodies[0];
+  const auto first = [&](std::size_t k) {
+    return body.positions.begin() + std::ptrdiff_t(3 * body.vertex_count * k);
+  };
+  if (name == "far_vertex" && far != 0)
+    for (std::size_t k = 0; k < keyframes; ++k) {
+      double* const corner = &*first(k) + 3 * (body.vertex_count - 1);
+      corner[0] += further;
+      corner[2] -= further;
+    }
+  if (name == "far_ground") {
+    const double half = std::max(further, 2.0);
+    const std::vector<double> ground{-half, -half, -1, half, -half, -1, 0, half, -1};
+    for (std::size_t k = keyframes; k-- > 0;)
+      body.positions.insert(first(k + 1), ground.begin(), ground.end());
+    const std::uint32_t corners[3] = {body.vertex_count, body.vertex_count + 1, body.vertex_count + 2};
+    body.primitives.add(corners);
+    body.vertex_count += 3;
+  }
+  return scene;
+}
 
 RawScene raw_scene(const std::string& name, const Range& range) {
   const auto wave = [](double lift) {
@@ -296,6 +346,8 @@ RawScene raw_scene(const std::string& name, const Range& range) {
   if (name == "geometry_changes_polygons") return with_geometry("polygons", {.seed = 36, .plans = true});
   if (name == "geometry_changes_points")
     return with_geometry("points_against_nets", {.seed = 37, .to_nothing = true});
+  if (const auto& far = far_scene_names(); std::find(far.begin(), far.end(), name) != far.end())
+    return raw_far_scene(name, 9, 4, 0.01 / range.epsilon);
   throw std::invalid_argument("no synthetic scene '" + name + "'");
 }
 
@@ -379,7 +431,18 @@ const std::vector<std::string>& synthetic_scene_names() {
                                               "extreme_velocities",
                                               "extreme_plan_changes",
                                               "plans_start_at_rest",
-                                              "plans_move_the_obstacle"};
+                                              "plans_move_the_obstacle",
+                                              "far_sheets",
+                                              "far_waves",
+                                              "far_translation",
+                                              "far_vertex",
+                                              "far_ground"};
+  return names;
+}
+
+const std::vector<std::string>& far_scene_names() {
+  static const std::vector<std::string> names{"far_sheets", "far_waves", "far_translation", "far_vertex",
+                                              "far_ground"};
   return names;
 }
 
@@ -400,22 +463,40 @@ const std::vector<std::string>& self_scene_names() {
   return names;
 }
 
+namespace {
 template <class S>
-TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_keyframe) {
-  const Range range{double(admissible_magnitude<S>), double(std::numeric_limits<S>::denorm_min())};
-  const RawScene raw = raw_scene(name, range);
-  TestScene<S> result;
-  result.scene.name = name;
+Scene<S> rounded(const std::string& name, const RawScene& raw) {
+  Scene<S> scene;
+  scene.name = name;
   for (std::size_t b = 0; b < raw.bodies.size(); ++b) {
     const RawBody& body = raw.bodies[b];
     std::vector<S> positions(body.positions.begin(), body.positions.end());
-    result.scene.bodies.push_back({"body" + std::to_string(b), body.primitives,
-                                   FlightPlans<S>(body.vertex_count, body.times, std::move(positions))});
+    scene.bodies.push_back({"body" + std::to_string(b), body.primitives,
+                            FlightPlans<S>(body.vertex_count, body.times, std::move(positions))});
   }
-  result.scene.pairs = all_pairs(result.scene.bodies);
-  for (const std::uint32_t body : raw.self) result.scene.pairs.push_back({body, body});
-  validate(result.scene);
-  cut_polygons(result.scene);
+  scene.pairs = all_pairs(scene.bodies);
+  for (const std::uint32_t body : raw.self) scene.pairs.push_back({body, body});
+  validate(scene);
+  cut_polygons(scene);
+  return scene;
+}
+}  // namespace
+
+template <class S>
+Scene<S> far_scene(const std::string& name, std::uint32_t n, std::uint32_t keyframes, FarPart part) {
+  const double far = part == FarPart::far ? 0.01 / double(std::numeric_limits<S>::epsilon()) : 0;
+  return rounded<S>(name, raw_far_scene(name, n, keyframes, far));
+}
+template Scene<float> far_scene(const std::string&, std::uint32_t, std::uint32_t, FarPart);
+template Scene<double> far_scene(const std::string&, std::uint32_t, std::uint32_t, FarPart);
+
+template <class S>
+TestScene<S> synthetic_scene(const std::string& name, std::uint32_t frames_per_keyframe) {
+  const Range range{double(admissible_magnitude<S>), double(std::numeric_limits<S>::denorm_min()),
+                    double(std::numeric_limits<S>::epsilon())};
+  const RawScene raw = raw_scene(name, range);
+  TestScene<S> result;
+  result.scene = rounded<S>(name, raw);
   result.frames = frame_times(result.scene, frames_per_keyframe);
   if (raw.script == Script::takes_off) {
     result.frames.clear();

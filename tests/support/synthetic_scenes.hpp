@@ -25,6 +25,15 @@ const std::vector<std::string>& geometry_scene_names();
 /// Scenes that ask for pairs within bodies, too; some of these change plans, or geometry.
 const std::vector<std::string>& self_scene_names();
 
+/// Those of the first in which a gap of 0.1 between two sheets lies among numbers of which half a unit of
+/// rounding is 0.005: far from the origin, or because of one vertex or triangle of the same body.
+const std::vector<std::string>& far_scene_names();
+
+/// Makes such a scene with sheets of n x n vertices, or the same without the large numbers.
+enum class FarPart : std::uint8_t { far, near };
+template <class S>
+Scene<S> far_scene(const std::string& name, std::uint32_t n, std::uint32_t keyframes, FarPart part);
+
 /// Makes one by name; deterministic. `frames_per_keyframe` places the script's changes at frames, keyframes
 /// and events.
 template <class S>

@@ -450,5 +450,31 @@ TEST(NestedStrategies, KnowNoMoreOfTheFutureThanTheirOwner) {
                                                   params, CountingPolicy::silent));
 }
 
+// Whatever a join was predicted to cost, it is not chosen again where its counts say that a refit costs less:
+// where bodies meet, and where nothing was seen to meet; in segments of any length.
+TEST(Auto, AJoinThatCostsMoreThanARefitIsLeft) {
+  for (const double frames : {2.0, 10.0, 30.0, 100.0, 1e4})
+    for (const bool near : {false, true})
+      for (const double times : {1.2, 3.0, 40.0, 1e5}) {
+        Observed seen;
+        seen.frames_per_segment = frames;
+        seen.near = near;
+        seen.reads = 4000;
+        seen.slab_tests = 1000;
+        seen.candidates = near ? 100 : 0;
+        ObservedJoin join;
+        join.start_over(seen);
+        join.refitted(1, seen);
+        join.joined(times * refit_cost(seen), seen.candidates, 20, seen);
+        EXPECT_GT(join_cost(seen), 1.1 * refit_cost(seen))
+            << times << " times a refit, " << frames << " frames a segment, near: " << near;
+        // What one segment took does not count for ever.
+        for (int choice = 0; choice < 40; ++choice) join.forget(seen);
+        if (frames >= 30) {
+          EXPECT_LT(join_cost(seen), refit_cost(seen)) << times << ", " << near;
+        }
+      }
+}
+
 }  // namespace
 }  // namespace kbvh::test::auto_test

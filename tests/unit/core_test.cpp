@@ -231,19 +231,32 @@ TEST(FlightPlans, SeeATranslationWhereStepsDifferByRoundingOnly) {
   EXPECT_EQ(first->lower, whole);
   EXPECT_EQ(first->upper, whole);
   EXPECT_FALSE(almost->exact);
-  EXPECT_EQ(almost->lower[0], less - 3);
-  EXPECT_EQ(almost->upper[0], 0);
+  // A step between the two that serves both, an epsilon of each one's own coordinate away.
+  EXPECT_LE(std::abs(almost->lower[0]), 0x1p-23f);
+  EXPECT_EQ(almost->lower, almost->upper);
   EXPECT_TRUE(rest->exact);
   EXPECT_EQ(rest->lower, none);
   EXPECT_FALSE(rounded->exact);
-  EXPECT_LE(rounded->lower[0], -1);
-  EXPECT_GT(rounded->upper[0], -1) << "above the exact step";
+  EXPECT_EQ(rounded->lower[0], -1);
   EXPECT_EQ(plans.translation(4), std::nullopt);
   EXPECT_EQ(plans.translation(-1), std::nullopt) << "before the first keyframe there is no segment";
   EXPECT_EQ(plans.translation(5), std::nullopt) << "nor after the last one";
   const float at[] = {0, 1, 2};
   plans.change(0, {.vertex = 0, .times = {}, .positions = {}, .velocity = {1, 0, -0.5f}}, at);
   EXPECT_EQ(plans.translation(0), std::nullopt) << "a plan of its own";
+}
+
+// What a far vertex is rounded by says nothing of the others.
+TEST(FlightPlans, AFarVertexHidesNoMotionOfTheOthers) {
+  const float far = 1e5f;
+  for (const float bend : {0.0f, 0.01f}) {
+    const FlightPlans<float> plans(3, {0, 1},
+                                   {far, 0, 0, 1, 2, 0, 2, 2, 0,  //
+                                    far, 0, 0, 1, 2, 0 + bend, 2, 2, 0});
+    EXPECT_EQ(plans.translation(0).has_value(), bend == 0);
+    const FlightPlans<float> along(2, {0, 1}, {far, 0, 0, 1, 0, 0, far + 0.5f, 0, 0, 1.5f + 5 * bend, 0, 0});
+    EXPECT_EQ(along.translation(0).has_value(), bend == 0) << "the step of the far one is known up to 0.012";
+  }
 }
 
 TEST(Playback, LazyPositionsEqualEagerOnes) {

@@ -69,14 +69,15 @@ void expect_bounded(const FlightPlans<S>& plans, const ReducedModel<S>& model) {
   for (double t = -0.5; t < double(plans.keyframe_count()) + 0.5; t += 0.25) {
     plans.evaluate(t, positions.data());
     model.at(plans, t, now);
-    const double slack = 20 * double(std::numeric_limits<S>::epsilon()) * now.magnitude;
     for (std::size_t i = 0; i + 1 < positions.size(); ++i) {
+      const double magnitude = now.translated[i % 3] + std::abs(double(model.rest[i])) + now.displaced;
+      const double slack = 20 * double(std::numeric_limits<S>::epsilon()) * magnitude;
       double x = now.translation[i % 3] + double(model.rest[i]);
       for (std::size_t m = 0; m < model.mode_count; ++m) x += now.modes[m] * double(model.shapes[m][i]);
       const double left = double(positions[i]) - x;
       ASSERT_GE(left, now.remainder * double(model.low[i]) - slack) << t;
       ASSERT_LE(left, now.remainder * double(model.high[i]) + slack) << t;
-      ASSERT_LE(std::abs(double(positions[i])), now.magnitude) << t;
+      ASSERT_LE(std::abs(double(positions[i])), magnitude) << t;
     }
   }
 }

@@ -49,18 +49,11 @@ struct SlabbedBodies {
   typename SlabQuery<S>::Side side(std::uint32_t body) {
     return {&hierarchies[body], body, &blocks[body], playback.positions(body)};
   }
-  PairBuffer by_slabs(double share_of_reach = 1) {
-    S reach = 0;
-    for (const auto& hierarchy : hierarchies) {
-      if (hierarchy.empty()) continue;
-      const Box<S> box = hierarchy.root_box();
-      for (int axis = 0; axis < 3; ++axis)
-        reach = std::max({reach, std::abs(box.lower[axis]), std::abs(box.upper[axis])});
-    }
+  PairBuffer by_slabs(S rounding = SlabQuery<S>::enough_rounding) {
     PairBuffer pairs;
     std::uint64_t tests = 0;
     for (const BodyPair& pair : scene.pairs)
-      slabs.run(side(pair.first), side(pair.second), S(share_of_reach) * reach, pairs, tests, {});
+      slabs.run(side(pair.first), side(pair.second), pairs, tests, {}, rounding);
     std::sort(pairs.begin(), pairs.end());
     return pairs;
   }

@@ -22,15 +22,12 @@ template <class S>
 struct Family {
   std::vector<S> coordinates[2];  // [pair][6][4]
   std::vector<SpanPair<S>> pairs;
-  S largest = 0;
 
   void add(const Pair<S>& first, const Pair<S>& last, float begin, float end) {
     for (const auto& [pair, to] : {std::pair(&first, &coordinates[0]), std::pair(&last, &coordinates[1])})
       for (const auto& triangle : *pair)
-        for (const auto& p : triangle) {
-          for (const S x : p) largest = std::max(largest, std::abs(x));
+        for (const auto& p : triangle)
           to->insert(to->end(), {p[0], p[1], p[2], std::numeric_limits<S>::quiet_NaN()});
-        }
     pairs.push_back({{}, begin, end});
   }
   void close() {
@@ -39,11 +36,8 @@ struct Family {
         for (std::size_t c = 0; c < 6; ++c)
           pairs[i].corner[end][c] = coordinates[end].data() + 24 * i + 4 * c;
   }
-  /// As the strategies choose it, for bodies with these coordinates.
-  SpanSlack<S> slack() const {
-    const S margin = 2 * 8 * std::numeric_limits<S>::epsilon() * largest;
-    return {.gap = 2 * margin, .component = margin};
-  }
+  /// As strategies choose it, where positions at the ends are rounded: span_rounding(unit_rounding).
+  static constexpr S rounding = 9 * std::numeric_limits<S>::epsilon();
 };
 
 template <class S>
@@ -64,7 +58,7 @@ Tally check(Family<S>& family) {
   for (const KernelSet set : supported_kernel_sets()) {
     tally = {};
     std::vector<SpanVerdict> verdicts(family.pairs.size());
-    span_test_kernels<S>(set).decide(family.pairs.data(), family.pairs.size(), family.slack(),
+    span_test_kernels<S>(set).decide(family.pairs.data(), family.pairs.size(), family.rounding,
                                      verdicts.data());
     int wrong = 0;
     for (std::size_t i = 0; i < family.pairs.size(); ++i) {

@@ -11,10 +11,10 @@ template <class S>
 struct BlendTerms {
   std::vector<BlendTerm<S>> terms;
   std::size_t stride = 0;
-  S offset[6] = {};
+  S offset[6] = {}, rounding = 0;  ///< as in Blend
 
   Blend<S> view() const {
-    Blend<S> blend{terms.data(), std::uint32_t(terms.size()), stride, {}};
+    Blend<S> blend{terms.data(), std::uint32_t(terms.size()), stride, {}, rounding};
     for (std::size_t side = 0; side < 6; ++side) blend.offset[side] = offset[side];
     return blend;
   }

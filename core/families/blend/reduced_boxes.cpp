@@ -3,20 +3,25 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/median.hpp"
+
 namespace kbvh {
 namespace {
 
-/// Returns the mean side of the boxes of leaves.
+/// Returns the median side of the boxes of leaves.
 template <class S>
 double leaf_side(WideHierarchy<S>& hierarchy, const FieldRows<S>& rows) {
   const std::size_t width = hierarchy.width();
   const WideNode* const nodes = hierarchy.arrays().nodes;
-  double sum = 0, leaves = 0;
+  std::vector<double> sides;
   for (std::size_t node = 0; node < hierarchy.node_count(); ++node)
-    for (std::size_t lane = 0; lane < nodes[node].leaf_count; ++lane, ++leaves)
+    for (std::size_t lane = 0; lane < nodes[node].leaf_count; ++lane) {
+      double side = 0;
       for (std::size_t row = 0; row < 6; ++row)  // rows are lower and -upper
-        sum -= double(rows.child_bounds[(node * 6 + row) * width + lane]) / 3;
-  return leaves > 0 ? sum / leaves : 0;
+        side -= double(rows.child_bounds[(node * 6 + row) * width + lane]) / 3;
+      sides.push_back(side);
+    }
+  return median(sides);
 }
 
 template <class S>
@@ -30,8 +35,9 @@ FieldRows<S> rows_of(const WideHierarchy<S>& hierarchy, const S* field) {
 
 template <class S>
 ReducedBoxes<S>::ReducedBoxes(WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans,
-                              std::uint32_t most_modes, double tolerance)
+                              std::uint32_t most_modes, double tolerance, S roundings)
     : plans_(&plans),
+      roundings_(roundings),
       rows_(rows_of(hierarchy, plans.keyframe(0))),
       scalars_(lane_scalars(hierarchy.width())),
       model_(plans, {most_modes, tolerance * leaf_side(hierarchy, rows_)}) {
@@ -52,16 +58,24 @@ ReducedBoxes<S>::ReducedBoxes(WideHierarchy<S>& hierarchy, const FlightPlans<S>&
   now_.modes.resize(model_.mode_count);
 }
 
-/// Copies the sides of all nodes to their places among the ranges of one term.
+/// Copies the sides of all nodes to their places among the ranges of one term, moved outwards by a share of
+/// themselves: what roundings can do to the term, whatever its weight. In epsilons of the scalar: half for
+/// the weight and half for the product; half for each sum; half for each sum in the measured remainder, and
+/// for storing it; and the rest for moving the side.
 template <class S>
 void ReducedBoxes<S>::put(WideHierarchy<S>& hierarchy, std::size_t term, Sides sides, EmptyLanes empty) {
   const std::size_t width = hierarchy.width(), terms = model_.mode_count + 2;
   const WideNode* const nodes = hierarchy.arrays().nodes;
+  const S share = roundings_ * S(terms + 8) * std::numeric_limits<S>::epsilon(),
+          least = 16 * std::numeric_limits<S>::min();
+  const auto outwards = [&](S side) {
+    return std::isinf(side) ? side : side - (share * std::abs(side) + least);
+  };
   for (std::size_t node = 0; node < hierarchy.node_count(); ++node) {
     S* const to = &ranges_[(node * terms + term) * scalars_];
     for (std::size_t i = sides.begin * width; i < sides.end * width; ++i)
       to[i] = i % width < nodes[node].count || empty == EmptyLanes::infinite
-                  ? rows_.child_bounds[node * scalars_ + i]
+                  ? outwards(rows_.child_bounds[node * scalars_ + i])
                   : S(0);
   }
 }
@@ -77,13 +91,14 @@ void ReducedBoxes<S>::blend_at(double t, BlendTerms<S>& out) const {
     out.terms[1 + m] = {ranges_.data() + (1 + m) * scalars_, S(std::abs(now_.modes[m])),
                         now_.modes[m] < 0 ? 1U : 0U};
   out.terms[terms - 1] = {ranges_.data() + (terms - 1) * scalars_, S(now_.remainder), 0};
-  // Roundings, in epsilons of the scalar times all magnitudes together: half for each sum; half for weights;
-  // half for products; half for each sum in the measured remainder, and for storing it; half for the offset
-  // and for the frame's position.
-  const double margin =
-      double(terms + 8) * double(std::numeric_limits<S>::epsilon()) * now_.magnitude * (1 + 0x1p-20) +
-      16 * double(terms) * double(std::numeric_limits<S>::denorm_min());
+  // The terms are moved outwards by their own roundings. What is left is half a unit for the offset, half a
+  // unit of double for the translation, and what double makes of steps, of other coordinates and of the
+  // measured remainder. The last sum is rounded like the frame's position, monotonically.
   for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double margin =
+        0.625 * (double(std::numeric_limits<S>::epsilon()) + 0x1p-52) * now_.translated[axis] +
+        double(terms + 8) * 0x1p-52 * now_.displaced +
+        64 * double(terms) * double(std::numeric_limits<S>::min());
     out.offset[axis] = S(now_.translation[axis] - margin);
     out.offset[3 + axis] = S(-now_.translation[axis] - margin);
   }

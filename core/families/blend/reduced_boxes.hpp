@@ -13,10 +13,11 @@ namespace kbvh {
 template <class S>
 class ReducedBoxes : public BlendSource<S> {
  public:
-  /// `tolerance` is a share of the mean side of the leaves' boxes at the first keyframe
+  /// `tolerance` is a share of the median side of the leaves' boxes at the first keyframe
   /// (ReducedModel::Settings).
+  /// `roundings`: 1, or less as a fault.
   ReducedBoxes(WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans, std::uint32_t most_modes,
-               double tolerance);
+               double tolerance, S roundings = 1);
 
   /// The terms are the rest shape, the modes, and the remainder. O(modes).
   void blend_at(double t, BlendTerms<S>& out) const override;
@@ -32,6 +33,7 @@ class ReducedBoxes : public BlendSource<S> {
   void put(WideHierarchy<S>& hierarchy, std::size_t term, Sides sides, EmptyLanes empty);
 
   const FlightPlans<S>* plans_;
+  S roundings_;
   FieldRows<S> rows_;  ///< for temporary use
   std::size_t scalars_;
   ReducedModel<S> model_;

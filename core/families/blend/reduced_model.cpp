@@ -210,7 +210,6 @@ ReducedModel<S>::ReducedModel(const FlightPlans<S>& plans, const Settings& setti
 
 template <class S>
 void ReducedModel<S>::measure() {
-  rest_largest_ = largest_of(rest);
   remainder_largest_ = std::max(largest_of(low), largest_of(high));
   for (const std::vector<S>& shape : shapes) shape_largest_.push_back(largest_of(shape));
 }
@@ -223,22 +222,24 @@ void ReducedModel<S>::at(const FlightPlans<S>& plans, double t, Coordinates& out
   const bool between = k + 1 < times.size() && t > times[k];
   const double* const last = between ? first + row() : first;
   const double share = between ? std::min((t - times[k]) / (times[k + 1] - times[k]), 1.0) : 0;
-  out.magnitude = rest_largest_;
-  double translated = 0;
-  const auto blend = [&](std::size_t i, double unit, double& magnitude) {
-    magnitude = std::max(magnitude, std::max(std::abs(first[i]), std::abs(last[i])) * unit);
+  out.displaced = 0;
+  const auto blend = [&](std::size_t i, double& magnitude) {
+    magnitude = std::max(std::abs(first[i]), std::abs(last[i]));
     return (1 - share) * first[i] + share * last[i];
   };
-  for (std::size_t d = 0; d < 3; ++d) out.translation[d] = blend(d, 1, translated);
-  out.magnitude += translated;
   double size = 0;
-  out.remainder = blend(3, remainder_largest_, size);
-  out.magnitude += size;
+  for (std::size_t d = 0; d < 3; ++d) {
+    out.translation[d] = first[d] + share * (last[d] - first[d]);  // a step is often far smaller
+    out.translated[d] = std::max(std::abs(first[d]), std::abs(last[d]));
+    size = std::max(size, std::abs(last[d] - first[d]));
+  }
+  out.displaced += size;
+  out.remainder = blend(3, size);
+  out.displaced += size * remainder_largest_;
   out.modes.resize(mode_count);
   for (std::size_t m = 0; m < mode_count; ++m) {
-    size = 0;
-    out.modes[m] = blend(4 + m, shape_largest_[m], size);
-    out.magnitude += size;
+    out.modes[m] = blend(4 + m, size);
+    out.displaced += size * shape_largest_[m];
   }
 }
 

@@ -21,20 +21,21 @@ struct ReducedModel {
     std::uint32_t most_modes = 16;
     double tolerance = 0;  ///< a length
   };
-  /// The coordinates at one time, with bounds on their magnitudes that hold throughout the segment.
+  /// The coordinates at one time, with bounds on magnitudes that hold throughout the segment.
   struct Coordinates {
     double translation[3];
     std::vector<double> modes;
     double remainder;  ///< the remainder of vertex v lies between remainder * low[v] and remainder * high[v]
-    /// Bounds the magnitude of every sum above, of its parts, and of every position.
-    double magnitude;
+    double translated[3];  ///< bounds the magnitude of the translation
+    /// Bounds those of its step, of all modes' displacements and of the remainder over the segment, together.
+    double displaced;
   };
 
   std::uint32_t mode_count = 0;
   std::vector<S> rest;                 ///< [vertex][3], and one scalar of padding
   std::vector<std::vector<S>> shapes;  ///< [mode], as `rest`
   /// Ranges of the remainder per unit of its size, over all keyframes; as `rest`. In exact numbers the
-  /// remainder exceeds them by less than `magnitude` * (mode_count + 6) units of rounding.
+  /// remainder exceeds them by less than mode_count + 6 units of rounding of the terms' magnitudes.
   std::vector<S> low, high;
   double rms = 0;  ///< root mean square of the remainder's length
 
@@ -56,7 +57,7 @@ struct ReducedModel {
   std::size_t row() const { return 4 + std::size_t(mode_count); }
   /// [keyframe]: translation x, y, z, size of the remainder, modes.
   std::vector<double> coordinates_;
-  double rest_largest_ = 0, remainder_largest_ = 0;
+  double remainder_largest_ = 0;
   std::vector<double> shape_largest_;  ///< [mode]
 };
 

@@ -6,6 +6,7 @@
 
 #include "core/families/blend/blend_source.hpp"
 #include "core/families/blend/field_rows.hpp"
+#include "core/motion/precise_quotient.hpp"
 
 namespace kbvh {
 
@@ -33,19 +34,20 @@ class TargetBoxes : public BlendSource<S> {
     out.stride = scalars_;
     out.terms.assign(1, {first.rows.child_bounds.data(), 1, 0});
     std::fill_n(out.offset, 6, S(0));
+    out.rounding = 0;
     if (k + 1 == times.size() || !(t > times[k])) return;
     const Target& last = targets_[k + 1];
-    const double share = std::min((t - times[k]) / (times[k + 1] - times[k]), 1.0);
-    // Not 0: empty lanes are infinite, and 0 times infinity is no number. The margin covers the difference.
+    const auto share = [&](double from, double to) {
+      return S(std::max(precise_quotient(two_diff(to, from), two_diff(times[k + 1], times[k])).hi, 0.0));
+    };
+    // Not 0: empty lanes are infinite, and 0 times infinity is no number. The offset covers the difference.
     const S least = std::numeric_limits<S>::min();
-    out.terms[0].weight = std::max(S(1 - share), least);
-    out.terms.push_back({last.rows.child_bounds.data(), std::max(S(share), least), 0});
-    // Roundings: half a unit each for weights, products, sums, the offset, and the frame's position, and
-    // three in double for the share, of a difference of up to two ends; in all less than 6 units of the
-    // larger end.
-    const S margin = 8 * std::numeric_limits<S>::epsilon() * std::max(first.largest, last.largest) +
-                     8 * std::numeric_limits<S>::denorm_min();
-    std::fill_n(out.offset, 6, -margin);
+    out.terms[0].weight = std::max(share(t, times[k + 1]), least);
+    out.terms.push_back({last.rows.child_bounds.data(), std::max(share(times[k], t), least), 0});
+    // Roundings, in shares of the terms: half a unit each for the weight, two products and the sum; the
+    // offset is added like the frame's position is rounded, monotonically.
+    out.rounding = S(2.5) * std::numeric_limits<S>::epsilon();
+    std::fill_n(out.offset, 6, -4 * least * std::max({S(1), first.largest, last.largest}));
   }
 
   std::size_t bytes() const override {

@@ -18,6 +18,7 @@ class ObservedJoin {
   void start_over(Observed& seen) {
     *this = {};
     seen.join_factor = costs::Work::hope;
+    seen.apart_factor = 1;
   }
   /// Registers that a strategy that refits has answered the frame before `frame`; its work is in `seen`.
   void refitted(int frame, Observed& seen) {
@@ -29,9 +30,14 @@ class ObservedJoin {
     compared_ = 0;
   }
   /// Registers the work of the join in a mean frame over whole segments before `frame`, in nanoseconds by its
-  /// counts, and the candidates of the last one.
+  /// counts, and the candidates of the last one. Where bodies are apart it is the work that was not foreseen.
   void joined(double work, double candidates, int frame, Observed& seen) {
-    if (!seen.near) return;
+    if (!seen.near) {
+      // No refit need answer: what one costs where nothing meets is known without.
+      seen.apart_factor = 1;
+      if (work > refit_cost(seen)) seen.apart_factor = std::max(1.0, factor(work, seen));
+      return;
+    }
     work_ = work;
     candidates_ = candidates;
     if (!met_)
@@ -49,6 +55,7 @@ class ObservedJoin {
   /// Prepares a choice while another strategy answers.
   void forget(Observed& seen) const {
     if (known_) seen.join_factor = std::pow(seen.join_factor, kept_);
+    seen.apart_factor = std::pow(seen.apart_factor, kept_);
   }
   /// Whether a join was compared with a refit.
   bool known() const { return known_; }
@@ -58,14 +65,19 @@ class ObservedJoin {
   bool outdated() const { return outdated_; }
 
  private:
-  /// One segment that took long does not tell that all will.
-  static constexpr double most = 4;
+  /// One segment that took long does not tell that all will. But it is left where it took longer than a
+  /// refit.
+  static constexpr double most = 4, dearer = 2;
 
+  /// Returns the work over the prediction.
+  static double factor(double work, const Observed& seen) {
+    const double predicted = join_cost(seen);
+    if (!(work > 0 && predicted > 0 && std::isfinite(predicted))) return 1;
+    return std::min(std::max(most, dearer * refit_cost(seen) / predicted), work / predicted);
+  }
   void compare(Observed& seen) {
     seen.join_factor = 1;
-    const double predicted = join_cost(seen);
-    if (work_ > 0 && predicted > 0 && std::isfinite(predicted))
-      seen.join_factor = std::min(most, work_ / predicted);
+    seen.join_factor = factor(work_, seen);
     if (!known_ || seen.join_factor > 1.1) kept_ = std::sqrt(kept_);
     compared_ = work_;
     compared_candidates_ = candidates_;

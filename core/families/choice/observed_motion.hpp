@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/median.hpp"
 #include "core/contract/strategy.hpp"
 #include "core/families/choice/predicted_costs.hpp"
 
@@ -17,7 +18,7 @@ class ObservedMotion {
   static constexpr std::uint32_t samples = 24;       ///< vertices of a body, or pairs, that are looked at
   static constexpr std::uint32_t all_samples = 256;  ///< of all moving bodies, but for some of each
 
-  /// Measures the hierarchies: the mean side of leaf boxes, and the number of vertices in leaves.
+  /// Measures the hierarchies: the median side of leaf boxes, and the number of vertices in leaves.
   ObservedMotion(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies)
       : scene_(scene), motion_(motion), velocities_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) measure(topologies[body], body);
@@ -63,7 +64,8 @@ class ObservedMotion {
 
   void measure(const Topology& topology, std::uint32_t body) {
     const Primitives& primitives = scene_.primitives(body);
-    double sum = 0, leaves = 0, reads = 0;
+    double reads = 0;
+    std::vector<double> sides;
     std::vector<std::uint32_t> unique;
     for (const TopologyNode& node : topology.nodes) {
       if (!node.is_leaf()) continue;
@@ -76,10 +78,11 @@ class ObservedMotion {
         }
       std::sort(unique.begin(), unique.end());
       reads += double(std::unique(unique.begin(), unique.end()) - unique.begin());
-      for (int axis = 0; axis < 3; ++axis) sum += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
-      ++leaves;
+      double side = 0;
+      for (int axis = 0; axis < 3; ++axis) side += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
+      sides.push_back(side);
     }
-    leaf_size_.push_back(leaves == 0 ? 0 : sum / leaves);
+    leaf_size_.push_back(median(sides));
     if (!scene_.moving(body)) return;
     ++moving_;
     reads_ += reads;

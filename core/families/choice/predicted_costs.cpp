@@ -84,7 +84,7 @@ double join_cost(const Observed& seen) {
     return std::numeric_limits<double>::infinity();
   // Bodies apart: one box at each end, unless they come to meet; over a long distance they may pass through
   // each other.
-  if (!seen.near) return Cost::join_apart / l * (1 + moves * moves) * refit_cost(seen);
+  if (!seen.near) return seen.apart_factor * Cost::join_apart / l * (1 + moves * moves) * refit_cost(seen);
   const double alike = 1 - seen.spread;
   // Small bodies that move past each other meet further bodies on their way, in addition to their current
   // contacts.

@@ -21,11 +21,12 @@ struct Observed {
   double reads = 0;          ///< vertices that a refit reads
   double primitives = 0;     ///< of moving bodies
   double bodies = 0;         ///< that move
-  double step = 0;           ///< mean step of a vertex per frame relative to another body, in mean leaf sides
-  double slide = 0;          ///< the same for primitives relative to their candidates
+  double step = 0;   ///< mean step of a vertex per frame relative to another body, in usual leaf sides
+  double slide = 0;  ///< the same for primitives relative to their candidates
   bool many_bodies = false;  ///< more than a thousand pairs of bodies
   double spread = 1;         ///< how different the steps are among a body's vertices; 0: all the same
   double join_factor = 1;    ///< cost of the join by its work, over its prediction (ObservedJoin)
+  double apart_factor = 1;   ///< the same where bodies are apart, if more
   bool rays_only = false;    ///< no pairs are asked
   double aged = 0;           ///< share of box tests in refitted trees that new ones would save
   /// Growth of a frame's tests beyond those of new trees from frame to frame, in lbvh_drift and

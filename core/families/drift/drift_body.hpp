@@ -3,15 +3,22 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
+#include "core/base/median.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 #include "core/geometry/predicates.hpp"
 
 namespace kbvh {
 
 /// One body whose boxes were made at an earlier frame, "then", and the known motion since: per axis an
-/// interval that contains the displacement of every vertex. All roundings err to the safe side, for positions
-/// up to `admissible_magnitude`. Sides are lower x, y, z, upper x, y, z.
+/// interval that contains the displacement of every vertex, but for a share of the vertex's own coordinate
+/// then (`rounding`). All roundings err to the safe side, for positions up to `admissible_magnitude`. Sides
+/// are lower x, y, z, upper x, y, z.
+///
+/// For displacements that are read the share is 0. A bound on steps is one on the plans: positions then and
+/// now are off these by half a unit each, of the coordinate then and of the displacement. Each change of a
+/// plan starts from a stored position, which is off by half a unit more.
 template <class S>
 struct DriftBody {
   /// The part of a body that a frame reads.
@@ -27,9 +34,10 @@ struct DriftBody {
   double rate_low[3] = {}, rate_high[3] = {};  ///< the same for one frame, as last observed
   Box<double> box, box_then;                   ///< contain every vertex now, and then
   S margin[6] = {};                            ///< margin by which its boxes exceed the vertices then
-  double slack = 0;                            ///< upper bound of all roundings in a comparison of boxes
-  double moved = 0, rounding = 0;  ///< by the bound on steps: displacement of any vertex since then
-  double leaf_size = 0;            ///< mean side of a leaf's box
+  double moved = 0;      ///< by the bound on steps: displacement of any vertex since then
+  bool bounded = false;  ///< displacements are bounded by steps, not read
+  std::uint32_t changes = 0, most_changes = 0;  ///< of plans since then, and those that boxes are made for
+  double leaf_size = 0;                         ///< median side of a leaf's box
   Watch watch = Watch::nothing;
   bool near = false;     ///< to another body: it takes part in searches
   bool changed = false;  ///< vertices have their own plans: the body no longer counts as resting
@@ -47,8 +55,11 @@ struct DriftBody {
     std::fill_n(low, 3, 0.0);
     std::fill_n(high, 3, 0.0);
     moved = 0;
-    rounding = above(largest_coordinate() * eps / 2) + double(std::numeric_limits<S>::denorm_min());
+    changes = 0;
   }
+  /// Returns the share of a coordinate then by which a vertex may have moved beyond the interval, after
+  /// `most_changes` changes of plans.
+  S rounding() const { return bounded ? S((1 + most_changes / 2.0) * eps) : S(0); }
 
   /// Takes the computed displacements of all vertices over `frames` frames; `interval` [8] holds lower x, y,
   /// z, unused, upper ...
@@ -65,8 +76,7 @@ struct DriftBody {
   /// Takes a bound on every vertex's displacement in this frame, by its plan.
   void moved_by_at_most(double way) {
     moved = above(moved + way);
-    // Both positions are the plan's, rounded.
-    const double most = above(moved + 2 * rounding + 2 * (eps * moved));
+    const double most = above(moved + 2 * (eps * moved));
     for (int axis = 0; axis < 3; ++axis) {
       low[axis] = -most;
       high[axis] = most;
@@ -79,7 +89,8 @@ struct DriftBody {
   /// rounding errors start anew.
   void plans_changed() {
     // Inflate: the stored position's rounding error grows with the distance moved.
-    moved = above(above(moved + rounding) + eps * moved);
+    moved = above(moved + eps * moved);
+    ++changes;
   }
   /// Takes the motion of the body's box in this frame, from `last` to `box`.
   void box_moved_from(const Box<double>& last) {
@@ -93,16 +104,16 @@ struct DriftBody {
   /// Returns a box of then, inflated by the displacements since then.
   Box<double> moved_on(Box<double> then) const {
     for (int axis = 0; axis < 3; ++axis) {
-      then.lower[axis] = below(then.lower[axis] + low[axis]);
-      then.upper[axis] = above(then.upper[axis] + high[axis]);
+      then.lower[axis] = below(then.lower[axis] + low[axis] - off(then.lower[axis]));
+      then.upper[axis] = above(then.upper[axis] + high[axis] + off(then.upper[axis]));
     }
     return then;
   }
 
   /// Sets margins that suffice for `frames` frames of the current motion; positive even without motion.
   void set_margin(double frames) {
-    slack = 8 * eps * largest_coordinate();
-    const double least = std::max(2 * slack, 4 * double(std::numeric_limits<S>::min()));
+    most_changes = changed ? 16 : 0;
+    const double least = 4 * double(std::numeric_limits<S>::min());
     for (int axis = 0; axis < 3; ++axis) {
       margin[axis] = S(least + frames * std::max(0.0, -rate_low[axis]));
       margin[axis + 3] = S(least + frames * std::max(0.0, rate_high[axis]));
@@ -112,33 +123,34 @@ struct DriftBody {
   Box<double> swept() const {
     Box<double> all = box;
     for (int axis = 0; axis < 3; ++axis) {
-      all.lower[axis] -= 2 * double(margin[axis]);
-      all.upper[axis] += 2 * double(margin[axis + 3]);
+      all.lower[axis] -= 2 * double(margin[axis]) + 2 * off(all.lower[axis]);
+      all.upper[axis] += 2 * double(margin[axis + 3]) + 2 * off(all.upper[axis]);
     }
     return all;
   }
 
  private:
-  double largest_coordinate() const {
-    double largest = 0;
-    for (int axis = 0; axis < 3; ++axis)
-      largest = std::max({largest, std::abs(box.lower[axis]), std::abs(box.upper[axis])});
-    return largest;
+  /// Returns how far vertices may have moved beyond a side and the interval.
+  double off(double side) const {
+    if (!bounded) return 0;
+    return (2.0 + std::max(changes, most_changes)) * eps * std::abs(side) +
+           double(std::numeric_limits<S>::min());
   }
   void put_box() { box = moved_on(box_then); }
 };
 
-/// Returns the mean side of the boxes of a hierarchy's leaves; 0 without leaves.
+/// Returns the median side of the boxes of a hierarchy's leaves; 0 without leaves.
 template <class S>
-double mean_leaf_side(const WideHierarchy<S>& hierarchy) {
-  double sum = 0, leaves = 0;
+double usual_leaf_side(const WideHierarchy<S>& hierarchy) {
+  std::vector<double> sides;
   for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
     if (!hierarchy.topology().nodes[node].is_leaf()) continue;
     const Box<S> box = hierarchy.box(node);
-    for (int axis = 0; axis < 3; ++axis) sum += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
-    ++leaves;
+    double side = 0;
+    for (int axis = 0; axis < 3; ++axis) side += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
+    sides.push_back(side);
   }
-  return leaves == 0 ? 0 : sum / leaves;
+  return median(sides);
 }
 
 /// Returns an upper bound on the closing of side k of the gap between two bodies (near_pairs.hpp) since then.
@@ -174,8 +186,8 @@ double used_reach(const DriftBody<S>& a, const DriftBody<S>& b) {
 template <class S>
 bool keeps_to_reach(const DriftBody<S>& a, const DriftBody<S>& b) {
   for (std::size_t k = 0; k < 6; ++k)
-    if (!(closing(a, b, k) + a.slack + b.slack <= double(reach(a, b, k)) * (1 - 0x1p-16))) return false;
-  return true;
+    if (!(closing(a, b, k) <= double(reach(a, b, k)) * (1 - 0x1p-16))) return false;
+  return a.changes <= a.most_changes && b.changes <= b.most_changes;
 }
 
 }  // namespace kbvh

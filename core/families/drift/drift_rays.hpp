@@ -68,8 +68,10 @@ class DriftRays {
       const S* from = hierarchy.arrays().child_bounds + begin;
       S* to = moving.child_bounds.data() + begin;
       for (std::size_t row = 0; row < 6; ++row)
-        for (std::size_t lane = 0; lane < width; ++lane)
-          to[row * width + lane] = from[row * width + lane] + moving.by[row];
+        for (std::size_t lane = 0; lane < width; ++lane) {
+          const S side = from[row * width + lane];
+          to[row * width + lane] = side + (moving.by[row] - moving.rounding * std::abs(side));
+        }
       moving.stale[node] = 0;
     };
     rays_.find(query, rays, hits, side_of, make, stats, tests, counts);
@@ -89,6 +91,7 @@ class DriftRays {
     AlignedArray<S> child_bounds;     ///< as in WideArrays
     std::vector<std::uint8_t> stale;  ///< [wide node]
     S by[6] = {};                     ///< added to each row
+    S rounding = 0;                   ///< share of a side by which it moves outwards
   };
 
   void make_room(const std::vector<WideHierarchy<S>>& hierarchies) {
@@ -104,15 +107,11 @@ class DriftRays {
     moving.moment = moment_;
     std::fill(moving.stale.begin(), moving.stale.end(), 1);
     if (moving.boxes != StoredBoxes::old) return;
-    // A sum has two roundings of half an ulp: of the displacement and of the result, whose magnitudes are
-    // below those of the coordinates, margins and displacements together.
-    double largest = 0;
-    for (int axis = 0; axis < 3; ++axis)
-      largest = std::max({largest, std::abs(body.box_then.lower[axis]) + double(body.margin[axis]),
-                          std::abs(body.box_then.upper[axis]) + double(body.margin[axis + 3])});
+    // A sum has two roundings of half a unit: of the displacement and of the result.
+    moving.rounding = body.rounding() + 2 * std::numeric_limits<S>::epsilon();
     for (int axis = 0; axis < 3; ++axis) {
       const auto slack = [&](double way) {
-        return 4 * DriftBody<S>::eps * (largest + std::abs(way)) + 4 * double(std::numeric_limits<S>::min());
+        return 4 * DriftBody<S>::eps * std::abs(way) + 4 * double(std::numeric_limits<S>::min());
       };
       moving.by[axis] = S(body.low[axis] - slack(body.low[axis]));
       moving.by[axis + 3] = S(-body.high[axis] - slack(body.high[axis]));

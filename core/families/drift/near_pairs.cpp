@@ -21,8 +21,13 @@ NearLeaves<S> NearPairs<S>::leaves(const NearSide<S>& side) {
     rows.rows_.resize(count * lane_scalars(std::max(4u, side.hierarchy->padded_leaf_size())));
     rows.stamp_ = 1;
   }
-  NearLeaves<S> result{
-      side.hierarchy->leaf_lists(), rows.rows_.data(), rows.stamps_.data(), rows.stamp_, side.positions, {}};
+  NearLeaves<S> result{side.hierarchy->leaf_lists(),
+                       rows.rows_.data(),
+                       rows.stamps_.data(),
+                       rows.stamp_,
+                       side.positions,
+                       {},
+                       side.rounding};
   std::copy_n(side.margin, 6, result.margin);
   return result;
 }

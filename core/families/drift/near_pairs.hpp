@@ -44,14 +44,14 @@ struct NearWork {
 };
 
 /// One side of a search for near pairs. The boxes of the hierarchy exceed the boxes of `positions` by the
-/// margin (lower sides x, y, z, upper sides); all roundings together make them at most 4 ulps of the largest
-/// coordinate too small.
+/// margin (lower sides x, y, z, upper sides) and by `rounding` of their coordinates.
 template <class S>
 struct NearSide {
   WideHierarchy<S>* hierarchy;
   const S* positions;  ///< [vertex][3], one scalar past the end readable
   const S* margin;
   NearLeafRows<S>* rows;  ///< rows of these positions, as far as they exist
+  S rounding = 0;         ///< the share of its coordinate by which a vertex may be off beyond the closing
 };
 
 /// The pairs of primitives of two bodies whose boxes can meet while the bodies close in on each other by no

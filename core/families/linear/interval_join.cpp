@@ -74,14 +74,14 @@ void IntervalJoin<S>::begin_bodies() {
 /// Describes the slabs of two bodies, without pairs of leaves.
 template <class S>
 SlabSpanPairs<S> IntervalJoin<S>::slabs_of(const BodySegmentBounds<S>& a, const BodySegmentBounds<S>& b) {
-  // Positions at frames and at ends differ from the lines by half an ulp each; the products of directions and
-  // corners, two sums of which are compared, by less than two ulps of the largest coordinate each. A body's
-  // margin is 8 ulps.
+  // For each leaf, over its largest coordinate: the distance of the lines from positions at the ends, half a
+  // unit for positions at frames, 3.1 for products of directions, whose components add up to 1, and corners;
+  // one more for the sum of bounds and slack, and the rest for its own rounding.
   return {a.hierarchy().arrays(),
           b.hierarchy().arrays(),
           a.slab_leaves(),
           b.slab_leaves(),
-          2 * (a.margin + b.margin) + std::numeric_limits<S>::min(),
+          std::max(a.rounding, b.rounding) + 8 * unit_rounding<S>,
           nullptr,
           0,
           nullptr,

@@ -73,14 +73,14 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   at.made = ++body.made;
   if (body.hierarchy.empty()) return {};
   at.excess = 0;
-  // Over an uncut segment a body's boxes may be translated, as long as their excess stays within the margin.
+  // Over an uncut segment a body's boxes may be translated, as long as they are not much larger than tight
+  // ones.
   const bool whole =
       end == 1 && segment.begin == motion.lines_begin(index) && segment.end == motion.lines_end(index);
   const auto step = whole ? motion.translation(index) : std::optional<Translation<S>>{};
   std::optional<TranslatedBoxes<S>> moved;
   if (step) moved.emplace(side.at[0], *step);
-  if (moved && moved->excess > 8 * std::numeric_limits<S>::epsilon() * largest_coordinate(side.at[0]))
-    moved.reset();
+  if (moved && moved->excess > 4 * std::numeric_limits<S>::epsilon()) moved.reset();
   if (side.apart) {
     if (moved) {
       moved->move_own(side.at[0].node_bounds, node_bounds.data());
@@ -151,15 +151,6 @@ bool LinearBounds<S>::make_end(Segment& segment, const SegmentMotion<S>& motion,
   step_refit(body, refit, refit.left);
   if (hierarchy(body).empty()) return true;
   return admissible_root(segment.sides[body].at[end]);
-}
-
-template <class S>
-void LinearBounds<S>::make_margin(BodySegmentBounds<S>& side) const {
-  S largest = 0;
-  if (!side.hierarchy().empty())
-    largest = std::max(largest_coordinate(side.at[0]), largest_coordinate(side.at[1]));
-  const S ulps = side.repaired ? 12 : 8;
-  side.margin = ulps * std::numeric_limits<S>::epsilon() * largest + 8 * std::numeric_limits<S>::denorm_min();
 }
 
 template <class S>
@@ -245,7 +236,7 @@ bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const 
   BodySegmentBounds<S>& side = segment.sides[body];
   const BodySegmentBounds<S>& old = before.sides[body];
   side.apart = old.apart;
-  side.repaired = false;
+  side.rounding = unit_rounding<S>;  // positions are rounded correctly
   side.at_rest = motion.at_rest(body);
   side.current = true;
   std::array<std::uint32_t, 3> used{none_used, none_used, none_used};
@@ -417,12 +408,11 @@ double LinearBounds<S>::looseness_in_the_middle() {
   return tight > 0 ? linear / tight - 1 : 0;
 }
 
-/// Sets the margins, and finds the bodies whose box meets another body's box over the segment. Bodies that
+/// Finds the bodies whose box meets another body's box over the segment. Bodies that
 /// come near again get all their boxes. Bodies that are apart get only one box from the next segment on, and
 /// keep their boxes until then.
 template <class S>
 void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
-  for (BodySegmentBounds<S>& side : segment.sides) make_margin(side);
   std::fill(near_.begin(), near_.end(), 0);
   const auto box_of = [&](std::uint32_t body) {
     const BodySegmentBounds<S>& side = segment.sides[body];
@@ -456,16 +446,9 @@ void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
 template <class S>
 std::vector<Box<double>> LinearBounds<S>::boxes_at(std::uint32_t body, double t) const {
   const BodySegmentBounds<S>& one = side(body);
-  const double s = double(fraction(t)), margin = double(one.margin);
   std::vector<Box<double>> boxes;
-  for (std::uint32_t node = 0; node < one.hierarchy().topology().size(); ++node) {
-    Box<double> box = one.box_between(node, s);
-    for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] -= margin;
-      box.upper[axis] += margin;
-    }
-    boxes.push_back(box);
-  }
+  for (std::uint32_t node = 0; node < one.hierarchy().topology().size(); ++node)
+    boxes.push_back(one.widened_between(node, double(fraction(t))));
   return boxes;
 }
 

@@ -22,11 +22,11 @@ namespace kbvh {
 /// core/adr/0010-prior-art-of-answering-intervals.md.
 ///
 /// Segments are those of all bodies overlaid: from the latest knot of any plan to the next one, cut as
-/// configured by `SegmentCuts`. Every box is inflated by a margin of 8 ulps of the largest coordinate of its
-/// body, which exceeds all roundings between the flight plans and the positions of frames.
+/// configured by `SegmentCuts`. Every side of a box is inflated by what rounding can do to it between the
+/// flight plans and the positions of frames (WideEnds): about two ulps of its own coordinate.
 ///
-/// The boxes of a body that translates over a segment are translated instead of refitted, as long as their
-/// rounding excess stays below the margin.
+/// The boxes of a body that translates over a segment are translated instead of refitted, as long as no side
+/// exceeds the tight one by more than 4 epsilons of its coordinate (TranslatedBoxes).
 template <class S>
 class LinearBounds {
  public:
@@ -159,7 +159,6 @@ class LinearBounds {
   bool make_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body, std::uint32_t end,
                 double t);
   void finish(Segment& segment, const SegmentMotion<S>& motion);
-  void make_margin(BodySegmentBounds<S>& side) const;
   bool take_over(std::uint32_t body);
   void follow_change(const PlanChange<S>& change);
   void follow_pieces(std::uint32_t body, std::uint32_t vertex);
@@ -180,8 +179,9 @@ class LinearBounds {
   ChangeHorizon horizon_;
   std::vector<ChangedParts> changed_;    ///< [body]
   std::vector<std::uint8_t> to_remake_;  ///< [body]
-  bool overflowed_ = false;              ///< a changed vertex leaves the range of numbers within the segment
-  std::vector<Knot> knots_;              ///< a heap
+  /// A changed vertex leaves the range of numbers within the segment, or its end is not known well enough.
+  bool lost_ = false;
+  std::vector<Knot> knots_;  ///< a heap
   Repairs repairs_;
   std::uint64_t leaves_before_ = 0;  ///< of repairs_.leaves, when the segment began
   std::vector<LinearBody<S>> bodies_;

@@ -52,15 +52,11 @@ class LinearRays {
   /// Interpolates the box of a body. The margin exceeds all roundings but the last.
   static Box<S> root_at(const BodySegmentBounds<S>& side, S fraction) {
     constexpr S infinity = std::numeric_limits<S>::infinity();
+    const Box<double> between = side.widened_between(0, double(fraction));
     Box<S> box;
     for (int axis = 0; axis < 3; ++axis) {
-      const auto between = [&](int bound) {
-        const double first = double(side.at[0].node_bounds[bound]);
-        return first + double(fraction) * (double(side.at[1].node_bounds[bound]) - first);
-      };
-      const double margin = double(side.margin);
-      box.lower[axis] = std::nextafter(S(between(axis) - margin), -infinity);
-      box.upper[axis] = std::nextafter(S(between(axis + 4) + margin), infinity);
+      box.lower[axis] = std::nextafter(S(between.lower[axis]), -infinity);
+      box.upper[axis] = std::nextafter(S(between.upper[axis]), infinity);
     }
     return box;
   }

@@ -8,6 +8,8 @@
 #include "core/families/linear/swept_root.hpp"
 #include "core/families/wide/kernels/wide_refit.hpp"
 #include "core/geometry/predicates.hpp"
+#include "core/motion/piece.hpp"
+#include "core/motion/precise_quotient.hpp"
 #include "core/motion/round_positions.hpp"
 
 namespace kbvh {
@@ -16,12 +18,27 @@ namespace {
 /// Orders a heap of knots, the earliest first.
 constexpr auto later = [](const auto& a, const auto& b) { return a.time > b.time; };
 
-/// Returns the coordinate at a time later than the piece's begin, on its line beyond its end, if necessary.
+/// Computes the coordinate at a time later than the piece's begin, on its line beyond its end, if necessary:
+/// off by half a unit of rounding. Returns false if it is beyond the end a small difference of large numbers,
+/// of which twice the precision of double leaves too little.
 template <class S>
-S extended(const Piece<S>& piece, double t) {
-  if (piece.kind == PieceKind::ray || t <= piece.t1) return round_piece(piece, t);
-  const double slope = (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
-  return S(double(piece.x0) + slope * (t - piece.t0));
+bool extend(const Piece<S>& piece, double t, S& coordinate) {
+  const bool beyond = piece.kind == PieceKind::chord && t > piece.t1;
+  if (piece.kind == PieceKind::chord && !beyond) {
+    coordinate = round_piece(piece, t);
+    return true;
+  }
+  DoubleDouble step{double(piece.x1), 0}, times = two_diff(t, piece.t0);
+  if (beyond) {
+    step = two_diff(double(piece.x1), double(piece.x0));
+    times = precise_quotient(times, two_diff(piece.t1, piece.t0));
+  }
+  const DoubleDouble way = two_product(step.hi, times.hi), sum = two_sum(double(piece.x0), way.hi);
+  const double value = sum.hi + (sum.lo + (way.lo + (step.hi * times.lo + step.lo * times.hi)));
+  coordinate = S(value);
+  if (std::abs(value) >= 0x1p-40 * (std::abs(double(piece.x0)) + std::abs(way.hi))) return true;
+  if (!beyond) coordinate = round_piece(piece, t);
+  return !beyond;
 }
 
 /// Enlarges a node's box by a vertex.
@@ -92,17 +109,17 @@ bool LinearBounds<S>::take_over(std::uint32_t index) {
   return true;
 }
 
-/// Follows a new plan from the present time on. Plans without a knot are read from the change: that costs a
-/// tenth of reading their pieces.
+/// Follows a new plan from the present time on. Plans without a knot are read from the change: that costs
+/// less than reading their pieces.
 template <class S>
 void LinearBounds<S>::follow_change(const PlanChange<S>& change) {
   if (!change.times.empty()) return follow_pieces(change.body, change.vertex);
   const S* const from = motion_.position(change.body, change.vertex);
-  const double rest = end() - motion_.time();
+  const double t = motion_.time();
   S last[3];
   for (int axis = 0; axis < 3; ++axis)
-    last[axis] = S(double(from[axis]) + double(change.velocity[axis]) * rest);
-  follow_line(change.body, change.vertex, motion_.time(), from, last);
+    lost_ |= !extend<S>({t, none, from[axis], change.velocity[axis], PieceKind::ray}, end(), last[axis]);
+  follow_line(change.body, change.vertex, t, from, last);
 }
 
 /// Follows the plan of a vertex from its last knot on.
@@ -113,7 +130,7 @@ void LinearBounds<S>::follow_pieces(std::uint32_t body, std::uint32_t vertex) {
   for (int axis = 0; axis < 3; ++axis) {
     piece = motion_.piece(body, vertex, axis);
     from[axis] = piece.x0;
-    last[axis] = extended(piece, end());
+    lost_ |= !extend(piece, end(), last[axis]);
   }
   if (piece.t1 < end()) {
     knots_.push_back({piece.t1, body, vertex});
@@ -123,14 +140,14 @@ void LinearBounds<S>::follow_pieces(std::uint32_t body, std::uint32_t vertex) {
 }
 
 /// Moves a vertex to the line from `from` at time t to `last` at the segment's end, extended back to the
-/// segment's begin, to from - (last - from) * back. The roundings of that number, and of `last` multiplied by
-/// `back`, shrink from there to t by 1 / (1 + back): after t, the line is off by at most 2 ulps more than one
-/// between two stored positions.
+/// segment's begin, to P = from - (last - from) * back. At a fraction s after t, the line is off by s times
+/// the rounding of `last` and by 1 - s times that of P: half a unit of each, and for P some roundings in
+/// double of (last - from) * back, which is at most 2 |P| + s |last|.
 template <class S>
 void LinearBounds<S>::follow_line(std::uint32_t index, std::uint32_t vertex, double t, const S* from,
                                   const S* last) {
   BodySegmentBounds<S>& side = segments_[present_].sides[index];
-  side.repaired = true;
+  side.rounding = unit_rounding<S> + S(0x1p-49);
   S* position[2];
   for (std::size_t end = 0; end < 2; ++end)
     position[end] = bodies_[index].room[side.at[end].slot].data() + std::size_t(3) * vertex;
@@ -139,7 +156,7 @@ void LinearBounds<S>::follow_line(std::uint32_t index, std::uint32_t vertex, dou
     position[0][axis] = S(double(from[axis]) - (double(last[axis]) - double(from[axis])) * back);
     position[1][axis] = last[axis];
     // A box hides what is no number: the segment does not serve.
-    overflowed_ = overflowed_ || !std::isfinite(position[0][axis]) || !std::isfinite(position[1][axis]);
+    lost_ = lost_ || !std::isfinite(position[0][axis]) || !std::isfinite(position[1][axis]);
   }
   if (side.apart) {
     for (std::size_t end = 0; end < 2; ++end)
@@ -155,7 +172,7 @@ void LinearBounds<S>::follow_line(std::uint32_t index, std::uint32_t vertex, dou
 template <class S>
 bool LinearBounds<S>::remake_boxes() {
   Segment& segment = segments_[present_];
-  const bool overflowed = std::exchange(overflowed_, false);
+  const bool lost = std::exchange(lost_, false);
   for (std::uint32_t index = 0; index < body_count(); ++index) {
     BodySegmentBounds<S>& side = segment.sides[index];
     if (to_remake_[index] != 0) {
@@ -177,11 +194,10 @@ bool LinearBounds<S>::remake_boxes() {
       repairs_.leaves += changed_[index].leaves().size();
       repairs_.nodes += 2 * nodes.size();
     }
-    if (!side.repaired) continue;
-    make_margin(side);
+    if (side.rounding == unit_rounding<S>) continue;
     if (!admissible_root(side.at[0]) || !admissible_root(side.at[1])) return false;
   }
-  return !overflowed && is_near_as_before();
+  return !lost && is_near_as_before();
 }
 
 /// Returns whether all bodies that may meet now are among those that were found to do so.

@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -17,7 +18,9 @@ struct EndpointBounds {
   const S* positions = nullptr;                             ///< [vertex][3]
   std::uint32_t slot = 0;  ///< index into LinearBody::rows of the data made from the positions
   std::uint32_t made = 0;  ///< a number that identifies the positions
-  S excess = 0;            ///< upper bound on a box's excess over the tight box, per side
+  /// Upper bound on the excess of a box's side over the tight box, over the largest coordinate that the side
+  /// has had since it was tight.
+  S excess = 0;
 };
 
 /// A body with linear bounds: its topology, and memory for three ends, those of the current segment and of
@@ -94,14 +97,11 @@ struct BodySegmentBounds {
   bool at_rest = false, current = false;
   /// The body meets no other body's box over this segment; only its root's box is read.
   bool apart = false;
-  /// Plans changed within the segment: lines of changed vertices are extended back to its begin, where only
-  /// they are in these places.
-  bool repaired = false;
-  S margin = 0;  ///< margin by which every box is inflated
+  S rounding = unit_rounding<S>;  ///< as in WideEnds
 
   WideHierarchy<S>& hierarchy() const { return body->hierarchy; }
   WideEnds<S> ends() const {
-    return {{at[0].child_bounds, at[1].child_bounds}, {at[0].node_bounds, at[1].node_bounds}, margin};
+    return {{at[0].child_bounds, at[1].child_bounds}, {at[0].node_bounds, at[1].node_bounds}, rounding};
   }
   WideLinearLeaves<S> leaves() const { return body->leaves(at[0], at[1]); }
   SlabSpanLeaves<S> slab_leaves() const { return body->slab_leaves(at[0], at[1]); }
@@ -119,6 +119,28 @@ struct BodySegmentBounds {
     }
     return box;
   }
+  /// Returns a side, moved outwards by what rounding can do at an end of the segment to it, to the line of a
+  /// vertex below it, and to a position on that line (WideEnds).
+  S widened_down(S side) const { return side - end_margin(side); }
+  S widened_up(S side) const { return side + end_margin(side); }
+  /// Interpolates a box between the ends, moved outwards like the boxes that kernels compute.
+  Box<double> widened_between(std::uint32_t node, double fraction) const {
+    Box<double> box = box_between(node, fraction);
+    const Box<S> first = box_at(0, node), last = box_at(1, node);
+    const auto margin = [this](double x0, double x1) {
+      return double(rounding + 2 * unit_rounding<S>) * std::abs(x0) +
+             double(rounding + 8 * unit_rounding<S>) * std::abs(x1 - x0) + double(least_margin<S>);
+    };
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lower[axis] -= margin(first.lower[axis], last.lower[axis]);
+      box.upper[axis] += margin(first.upper[axis], last.upper[axis]);
+    }
+    return box;
+  }
+
+ private:
+  /// Half a unit of rounding for the position on the line, and one and a half for those of this function.
+  S end_margin(S side) const { return (rounding + 4 * unit_rounding<S>)*std::abs(side) + least_margin<S>; }
 };
 
 /// All bodies of a scene over a segment in which every vertex stays on one line.

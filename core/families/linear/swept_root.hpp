@@ -13,8 +13,8 @@ Box<S> swept(const BodySegmentBounds<S>& side) {
   Box<S> box;
   for (const EndpointBounds<S>& end : side.at)
     for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] = std::min(box.lower[axis], end.node_bounds[axis] - 2 * side.margin);
-      box.upper[axis] = std::max(box.upper[axis], end.node_bounds[axis + 4] + 2 * side.margin);
+      box.lower[axis] = std::min(box.lower[axis], side.widened_down(end.node_bounds[axis]));
+      box.upper[axis] = std::max(box.upper[axis], side.widened_up(end.node_bounds[axis + 4]));
     }
   return box;
 }

@@ -151,7 +151,7 @@ void TriangleSpanFilter<S>::collect_due(const IntervalJoin<S>& join, float fract
 /// Finds the verdicts on the pairs [begin, end) of those that are due.
 template <class S>
 void TriangleSpanFilter<S>::decide(const LinearSegment<S>& segment, const SceneView<S>& scene,
-                                   const IntervalJoin<S>& join, float fraction, float share, S margin,
+                                   const IntervalJoin<S>& join, float fraction, float share, S rounding,
                                    std::size_t begin, std::size_t end) {
   BodyPair bodies = join.bodies_of(due_[begin]);
   const BodySegmentBounds<S>*a = nullptr, *b = nullptr;
@@ -182,31 +182,29 @@ void TriangleSpanFilter<S>::decide(const LinearSegment<S>& segment, const SceneV
     span.begin = fraction - fraction_slack;
     span.end = fraction + share * (pair.end - fraction) + fraction_slack;
   }
-  // A body's margin is 8 ulps of its largest coordinate. Positions of frames differ from the plans by half an
-  // ulp each, and so do the ends read here. Interpolation in S adds two and a half ulps at each of two
-  // corners, their difference another one, products some more.
   span_test_kernels<S>(a->hierarchy().kernels())
-      .decide(tries_.data() + begin, end - begin, {.gap = 2 * margin, .component = margin},
-              verdicts_.data() + begin);
+      .decide(tries_.data() + begin, end - begin, rounding, verdicts_.data() + begin);
 }
 
 template <class S>
 void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>& scene,
                                     const IntervalJoin<S>& join, float fraction, float share) {
   if (due_.empty()) return;
-  // The largest margin: a larger one leaves more pairs open, but makes no wrong verdict.
-  S margin = 0;
+  // The largest rounding of any body: more leaves more pairs open, but makes no wrong verdict.
+  S rounding = 0;
   BodyPair last = join.bodies_of(due_[0]);
-  const auto take_margin = [&](const BodyPair& bodies) {
-    margin = std::max(margin, segment.sides[bodies.first].margin + segment.sides[bodies.second].margin);
+  const auto take_rounding = [&](const BodyPair& bodies) {
+    rounding =
+        std::max({rounding, segment.sides[bodies.first].rounding, segment.sides[bodies.second].rounding});
   };
-  take_margin(last);
+  take_rounding(last);
   for (const std::uint32_t pair : due_)
-    if (const BodyPair bodies = join.bodies_of(pair); differ(bodies, last)) take_margin(last = bodies);
+    if (const BodyPair bodies = join.bodies_of(pair); differ(bodies, last)) take_rounding(last = bodies);
+  rounding = span_rounding(rounding);
   tries_.resize(due_.size());
   verdicts_.resize(due_.size());
   const auto attempt_part = [&](std::size_t begin, std::size_t end) {
-    decide(segment, scene, join, fraction, share, margin, begin, end);
+    decide(segment, scene, join, fraction, share, rounding, begin, end);
   };
   const Parts cut{due_.size(), attempts_at_once};
   if (workers_ != nullptr && workers_->several())

@@ -8,6 +8,15 @@
 
 namespace kbvh {
 
+/// Returns the rounding for SpanTestKernels where lines are off the positions at the ends of a segment by
+/// this share (WideEnds). Each of two corners is off by that, by half a unit at a frame, and as interpolated
+/// by one for the difference of its two ends, one for a product and half a unit for the sum; the difference
+/// of the corners by one, and there is one more for products of roundings. A unit is two `unit_rounding`.
+template <class S>
+constexpr S span_rounding(S rounding) {
+  return 2 * rounding + 16 * unit_rounding<S>;
+}
+
 /// Decides the triangle tests of an interval join for spans of time where a proof exists. When a pair begins,
 /// or when a proof expires, it retries the remaining span, then its first quarter, and so on while several
 /// frames lie in the next quarter. A pair proved apart is not examined again before its span ends; a pair
@@ -86,7 +95,7 @@ class TriangleSpanFilter {
   void attempt(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                float fraction, float share);
   void decide(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
-              float fraction, float share, S margin, std::size_t begin, std::size_t end);
+              float fraction, float share, S rounding, std::size_t begin, std::size_t end);
   void attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                    float fraction);
 

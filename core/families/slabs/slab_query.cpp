@@ -26,8 +26,8 @@ SlabLeaves<S> SlabBlocks<S>::of(const WideTree<S>& tree, const S* positions) {
 }
 
 template <class S>
-QueryStatus SlabQuery<S>::run(const Side& a, const Side& b, S reach, PairBuffer& out, std::uint64_t& tests,
-                              const Budget& budget) {
+QueryStatus SlabQuery<S>::run(const Side& a, const Side& b, PairBuffer& out, std::uint64_t& tests,
+                              const Budget& budget, S rounding) {
   if (a.hierarchy->empty() || b.hierarchy->empty()) return {};
   if (!a.hierarchy->suits(*b.hierarchy))
     throw std::invalid_argument("a query needs hierarchies of one width and leaf size");
@@ -40,16 +40,12 @@ QueryStatus SlabQuery<S>::run(const Side& a, const Side& b, S reach, PairBuffer&
   WideTraversal state{stack_.data(),  0, stack_.size(),   leaf_pairs_.data(), 0,
                       leaf_pair_room, 1, budget.box_tests};
   if (overlap(a.hierarchy->root_box(), b.hierarchy->root_box())) state.stack[state.depth++] = {0, 0};
-  // The product of a direction and a corner, three products and two sums in S, is off by less than 3.1
-  // roundings of `reach`, for the direction's components add up to 1; two of them, and the sum of a bound and
-  // the slack, by less than 8, which is four times less than this. The second term covers underflow.
-  const S slack = 16 * std::numeric_limits<S>::epsilon() * reach + std::numeric_limits<S>::min();
   const bool self = a.body == b.body;
   SlabLeafPairs<S> leaves{a.hierarchy->arrays(),
                           b.hierarchy->arrays(),
                           a.blocks->of(*a.hierarchy, a.positions),
                           b.blocks->of(*b.hierarchy, b.positions),
-                          slack,
+                          rounding,
                           leaf_pairs_.data(),
                           0,
                           0,

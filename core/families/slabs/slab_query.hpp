@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -45,10 +46,14 @@ class SlabQuery {
     SlabBlocks<S>* blocks;
     const S* positions;
   };
-  /// Appends the pairs. `reach` bounds the absolute coordinates of both bodies. Returns the work that the
-  /// budget left undone; adds the box tests made, those of triangles against slabs included, to `tests`.
-  QueryStatus run(const Side& a, const Side& b, S reach, PairBuffer& out, std::uint64_t& tests,
-                  const Budget& budget);
+  /// Appends the pairs. Returns the work that the budget left undone; adds the box tests made, those of
+  /// triangles against slabs included, to `tests`. `rounding` as in SlabLeafPairs; less is a fault.
+  QueryStatus run(const Side& a, const Side& b, PairBuffer& out, std::uint64_t& tests, const Budget& budget,
+                  S rounding = enough_rounding);
+  /// The product of a direction and a corner, three products and two sums in S, is off by less than 3.1
+  /// half units of the leaf's largest coordinate, for the direction's components add up to 1, and one more is
+  /// for the sum of a bound and the slack: half of this at most.
+  static constexpr S enough_rounding = 4 * std::numeric_limits<S>::epsilon();
   /// Returns the pairs of leaves compared so far, and those of which a slab has left nothing.
   std::uint64_t leaf_pairs() const { return leaf_pairs_seen_; }
   std::uint64_t separated() const { return separated_; }

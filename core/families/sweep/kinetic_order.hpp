@@ -167,6 +167,9 @@ class KineticOrder {
     // Closed boxes: what touches all the time overlaps.
     return (a & 1) != (b & 1) ? (a & 1) == 0 : a < b;
   }
+  static double magnitude(const MovingEnd<S>& line) {
+    return std::max(std::abs(double(line.begin)), std::abs(double(line.end)));
+  }
   bool moves() const { return begin_ < end_ && std::isfinite(end_); }
   double fraction(double t) const { return (t - begin_) / (end_ - begin_); }
   std::uint32_t bin_of(double fraction) const {
@@ -184,7 +187,7 @@ class KineticOrder {
     for (std::size_t i = 0; i < list_.size(); ++i) {
       const MovingEnd<S> line = lines_[list_[i]];
       const double first = double(line.begin), last = double(line.end);
-      largest = std::max({largest, std::abs(first), std::abs(last)});
+      largest = std::max(largest, magnitude(line));
       values_[i] = first + now * (last - first);
     }
     const double error = 0x1p-48 * largest;
@@ -220,6 +223,10 @@ class KineticOrder {
     if (difference > error) return true;
     const End first = list_[place], second = list_[place + 1];
     if (lines_[first] == lines_[second]) return false;
+    // `error` is that of the largest end in the list; these two may be much smaller.
+    const double own = 0x1p-48 * std::max(magnitude(lines_[first]), magnitude(lines_[second]));
+    if (difference < -own) return false;
+    if (difference > own) return true;
     ++exact_;
     const int sign = compare_at(piece(first), piece(second), t);
     return sign > 0 || (sign == 0 && Rule::swaps(lines_[first], lines_[second]));

@@ -27,7 +27,9 @@ struct Blend {
   const BlendTerm<S>* terms;
   std::uint32_t count;  ///< at least 1
   std::size_t stride;
-  S offset[6];  ///< as rows: added to lower x, y, z and to -upper x, y, z
+  S offset[6];  ///< as rows: added to lower x, y, z and to -upper x, y, z, after all terms
+  /// Not 0: every side moves outwards by this share of its terms' magnitudes.
+  S rounding;
 };
 
 template <class S>

@@ -12,6 +12,19 @@ constexpr std::size_t lanes_of = [] {
   return fit * sizeof(S) < 16 ? std::size_t(1) : fit;  // there are no shorter registers
 }();
 
+// Gaps are compared with margins and reaches that are larger than these motions need by 2^-16 of themselves,
+// which covers roundings of gaps and margins. What is left are shares of coordinates: `rounding` of both
+// bodies, half a unit for a side that is moved by two sums, each, and half a unit for products of roundings.
+// The coordinates of one of two boxes suffice, for those of the other one differ by the gap.
+template <class S>
+constexpr S unit = sizeof(S) == 4 ? S(0x1p-24) : S(0x1p-53);
+template <class S>
+constexpr S least = sizeof(S) == 4 ? S(0x1p-126) : S(0x1p-1022);
+template <class S>
+[[gnu::always_inline]] inline S share_of(S side, S rounding) {
+  return (rounding + 3 * unit<S>)*larger(side, -side) + least<S>;
+}
+
 /// A box to compare rows of the other body with: upper bounds, and negated lower bounds.
 template <class S>
 struct Bounds {
@@ -20,6 +33,13 @@ struct Bounds {
 template <class S>
 [[gnu::always_inline]] inline Bounds<S> bounds_of(const SixSides<S>& box) {
   return {{box.upper[0], box.upper[1], box.upper[2], -box.lower[0], -box.lower[1], -box.lower[2]}};
+}
+
+/// Returns the same, moved outwards by what vertices may be off by.
+template <class S>
+[[gnu::always_inline]] inline Bounds<S> loosened(Bounds<S> box, S rounding) {
+  for (S& bound : box.bound) bound += share_of(bound, rounding);
+  return box;
 }
 
 /// Returns a mask. Bit i: lane i of the rows, inflated by the margin, overlaps the box.
@@ -74,6 +94,7 @@ void near(LeafNear<S>& shared) {
     return h.nodes[slot.node()].first_leaf + slot.lane();
   };
   const WideLeafLists &lists_a = state.leaves_a.lists, &lists_b = state.leaves_b.lists;
+  const S rounding = state.leaves_a.rounding + state.leaves_b.rounding;
   alignas(64) S ratios[padded];
   for (; state.next < state.count && state.found + leaf_pair_step <= state.out_room; ++state.next) {
     const LeafSlot slot_a = state.pairs[2 * state.next], slot_b = state.pairs[2 * state.next + 1];
@@ -84,17 +105,24 @@ void near(LeafNear<S>& shared) {
     const std::uint32_t count_a = lists_a.end_entry[leaf_a] - begin_a;
     const std::uint32_t count_b = lists_b.end_entry[leaf_b] - begin_b;
     // The leaf box of b is inflated by the margin of b, the rows of a are not.
-    const Bounds<S> box_b = bounds_of(
-        lane_box(state.b.child_bounds + slot_b.node() * std::size_t(6) * width, width, slot_b.lane()));
+    const Bounds<S> box_b =
+        loosened(bounds_of(lane_box(state.b.child_bounds + slot_b.node() * std::size_t(6) * width, width,
+                                    slot_b.lane())),
+                 state.leaves_a.rounding);
     unsigned first = widened<S, padded>(rows_a, box_b, state.leaves_a.margin);
     state.tests += count_a + std::uint64_t(unsigned(__builtin_popcount(first))) * count_b;
     for (; first != 0; first &= first - 1) {
       const std::uint32_t i = lowest(first), primitive_a = lists_a.primitives[begin_a + i];
-      unsigned second = within_reach<S, padded>(rows_b, bounds_of(lane_box(rows_a, padded, i)),
-                                                state.inverse_reach, ratios);
+      const Bounds<S> box_a = bounds_of(lane_box(rows_a, padded, i));
+      unsigned second =
+          within_reach<S, padded>(rows_b, loosened(box_a, rounding), state.inverse_reach, ratios);
       for (; second != 0; second &= second - 1) {
         const std::uint32_t j = lowest(second);
-        state.out[state.found++] = {primitive_a, lists_b.primitives[begin_b + j], float(ratios[j])};
+        bool overlap = true;
+        for (std::size_t k = 0; k < 6; ++k) overlap = overlap && rows_b[k * padded + j] <= box_a.bound[k];
+        const float ratio = float(ratios[j]);
+        state.out[state.found++] = {primitive_a, lists_b.primitives[begin_b + j],
+                                    overlap ? 0.0F : larger(ratio, 0x1p-126F)};
       }
     }
   }
@@ -102,15 +130,18 @@ void near(LeafNear<S>& shared) {
 }
 
 template <class S, std::uint32_t width>
-void widen(WideArrays<S> h, std::uint32_t node_count, const S* margin) {
+void widen(WideArrays<S> h, std::uint32_t node_count, const S* margin, S rounding) {
   for (std::uint32_t n = 0; n < node_count; ++n) {
     S* rows = h.child_bounds + std::size_t(n) * 6 * width;
     for (std::size_t k = 0; k < 6; ++k)
-      for (std::size_t i = 0; i < width; ++i) rows[k * width + i] -= margin[k];
+      for (std::size_t i = 0; i < width; ++i) {
+        S& side = rows[k * width + i];
+        side -= margin[k] + share_of(side, rounding);
+      }
     S* node_bounds = h.node_bounds + std::size_t(8) * n;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      node_bounds[axis] -= margin[axis];
-      node_bounds[axis + 4] += margin[axis + 3];
+      node_bounds[axis] -= margin[axis] + share_of(node_bounds[axis], rounding);
+      node_bounds[axis + 4] += margin[axis + 3] + share_of(node_bounds[axis + 4], rounding);
     }
   }
 }

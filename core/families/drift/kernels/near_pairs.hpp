@@ -7,8 +7,8 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// Two near primitives, with the share of the reach at which their boxes can first meet. Not positive if they
-/// overlap already.
+/// Two near primitives, with the share of the reach at which their boxes can first meet. 0 if and only if
+/// they overlap already.
 struct NearPair {
   std::uint32_t primitive_a, primitive_b;
   float ratio;
@@ -23,6 +23,7 @@ struct NearLeaves {
   std::uint32_t stamp;
   const S* positions;
   S margin[6];  ///< margin by which the hierarchy's rows exceed the vertices: lower sides, upper ones
+  S rounding;   ///< and what vertices may be off by beyond that, over their coordinates
 };
 
 /// Turns pairs of leaves into pairs of primitives whose boxes may meet while the two bodies close in on each
@@ -53,8 +54,9 @@ struct NearKernels {
   /// Continues until all pairs of leaves are done or the next one might exceed the free space
   /// (`leaf_pair_step`).
   using Near = void (*)(LeafNear<S>& state);
-  /// Inflates all boxes of a hierarchy by the margin: lower sides x, y, z, upper sides x, y, z.
-  using Widen = void (*)(WideArrays<S> hierarchy, std::uint32_t node_count, const S* margin);
+  /// Inflates all boxes of a hierarchy by the margin, lower sides x, y, z, upper sides x, y, z, and by
+  /// `rounding` of each side, with more for the roundings of this function.
+  using Widen = void (*)(WideArrays<S> hierarchy, std::uint32_t node_count, const S* margin, S rounding);
   Near near_padded[3][3];  ///< [log2(width) - 1][padded leaf size 4, 8, 16]
   Widen widen_width[3];    ///< [log2(width) - 1]
   /// Computes the least and the largest of now - before over `vertices` points [vertex][3], each rounded to

@@ -41,7 +41,7 @@ KBVH_INLINE Gap<S> gap(const Corners<S>& at, const Point<S>& direction) {
 /// Returns all bits set where the direction separates the triangles at both ends, in the same order.
 template <class S>
 KBVH_INLINE Words<S> apart(const Corners<S>& first, const Corners<S>& last, const Point<S>& direction,
-                           S margin) {
+                           Values<S> margin) {
   const Gap<S> g0 = gap(first, direction), g1 = gap(last, direction);
   const Values<S> least = larger(smaller(g0.a_first, g1.a_first), smaller(g0.b_first, g1.b_first));
   const Point<S> size = absolute(direction);
@@ -101,7 +101,7 @@ struct Sign {
 /// rounding is far below 64 roundings of UVW.
 template <class S>
 KBVH_INLINE Sign<S> sign_of(const Linear<S>& u, const Linear<S>& v, const Normal<S>& n, const Linear<S>& w,
-                            S o) {
+                            Values<S> o) {
   constexpr S rounding = sizeof(S) == sizeof(float) ? S(0x1p-18) : S(0x1p-47);
   const Values<S> c0 = dot(n.first, w.first), c3 = dot(n.last, w.last);
   const Values<S> c1 = (dot(n.twice_middle, w.first) + dot(n.first, w.last)) * S(1.0 / 3);
@@ -124,7 +124,7 @@ KBVH_INLINE Words<S> alike(const Sign<S>& a, const Sign<S>& b, const Sign<S>& c)
 /// Returns all bits set where some edge of one triangle certainly passes through the other triangle
 /// throughout.
 template <class S>
-[[gnu::noinline]] Words<S> intersecting(const Corners<S>& first, const Corners<S>& last, S o) {
+[[gnu::noinline]] Words<S> intersecting(const Corners<S>& first, const Corners<S>& last, Values<S> o) {
   const Point<S> zero{};
   const Point<S>* const a0[3] = {&zero, &first.a1, &first.a2};
   const Point<S>* const a1[3] = {&zero, &last.a1, &last.a2};
@@ -172,7 +172,7 @@ struct Certain {
 };
 
 template <class S>
-[[gnu::noinline]] Certain decide_register(const SpanPair<S>* const* pairs, SpanSlack<S> slack) {
+[[gnu::noinline]] Certain decide_register(const SpanPair<S>* const* pairs, S rounding) {
   constexpr std::size_t width = lanes<S>;
   constexpr unsigned all = unsigned((std::uint64_t(1) << width) - 1);
   alignas(64) S fractions[2][width];
@@ -185,6 +185,7 @@ template <class S>
   Point<S>* const points[2][5] = {{&first.a1, &first.a2, &first.b0, &first.b1, &first.b2},
                                   {&last.a1, &last.a2, &last.b0, &last.b1, &last.b2}};
   Point<S> origin[2];
+  Values<S> largest{};
   for (std::size_t c = 0; c < 6; ++c) {
     const S* rows[2][width];
     for (std::size_t k = 0; k < width; ++k) {
@@ -192,6 +193,9 @@ template <class S>
       rows[1][k] = pairs[k]->corner[1][c];
     }
     const Point<S> p = load_points(rows[0]), q = load_points(rows[1]);
+    const Point<S> size_p = absolute(p), size_q = absolute(q);
+    largest = larger(larger(size_p.x, size_p.y), larger(size_p.z, largest));
+    largest = larger(larger(size_q.x, size_q.y), larger(size_q.z, largest));
     const Point<S> at_begin = between(p, q, begin), at_end = between(p, q, end);
     if (c == 0) {
       origin[0] = at_begin;
@@ -201,30 +205,31 @@ template <class S>
       *points[1][c - 1] = at_end - origin[1];
     }
   }
+  const Values<S> component = rounding * largest + tiny<S>, along = 2 * component;
   // Twice the corners at the middle; only directions are derived from them.
   const Point<S> a1 = sum(first.a1, last.a1), a2 = sum(first.a2, last.a2);
   const Point<S> b0 = sum(first.b0, last.b0), b1 = sum(first.b1, last.b1), b2 = sum(first.b2, last.b2);
   const Point<S> edges_a[3] = {a1, a2 - a1, a2}, edges_b[3] = {b1 - b0, b2 - b1, b2 - b0};
-  Words<S> found = apart(first, last, cross_product(edges_a[0], edges_a[2]), slack.gap);
-  found |= apart(first, last, cross_product(edges_b[0], edges_b[2]), slack.gap);
+  Words<S> found = apart(first, last, cross_product(edges_a[0], edges_a[2]), along);
+  found |= apart(first, last, cross_product(edges_b[0], edges_b[2]), along);
   for (std::size_t i = 0; i < 3; ++i) {
     if (high_bits<S>(found) == all) return {all, 0};
     for (std::size_t j = 0; j < 3; ++j)
-      found |= apart(first, last, cross_product(edges_a[i], edges_b[j]), slack.gap);
+      found |= apart(first, last, cross_product(edges_a[i], edges_b[j]), along);
   }
   const unsigned separate = high_bits<S>(found);
   if (separate == all) return {all, 0};
-  return {separate, high_bits<S>(intersecting(first, last, slack.component))};
+  return {separate, high_bits<S>(intersecting(first, last, component))};
 }
 
 template <class S>
-void decide(const SpanPair<S>* pairs, std::size_t count, SpanSlack<S> slack, SpanVerdict* verdicts) {
+void decide(const SpanPair<S>* pairs, std::size_t count, S rounding, SpanVerdict* verdicts) {
   constexpr std::size_t width = lanes<S>;
   for (std::size_t at = 0; at < count; at += width) {
     const SpanPair<S>* chosen[width];
     const std::size_t valid = count - at < width ? count - at : width;
     for (std::size_t k = 0; k < width; ++k) chosen[k] = pairs + at + (k < valid ? k : valid - 1);
-    const Certain certain = decide_register<S>(chosen, slack);
+    const Certain certain = decide_register<S>(chosen, rounding);
     for (std::size_t k = 0; k < valid; ++k)
       verdicts[at + k] = static_cast<SpanVerdict>((certain.apart >> k & 1) != 0       ? 1
                                                   : (certain.intersect >> k & 1) != 0 ? 2

@@ -9,13 +9,6 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// Two bounds on the distance of a frame's positions, and of the kernel's results, from the linear motion.
-template <class S>
-struct SpanSlack {
-  S gap;        ///< along a direction whose absolute components add up to 1
-  S component;  ///< of a difference of two corners
-};
-
 /// The certain verdict on a pair throughout its span.
 enum class SpanVerdict : std::uint8_t { open, apart, intersect };
 
@@ -30,9 +23,12 @@ enum class SpanVerdict : std::uint8_t { open, apart, intersect };
 /// cubics in time; if all Bernstein coefficients of a cubic have one sign, so has the cubic throughout.
 template <class S>
 struct SpanTestKernels {
-  /// Writes the certain verdicts on `count` pairs. A pair with gaps and coefficients within the slack stays
-  /// open. Reads one scalar past each corner.
-  void (*decide)(const SpanPair<S>* pairs, std::size_t count, SpanSlack<S> slack, SpanVerdict* verdicts);
+  /// Writes the certain verdicts on `count` pairs. `rounding` bounds the distance of a component of a
+  /// difference of two corners, at a frame and as computed, from that of the linear motion, over the largest
+  /// coordinate of the pair; that of a gap, along a direction whose absolute components add up to 1, is twice
+  /// as large at most. Gaps and coefficients within these bounds leave a pair open. Reads one scalar past
+  /// each corner.
+  void (*decide)(const SpanPair<S>* pairs, std::size_t count, S rounding, SpanVerdict* verdicts);
 };
 KBVH_DECLARE_KERNELS(SpanTestKernels<float>, span_tests_float)
 KBVH_DECLARE_KERNELS(SpanTestKernels<double>, span_tests_double)

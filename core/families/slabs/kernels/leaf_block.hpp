@@ -145,6 +145,23 @@ template <class S, std::size_t padded>
   high = reduced<S, padded>(highs, larger_lanes);
 }
 
+/// Returns the largest magnitude among the rows of corners.
+template <class S, std::size_t padded>
+[[gnu::always_inline]] inline S largest_coordinate(const S* corners) {
+  using V = Vector<S, block_lanes<S, padded>>;
+  constexpr std::size_t lanes = block_lanes<S, padded>;
+  alignas(64) S most[padded];
+  for (std::size_t lane = 0; lane < padded; lane += lanes) {
+    V m{};
+    for (std::size_t row = 0; row < 9; ++row) {
+      const V x = load_lanes<V>(corners + row * padded + lane);
+      m = larger(larger(x, -x), m);
+    }
+    store_lanes(most + lane, m);
+  }
+  return reduced<S, padded>(most, larger_lanes);
+}
+
 /// Returns a mask. Bit i: triangle i may reach into the slab, or a number on the way is not finite.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline unsigned meeting_slab(const S* corners, const Slab<S>& slab) {

@@ -30,6 +30,8 @@ template <class S, std::size_t padded>
                                      leaf.blocks[1][SpanBlock::rows * padded + axis]);
   for (std::size_t end = 0; end < 2; ++end)
     find_extent<S, padded>(leaf.blocks[end], slab.direction, slab.low[end], slab.high[end]);
+  slab.largest =
+      larger(largest_coordinate<S, padded>(leaf.blocks[0]), largest_coordinate<S, padded>(leaf.blocks[1]));
 }
 
 template <class S, std::size_t padded>
@@ -89,6 +91,7 @@ template <class S, std::size_t padded>
 template <class S, std::size_t padded>
 void filter(SlabSpanPairs<S>& shared) {
   SlabSpanPairs<S> state = shared;
+  constexpr S least = sizeof(S) == 4 ? S(0x1p-126) : S(0x1p-1022);  // what underflow loses
   const auto number = [](const WideArrays<S>& h, LeafSlot slot) {
     return h.nodes[slot.node()].first_leaf + slot.lane();
   };
@@ -97,8 +100,9 @@ void filter(SlabSpanPairs<S>& shared) {
     const LeafSlot slot_a = state.pairs[2 * i], slot_b = state.pairs[2 * i + 1];
     const SpanLeaf<S> a = span_leaf<S, padded>(state.leaves_a, number(state.a, slot_a));
     const SpanLeaf<S> b = span_leaf<S, padded>(state.leaves_b, number(state.b, slot_b));
-    const unsigned of_b = meeting_slab<S, padded>(b, *a.slab, state.slack);
-    const unsigned of_a = meeting_slab<S, padded>(a, *b.slab, state.slack);
+    const S slack = state.rounding * (a.slab->largest + b.slab->largest) + least;
+    const unsigned of_b = meeting_slab<S, padded>(b, *a.slab, slack);
+    const unsigned of_a = meeting_slab<S, padded>(a, *b.slab, slack);
     state.pairs[2 * kept] = slot_a;
     state.pairs[2 * kept + 1] = slot_b;
     state.masks[kept] = of_a | of_b << 16;

@@ -9,11 +9,11 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// The slab of a leaf over a segment: one direction for the whole segment, and the leaf's extent along it at
-/// both ends.
+/// The slab of a leaf over a segment: one direction for the whole segment, the leaf's extent along it at both
+/// ends, and its largest coordinate.
 template <class S>
 struct SpanSlab {
-  S direction[3], low[2], high[2], unused;
+  S direction[3], low[2], high[2], largest;
 };
 
 /// A leaf of triangles at one end of a segment: nine rows of coordinates as in SlabBlock, and the direction
@@ -44,7 +44,9 @@ template <class S>
 struct SlabSpanPairs {
   WideArrays<S> a, b;
   SlabSpanLeaves<S> leaves_a, leaves_b;
-  S slack;          ///< bounds the rounding, and the distance of positions from the lines
+  /// Bounds the rounding of a product, and the distance of positions from the lines, over a leaf's largest
+  /// coordinate.
+  S rounding;
   LeafSlot* pairs;  ///< first, second, ...; replaced by those that are left
   std::size_t count;
   /// Of the pairs that are left: bit i, triangle i of the first leaf may meet the second leaf; bit 16 + i,

@@ -45,6 +45,7 @@ template <class S, std::size_t padded>
   find_planes<S, padded>(normals, block);
   const S direction[3] = {tail[0], tail[1], tail[2]};
   find_extent<S, padded>(corners, direction, tail[3], tail[4]);
+  tail[5] = largest_coordinate<S, padded>(corners);
 }
 
 /// Computes the block of a leaf unless it is current.
@@ -81,6 +82,7 @@ template <class S, std::size_t padded>
 template <class S, std::uint32_t width, std::size_t padded>
 void slab_pairs(SlabLeafPairs<S>& shared) {
   SlabLeafPairs<S> state = shared;
+  constexpr S least = sizeof(S) == 4 ? S(0x1p-126) : S(0x1p-1022);  // what underflow loses
   const auto number = [](const WideArrays<S>& h, LeafSlot slot) {
     return h.nodes[slot.node()].first_leaf + slot.lane();
   };
@@ -96,8 +98,10 @@ void slab_pairs(SlabLeafPairs<S>& shared) {
     const std::uint32_t count_a = lists_a.end_entry[leaf_a] - begin_a;
     const std::uint32_t count_b = lists_b.end_entry[leaf_b] - begin_b;
     state.tests += count_a + count_b;
-    const unsigned of_b = meeting_slab<S, padded>(corners_b, slab_of<S, padded>(block_a, state.slack));
-    const unsigned of_a = meeting_slab<S, padded>(corners_a, slab_of<S, padded>(block_b, state.slack));
+    constexpr std::size_t largest = SlabBlock::rows * padded + 5;
+    const S slack = state.rounding * (block_a[largest] + block_b[largest]) + least;
+    const unsigned of_b = meeting_slab<S, padded>(corners_b, slab_of<S, padded>(block_a, slack));
+    const unsigned of_a = meeting_slab<S, padded>(corners_a, slab_of<S, padded>(block_b, slack));
     const SixSides<S> box_b =
         lane_box(state.b.child_bounds + slot_b.node() * std::size_t(6) * width, width, slot_b.lane());
     unsigned first = of_b == 0 ? 0 : overlapping<S, padded>(block_a, box_b) & of_a;
@@ -112,7 +116,7 @@ void slab_pairs(SlabLeafPairs<S>& shared) {
     for (; first != 0; first &= first - 1) {
       const std::uint32_t i = lowest(first), primitive_a = lists_a.primitives[begin_a + i];
       unsigned second = overlapping<S, padded>(block_b, lane_box(block_a, padded, i)) & of_b;
-      second &= meeting_slab<S, padded>(corners_b, plane_of<S, padded>(block_a, i, state.slack));
+      second &= meeting_slab<S, padded>(corners_b, plane_of<S, padded>(block_a, i, slack));
       for (std::size_t k = 0; k < padded; ++k) state.primitives_a[state.found + k] = primitive_a;
       state.found += pack_lanes(second, entries_b, state.primitives_b + state.found);
     }

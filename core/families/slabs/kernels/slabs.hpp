@@ -13,8 +13,8 @@ enum class KernelSet : std::uint8_t;
 /// those of a node; nine rows of coordinates (corner 0 x, y, z, corner 1 x, ...); three rows of normals, with
 /// the smallest and the largest product of a triangle's normal and its corners, and the sum of the normal's
 /// absolute components; and behind the rows the slab: a direction whose absolute components add up to about
-/// 1, and the smallest and the largest product of it and a corner. Lanes behind the last triangle have empty
-/// boxes and repeat its other numbers.
+/// 1, the smallest and the largest product of it and a corner, and the largest coordinate. Lanes behind the
+/// last triangle have empty boxes and repeat its other numbers.
 struct SlabBlock {
   static constexpr std::size_t corner_row = 6, normal_row = 15, low_row = 18, high_row = 19, size_row = 20;
   static constexpr std::size_t rows = 21, tail = 16;
@@ -37,8 +37,8 @@ template <class S>
 struct SlabLeafPairs {
   WideArrays<S> a, b;
   SlabLeaves<S> leaves_a, leaves_b;
-  /// Bounds the rounding of two products of a direction and a corner, of all leaves.
-  S slack;
+  /// Bounds the rounding of a product of a direction and a corner, over the leaf's largest coordinate.
+  S rounding;
   const LeafSlot* pairs;  ///< first, second, ...
   std::size_t next, count;
   std::uint32_t *primitives_a, *primitives_b;  ///< found pairs in columns

@@ -6,23 +6,57 @@
 namespace kbvh {
 namespace {
 
+// ---- What rounding can do (WideEnds) ----------------------------------------------------------------------
+
+template <class V>
+[[gnu::always_inline]] inline V magnitude(V x) {
+  return larger(x, -x);
+}
+
+/// Returns the share of a side's coordinate by which it moves outwards to meet the other body's sides.
+template <class S>
+[[gnu::always_inline]] inline S both_roundings(const WideEnds<S>& a, const WideEnds<S>& b) {
+  return a.rounding + b.rounding + 4 * unit_rounding<S>;
+}
+template <class S>
+[[gnu::always_inline]] inline S side_margin(S side, S rounding) {
+  return rounding * magnitude(side) + least_margin<S>;
+}
+
+/// The margin of a side at a fraction, by its coordinate at the start and its way from there to the end.
+template <class S>
+struct MomentMargin {
+  S of_first, of_way;
+  explicit MomentMargin(S rounding)
+      : of_first(rounding + 2 * unit_rounding<S>), of_way(rounding + 8 * unit_rounding<S>) {}
+  [[gnu::always_inline]] S operator()(S first, S way) const {
+    return of_first * magnitude(first) + of_way * magnitude(way) + least_margin<S>;
+  }
+};
+
 // ---- One moment -------------------------------------------------------------------------------------------
 
 template <class S, std::uint32_t width>
 void make(const WideMoment<S>& moment, std::uint32_t node) {
   constexpr std::size_t scalars = 6 * width;
-  const S margin = moment.ends.margin, s = moment.fraction;
+  const MomentMargin<S> margin(moment.ends.rounding);
+  const S s = moment.fraction;
   const S* first = moment.ends.child_bounds[0] + node * scalars;
   const S* last = moment.ends.child_bounds[1] + node * scalars;
   S* rows = moment.hierarchy.child_bounds + node * scalars;
   // Upper bounds are stored negated: smaller is further out in every row. Empty lanes become NaN, which
   // overlaps nothing either.
-  for (std::size_t i = 0; i < scalars; ++i) rows[i] = first[i] + s * (last[i] - first[i]) - margin;
+  for (std::size_t i = 0; i < scalars; ++i) {
+    const S way = last[i] - first[i];
+    rows[i] = first[i] + s * way - margin(first[i], way);
+  }
   const S* own_first = moment.ends.node_bounds[0] + std::size_t(8) * node;
   const S* own_last = moment.ends.node_bounds[1] + std::size_t(8) * node;
   S* node_bounds = moment.hierarchy.node_bounds + std::size_t(8) * node;
-  for (std::size_t i = 0; i < 8; ++i)
-    node_bounds[i] = own_first[i] + s * (own_last[i] - own_first[i]) + (i < 4 ? -margin : margin);
+  for (std::size_t i = 0; i < 8; ++i) {
+    const S way = own_last[i] - own_first[i], outwards = margin(own_first[i], way);
+    node_bounds[i] = own_first[i] + s * way + (i < 4 ? -outwards : outwards);
+  }
 }
 
 /// Stored boxes that are computed at the first visit.
@@ -51,20 +85,21 @@ void at(WideMoment<S> a, WideMoment<S> b, WideTraversal& state) {
 // ---- A whole segment --------------------------------------------------------------------------------------
 
 /// A box at both ends, in the form to compare rows of the other side with: upper bounds and negated lower
-/// bounds, both inflated by the margin.
+/// bounds, both inflated by what rounding can do to both sides.
 template <class S>
 struct Reach {
   S bound[2][6];
 };
 
 template <class S>
-[[gnu::always_inline]] inline Reach<S> reach_of(const SixSides<S>& first, const SixSides<S>& last, S margin) {
+[[gnu::always_inline]] inline Reach<S> reach_of(const SixSides<S>& first, const SixSides<S>& last,
+                                                S rounding) {
   Reach<S> reach;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    reach.bound[0][axis] = first.upper[axis] + margin;
-    reach.bound[0][axis + 3] = margin - first.lower[axis];
-    reach.bound[1][axis] = last.upper[axis] + margin;
-    reach.bound[1][axis + 3] = margin - last.lower[axis];
+    reach.bound[0][axis] = first.upper[axis] + side_margin(first.upper[axis], rounding);
+    reach.bound[0][axis + 3] = side_margin(first.lower[axis], rounding) - first.lower[axis];
+    reach.bound[1][axis] = last.upper[axis] + side_margin(last.upper[axis], rounding);
+    reach.bound[1][axis + 3] = side_margin(last.lower[axis], rounding) - last.lower[axis];
   }
   return reach;
 }
@@ -144,21 +179,21 @@ template <class S, std::uint32_t width, bool self>
 struct SegmentView {
   static constexpr bool within_one = self, selects = false;
   WideEnds<S> a, b;
-  S margin;
+  S rounding;
   static constexpr std::size_t row_scalars = 6 * width;
 
   [[gnu::always_inline]] SegmentView(const WideEnds<S>& first, const WideEnds<S>& second)
-      : a(first), b(second), margin(first.margin + second.margin) {}
+      : a(first), b(second), rounding(both_roundings(first, second)) {}
   [[gnu::always_inline]] static bool waits(const WideTraversal&) { return false; }
   [[gnu::always_inline]] static void enter(std::uint32_t, std::uint32_t) {}
   [[gnu::always_inline]] Reach<S> own_b(std::uint32_t node) const {
     return reach_of(own_box(b.node_bounds[0] + std::size_t(8) * node),
-                    own_box(b.node_bounds[1] + std::size_t(8) * node), margin);
+                    own_box(b.node_bounds[1] + std::size_t(8) * node), rounding);
   }
   [[gnu::always_inline]] Reach<S> lane_of(const WideEnds<S>& ends, std::uint32_t node,
                                           std::uint32_t lane) const {
     return reach_of(lane_box(ends.child_bounds[0] + node * row_scalars, width, lane),
-                    lane_box(ends.child_bounds[1] + node * row_scalars, width, lane), margin);
+                    lane_box(ends.child_bounds[1] + node * row_scalars, width, lane), rounding);
   }
   [[gnu::always_inline]] Reach<S> lane_a(std::uint32_t node, std::uint32_t lane) const {
     return lane_of(a, node, lane);
@@ -264,12 +299,13 @@ template <class S, std::size_t padded>
 struct LeafReach {
   alignas(64) S bound[2][6][padded];  ///< by end, side and primitive
 
-  [[gnu::always_inline]] void make(const LeafRows<S>& leaf, S margin) {
+  [[gnu::always_inline]] void make(const LeafRows<S>& leaf, S rounding) {
     for (std::size_t side = 0; side < 6; ++side) {
       const std::size_t opposite = (side < 3 ? side + 3 : side - 3) * padded;
       for (std::size_t i = 0; i < padded; ++i) {
-        bound[0][side][i] = margin - leaf.first[opposite + i];
-        bound[1][side][i] = margin - leaf.last[opposite + i];
+        const S first = leaf.first[opposite + i], last = leaf.last[opposite + i];
+        bound[0][side][i] = side_margin(first, rounding) - first;
+        bound[1][side][i] = side_margin(last, rounding) - last;
       }
     }
   }
@@ -348,10 +384,10 @@ struct PartlyBatch {
 /// the overlap would cost as much as the comparisons, so only the ends of loops branch.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline void leaf_pairs(const LeafRows<S>& outer, unsigned bits,
-                                              const LeafRows<S>& inner, unsigned inner_bits, S margin,
+                                              const LeafRows<S>& inner, unsigned inner_bits, S rounding,
                                               bool swapped, WideLeafJoin<S>& state, PartlyBatch<S>& batch) {
   LeafReach<S, padded> reach;
-  reach.make(outer, margin);
+  reach.make(outer, rounding);
   JoinColumns& all = state.throughout;
   std::uint32_t* const column_outer = swapped ? all.primitive_b : all.primitive_a;
   std::uint32_t* const column_inner = swapped ? all.primitive_a : all.primitive_b;
@@ -389,7 +425,7 @@ template <class S, std::size_t padded>
 template <class S, std::size_t padded, bool selected>
 void leaf_join(WideLeafJoin<S>& shared) {
   WideLeafJoin<S> state = shared;
-  const S margin = state.ends_a.margin + state.ends_b.margin;
+  const S rounding = both_roundings(state.ends_a, state.ends_b);
   const auto number = [](const WideArrays<S>& h, LeafSlot slot) {
     return h.nodes[slot.node()].first_leaf + slot.lane();
   };
@@ -399,10 +435,10 @@ void leaf_join(WideLeafJoin<S>& shared) {
     return LeafRows<S>{leaves.rows[0] + place, leaves.rows[1] + place, leaves.lists.primitives + begin,
                        end - begin};
   };
-  const auto box_of = [margin, width = state.width](const WideEnds<S>& ends, LeafSlot slot) {
+  const auto box_of = [rounding, width = state.width](const WideEnds<S>& ends, LeafSlot slot) {
     const std::size_t place = slot.node() * std::size_t(6) * width;
     return reach_of(lane_box(ends.child_bounds[0] + place, width, slot.lane()),
-                    lane_box(ends.child_bounds[1] + place, width, slot.lane()), margin);
+                    lane_box(ends.child_bounds[1] + place, width, slot.lane()), rounding);
   };
   PartlyBatch<S> batch;
   std::size_t made = state.next;
@@ -431,14 +467,14 @@ void leaf_join(WideLeafJoin<S>& shared) {
       const unsigned second = rest == 0 ? 0 : near_b & state.selected_b[number(state.b, slot_b)];
       state.tests += std::uint64_t(unsigned(__builtin_popcount(first))) * b.count +
                      std::uint64_t(unsigned(__builtin_popcount(second))) * a.count;
-      if (first != 0) leaf_pairs<S, padded>(a, first, b, near_b, margin, false, state, batch);
-      if (second != 0) leaf_pairs<S, padded>(b, second, a, rest, margin, true, state, batch);
+      if (first != 0) leaf_pairs<S, padded>(a, first, b, near_b, rounding, false, state, batch);
+      if (second != 0) leaf_pairs<S, padded>(b, second, a, rest, rounding, true, state, batch);
     } else if (count_a <= count_b) {
       state.tests += std::uint64_t(count_a) * b.count;
-      leaf_pairs<S, padded>(a, near_a, b, near_b, margin, false, state, batch);
+      leaf_pairs<S, padded>(a, near_a, b, near_b, rounding, false, state, batch);
     } else {
       state.tests += std::uint64_t(count_b) * a.count;
-      leaf_pairs<S, padded>(b, near_b, a, near_a, margin, true, state, batch);
+      leaf_pairs<S, padded>(b, near_b, a, near_a, rounding, true, state, batch);
     }
   }
   if (batch.count > 0) batch.flush(state.partly);

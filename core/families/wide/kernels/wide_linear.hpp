@@ -9,13 +9,40 @@ enum class KernelSet : std::uint8_t;
 
 /// Boxes of a wide hierarchy that are linear in time over a segment: child and node bounds as in
 /// `WideArrays`, at its start and at its end. A box at a fraction in between is the interpolation, inflated
-/// by the margin on every side.
+/// by what rounding can do to each of its sides.
+///
+/// Let x0 and x1 be a lower side at the ends, the smallest stored positions there, u half an epsilon, and r
+/// `rounding`. The line A of a vertex is at an end off its stored position P by r |P| at most, and x - r |x|
+/// grows with x, so A >= x - r |x| there, and at a fraction f
+///   A >= (1 - f) x0 + f x1 - r ((1 - f) |x0| + f |x1|).
+/// The position B of a frame is A rounded to nearest, which is monotone: the same sum, rounded, is no larger
+/// than B. So rounding depends on the two numbers of one side alone, neither on other axes nor on other
+/// boxes. Upper sides are mirror images.
+///
+/// Two boxes over a segment (`side_margin`): where B of one body is not above B of another one, the rounded
+/// sums of their sides x and y are not, either, and the gap x - y is at most (ra + u)(1 + u) |x| +
+/// (rb + u)(1 + u) |y|, in the mean of both ends. With |x| <= |x - y| + |y| the coordinates of one box
+/// suffice: y moves outwards by c |y|, where c = ra + rb + 2 u, and 2 u more for the rounding of the moved
+/// side and for products of roundings. What is neglected is some u of the gap, and thus of the fraction at
+/// which it closes, which `fraction_slack` covers.
+///
+/// A box at a fraction s (`moment_margin`): the last operation rounds to nearest, as B is rounded, and costs
+/// nothing. The sum before it, x0 + s (x1 - x0), is off by u of the result, by 2 u s |x1 - x0| for difference
+/// and product, and by 3 u s |x1 - x0| for the fraction, of three roundings in double. With r that is
+/// (r + u) |x0| + (r + 6 u) |x1 - x0|, to which u and 2 u are added for the roundings of the margin.
 template <class S>
 struct WideEnds {
   const S* child_bounds[2];
   const S* node_bounds[2];
-  S margin;
+  /// The largest distance of a vertex's line from its stored position at an end, over that coordinate.
+  S rounding;
 };
+/// Half a unit of rounding, over the number that is rounded; and the smallest normal number, which bounds
+/// what underflow loses.
+template <class S>
+inline constexpr S unit_rounding = sizeof(S) == 4 ? S(0x1p-24) : S(0x1p-53);
+template <class S>
+inline constexpr S least_margin = sizeof(S) == 4 ? S(0x1p-126) : S(0x1p-1022);
 
 /// Boxes at one fraction of the segment, computed from the ends when the traversal first visits a node.
 template <class S>
