@@ -26,10 +26,12 @@
 // For larger leaves it reports all pairs: these come several at a time, and are filtered by their boxes.
 //
 // Denormals. Embree flushes them. Denormal bounds are widened to the smallest normal number, so that flushing
-// cannot lose a pair. Bounds beyond 1.8e18, which Embree treats as invalid, are clamped. Both operations are
-// monotone, like flushing: boxes that touch still touch. kbvh's own test follows after the floating-point
-// state is restored. Upper bounds are an ulp or two larger, because Embree's builder asserts that the box of
-// all primitives is not a point.
+// cannot lose a pair. This is monotone, like flushing: boxes that touch still touch. kbvh's own test follows
+// after the floating-point state is restored. Upper bounds are an ulp or two larger, because Embree's builder
+// asserts that the box of all primitives is not a point.
+//
+// Range. Coordinates up to 1.8e18 (largest_coordinate): Embree treats bounds from 1.844e18 on as invalid,
+// leaves their primitives out without a word, and aborts the program where that leaves none.
 //
 // Rays. rtcIntersect1 and rtcOccluded1 on triangle geometry, body after body: the fan of each polygon in a
 // compact scene that is refitted like the others (with geometry=triangles and bodies of triangles, by the
@@ -205,7 +207,6 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     ray_order_.start(this->scene_, [&](std::uint32_t body) { return box_for_rays(bodies_[body]); });
     for (std::size_t i = 0; i < rays.size(); ++i) {
       hits[i] = {};
-      if (!is_valid(rays[i])) continue;
       RTCRayHit found = ray_of(rays[i]);
       const auto limit = [&] { return double(found.ray.tfar); };
       tests += ray_order_.follow(RaySearch<S>(rays[i], query).line(), limit, [&](std::uint32_t body, bool) {
@@ -384,22 +385,19 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   static void hand_over(const Bounds& tight, RTCBounds& box) {
     constexpr float twice_smallest = 2 * std::numeric_limits<float>::min();
     constexpr float ulp = std::numeric_limits<float>::epsilon();
-    const Lanes sides[2] = {
-        (tight.lower - twice_smallest).max(-largest_bound).min(largest_bound),
-        (tight.upper + (tight.upper.abs() * ulp + twice_smallest)).max(-largest_bound).min(largest_bound)};
+    const Lanes sides[2] = {tight.lower - twice_smallest,
+                            tight.upper + (tight.upper.abs() * ulp + twice_smallest)};
     static_assert(sizeof(RTCBounds) == sizeof(sides));
     std::memcpy(&box, sides, sizeof(box));
   }
 
-  /// The root box of the triangles, which no query reads, must lie within that of the boxes, as far as these
-  /// reach.
+  /// The root box of the triangles, which no query reads, must lie within that of the boxes.
   static bool bounds_triangles(const BodyState& state) {
     RTCBounds boxes, triangles;
     rtcGetSceneBounds(state.boxes.scene.get(), &boxes);
     rtcGetSceneBounds(state.triangles.scene.get(), &triangles);
     const auto within = [](float lower, float inner_lower, float inner_upper, float upper) {
-      return lower <= std::clamp(inner_lower, -largest_bound, largest_bound) &&
-             std::clamp(inner_upper, -largest_bound, largest_bound) <= upper;
+      return lower <= inner_lower && inner_upper <= upper;
     };
     return within(boxes.lower_x, triangles.lower_x, triangles.upper_x, boxes.upper_x) &&
            within(boxes.lower_y, triangles.lower_y, triangles.upper_y, boxes.upper_y) &&
@@ -477,6 +475,7 @@ KBVH_STRATEGY(embree) {
   info.positions = PositionUse::all;
   info.topology.own = true;
   info.own_scalar = "float";
+  info.max_coordinate = largest_coordinate;
   info.parameters = {{"geometry",
                       "user",
                       {"user", "triangles"},
