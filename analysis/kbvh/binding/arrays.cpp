@@ -61,7 +61,8 @@ py::array real_array(const py::object& given, const std::string& what) {
   }
   const char kind = array.dtype().kind();
   if (array.size() == 0 || kind == 'f' || kind == 'i' || kind == 'u') return array;
-  if (array.ndim() == 0) throw std::invalid_argument(what + " is no array of numbers, but " + in_words(given));
+  if (array.ndim() == 0)
+    throw std::invalid_argument(what + " is no array of numbers, but " + in_words(given));
   throw std::invalid_argument(what + ": real numbers are needed, not " + std::string(py::str(array.dtype())));
 }
 
