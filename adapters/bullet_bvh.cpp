@@ -348,6 +348,7 @@ KBVH_STRATEGY(bullet_bvh) {
   using namespace kbvh;
   Info info = bullet::info("bullet_bvh", "Bullet quantised BVH, refit");
   info.tightness = Tightness::conservative;
+  info.max_coordinate = 1e18;
   info.parameters.push_back({"query",
                              "trees",
                              {"trees", "primitives"},

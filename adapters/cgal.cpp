@@ -14,6 +14,8 @@
 //   triangles CGAL's default of 10 takes 4.5 times as long as 1000 (100: 2.4 times, 5000: 1.2 times).
 // - The splits are random, by a generator that starts anew at every split: equal input gives equal work.
 //
+// Range: everything admissible. CGAL compares coordinates and computes nothing with them.
+//
 // The update computes the boxes; the query is CGAL's. There is no hierarchy to audit, and no count of box
 // tests.
 #include <CGAL/box_intersection_d.h>

@@ -32,17 +32,19 @@
 // primitives' boxes.
 //
 // Denormals. Embree flushes them. The adapter widens denormal bounds to the smallest normal number, so that
-// flushing cannot lose a pair, and clamps bounds beyond 1.8e18, which Embree treats as invalid. Both
-// operations are monotone, like flushing: boxes that touch still touch. kbvh's own test follows after the
-// floating-point state is restored. Upper bounds are an ulp or two larger, because Embree's builder asserts
-// that the box of all primitives is not a point.
+// flushing cannot lose a pair. This is monotone, like flushing: boxes that touch still touch. kbvh's own test
+// follows after the floating-point state is restored. Upper bounds are an ulp or two larger, because Embree's
+// builder asserts that the box of all primitives is not a point.
+//
+// Range. Coordinates up to 1.8e18 (largest_coordinate): Embree treats bounds from 1.844e18 on as invalid,
+// leaves their primitives out without a word, and aborts the program where that leaves none.
 //
 // Rays. rtcIntersect1 and rtcOccluded1 on triangle geometry, body after body: the triangles of all
-// polygons in a scene that is refitted like the others. With geometry=triangles and bodies of triangles the update itself
-// refits it. Otherwise the first ray of a frame that enters the body does, so the time of rays includes that
-// refit. Bodies are entered front to back, and not at all behind the closest hit so far. Embree decides in
-// float, with no bound on its error, and may miss rays through edges and corners: its answers are marked
-// approximate, and their differences from the truth are counted.
+// polygons in a scene that is refitted like the others. With geometry=triangles and bodies of triangles the
+// update itself refits it. Otherwise the first ray of a frame that enters the body does, so the time of rays
+// includes that refit. Bodies are entered front to back, and not at all behind the closest hit so far. Embree
+// decides in float, with no bound on its error, and may miss rays through edges and corners: its answers are
+// marked approximate, and their differences from the truth are counted.
 //
 // Embree does not show its hierarchy, so there is no audit. Float scenes only.
 #include <Eigen/Core>
@@ -212,7 +214,6 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
     ray_order_.start(this->scene_, [&](std::uint32_t body) { return box_for_rays(bodies_[body]); });
     for (std::size_t i = 0; i < rays.size(); ++i) {
       hits[i] = {};
-      if (!is_valid(rays[i])) continue;
       RTCRayHit found = ray_of(rays[i]);
       const auto limit = [&] { return double(found.ray.tfar); };
       tests += ray_order_.follow(RaySearch<S>(rays[i], query).line(), limit, [&](std::uint32_t body, bool) {
@@ -389,22 +390,19 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
   static void hand_over(const Bounds& tight, RTCBounds& box) {
     constexpr float twice_smallest = 2 * std::numeric_limits<float>::min();
     constexpr float ulp = std::numeric_limits<float>::epsilon();
-    const Lanes sides[2] = {
-        (tight.lower - twice_smallest).max(-largest_bound).min(largest_bound),
-        (tight.upper + (tight.upper.abs() * ulp + twice_smallest)).max(-largest_bound).min(largest_bound)};
+    const Lanes sides[2] = {tight.lower - twice_smallest,
+                            tight.upper + (tight.upper.abs() * ulp + twice_smallest)};
     static_assert(sizeof(RTCBounds) == sizeof(sides));
     std::memcpy(&box, sides, sizeof(box));
   }
 
-  /// The root box of the triangles, which no query reads, must lie within that of the boxes, as far as these
-  /// reach.
+  /// The root box of the triangles, which no query reads, must lie within that of the boxes.
   static bool bounds_triangles(const BodyState& state) {
     RTCBounds boxes, triangles;
     rtcGetSceneBounds(state.boxes.scene.get(), &boxes);
     rtcGetSceneBounds(state.triangles.scene.get(), &triangles);
     const auto within = [](float lower, float inner_lower, float inner_upper, float upper) {
-      return lower <= std::clamp(inner_lower, -largest_bound, largest_bound) &&
-             std::clamp(inner_upper, -largest_bound, largest_bound) <= upper;
+      return lower <= inner_lower && inner_upper <= upper;
     };
     return within(boxes.lower_x, triangles.lower_x, triangles.upper_x, boxes.upper_x) &&
            within(boxes.lower_y, triangles.lower_y, triangles.upper_y, boxes.upper_y) &&
@@ -490,6 +488,7 @@ KBVH_STRATEGY(embree) {
   info.positions = PositionUse::all;
   info.topology.own = true;
   info.own_scalar = "float";
+  info.max_coordinate = largest_coordinate;
   info.parameters = {{"geometry",
                       "user",
                       {"user", "triangles"},

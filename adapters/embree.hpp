@@ -2,7 +2,6 @@
 // Owners of Embree's objects, and what the adapter asks of them.
 #include <embree3/rtcore.h>
 
-#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -98,22 +97,17 @@ struct RefitScene {
   }
 };
 
-/// Returns a ray as Embree takes it; geometry identifiers are those of no hit.
-inline constexpr float largest_bound = 1.8e18F;  ///< that is passed to Embree
+/// The largest coordinate that is passed to Embree. Its FLT_LARGE is 1.844e18: it leaves primitives out whose
+/// bounds reach that, and asserts that rays do not.
+inline constexpr double largest_coordinate = 1.8e18;
 
-/// Embree asserts that rays are within its range of numbers; others count as misses.
-inline bool is_valid(const Ray<float>& ray) {
-  for (const float* const values : {ray.origin, ray.direction})
-    for (int axis = 0; axis < 3; ++axis)
-      if (!(std::abs(values[axis]) <= largest_bound)) return false;
-  return true;
-}
 inline Box<float> bounds_of_scene(const RefitScene& scene) {
   if (!scene.scene) return {};
   RTCBounds bounds;
   rtcGetSceneBounds(scene.scene.get(), &bounds);
   return {{bounds.lower_x, bounds.lower_y, bounds.lower_z}, {bounds.upper_x, bounds.upper_y, bounds.upper_z}};
 }
+/// Returns a ray as Embree takes it; geometry identifiers are those of no hit.
 inline RTCRayHit ray_of(const Ray<float>& ray) {
   RTCRayHit made{};
   made.ray.org_x = ray.origin[0];

@@ -10,6 +10,7 @@ import json
 import math
 import sys
 from dataclasses import dataclass, field
+from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Optional
@@ -234,7 +235,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "key": str(record.get("key", "")),
         "session": str(record.get("run", "")),
         "kind": record.text("kind"),
-        "when": record.text("when", ""),
+        "when": _time(record.text("when", "")),
         "commit": record.text("commit", ""),
         "dirty": record.flag("dirty", False),
         **machine,
@@ -310,6 +311,18 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         [row["scene_name"], row["hash"], row["primitives"], row["scalar"], row["l"], str(row["frames"]), row["machine"]]
     )
     return row
+
+
+def _time(text: str) -> str:
+    """Returns a time as kbvh writes it; empty for a day that does not exist: it would be the newest one.
+
+    >>> _time("2026-01-31T23:59:59Z"), _time("2999-13-45T00:00:00Z")
+    ('2026-01-31T23:59:59Z', '')
+    """
+    try:
+        return text if datetime.strptime(text, "%Y-%m-%dT%H:%M:%SZ") else ""
+    except ValueError:
+        return ""
 
 
 def _object(record: _Record, path: str) -> dict[str, Any]:

@@ -66,16 +66,16 @@ def run(options: argparse.Namespace) -> int:
     targets = targets_table.load_targets(file) if file.exists() else []
     claims = paper_claims.evaluate(study, options.folder)
     paper_claims.write(claims, options.folder)
+    hint = ""
     try:
         explorer = explore.PAGE if explore.program() else ""
     except explore.NotBuilt as reason:
-        explorer = ""
-        print(f"report: {explore.PAGE} is not written: {reason}", file=sys.stderr)
+        explorer, hint = "", f"{explore.PAGE} is not written: {reason}"
     page = write(study, options.folder, options.title, options.figures, targets, claims, explorer)
     if explorer:
         title = "" if options.title == explore.TITLE else options.title  # else the plan's question
         explore.write(load(options.folder, ONE_OF_EACH_COMMIT), options.folder, title, claims)
-    for note in study.notes:
+    for note in [*study.notes, *([hint] if hint else [])]:  # last: a report that is not written needs no hint
         print(f"report: {note}", file=sys.stderr)
     if options.printed:
         for scene, group in plain_groups(study):

@@ -183,7 +183,8 @@ class Strategy:
         raise NotImplementedError
 
     def counters(self) -> dict[str, int]:
-        """Returns what was counted since the last `reset`, by names of kbvh's counters or by own ones."""
+        """Returns what was counted since the last `reset`, by names of kbvh's counters or by own ones: whole numbers from 0 to
+        2**64 - 1."""
         return {}
 
     def bytes(self) -> int:
@@ -233,6 +234,10 @@ def register(cls: S) -> S:
         raise TypeError(f"{cls!r} is no class derived from kbvh.Strategy")
     if not _overrides(cls, "candidates"):
         raise _core.ConfigError(f"strategy '{cls.id}' has no method candidates")
+    if isinstance(cls.primitives, str):
+        raise TypeError(f"strategy '{cls.id}': its primitives are a list of words, not the text '{cls.primitives}'")
+    if cls.topology is not None and not isinstance(cls.topology, Mapping):
+        raise TypeError(f"strategy '{cls.id}': its topology is a dictionary or None, not {type(cls.topology).__name__}")
     if cls.foresight not in _MOTIONS:
         raise _core.ConfigError(f"strategy '{cls.id}': its foresight is one of {', '.join(_MOTIONS)}, not '{cls.foresight}'")
     abilities = [

@@ -18,6 +18,10 @@ SHAPES = ("polygons", "points", "control_nets")
 PathLike = Union[str, "os.PathLike[str]"]
 
 
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 @dataclass
 class Body:
     """A mesh and its motion.
@@ -51,9 +55,9 @@ class Body:
                 f"body '{self.name}': positions are [vertex][3] or [keyframe][vertex][3], not {list(self.positions.shape)}"
             )
         if self.times is None and self.positions.ndim == 3:
-            raise ValueError(f"body '{self.name}': {self.positions.shape[0]} keyframes need times")
+            raise ValueError(f"body '{self.name}': {_counted(self.positions.shape[0], 'keyframe')} without times")
         if self.times is not None and np.size(self.times) != self.keyframes:
-            raise ValueError(f"body '{self.name}': {np.size(self.times)} times, but positions at {self.keyframes} keyframes")
+            raise ValueError(f"body '{self.name}': {_counted(np.size(self.times), 'time')}, but positions at {_counted(self.keyframes, 'keyframe')}")
         if not self.known and self.positions.ndim == 3:
             raise ValueError(f"body '{self.name}': an unknown motion has no keyframes")
 

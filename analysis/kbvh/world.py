@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import warnings
 from dataclasses import dataclass
 from typing import Any, Iterator, Mapping, Optional, Sequence, Union
 
@@ -32,6 +33,14 @@ def words(given: Optional[Words]) -> dict[str, str]:
     return out
 
 
+def _real(given: npt.ArrayLike, what: str) -> Array:
+    """Returns an array of whole or real numbers. Raises ValueError for text, dates and complex numbers."""
+    array = np.asarray(given)
+    if array.size and array.dtype.kind not in "fiu":
+        raise ValueError(f"{what} are no real numbers, but {array.dtype}")
+    return array
+
+
 def padded(positions: npt.ArrayLike, precision: str = "float32") -> Array:
     """Returns an array of the positions, [vertex][3], that a world of this precision reads without a copy: its memory has one
     more number at the end, as vector instructions need it.
@@ -40,7 +49,7 @@ def padded(positions: npt.ArrayLike, precision: str = "float32") -> Array:
     >>> kbvh.padded(np.ones((4, 3))).base.shape
     (13,)
     """
-    given = np.asarray(positions)
+    given = _real(positions, "positions")
     memory = np.zeros(given.size + 1, dtype=precision)
     out = memory[:-1].reshape(-1, 3)
     out[...] = given
@@ -88,8 +97,8 @@ class World:
     width, leaf_size), `t` the time of the start; by default that of the first keyframe. Input in the world's precision (float32
     or float64) and in C order is read where it lies; the world keeps its own copy of keyframes.
 
-    Raises ValueError for wrong input (ConfigError for a strategy or parameter), RuntimeError for calls in the wrong order and
-    for abilities that the strategy lacks; nothing has changed then.
+    Raises ValueError or TypeError for wrong input (ConfigError for a strategy or parameter), RuntimeError for calls in the wrong
+    order and for abilities that the strategy lacks; nothing has changed then. Ctrl-C ends a long call at its next frame.
 
     >>> sheet = kbvh.scene("waving_sheet", triangles=200, keyframes=3)
     >>> world = kbvh.World(sheet, "drift_boxes", precision="float64")
@@ -249,7 +258,7 @@ class World:
     ) -> Array:
         """Answers rays at the current time: the points origin + s * direction, [ray][3] each, with 0 <= s <= length. Returns for each
         ray the body and primitive that it meets first (query "any": one that it meets) and s as parameter; 2**32 - 1 and infinity
-        for a miss. Only polygons are met.
+        for a miss. Only polygons are met. Rays are rounded to the world's precision; a warning says so where that changes one.
 
         >>> world = kbvh.World([kbvh.Body([0, 1, 2], np.eye(3))], "bottom_up")
         >>> world.hits([[0, 0, 0], [5, 5, 5]], [[1, 1, 1], [1, 0, 0]]).tolist()
@@ -257,12 +266,22 @@ class World:
         """
         if query not in ("closest", "any"):
             raise ValueError(f"a ray's query is closest or any, not '{query}'")
-        starts = np.atleast_2d(np.asarray(origins, dtype=float))
+        starts = np.atleast_2d(_real(origins, "origins of rays"))
         rays = np.empty((len(starts), 7))
         try:
-            rays[:, :3], rays[:, 3:6], rays[:, 6] = starts, directions, lengths
-        except ValueError:
+            rays[:, :3], rays[:, 3:6] = starts, _real(directions, "directions of rays")
+            rays[:, 6] = _real(lengths, "lengths of rays")
+        except ValueError as reason:
+            if "real numbers" in str(reason):
+                raise
             raise ValueError(f"{len(starts)} rays need origins and directions [ray][3], and lengths [ray]") from None
+        if self.precision == "float32":
+            with np.errstate(over="ignore"):
+                rounded = rays.astype(np.float32)
+            changed = int(np.count_nonzero(np.any((rounded != rays) & ~np.isnan(rays), axis=1)))
+            if changed:
+                whose = "ray of this call was" if changed == 1 else "rays of this call were"
+                warnings.warn(f"{changed} {whose} rounded to float32, the precision of the world", stacklevel=2)
         return self._core.hits(rays, query == "any")
 
     def next_knot(self) -> float:

@@ -113,6 +113,8 @@ def page(
         ["can", ", ".join(word.replace("_", " ") for word in info["capabilities"]) or "pairs between bodies at frames"],
         ["primitives", ", ".join(word.replace("_", " ") for word in info["primitives"])],
     ]
+    most = info["max_coordinate"]
+    rows.append(["coordinates", "every admissible one" if most is None else f"up to {most:g}; scenes that reach beyond are refused"])
     topology = info["topology"]
     if topology:
         own = topology["preferred"]

@@ -1,9 +1,11 @@
 #include "core/contract/registry.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "core/base/assert.hpp"
+#include "core/motion/admissible.hpp"
 #include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
@@ -54,6 +56,26 @@ BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> meth
   return config;
 }
 
+namespace {
+
+/// Returns where a keyframe is beyond the range of the contestant; empty if none is.
+template <class S>
+std::string beyond_range(const Info& info, const Body<S>& body) {
+  const FlightPlans<S>& plans = body.plans;
+  for (std::size_t k = 0; k < plans.keyframe_count(); ++k) {
+    const S* const positions = plans.keyframe(k);
+    for (std::size_t i = 0; i < std::size_t(3) * plans.keyframed_count(); ++i)
+      if (std::abs(double(positions[i])) > info.max_coordinate)
+        return "takes coordinates up to " + number_text(info.max_coordinate) + ", but vertex " +
+               std::to_string(i / 3) + " of body '" + body.name + "' is at " + "xyz"[i % 3] + " = " +
+               number_text(double(positions[i])) +
+               (plans.keyframe_count() > 1 ? " at keyframe " + std::to_string(k) : "");
+  }
+  return {};
+}
+
+}  // namespace
+
 template <class S>
 std::string unsuitable_bodies(const Info& info, const Scene<S>& scene) {
   if (has_self_pairs(scene.pairs) && !info.can.self_pairs) return "cannot answer pairs within one body";
@@ -65,6 +87,8 @@ std::string unsuitable_bodies(const Info& info, const Scene<S>& scene) {
     if (body.plans.is_handed_in() && info.foresight != Foresight::none)
       return "needs to know the motion in advance, but the positions of body '" + body.name +
              "' are handed in frame by frame";
+    if (info.max_coordinate < double(admissible_magnitude<S>))
+      if (std::string where = beyond_range(info, body); !where.empty()) return where;
   }
   return {};
 }

@@ -146,8 +146,8 @@ BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> meth
                                std::optional<std::uint32_t> width, std::optional<std::uint32_t> leaf_size);
 
 /// Returns the reason why the strategy cannot play a scene of these bodies, as the end of a sentence that
-/// begins with its id; empty if it can. Checks pairs within a body, kinds of primitives, and positions handed
-/// in frame by frame.
+/// begins with its id; empty if it can. Checks pairs within a body, kinds of primitives, positions handed in
+/// frame by frame, and the range of keyframes.
 template <class S>
 std::string unsuitable_bodies(const Info& info, const Scene<S>& scene);
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -11,6 +12,7 @@
 #include "core/contract/audit_volumes.hpp"
 #include "core/contract/event_source.hpp"
 #include "core/contract/queries.hpp"
+#include "core/motion/admissible.hpp"
 #include "core/scene/geometry_change.hpp"
 #include "core/scene/motion_view.hpp"
 #include "core/scene/pair_difference.hpp"
@@ -100,6 +102,10 @@ struct Info {
   /// The largest scene on which the strategy runs, in primitive pairs of one body pair (quadratic
   /// contestants); 0: any.
   std::uint64_t max_primitive_pairs = 0;
+  /// The largest magnitude of a coordinate, of positions during the whole motion and of rays, with which the
+  /// contestant works; what reaches beyond is refused. Infinite: everything admissible
+  /// (core/motion/admissible.hpp).
+  double max_coordinate = std::numeric_limits<double>::infinity();
   /// Calls a peer library's own, uncertified test of two moving features (core/continuous/impact.hpp) and
   /// returns whether it reports contact. `kbvh ccd` compares it with the exact test. Null: there is none.
   bool (*own_impact)(Contact::Kind kind, const MovingPoints& points) = nullptr;
@@ -145,7 +151,7 @@ class Strategy {
   /// Restarts at time t (first frame, loops, lessons): afterwards all bounds are valid at t. Clears counters.
   /// Throws std::invalid_argument if t is not finite.
   void reset(double t) {
-    if (!std::isfinite(t)) throw std::invalid_argument("cannot start at t = " + std::to_string(t));
+    if (!std::isfinite(t)) throw std::invalid_argument("cannot start at t = " + number_text(t));
     triangle_stats_ = {};
     previous_time_ = time_ = t;
     between_frames_ = false;
@@ -366,8 +372,8 @@ class Strategy {
   void check_not_before(double t) const {
     const double earliest = between_frames_ ? earliest_ : time_;
     if (!(t >= earliest) || !std::isfinite(t))
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(earliest) + " back to " +
-                                  std::to_string(t));
+      throw std::invalid_argument("cannot advance from t = " + number_text(earliest) + " back to " +
+                                  number_text(t));
   }
   void move_to(double t) {
     check_not_before(t);
@@ -377,11 +383,11 @@ class Strategy {
   }
   void stand_at(double t) const {
     if (between_frames_)
-      throw std::invalid_argument("asked for t = " + std::to_string(t) +
+      throw std::invalid_argument("asked for t = " + number_text(t) +
                                   ", but the strategy stands between frames, after an event");
     if (t != time_)
-      throw std::invalid_argument("asked for t = " + std::to_string(t) + ", but the strategy stands at " +
-                                  std::to_string(time_));
+      throw std::invalid_argument("asked for t = " + number_text(t) + ", but the strategy stands at " +
+                                  number_text(time_));
   }
 
   double time_ = 0, previous_time_ = 0;

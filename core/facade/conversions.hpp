@@ -39,6 +39,10 @@ inline Primitives primitives_of(const Connectivity& connectivity) {
     return primitives;
   }
   const auto offsets = connectivity.offsets;
+  if (offsets.front() != 0 || offsets.back() != indices.size())
+    throw std::invalid_argument("offsets run from 0 to the number of indices, " +
+                                std::to_string(indices.size()) + ", not from " +
+                                std::to_string(offsets.front()) + " to " + std::to_string(offsets.back()));
   for (std::size_t p = 0; p + 1 < offsets.size(); ++p) {
     if (offsets[p] > offsets[p + 1] || offsets[p + 1] > indices.size())
       throw std::invalid_argument("primitive " + std::to_string(p) + " has indices " +

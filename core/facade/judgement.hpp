@@ -32,7 +32,7 @@ inline void check_frames(std::span<const double> frames) {
   for (std::size_t i = 0; i < frames.size(); ++i)
     if (!std::isfinite(frames[i]) || (i > 0 && frames[i] < frames[i - 1]))
       throw std::invalid_argument("frame " + std::to_string(i) +
-                                  " cannot be at t = " + std::to_string(frames[i]));
+                                  " cannot be at t = " + number_text(frames[i]));
 }
 
 }  // namespace kbvh::facade

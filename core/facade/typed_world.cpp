@@ -119,8 +119,7 @@ class TypedWorld final : public detail::WorldImplementation {
     if (!session().info().can.spans)
       throw std::logic_error("'" + session().info().id + "' does not declare spans");
     if (!(t >= time()) || !std::isfinite(t))
-      throw std::invalid_argument("spans from t = " + std::to_string(time()) +
-                                  " to t = " + std::to_string(t));
+      throw std::invalid_argument("spans from t = " + number_text(time()) + " to t = " + number_text(t));
     spans_.clear();
     session().spans(t, spans_);
     out.clear();
@@ -196,8 +195,8 @@ class TypedWorld final : public detail::WorldImplementation {
     const FlightPlans<S>& plans = session().playback().plans(body);
     if (plans.is_handed_in())
       throw std::logic_error("the motion of body '" + scene_.bodies[body].name +
-                             "' is not known, so it has no positions at t = " + std::to_string(t));
-    if (!std::isfinite(t)) throw std::invalid_argument("there are no positions at t = " + std::to_string(t));
+                             "' is not known, so it has no positions at t = " + number_text(t));
+    if (!std::isfinite(t)) throw std::invalid_argument("there are no positions at t = " + number_text(t));
     std::vector<S> numbers(std::size_t(3) * plans.vertex_count() + 1);
     plans.evaluate(t, numbers.data());
     out.assign(numbers.begin(), numbers.end() - 1);
@@ -364,7 +363,7 @@ class TypedWorld final : public detail::WorldImplementation {
     for (std::size_t i = 0; i < size; ++i)
       if (!(std::abs(S(positions[i])) <= admissible_magnitude<S>))
         throw std::invalid_argument("body '" + target.name + "', vertex " + std::to_string(i / 3) +
-                                    ": coordinate " + std::to_string(positions[i]) +
+                                    ": coordinate " + number_text(double(positions[i])) +
                                     " is not finite or not admissible");
     if constexpr (std::is_same_v<S, T>)
       if (positions.size() == size + 1) {

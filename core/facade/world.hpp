@@ -186,6 +186,8 @@ struct WorldStrategy {
   std::string method;  ///< of its best tree, with width and leaf size; empty if it builds its own
   std::uint32_t width = 0, leaf_size = 0;
   std::uint64_t max_primitive_pairs = 0;  ///< of two bodies; 0: any number
+  /// The largest magnitude of a coordinate that it takes; infinite: everything admissible.
+  double max_coordinate = std::numeric_limits<double>::infinity();
 };
 
 /// A counter of a strategy since the last `reset`.

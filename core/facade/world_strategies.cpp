@@ -91,6 +91,7 @@ std::vector<WorldStrategy> World::strategy_descriptions() {
     made.abilities = words(info.can);
     for (const PrimitiveKind kind : info.primitives) made.primitives.push_back(name(kind));
     made.max_primitive_pairs = info.max_primitive_pairs;
+    made.max_coordinate = info.max_coordinate;
     if (info.topology.own) continue;
     made.method = name(info.topology.preferred.method);
     made.width = info.topology.preferred.width;

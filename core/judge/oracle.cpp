@@ -1,6 +1,7 @@
 #include "core/judge/oracle.hpp"
 
 #include "core/base/hasher.hpp"
+#include "core/base/interruption.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/judge/polygon_region.hpp"
 #include "core/judge/sort_pairs.hpp"
@@ -60,12 +61,14 @@ PairBuffer brute_force_pairs(const Scene<S>& scene, Playback<S>& playback) {
   for (const BodyPair& pair : scene.pairs) {
     const Body<S>&a = scene.bodies[pair.first], &b = scene.bodies[pair.second];
     const bool within = pair.first == pair.second;
-    for (std::uint32_t i = 0; i < a.primitives.count(); ++i)
+    for (std::uint32_t i = 0; i < a.primitives.count(); ++i) {
+      Interruptible::check();
       for (std::uint32_t j = within ? i + 1 : 0; j < b.primitives.count(); ++j)
         if (a.primitives.alive(i) && b.primitives.alive(j) &&
             !(within && share_vertex(a.primitives[i], a.primitives[j])) &&
             truly_meet(pair.first, i, pair.second, j))
           result.push_back({pair.first, i, pair.second, j});
+    }
   }
   sort_pairs(result);
   return result;
@@ -117,6 +120,7 @@ PairBuffer sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
     // from a's side.
     std::size_t i = 0, j = 0;
     while (i < items_a.size() && j < items_b.size()) {
+      Interruptible::check();
       if (items_a[i].box.lower[axis] <= items_b[j].box.lower[axis]) {
         for (std::size_t k = j;
              k < items_b.size() && items_b[k].box.lower[axis] <= items_a[i].box.upper[axis]; ++k)

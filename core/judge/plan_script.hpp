@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/hasher.hpp"
+#include "core/motion/admissible.hpp"
 #include "core/scene/geometry_change.hpp"
 
 namespace kbvh {
@@ -87,9 +88,9 @@ class ScriptCursor {
     const auto& step = script_->steps[next_];
     if (t < step.time) return nullptr;
     if (!(t == step.time))
-      throw std::invalid_argument("the script makes changes at t = " + std::to_string(step.time) +
-                                  ", which is not the time of a frame (the next one is at " +
-                                  std::to_string(t) + ")");
+      throw std::invalid_argument("the script makes changes at t = " + number_text(step.time) +
+                                  ", which is not the time of a frame (the next one is at " + number_text(t) +
+                                  ")");
     ++next_;
     return &step;
   }

@@ -2,16 +2,24 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <string>
 
+#include "core/contract/strategy.hpp"
 #include "core/judge/plan_script.hpp"
 #include "core/motion/admissible.hpp"
 
 namespace kbvh {
 
-/// Tracks the time until which every vertex whose plan has no further knot stays within admissible_reach.
+/// Tracks the time until which every vertex whose plan has no further knot stays within a range:
+/// admissible_reach, or the narrower one of a contestant (Info::max_coordinate).
 template <class S>
 class RangeWatch {
  public:
+  /// Watches what is admissible for all.
+  RangeWatch() = default;
+  /// Watches the range of a contestant.
+  explicit RangeWatch(const Info& contestant);
+
   /// Starts with the current plans. O(1) if no vertex has its own plan.
   void start(const Playback<S>& playback);
   /// Registers a new plan of a vertex. O(log knots).
@@ -23,7 +31,23 @@ class RangeWatch {
   /// has been replaced.
   void check(const Playback<S>& playback, double t);
 
+  // What is given at run time, before it is applied: each throws std::invalid_argument with place and value
+  // if it is beyond the range of the contestant. O(1) for one that takes everything admissible.
+  void check_positions(std::uint32_t body, std::uint32_t vertices, const S* positions) const;
+  void check_plans(std::span<const PlanChange<S>> changes) const;
+  void check_added(const GeometryChange<S>& change) const;
+  void check_rays(std::span<const Ray<S>> rays) const;
+
  private:
+  bool narrow() const { return !contestant_.empty(); }
+  void check_point(const S* point, const std::string& what) const;
+  /// Throws: something is at `where`, which is out of the range.
+  [[noreturn]] void refuse(const std::string& where) const;
+  double stays_until(const FlightPlans<S>& plans, std::uint32_t vertex) const;
+  void check_vertex(const FlightPlans<S>& plans, std::uint32_t body, std::uint32_t vertex, double t) const;
+
+  double most_ = double(admissible_reach<S>);
+  std::string contestant_;                                       ///< empty: the range is what is admissible
   double safe_until_ = std::numeric_limits<double>::infinity();  ///< an upper limit; plans may have changed
 };
 
@@ -33,6 +57,17 @@ class RangeWatch {
 /// O(keyframes + changes), plus all positions of a body at times of many changes.
 template <class S>
 void check_played(const Scene<S>& scene, const PlanScript<S>& script, std::span<const double> frames);
+
+/// Returns why the range of a contestant does not contain the whole motion of a scene that `check_played`
+/// accepts, as the end of a sentence that begins with its id; empty if it does. O(1) for a contestant that
+/// takes everything admissible.
+template <class S>
+std::string out_of_range(const Info& contestant, const Scene<S>& scene, const PlanScript<S>& script,
+                         std::span<const double> frames);
+
+/// Does the same for rays.
+template <class S>
+std::string out_of_range(const Info& contestant, std::span<const Ray<S>> rays);
 
 extern template class RangeWatch<float>;
 extern template class RangeWatch<double>;

@@ -11,8 +11,7 @@ namespace {
 
 std::string text(const RayHit& hit) {
   if (!hit) return "a miss";
-  return std::to_string(hit.body) + ":" + std::to_string(hit.primitive) + " at " +
-         std::to_string(hit.parameter);
+  return std::to_string(hit.body) + ":" + std::to_string(hit.primitive) + " at " + number_text(hit.parameter);
 }
 
 /// Returns the answer to a ray if there were no other primitive than that of `found`.

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/interruption.hpp"
 #include "core/contract/registry.hpp"
 #include "core/judge/contact_sweep.hpp"
 #include "core/judge/phase_times.hpp"
@@ -38,7 +39,8 @@ class Session {
         changing_(info_->can.geometry_changes ? std::optional<ChangingScene<S>>(scene) : std::nullopt),
         scene_(changing_ ? &changing_->scene() : &scene),
         view_(*scene_),
-        playback_(scene) {
+        playback_(scene),
+        watch_(*info_) {
     make_strategy();
   }
   Session(const Session&) = delete;
@@ -48,6 +50,7 @@ class Session {
   /// instance is created anew, and references to the old one become invalid. Throws std::invalid_argument and
   /// changes nothing if t is not finite or not admissible (motion/admissible.hpp).
   void reset(double t) {
+    Interruptible::check();
     check_time(t, "cannot start");
     playback_.restore_plans();
     if (geometry_changed_) {
@@ -64,15 +67,21 @@ class Session {
   }
   /// Stores an array with a body's positions for the next call that moves to another time (`reset`,
   /// `advance`, `contacts`), and for the frames after it (Playback::hand_in). For contacts, the array handed
-  /// in before must keep the previous positions until then.
-  void hand_in(std::uint32_t body, const S* positions) { handed_in_.push_back({body, positions}); }
+  /// in before must keep the previous positions until then. Throws std::invalid_argument if a position is
+  /// beyond the range of the contestant (Info::max_coordinate).
+  void hand_in(std::uint32_t body, const S* positions) {
+    if (body < playback_.body_count())
+      watch_.check_positions(body, playback_.plans(body).vertex_count(), positions);
+    handed_in_.push_back({body, positions});
+  }
   /// Moves to t, with positions if the strategy needs all of them, and advances the strategy. Throws
   /// std::invalid_argument and changes nothing if t is before the current time, not finite or not admissible,
-  /// or if a vertex has left the admissible range by then.
+  /// or if a vertex has left the admissible range, or that of the contestant, by then.
   void advance(double t, PhaseTimes& times) {
     if (!(t >= playback_.time()))
-      throw std::invalid_argument("cannot advance from t = " + std::to_string(playback_.time()) +
-                                  " back to " + std::to_string(t));
+      throw std::invalid_argument("cannot advance from t = " + number_text(playback_.time()) + " back to " +
+                                  number_text(t));
+    Interruptible::check();
     watch_.check(playback_, t);
     seek(t);
     if (info_->positions == PositionUse::all ||
@@ -82,6 +91,7 @@ class Session {
   }
   /// Fills `pairs` with the confirmed pairs at the current time.
   QueryStatus query(PairBuffer& pairs, PhaseTimes& times, const Budget& budget = {}) {
+    Interruptible::check();
     QueryStatus status;
     pairs.clear();
     timed(times.traversal, [&] { status = strategy_->candidates_at(playback_.time(), pairs, budget); });
@@ -93,8 +103,10 @@ class Session {
   void changes(Answer answer, PairBuffer& begun, PairBuffer& ended, PhaseTimes& times) {
     timed(times.traversal, [&] { strategy_->changes_at(playback_.time(), answer, begun, ended); });
   }
-  /// Answers rays at the current time (Strategy::hits_at). Everything counts as traversal.
+  /// Answers rays at the current time (Strategy::hits_at). Everything counts as traversal. Throws
+  /// std::invalid_argument if a ray is beyond the range of the contestant.
   void hits(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, PhaseTimes& times) {
+    watch_.check_rays(rays);
     timed(times.traversal, [&] { strategy_->hits_at(playback_.time(), query, rays, hits); });
   }
   /// Performs the first event if it is due by time `until` (Strategy::step_event); the motion keeps its time
@@ -102,6 +114,7 @@ class Session {
   bool step_event(double until, EventDescription<S>& out) { return strategy_->step_event(until, out); }
   /// Moves to t and appends the pairs of the elapsed interval, for strategies with spans.
   void spans(double t, SpanBuffer& out) {
+    Interruptible::check();
     const double from = playback_.time();
     watch_.check(playback_, t);
     seek(t);
@@ -117,11 +130,13 @@ class Session {
   std::size_t contacts(double t, ContactBuffer& out, PhaseTimes& times) {
     if (!info_->can.contacts) throw std::logic_error("'" + info_->id + "' does not declare contacts");
     if (!(t > playback_.time()) || !std::isfinite(t))
-      throw std::invalid_argument("contacts from t = " + std::to_string(playback_.time()) +
-                                  " to t = " + std::to_string(t) + ", which is not later");
+      throw std::invalid_argument("contacts from t = " + number_text(playback_.time()) +
+                                  " to t = " + number_text(t) + ", which is not later");
     if (const double knot = next_knot(); t > knot)
-      throw std::invalid_argument("contacts to t = " + std::to_string(t) + " across the knot of a plan at " +
-                                  std::to_string(knot));
+      throw std::invalid_argument("contacts to t = " + number_text(t) + " across the knot of a plan at " +
+                                  number_text(knot));
+    Interruptible::check();
+    watch_.check(playback_, t);
     if (!sweep_) sweep_.emplace(*scene_);
     return sweep_->find(
         *strategy_, playback_, t, [this](double to) { seek(to); }, out, times);
@@ -140,8 +155,9 @@ class Session {
   const PairBuffer& swept_pairs() const { return sweep_->pairs(); }
 
   /// Applies the changes at the current time: all of them or, if one is not valid, none
-  /// (Playback::change_plans).
+  /// (Playback::change_plans, or beyond the range of the contestant).
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
+    watch_.check_plans(changes);
     timed(times.motion, [&] {
       if (changing_) changing_->check_plans(changes);
       playback_.change_plans(playback_.time(), changes);
@@ -154,6 +170,7 @@ class Session {
   /// ChangingScene) without any change.
   void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
     if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
+    watch_.check_added(change);
     timed(times.motion, [&] { changing_->apply(change, playback_); });
     geometry_changed_ = true;
     sweep_.reset();  // its features are of the old geometry

@@ -120,7 +120,7 @@ class FrameChecker {
   }
   void violate(const std::string& what) {
     if (result_.first_violation.empty())
-      result_.first_violation = "t = " + std::to_string(session_.playback().time()) + ": " + what;
+      result_.first_violation = "t = " + number_text(session_.playback().time()) + ": " + what;
   }
   Session<S>& session_;
   Verification& result_;

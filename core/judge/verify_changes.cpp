@@ -86,8 +86,7 @@ class ChangesChecker {
  private:
   double time() { return session_.playback().time(); }
   void violate(const std::string& what) {
-    if (result_.first_violation.empty())
-      result_.first_violation = "t = " + std::to_string(time()) + ": " + what;
+    if (result_.first_violation.empty()) result_.first_violation = "t = " + number_text(time()) + ": " + what;
   }
   Session<S>& session_;
   Oracle<S>& oracle_;

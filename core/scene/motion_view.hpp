@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/motion/admissible.hpp"
 #include "core/scene/playback.hpp"
 
 namespace kbvh {
@@ -99,8 +100,8 @@ class SegmentMotion : public SteppedMotion<S> {
   const S* positions_on_lines(std::uint32_t body, double t, std::vector<S>& room) const {
     const FlightPlans<S>& plans = this->playback_->plans(body);
     if (!(t >= plans.lines_begin(time()) && t <= plans.lines_end(time())))
-      throw std::invalid_argument("positions at t = " + std::to_string(t) +
-                                  " are not foreseen at t = " + std::to_string(time()));
+      throw std::invalid_argument("positions at t = " + number_text(t) +
+                                  " are not foreseen at t = " + number_text(time()));
     if (!plans.has_own_plans()) {
       const std::size_t k = plans.segment_at(t);
       const auto times = plans.keyframe_times();

@@ -56,9 +56,9 @@ void check_rays(std::span<const Ray<S>> rays) {
         if (!(std::abs(values[axis]) <= admissible_magnitude<S>))
           throw std::invalid_argument("ray " + std::to_string(i) + ": " +
                                       (values == ray.origin ? "origin" : "direction") + " has " +
-                                      std::to_string(values[axis]) + " on axis " + std::to_string(axis));
+                                      number_text(double(values[axis])) + " on axis " + std::to_string(axis));
     if (!(ray.length >= 0))
-      throw std::invalid_argument("ray " + std::to_string(i) + ": length " + std::to_string(ray.length));
+      throw std::invalid_argument("ray " + std::to_string(i) + ": length " + number_text(double(ray.length)));
   }
 }
 

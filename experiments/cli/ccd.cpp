@@ -239,7 +239,7 @@ int run(const Arguments& arguments) {
                    {"options", options},
                    {"files", records}});
   if (wrong == 0) return success;
-  say(counted(wrong, "verdict") + " that are wrong");
+  say(counted(wrong, "verdict") + (wrong == 1 ? " is wrong" : " are wrong"));
   return guarantee_broken;
 }
 

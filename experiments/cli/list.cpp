@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "core/contract/about.hpp"
+#include "core/motion/admissible.hpp"
 #include "experiments/cli/commands.hpp"
 #include "experiments/cli/program.hpp"
 #include "experiments/common/output.hpp"
@@ -98,7 +99,8 @@ json strategy_json(const Info& info) {
           {"primitives", primitives_of(info)},
           {"parameters", parameters},
           {"topology", topology},
-          {"max_primitive_pairs", info.max_primitive_pairs}};
+          {"max_primitive_pairs", info.max_primitive_pairs},
+          {"max_coordinate", std::isfinite(info.max_coordinate) ? json(info.max_coordinate) : json(nullptr)}};
 }
 
 void print_json() {
@@ -154,6 +156,11 @@ void print_strategy(const Info& info) {
     text += "    takes only " + joined(words, " and ") + "\n";
   if (info.max_primitive_pairs > 0)
     text += fmt::format("    only up to {} primitive pairs of two bodies\n", info.max_primitive_pairs);
+  if (std::isfinite(info.max_coordinate))
+    text += fmt::format("    takes coordinates up to {}, and no scene that reaches beyond\n",
+                        number_text(info.max_coordinate));
+  else if (info.topology.own)
+    text += "    takes every admissible coordinate\n";
   for (const Parameter& parameter : info.parameters) {
     text += fmt::format("    {}={} ({}): {}\n", parameter.name, parameter.default_value,
                         admissible(parameter), parameter.meaning);

@@ -17,6 +17,7 @@
 #include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/bytes.hpp"
+#include "experiments/run/in_progress.hpp"
 
 namespace kbvh::experiments {
 
@@ -105,6 +106,7 @@ int finished(int code) {
       why = "terminated by an exception of an unknown type";
     }
   }
+  InProgress::note_termination();
   const std::string& work = Progress::activity();
   say("internal error: " + why + (work.empty() ? "" : ", during " + work) +
       "; out of memory, perhaps (ulimit -v). What this scene has measured is lost, other results are kept");

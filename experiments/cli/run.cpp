@@ -135,8 +135,8 @@ int run_study(const StudyOptions& options, Harness harness) {
         (std::filesystem::path(options.out) / (options.job.empty() ? "results.jsonl" : "jobs")).string() +
         " already");
   if (outcome.unfinished > 0)
-    say(counted(outcome.unfinished, "configuration") +
-        " without enough memory; the next run measures them again");
+    say(counted(outcome.unfinished, "configuration") + " without enough memory; the next run measures " +
+        (outcome.unfinished == 1 ? "it" : "them") + " again");
   if (outcome.refused == 0) return outcome.unfinished == 0 ? success : internal_error;
   say(counted(outcome.refused, "configuration") + " in which a strategy breaks its guarantee");
   return guarantee_broken;

@@ -4,6 +4,8 @@
 
 #include <cstdio>
 
+#include "core/base/interruption.hpp"
+
 namespace kbvh::experiments {
 
 namespace {
@@ -13,6 +15,7 @@ std::string current_activity;
 Progress::Progress() : terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 void Progress::show(const std::string& line) {
+  Interruptible::check();
   current_activity = line;
   if (!terminal_) return;
   shown_ = true;

@@ -5,8 +5,13 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Iterator
+
+#: Exit codes of kbvh after which the records are complete: all guarantees hold, or one is broken.
+COMPLETE = (0, 1)
 
 
 def read(file: Path) -> Iterator[tuple[bytes, dict[str, Any]]]:
@@ -22,11 +27,44 @@ def read(file: Path) -> Iterator[tuple[bytes, dict[str, Any]]]:
             yield line, record
 
 
+def is_time(text: Any) -> bool:
+    """Whether a text is a time as kbvh writes it, 2026-01-31T23:59:59Z, on a day that exists."""
+    if not isinstance(text, str) or not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", text, re.ASCII):
+        return False
+    try:
+        datetime.strptime(text, "%Y-%m-%dT%H:%M:%SZ")
+    except ValueError:
+        return False
+    return True
+
+
 def rank(record: dict[str, Any]) -> tuple[bool, str]:
-    """Orders the records of one key: the largest counts, the newest finished one. Of equal ones, the one that stands later.
-    This is the rule of `kbvh merge` (experiments/results/merge.cpp), and a test compares the two."""
+    """Orders the records of one key: the largest counts, the newest finished one; those without a valid time are the oldest. Of
+    equal ones, the one that stands later. This is the rule of `kbvh merge` (experiments/results/merge.cpp), and a test compares
+    the two."""
     when = record.get("when")
-    return record.get("unfinished") is not True, when if isinstance(when, str) else ""
+    return record.get("unfinished") is not True, when if isinstance(when, str) and is_time(when) else ""
+
+
+def keys(file: Path) -> set[str]:
+    """Returns the keys of the records of a file."""
+    return {record["key"] for _, record in read(file)}
+
+
+def done_code(out: Path, job: str, known: set[str]) -> int | None:
+    """Returns kbvh's exit code of a job that is finished, and whose records are all there: `known` are the keys of
+    OUT/results.jsonl. Else None."""
+    try:
+        done = json.loads((out / "jobs" / job / "done").read_text())
+        code, wanted = done["exit"], set(done["keys"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    if code not in COMPLETE:
+        return None
+    missing = wanted - known
+    for file in (out / "jobs" / job).glob("*.jsonl") if missing else ():
+        missing -= keys(file)
+    return None if missing else code
 
 
 def identity(line: bytes, record: dict[str, Any]) -> tuple[Any, ...]:

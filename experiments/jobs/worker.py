@@ -2,8 +2,8 @@
 
 usage: worker.py KBVH PLAN OUT [--share-cores] (job | scene) ID --threads N
 
-Every attempt has files of its own in OUT/jobs/ID: records (written by kbvh), a log and its provenance. The file `done` is
-written last; jobs without it are done again.
+Every attempt has files of its own in OUT/jobs/ID: records (written by kbvh), a log and its provenance. kbvh also writes the
+keys of the job's records to `keys`. The file `done`, which repeats them, is written last; jobs without it are done again.
 """
 
 from __future__ import annotations
@@ -21,9 +21,7 @@ from pathlib import Path
 from typing import Any, Callable
 
 from cores import hold_cores
-
-#: Exit codes of kbvh after which the records are complete: all guarantees hold, or one is broken.
-COMPLETE = (0, 1)
+from records import COMPLETE
 
 
 def now() -> str:
@@ -73,6 +71,7 @@ def main() -> int:
         "command": command, "begin": now(),
     }  # fmt: skip
     attempt = f"{about['begin'].replace(':', '')}-{about['host']}-{os.getpid()}"
+    (folder / "keys").unlink(missing_ok=True)  # of an earlier attempt
     with open(folder / f"{attempt}.log", "wb") as log:
         child = subprocess.Popen(
             command, stdout=log, stderr=subprocess.STDOUT, close_fds=False, preexec_fn=die_with_parent(signal.SIGKILL)
@@ -89,7 +88,14 @@ def main() -> int:
         print(f"sweep: {options.kind} {options.id} ended with {code} on {about['host']}", file=sys.stderr)
         print("\n".join("  " + line for line in lines[-3:]), file=sys.stderr)
         return 3
-    write(folder / "done", {"attempt": attempt, "exit": code})
+    done: dict[str, Any] = {"attempt": attempt, "exit": code}
+    if options.kind == "job":
+        try:
+            done["keys"] = (folder / "keys").read_text().split("\n")[:-1]
+        except FileNotFoundError:
+            print(f"sweep: {options.kbvh} ended with {code}, but has not measured job {options.id}", file=sys.stderr)
+            return 3
+    write(folder / "done", done)
     return 0
 
 

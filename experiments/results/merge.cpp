@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -26,18 +27,35 @@ namespace fs = std::filesystem;
 
 namespace {
 
+/// Returns whether a text is a time as this program writes it, 2026-01-31T23:59:59Z, on a day that exists.
+bool is_time(const std::string& text) {
+  constexpr std::string_view form = "dddd-dd-ddTdd:dd:ddZ";
+  if (text.size() != form.size()) return false;
+  for (std::size_t i = 0; i < form.size(); ++i)
+    if (form[i] == 'd' ? text[i] < '0' || text[i] > '9' : text[i] != form[i]) return false;
+  const auto at = [&](std::size_t begin, std::size_t digits) {
+    return unsigned(*parse_whole(std::string_view(text).substr(begin, digits)));
+  };
+  const std::chrono::year_month_day day{std::chrono::year(int(at(0, 4))), std::chrono::month(at(5, 2)),
+                                        std::chrono::day(at(8, 2))};
+  return at(0, 4) > 0 && day.ok() && at(11, 2) < 24 && at(14, 2) < 60 && at(17, 2) <= 60;
+}
+
 /// One line of a results file.
 struct Line {
   std::string text, place;  // the place is "FILE line N"
   json record;
 
   std::string key() const { return record.at("key").get<std::string>(); }
+  /// Returns when it was measured; empty if it does not say so.
+  std::string time() const {
+    const auto when = record.find("when");
+    return when != record.end() && when->is_string() && is_time(*when) ? when->get<std::string>() : "";
+  }
   /// Orders the records of one key; the largest counts.
   std::pair<bool, std::string> rank() const {
     const auto unfinished = record.find("unfinished");
-    const auto when = record.find("when");
-    return {unfinished == record.end() || *unfinished != json(true),
-            when != record.end() && when->is_string() ? when->get<std::string>() : ""};
+    return {unfinished == record.end() || *unfinished != json(true), time()};
   }
 };
 
@@ -63,8 +81,8 @@ std::string no_record(const json& value) {
 std::vector<Line> read_lines(const fs::path& file, std::vector<std::string>& notes) {
   const std::string all = io::read_file(file);
   std::vector<Line> lines;
-  std::size_t number = 0, defects = 0;
-  std::string first_defect;
+  std::size_t number = 0, defects = 0, undated = 0;
+  std::string first_defect, first_undated;
   for (std::size_t begin = 0; begin < all.size();) {
     std::size_t end = all.find('\n', begin);
     const bool breaks_off = end == std::string::npos;
@@ -82,6 +100,7 @@ std::vector<Line> read_lines(const fs::path& file, std::vector<std::string>& not
       throw io::InputError(line.place + ": " + why);
     if (const std::string why = unusable(line.record); !why.empty() && ++defects == 1)
       first_defect = line.place + ": " + why;
+    if (line.time().empty() && ++undated == 1) first_undated = line.place;
     lines.push_back(std::move(line));
   }
   if (lines.empty()) throw io::InputError(file.string() + ": has no record of results");
@@ -89,6 +108,10 @@ std::vector<Line> read_lines(const fs::path& file, std::vector<std::string>& not
     notes.push_back(counted(defects, "record") + " of " + file.string() +
                     (defects == 1 ? " lacks" : " lack") + " a field that tables need (" + first_defect +
                     "), and " + (defects == 1 ? "is" : "are") + " kept unchanged");
+  if (undated > 0)
+    notes.push_back(counted(undated, "record") + " of " + file.string() + (undated == 1 ? " has" : " have") +
+                    " no valid time (" + first_undated + "), and " + (undated == 1 ? "counts" : "count") +
+                    " as older than all others");
   return lines;
 }
 

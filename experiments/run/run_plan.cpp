@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include "experiments/common/environment.hpp"
@@ -19,6 +20,7 @@
 #include "experiments/results/table.hpp"
 #include "experiments/results/target_rows.hpp"
 #include "experiments/run/bench_harness.hpp"
+#include "experiments/run/in_progress.hpp"
 #include "experiments/run/scene_pictures.hpp"
 #include "experiments/study/contact_measurement.hpp"
 #include "experiments/study/ray_measurement.hpp"
@@ -67,8 +69,11 @@ class Runner {
         plan_{{"name", plan.name}, {"description", plan.description}},
         machine_(machine()),
         run_(invocation(job)) {
+    if (!out.empty()) store_ = opened(out, job, run_);
+    in_progress_.emplace(out.empty() || job.empty() ? out : out / "jobs" / job);
+    for (const std::string& doing : in_progress_->killed())
+      say("note: an earlier run was ended from outside while " + doing + "; it is measured again");
     if (out.empty()) return;
-    store_ = opened(out, job, run_);
     std::error_code error;
     for (const char* name : {"benchmark.json", "targets.json"})
       if (const auto file = out / name; std::filesystem::is_directory(file, error))
@@ -111,6 +116,17 @@ class Runner {
     if (store_) write_targets(store_->folder(), rows);
   }
 
+  /// Writes the keys of everything that a job requested, whether measured now or before, in one step: with
+  /// them experiments/sweep sees whether records of a finished job were lost.
+  void write_keys(const std::filesystem::path& file) const {
+    std::set<std::string> keys;
+    for (const TargetGroup& group : groups_)
+      for (const json& record : group.records) keys.insert(record.at("key").get<std::string>());
+    std::string text;
+    for (const std::string& key : keys) text += key + "\n";
+    io::write_file_atomically(file, text);
+  }
+
   StudyOutcome outcome() const { return outcome_; }
 
  private:
@@ -144,9 +160,10 @@ class Runner {
   }
 
   /// Warns of a scene of one body: it has times, but its query has nothing to find, which is seldom intended.
+  /// Rays meet a body alone.
   template <class S>
-  void warn_of_no_pairs(const Scene<S>& scene) {
-    if (!scene.pairs.empty()) return;
+  void warn_of_no_pairs(const Scene<S>& scene, const Study& study) {
+    if (!scene.pairs.empty() || study.rays) return;
     note("warning: " + scene.name +
          " has one body, so there are no pairs of bodies, and nothing is found or compared; --self (in a "
          "plan: \"self\": true) asks for pairs within it");
@@ -155,7 +172,7 @@ class Runner {
   template <class S>
   void scene(const Study& study, const std::vector<ContestantSpec>& contestants, const LoadedScene& loaded) {
     const Scene<S> scene = assemble<S>(loaded);
-    warn_of_no_pairs(scene);
+    warn_of_no_pairs(scene, study);
     const PlanScript<S> script = script_of(scene, loaded, making_);
     if (study.continuous) {
       contact_group(study, contestants, loaded, scene, script);
@@ -207,7 +224,7 @@ class Runner {
            " only keyframes are compared with the truth; take a number without common factors");
     Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script, study.changes);
     measure_all(study, contestants, loaded, about_scene, title, measurement,
-                [&](const Info& info) { return unsuitable(info, scene, script); });
+                [&](const Info& info) { return unsuitable(info, scene, script, frames); });
   }
 
   /// Does the same for rays.
@@ -223,7 +240,8 @@ class Runner {
                 scene.name + ", l = " + std::to_string(l) + suffix_of(study), measurement,
                 [&](const Info& info) -> std::string {
                   if (!info.can.rays) return "answers no rays";
-                  return unsuitable(info, scene, script);
+                  if (std::string why = unsuitable(info, scene, script, frames); !why.empty()) return why;
+                  return measurement.beyond_range(info);
                 });
   }
 
@@ -253,7 +271,7 @@ class Runner {
     measure_all(study, contestants, loaded, about_scene, scene.name + ", contacts", measurement,
                 [&](const Info& info) -> std::string {
                   if (!info.can.contacts) return "finds no contacts between keyframes";
-                  return unsuitable(info, scene, script);
+                  return unsuitable(info, scene, script, knots);
                 });
   }
 
@@ -267,6 +285,28 @@ class Runner {
     std::vector<json> records;           // in the order of the contestants
     std::vector<std::size_t> record_of;  // of each measured contestant
     std::size_t skipped = 0;
+    std::string failed;  // the first file that could not be written
+    const auto keep = [&failed](const auto& work) {
+      try {
+        work();
+      } catch (const io::InputError& problem) {
+        if (failed.empty()) failed = problem.what();
+      }
+    };
+    const auto finish = [&](std::size_t i) {
+      json& record = records[record_of[i]];
+      complete(record, measurement[i]);
+      record.update(measurement.extras(i));
+      ++outcome_.measured;
+      if (measurement[i].unfinished)
+        ++outcome_.unfinished;
+      else if (!measurement[i].refused.empty())
+        ++outcome_.refused;
+      if (store_)
+        keep([&] { store_->append(record); });
+      else
+        of_this_run_.insert_or_assign(record.at("key").get<std::string>(), record);
+    };
     for (std::size_t c = 0; c < contestants.size(); ++c) {
       const ContestantSpec& spec = contestants[c];
       if (const std::string why = why_not(spec.entry->info); !why.empty()) {
@@ -294,23 +334,29 @@ class Runner {
         if (store_) ++skipped;
         continue;
       }
-      progress_.show(title + ": verifying " + spec.label);
-      measurement.add(spec, study.oracle_every);
+      const std::string key = record["key"];
       record_of.push_back(records.size());
       records.push_back(std::move(record));
+      if (const InProgress::Earlier* end = in_progress_->earlier(key)) {
+        note("note: " + spec.label + " is left out of " + title + ": " + end->doing +
+             ", an earlier run ended " + end->how);
+        refuse_for(measurement.add_refused(spec), *end);
+        finish(measurement.size() - 1);
+        in_progress_->settle(key);
+        continue;
+      }
+      progress_.show(title + ": verifying " + spec.label);
+      in_progress_->begin(key, "verifying " + spec.label + " on " + title + ", " + scalar);
+      measurement.add(spec, study.oracle_every);
     }
     if (skipped > 0)
       note(title + ", " + scalar + ": " + std::to_string(skipped) + " of " +
            counted(records.size(), "configuration") + " in the results already, not measured again");
-    const json benchmarks = play_all(measurement, study.repetitions, title, scalar);
-    std::string failed;  // the first file that could not be written
-    const auto keep = [&failed](const auto& work) {
-      try {
-        work();
-      } catch (const io::InputError& problem) {
-        if (failed.empty()) failed = problem.what();
-      }
-    };
+    const json benchmarks = play_all(measurement, study.repetitions, title, scalar, [&](std::size_t i) {
+      in_progress_->begin(records[record_of[i]]["key"],
+                          "timing " + measurement[i].spec->label + " on " + title + ", " + scalar);
+    });
+    in_progress_->end();
     // Written before the records: a configuration with a record is not measured again, so its table in
     // benchmark.json would never be written.
     if (store_ && !benchmarks.is_null())
@@ -318,20 +364,8 @@ class Runner {
         if (const std::string said = add_to_benchmark_file(store_->folder(), benchmarks); !said.empty())
           note("warning: " + said);
       });
-    for (std::size_t i = 0; i < measurement.size(); ++i) {
-      json& record = records[record_of[i]];
-      complete(record, measurement[i]);
-      record.update(measurement.extras(i));
-      ++outcome_.measured;
-      if (measurement[i].unfinished)
-        ++outcome_.unfinished;
-      else if (!measurement[i].refused.empty())
-        ++outcome_.refused;
-      if (store_)
-        keep([&] { store_->append(record); });
-      else
-        of_this_run_.insert_or_assign(record.at("key").get<std::string>(), record);
-    }
+    for (std::size_t i = 0; i < measurement.size(); ++i)
+      if (!records[record_of[i]].contains("when")) finish(i);
     outcome_.skipped += skipped;
     groups_.push_back({about_scene, records});
     progress_.clear();
@@ -360,10 +394,18 @@ class Runner {
     return known;
   }
 
-  /// Plays the repetitions; returns Google Benchmark's report, or null.
-  template <class M>
+  /// Refuses a time to the configuration in which an earlier run ended. If memory may have run out, that is
+  /// no verdict, as always.
+  static void refuse_for(Measured& measured, const InProgress::Earlier& end) {
+    measured.refused = end.doing + ", the program ended " + end.how;
+    measured.unfinished = end.cause == InProgress::Earlier::Cause::terminated;
+    if (!measured.unfinished) measured.verification.first_violation = measured.refused;
+  }
+
+  /// Plays the repetitions; returns Google Benchmark's report, or null. Calls announce(i) before each clip.
+  template <class M, class Announce>
   json play_all(M& measurement, std::uint32_t repetitions, const std::string& title,
-                const std::string& scalar) {
+                const std::string& scalar, const Announce& announce) {
     std::vector<std::size_t> timed;
     for (std::size_t i = 0; i < measurement.size(); ++i)
       if (measurement.timed(i)) timed.push_back(i);
@@ -373,6 +415,7 @@ class Runner {
       if (!measurement.timed(i)) return nullptr;  // an exception was thrown
       progress_.show(title + ": clip " + std::to_string(++done) + " of " +
                      std::to_string(timed.size() * repetitions) + ", " + measurement[i].spec->label);
+      announce(i);
       return measurement.play(i);
     };
     if (harness_ == Harness::rounds) {
@@ -415,6 +458,7 @@ class Runner {
   std::string card_;                         // of the current scene
   json scene_object_;                        // the current scene in a plan
   Progress progress_;
+  std::optional<InProgress> in_progress_;
   const MakeProgress making_ = [this](const std::string& what, double fraction) {
     progress_.show(what + (fraction > 0 ? ": " + std::to_string(int(100 * fraction)) + " %" : ""));
   };
@@ -438,6 +482,7 @@ StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::
   Runner runner(harness, plan, out, job);
   for (std::size_t i = 0; i < plan.studies.size(); ++i) runner.study(plan.studies[i], contestants[i]);
   runner.targets(plan);
+  if (!job.empty()) runner.write_keys(out / "jobs" / job / "keys");
   return runner.outcome();
 }
 

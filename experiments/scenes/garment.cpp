@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/base/interruption.hpp"
 #include "experiments/scenes/garment_solver.hpp"
 #include "experiments/scenes/shapes.hpp"
 
@@ -69,7 +70,10 @@ void simulate_in_full(const GarmentConfig& config, const GarmentPattern& pattern
   const double dt = 1.0 / (config.keyframes_per_second * double(steps));
   keep(line.first(), solver.positions());
   for (std::int64_t k = line.first(); k < last; ++k) {
-    for (std::uint32_t s = 0; s < steps; ++s) solver.step(figure, line.time(k) + dt * double(s), dt, 1);
+    for (std::uint32_t s = 0; s < steps; ++s) {
+      Interruptible::check();
+      solver.step(figure, line.time(k) + dt * double(s), dt, 1);
+    }
     keep(k + 1, solver.positions());
   }
 }
@@ -97,6 +101,7 @@ void simulate_guided(const GarmentConfig& config, const GarmentPattern& coarse_p
   keep(start, solver.positions());
   for (std::int64_t k = start; k < last; ++k) {
     for (std::uint32_t s = 0; s < config.fine_steps; ++s) {
+      Interruptible::check();
       const double t = double(s + 1) / double(config.fine_steps), t2 = t * t, t3 = t2 * t;
       const double weights[4] = {0.5 * (-t3 + 2 * t2 - t), 0.5 * (3 * t3 - 5 * t2 + 2),
                                  0.5 * (-3 * t3 + 4 * t2 + t), 0.5 * (t3 - t2)};

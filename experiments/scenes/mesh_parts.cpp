@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/library_gaps.hpp"
 #include "experiments/scenes/shapes.hpp"
 
 namespace kbvh::scenes {
@@ -19,7 +20,7 @@ void check_triangles(std::uint32_t triangles, const char* shape) {
 
 void check_length(double value, const char* what) {
   if (!(value > 0.0) || !(value < 1e6))
-    throw io::InputError(std::string(what) + " is " + std::to_string(value) + ", must be in (0, 1e6)");
+    throw io::InputError(std::string(what) + " is " + shortest_text(value) + ", must be in (0, 1e6)");
 }
 
 std::uint32_t nearest_frequency(std::uint32_t triangles, std::uint32_t per_square) {

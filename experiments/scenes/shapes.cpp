@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "core/base/library_gaps.hpp"
 #include "experiments/scenes/mesh_parts.hpp"
 
 namespace kbvh::scenes {
@@ -222,7 +223,7 @@ io::AnimatedMesh round_table(std::uint32_t triangles, const RoundTableShape& sha
   check_length(shape.thickness, "round_table: the thickness");
   check_length(shape.rim_radius, "round_table: the rim's radius");
   if (2.0 * shape.rim_radius > shape.thickness || shape.rim_radius >= shape.radius)
-    throw io::InputError("round_table: the rim's radius " + std::to_string(shape.rim_radius) +
+    throw io::InputError("round_table: the rim's radius " + shortest_text(shape.rim_radius) +
                          " is more than half of the thickness or reaches the axis");
   const bool pedestal = shape.pedestal_radius > 0.0;
   const double inner = shape.radius - shape.rim_radius;
@@ -270,7 +271,7 @@ io::AnimatedMesh round_table(std::uint32_t triangles, const RoundTableShape& sha
 std::vector<double> keyframe_times(std::uint32_t keyframes, double keyframes_per_second) {
   if (keyframes == 0) throw io::InputError("0 keyframes asked for, at least 1 is needed");
   if (!(keyframes_per_second > 0.0) || !(keyframes_per_second < 1e9))
-    throw io::InputError(std::to_string(keyframes_per_second) +
+    throw io::InputError(shortest_text(keyframes_per_second) +
                          " keyframes per second asked for, must be positive");
   std::vector<double> times(keyframes);
   for (std::uint32_t k = 0; k < keyframes; ++k) times[k] = double(k) / keyframes_per_second;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/interruption.hpp"
+
 namespace kbvh::scenes {
 namespace {
 
@@ -88,7 +90,10 @@ class ClothSolver {
   void advance_keyframe() {
     const std::uint32_t count = substeps();
     const double dt = 1.0 / (config_.keyframes_per_second * double(count));
-    for (std::uint32_t s = 0; s < count; ++s) step(dt);
+    for (std::uint32_t s = 0; s < count; ++s) {
+      Interruptible::check();
+      step(dt);
+    }
   }
 
  private:

@@ -17,6 +17,8 @@
 #include <ctime>
 #include <stdexcept>
 
+#include "core/base/library_gaps.hpp"
+
 namespace kbvh::experiments::stress {
 
 namespace {
@@ -135,7 +137,7 @@ std::vector<JobOutcome> run_in_children(std::size_t jobs, double seconds,
     if (outcomes.size() >= jobs) break;
     if (hung)
       outcomes.push_back({JobOutcome::End::hung,
-                          "was still at work after " + std::to_string(seconds) + " s of processor time"});
+                          "was still at work after " + shortest_text(seconds) + " s of processor time"});
     else
       outcomes.push_back({JobOutcome::End::crashed, ending(status)});
   }

@@ -103,7 +103,7 @@ CaseResult run_here(const Playable<S>& stress, Oracle<S>& oracle, const Contesta
     result.what = seen.first_violation;
     // Only approximate contestants may have errors; any other contestant may not, whatever it declares.
     if (result.what.empty() && spec.entry->info.guarantee != Guarantee::approximate && result.protrusion != 0)
-      result.what = "protrusion " + std::to_string(result.protrusion);
+      result.what = "protrusion " + number_text(result.protrusion);
     if (!result.what.empty()) result.outcome = Outcome::broken;
   } catch (const std::exception& problem) {
     result.outcome = Outcome::threw;
@@ -129,7 +129,7 @@ std::vector<CaseResult> run_as(const StressScene& scene, const std::vector<Conte
   }
   std::vector<std::size_t> jobs;
   for (std::size_t i = 0; i < contestants.size(); ++i) {
-    results[i].what = unsuitable(contestants[i].entry->info, stress.scene, stress.script);
+    results[i].what = unsuitable(contestants[i].entry->info, stress.scene, stress.script, stress.frames);
     if (results[i].what.empty())
       jobs.push_back(i);
     else

@@ -249,12 +249,14 @@ std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests,
 }
 
 template <class S>
-std::string unsuitable(const Info& info, const Scene<S>& scene, const PlanScript<S>& script) {
+std::string unsuitable(const Info& info, const Scene<S>& scene, const PlanScript<S>& script,
+                       std::span<const double> frames) {
   if (!(sizeof(S) == 4 ? info.has_float : info.has_double))
     return std::string("has no ") + (sizeof(S) == 4 ? "float" : "double") + " version";
   if (script.changes_plans() && !info.can.plan_changes) return "cannot take changes of plans";
   if (script.changes_geometry() && !info.can.geometry_changes) return "cannot take changes of geometry";
   if (std::string why = unsuitable_bodies(info, scene); !why.empty()) return why;
+  if (std::string why = out_of_range(info, scene, script, frames); !why.empty()) return why;
   if (info.max_primitive_pairs == 0) return {};
   for (const BodyPair& pair : scene.pairs) {
     const std::uint64_t pairs = std::uint64_t(scene.bodies[pair.first].primitives.count()) *
@@ -266,7 +268,9 @@ std::string unsuitable(const Info& info, const Scene<S>& scene, const PlanScript
   return {};
 }
 
-template std::string unsuitable(const Info&, const Scene<float>&, const PlanScript<float>&);
-template std::string unsuitable(const Info&, const Scene<double>&, const PlanScript<double>&);
+template std::string unsuitable(const Info&, const Scene<float>&, const PlanScript<float>&,
+                                std::span<const double>);
+template std::string unsuitable(const Info&, const Scene<double>&, const PlanScript<double>&,
+                                std::span<const double>);
 
 }  // namespace kbvh::experiments

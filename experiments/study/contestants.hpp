@@ -1,6 +1,7 @@
 #pragma once
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -57,8 +58,10 @@ std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests,
                                    const BuilderRequest& builder, std::vector<std::string>& notes);
 
 /// Returns why the strategy cannot take part in the scene, in one clause; or "". `script`: the changes to be
-/// replayed, empty for most scenes.
+/// replayed, empty for most scenes. `frames`: the times to be played; without them, the range of changed
+/// plans is not checked.
 template <class S>
-std::string unsuitable(const Info& info, const Scene<S>& scene, const PlanScript<S>& script = {});
+std::string unsuitable(const Info& info, const Scene<S>& scene, const PlanScript<S>& script = {},
+                       std::span<const double> frames = {});
 
 }  // namespace kbvh::experiments

@@ -4,11 +4,13 @@
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cmath>
 
+#include "core/motion/admissible.hpp"
 #include "experiments/common/json_reader.hpp"
 #include "experiments/common/names.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/ply.hpp"
+#include "experiments/io/validate.hpp"
 
 namespace kbvh::experiments {
 
@@ -117,6 +119,8 @@ ImpactQueries read_impact_queries(const fs::path& file) {
         io::fail(
             file, place,
             io::printable(cells[2 * axis]) + " / " + io::printable(cells[2 * axis + 1]) + " is not a double");
+      if (std::abs(*value) > admissible_magnitude<double>)
+        io::fail(file, place, number_text(*value) + " is beyond the limit of 1e+100");
       query.points[rows % 8 / 4][rows % 4][axis] = *value;
     }
     if (cells.size() == 7) {
@@ -143,7 +147,9 @@ FramePair read_frame_pair(const fs::path& folder) {
   const std::vector<fs::path> frames = files_in(folder / "frames", ".ply");
   if (frames.size() != 2) io::fail(folder / "frames", "", "expected two PLY files");
   for (int end = 0; end < 2; ++end) {
-    io::AnimatedMesh mesh = io::read_ply(frames[std::size_t(end)]);
+    const fs::path& file = frames[std::size_t(end)];
+    io::AnimatedMesh mesh = io::read_ply(file);
+    io::finish(mesh, file);
     pair.positions[end] = std::move(mesh.positions);
     if (end == 1) continue;
     for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {

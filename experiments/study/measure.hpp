@@ -71,6 +71,12 @@ class Entrants {
  public:
   std::size_t size() const { return entrants_.size(); }
   Measured& operator[](std::size_t i) { return entrants_[i].measured; }
+  /// Adds a contestant that is refused its time without being played; the caller says why.
+  Measured& add_refused(const ContestantSpec& spec) {
+    Measured& measured = entrants_.emplace_back().measured;
+    measured.spec = &spec;
+    return measured;
+  }
   /// Returns whether the contestant has an instance to be timed.
   bool timed(std::size_t i) const { return entrants_[i].session != nullptr; }
 

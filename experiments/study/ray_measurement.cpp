@@ -268,6 +268,11 @@ nlohmann::json RayMeasurement<S>::extras(std::size_t i) const {
             {"hidden_bodies", entrant.hidden_bodies}}}};
 }
 
+template <class S>
+std::string RayMeasurement<S>::beyond_range(const Info& contestant) const {
+  return out_of_range(contestant, std::span<const Ray<S>>(rays_));
+}
+
 template class RayMeasurement<float>;
 template class RayMeasurement<double>;
 

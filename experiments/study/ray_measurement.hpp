@@ -56,6 +56,9 @@ class RayMeasurement : public Entrants<RayEntrant<S>> {
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
   const ClipTimes* play(std::size_t i);
   nlohmann::json extras(std::size_t i) const;
+  /// Returns why the rays are beyond the range of a contestant, as the end of a sentence that begins with its
+  /// id; or "".
+  std::string beyond_range(const Info& contestant) const;
 
  private:
   const Scene<S>* scene_;

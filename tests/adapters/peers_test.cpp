@@ -177,6 +177,94 @@ TEST(Peers, AnswerTheSameAfterStartingOver) {
   });
 }
 
+/// Returns two soups that pass through each other within the cube of this half-side around the origin, or, if
+/// `aside`, in a corner of it.
+template <class S>
+Scene<S> soups_within(double most, bool aside) {
+  const double scale = aside ? most / 8 : most / 1.25, offset = aside ? most - most / 6 : 0;
+  return adapters_test::scene<S>(
+      "at the limit", {adapters_test::soup<S>({.scale = scale, .offset = offset, .size = .25, .seed = 31}),
+                       adapters_test::soup<S>({.scale = scale, .offset = offset, .size = .25, .seed = 32})});
+}
+
+/// Within its range a peer answers, with its own test of triangles as well; beyond, it says so before it
+/// plays.
+template <class S>
+void range_is_kept() {
+  std::size_t limited = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (!is_peer(entry.info) || entry.factory<S>() == nullptr) continue;
+    const double most = std::min(entry.info.max_coordinate, double(admissible_magnitude<S>));
+    for (const bool aside : {false, true}) {
+      const Scene<S> scene = soups_within<S>(most, aside);
+      Oracle<S> oracle(scene);
+      for (const auto& params : settings(entry.info)) {
+        SCOPED_TRACE(describe(entry.info, params) + (aside ? " aside" : ""));
+        ASSERT_EQ(unsuitable_bodies(entry.info, scene), "");
+        Session<S> session(scene, {&entry, params, {}}, CountingPolicy::counting);
+        const Verification found = verify<S>(session, frame_times(scene, 3), oracle);
+        EXPECT_TRUE(found.holds()) << found.first_violation;
+        EXPECT_EQ(found.missed, 0u);
+        EXPECT_EQ(found.extra, 0u);
+        EXPECT_GT(found.pairs, 0u);
+      }
+    }
+    if (!(entry.info.max_coordinate < double(admissible_magnitude<S>))) continue;
+    ++limited;
+    SCOPED_TRACE(entry.info.id);
+    const Scene<S> beyond = soups_within<S>(2 * most, false);
+    EXPECT_TRUE(unsuitable_bodies(entry.info, beyond).starts_with("takes coordinates up to "));
+    EXPECT_THROW(Session<S>(beyond, {&entry, {}, {}}, CountingPolicy::silent), ConfigError);
+    // A motion that reaches beyond later: by a change of plans, at a knot of the new plan, by positions
+    // handed in.
+    Scene<S> scene = soups_within<S>(most / 4, false);
+    PhaseTimes times;
+    PlanChange<S> change{.body = 1, .vertex = 2};
+    change.velocity[1] = S(most);
+    {
+      Session<S> session(scene, {&entry, {}, {}}, CountingPolicy::silent);
+      session.reset(0);
+      session.change_plans(std::span(&change, 1), times);
+      session.advance(.5, times);
+      EXPECT_THROW(session.advance(2.5, times), std::invalid_argument);
+      session.advance(.6, times);
+      PlanScript<S> script;
+      script.steps.push_back({0, {change}});
+      const std::vector<double> short_clip{0, .5}, long_clip{0, .5, 2.5};
+      EXPECT_EQ(out_of_range(entry.info, scene, script, std::span<const double>(short_clip)), "");
+      const std::string why = out_of_range(entry.info, scene, script, std::span<const double>(long_clip));
+      EXPECT_NE(why.find("but vertex 2 of body 1 is at y = "), std::string::npos) << why;
+      change.times = {1.0};
+      change.positions = {0, 0, S(1.5 * most)};
+      EXPECT_THROW(session.change_plans(std::span(&change, 1), times), std::invalid_argument);
+    }
+    std::vector<S> given(scene.bodies[1].plans.keyframe(0),
+                         scene.bodies[1].plans.keyframe(0) + 3 * scene.bodies[1].plans.vertex_count());
+    scene.bodies[1].plans = FlightPlans<S>::handed_in(scene.bodies[1].plans.vertex_count(), given);
+    Session<S> session(scene, {&entry, {}, {}}, CountingPolicy::silent);
+    session.reset(0);
+    given.push_back(0);
+    given[4] = S(-1.5 * most);
+    EXPECT_THROW(session.hand_in(1, given.data()), std::invalid_argument);
+    if (!entry.info.can.rays) continue;
+    Ray<S> ray{};
+    ray.origin[2] = S(1.5 * most);
+    ray.direction[2] = -1;
+    ray.length = std::numeric_limits<S>::infinity();
+    RayHit hit;
+    EXPECT_THROW(session.hits(RayQuery::closest, std::span<const Ray<S>>(&ray, 1), std::span(&hit, 1), times),
+                 std::invalid_argument);
+  }
+  EXPECT_GT(limited, 0u);
+}
+
+TEST(Peers, StateTheirRangeInFloat) {
+  range_is_kept<float>();
+}
+TEST(Peers, StateTheirRangeInDouble) {
+  range_is_kept<double>();
+}
+
 /// Bullet's margin of 1.0 is why its scene is scaled; the parameter shows the difference.
 TEST(Bullet, ScalingKeepsFalsePairsOfSmallMeshesAway) {
   const auto found = std::find_if(registry().begin(), registry().end(),

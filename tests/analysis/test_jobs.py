@@ -95,6 +95,35 @@ class Records(Folder):
         self.assertEqual(self.joined("three", "two", "one")[0], 1)  # r2 and r4 have changed places
         self.assertEqual(self.joined("three", "two", "one")[0], 0)
 
+    def test_a_day_that_does_not_exist_is_not_the_newest(self):
+        """The cases of tests/program/merge_test.cpp."""
+        for wrong in ("2999-13-45", "2999-13-45T00:00:00Z", "2999-02-29T00:00:00Z", "2999-01-01T24:00:00Z", "2999-1-1T0:00:00Z", "", 7):
+            with self.subTest(wrong):
+                self.assertEqual(records.rank({"when": wrong}), (True, ""))
+        self.assertEqual(records.rank({"when": "2026-01-31T23:59:59Z"}), (True, "2026-01-31T23:59:59Z"))
+        good, bad = {"key": "k", "run": "1", "when": "2026-01-01T00:00:00Z"}, {"key": "k", "run": "2", "when": "2999-13-45T00:00:00Z"}
+        self.file("jobs/one/1.jsonl", good, bad)
+        self.assertEqual(self.joined("one"), (1, [good]))
+
+    def test_a_job_is_done_if_its_records_are_there(self):
+        def code():
+            return records.done_code(self.path, "one", records.keys(self.path / "results.jsonl"))
+
+        done = {"attempt": "a", "exit": 0, "keys": ["a", "b"]}
+        self.file("jobs/one/1.jsonl", {"key": "a"})
+        self.assertIsNone(code())
+        self.file("jobs/one/done", done)
+        self.assertIsNone(code())  # b is nowhere
+        self.file("jobs/one/2.jsonl", {"key": "b"})
+        self.assertEqual(code(), 0)
+        self.file("jobs/one/2.jsonl")
+        self.assertIsNone(code())
+        self.file("results.jsonl", {"key": "b"}, {"key": "c"})
+        self.assertEqual(code(), 0)
+        for damaged in (b"", b"{", b"[1]", b"3", b'{"exit": 0}', {**done, "exit": 3}, {**done, "exit": "x"}, {**done, "keys": 3}):
+            self.file("jobs/one/done", damaged)
+            self.assertIsNone(code(), damaged)
+
     def test_lines_stay_as_they_are(self):
         line = b'{"key": "a",   "t": 1.000, "n": 18446744073709551615}\n'
         self.file("jobs/one/1.jsonl", line)

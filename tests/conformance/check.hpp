@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <list>
 #include <type_traits>
@@ -33,6 +34,9 @@ std::string skipped(const StrategyEntry& entry, const TestScene<S>& test) {
               test.scene.bodies[pair.second].primitives.count() >
           entry.info.max_primitive_pairs)
         return "skipped: too large for it";
+  const bool within = unsuitable_bodies(entry.info, test.scene).empty() &&
+                      out_of_range(entry.info, test.scene, test.script, test.frames).empty();
+  if (std::isfinite(entry.info.max_coordinate) && !within) return "skipped: beyond its range of coordinates";
   if (entry.info.topology.own && !entry.info.own_scalar.empty())
     for (const auto& body : test.scene.bodies)
       if (body.primitives.kind != PrimitiveKind::polygons) return "skipped: a peer that knows polygons only";

@@ -11,6 +11,7 @@
 #include "experiments/common/environment.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/study/impact_queries.hpp"
+#include "tests/program/temporary_folder.hpp"
 
 namespace kbvh::experiments::impact_truth_test {
 namespace {
@@ -108,7 +109,8 @@ INSTANTIATE_TEST_SUITE_P(Data, FramePairs, testing::Values("cloth-ball", "rod-tw
 });
 
 TEST(ImpactQueries, ComplainWithTheLine) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "impact_queries";
+  const TemporaryFolder place;
+  const std::filesystem::path folder = place / "queries";
   std::filesystem::create_directories(folder);
   const auto message = [&](const std::string& name, const std::string& text) -> std::string {
     const std::filesystem::path file = folder / name;

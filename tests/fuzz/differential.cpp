@@ -110,7 +110,7 @@ void play(const Scene<S>& scene, const PlanScript<S>& script, std::uint32_t per_
   Oracle<S> oracle(scene, {}, hash(script)), unchanged(scene);
   for (const StrategyEntry& entry : registry()) {
     if (entry.info.guarantee == Guarantee::approximate) continue;
-    if (!experiments::unsuitable(entry.info, scene, script).empty()) continue;
+    if (!experiments::unsuitable(entry.info, scene, script, frames).empty()) continue;
     Session<S> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
     const auto expect = [&](const Verification& result, const char* when) {
       if (result.holds()) return;

@@ -11,6 +11,7 @@
 #include "core/contract/registry.hpp"
 #include "experiments/common/environment.hpp"
 #include "experiments/study/box_candidates.hpp"
+#include "temporary_folder.hpp"
 
 namespace kbvh::experiments::candidates_test {
 namespace {
@@ -106,6 +107,59 @@ TEST(BoxCandidates, ListedPairsThatAreNoneAreCounted) {
   EXPECT_EQ(found.missed, 1u);
   EXPECT_NE(complaint([&] { box_candidates(frames, BoxMargin::none, "rebuild"); }).find("finds no contacts"),
             std::string::npos);
+}
+
+/// Writes two frames of one triangle each, the second with a coordinate of this text, and their lists of
+/// pairs.
+void write_frame_pair(const std::filesystem::path& folder, const std::string& coordinate) {
+  for (const char* part : {"frames", "boxes", "mma_bool"}) std::filesystem::create_directories(folder / part);
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  write_text(folder / "frames/0.ply", head + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  write_text(folder / "frames/1.ply", head + "0 0 0\n1 0 0\n0 " + coordinate + " 0\n3 0 1 2\n");
+  for (const char* kind : {"vf", "ee"}) {
+    write_text(folder / "boxes" / (std::string("1") + kind + ".json"), "[]");
+    write_text(folder / "mma_bool" / (std::string("1") + kind + "_mma_bool.json"), "[]");
+  }
+}
+
+TEST(BoxCandidates, FramesAreLimitedAsAllFiles) {
+  TemporaryFolder folder;
+  write_frame_pair(folder.path(), "1e30");
+  EXPECT_EQ(box_candidates(read_frame_pair(folder.path()), BoxMargin::one_ulp).edge_edge, 0u);
+  for (const std::string coordinate : {"1e+31", "-1e+38", "1e+39", "1e+300"}) {
+    write_frame_pair(folder.path(), coordinate);
+    const std::string said = complaint([&] { read_frame_pair(folder.path()); });
+    EXPECT_NE(said.find("1.ply: vertex 2: coordinate y is " + coordinate + ", beyond the limit of 1e+30"),
+              std::string::npos)
+        << said;
+  }
+}
+
+TEST(ImpactQueries, AreLimitedAsTheExactTestIs) {
+  TemporaryFolder folder;
+  const auto write = [&](int power) {
+    std::string digits = "1", rows;
+    for (int i = 0; i < power; ++i) {  // 2^power, in decimal
+      int carry = 0;
+      for (auto digit = digits.rbegin(); digit != digits.rend(); ++digit) {
+        const int twice = 2 * (*digit - '0') + carry;
+        *digit = char('0' + twice % 10);
+        carry = twice / 10;
+      }
+      if (carry > 0) digits.insert(digits.begin(), char('0' + carry));
+    }
+    for (int row = 0; row < 8; ++row)
+      rows += (row == 5 ? digits : std::to_string(row)) + ",1,0,1," + std::to_string(row % 3) + ",1,0\n";
+    write_text(folder / "vf.csv", rows);
+  };
+  write(332);  // 8.7e99
+  EXPECT_EQ(read_impact_queries(folder / "vf.csv").queries.size(), 1u);
+  write(333);
+  const std::string said = complaint([&] { read_impact_queries(folder / "vf.csv"); });
+  EXPECT_NE(said.find("line 6: 1.74"), std::string::npos) << said;
+  EXPECT_NE(said.find("is beyond the limit of 1e+100"), std::string::npos) << said;
 }
 
 TEST(BoxCandidates, OfClothBallAreThePublishedOnes) {

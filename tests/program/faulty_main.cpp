@@ -11,7 +11,7 @@
 namespace kbvh {
 namespace {
 
-enum class Fault { none, loses_a_pair, repeats_a_pair, throws, needs_memory };
+enum class Fault { none, loses_a_pair, repeats_a_pair, throws, needs_memory, aborts };
 
 /// Every pair of primitives is a candidate, but for the fault.
 template <class S, Fault fault>
@@ -23,6 +23,7 @@ class EveryPair : public Strategy<S> {
   void reset_to(double) override {}
   void advance_to(double) override {
     if (fault == Fault::throws) throw std::runtime_error("out of luck");
+    if (fault == Fault::aborts && ++advances_ > number_of("KBVH_TEST_ABORT", 1000)) std::abort();
     if (fault == Fault::needs_memory && ++advances_ > memory_for()) {
       if (memory_for() < 0) std::terminate();
       throw std::bad_alloc();
@@ -45,9 +46,10 @@ class EveryPair : public Strategy<S> {
  private:
   /// How often it can advance before there is no memory left; below 0 there is none to throw, either, and it
   /// terminates the program as Embree can.
-  static int memory_for() {
-    const char* said = std::getenv("KBVH_TEST_MEMORY");
-    return said == nullptr ? 0 : std::atoi(said);
+  static int memory_for() { return number_of("KBVH_TEST_MEMORY", 0); }
+  static int number_of(const char* variable, int otherwise) {
+    const char* said = std::getenv(variable);
+    return said == nullptr ? otherwise : std::atoi(said);
   }
   int advances_ = 0;
 };
@@ -67,6 +69,10 @@ struct Repeats : EveryPair<S, Fault::repeats_a_pair> {
 template <class S, class Count>
 struct NeedsMemory : EveryPair<S, Fault::needs_memory> {
   using EveryPair<S, Fault::needs_memory>::EveryPair;
+};
+template <class S, class Count>
+struct Aborts : EveryPair<S, Fault::aborts> {
+  using EveryPair<S, Fault::aborts>::EveryPair;
 };
 template <class S, class Count>
 struct Throws : EveryPair<S, Fault::throws> {
@@ -90,6 +96,8 @@ Info info(const char* id, Guarantee guarantee) {
 const std::vector<StrategyEntry>& registry() {
   Info small = info("only_small", Guarantee::exact);
   small.max_primitive_pairs = 10;
+  Info near = info("only_near", Guarantee::exact);
+  near.max_coordinate = 100;
   static const std::vector<StrategyEntry> entries{
       make_entry<Honest>(info("honest", Guarantee::exact)),
       make_entry<Loses>(info("loses", Guarantee::exact)),
@@ -97,7 +105,9 @@ const std::vector<StrategyEntry>& registry() {
       make_entry<Repeats>(info("repeats", Guarantee::candidate_superset)),
       make_entry<Throws>(info("throws", Guarantee::exact)),
       make_entry<NeedsMemory>(info("needs_memory", Guarantee::exact)),
+      make_entry<Aborts>(info("aborts", Guarantee::exact)),
       make_entry<Honest>(small),
+      make_entry<Honest>(near),
       make_entry<Honest, Scalars::double_only>(info("only_double", Guarantee::exact))};
   return entries;
 }

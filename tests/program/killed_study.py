@@ -48,22 +48,24 @@ def main() -> int:
         whole = time.monotonic() - started
         wanted = {record["key"] for record in readable(out / "results.jsonl")}
 
-        killed = clips = 0
+        killed = clips = named = 0
         while killed < times:
             for file in sorted(out.rglob("*"), reverse=True):
                 file.unlink() if file.is_file() else file.rmdir()
             before: set[str] = set()
             clips += 1
             for _ in range(1000):
-                run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
                 try:
-                    run.wait(timeout=chance.uniform(0.0, 0.5 * whole))
+                    said = run.communicate(timeout=chance.uniform(0.0, 0.5 * whole))[1]
+                    named += said.count("an earlier run was ended from outside while ")
                     if run.returncode != 0:
                         raise SystemExit(f"a run that went on where another was killed ended with {run.returncode}")
                     break
                 except subprocess.TimeoutExpired:
                     run.send_signal(signal.SIGKILL)
-                    run.wait()
+                    said = run.communicate()[1]
+                    named += said.count("an earlier run was ended from outside while ")
                     killed += 1
                 records = readable(out / "results.jsonl")
                 keys = [record["key"] for record in records]
@@ -74,7 +76,14 @@ def main() -> int:
                 before = set(keys)
             if {record["key"] for record in readable(out / "results.jsonl")} != wanted:
                 raise SystemExit("the study ended, but not with all of its configurations")
-    print(f"killed {killed} times in {clips} studies of {len(wanted)} configurations: nothing lost but the run in progress")
+            if left := list(out.rglob("*.measuring")):
+                raise SystemExit(f"a study that has ended measures nothing, but there is {left}")
+    if not 0 < named <= killed:
+        raise SystemExit(f"killed {killed} times, and {named} times the next run said what was being measured")
+    print(
+        f"killed {killed} times in {clips} studies of {len(wanted)} configurations: nothing lost but the run in progress, which the"
+        f" next run named {named} times"
+    )
     return 0
 
 

@@ -66,6 +66,70 @@ TEST_F(Binary, AContestantThatTerminatesTheProgramIsNamed) {
   EXPECT_EQ(kbvh("run " + tiny + "--strategies honest --out out", "", KBVH_FAULTY_PROGRAM).code, 0);
 }
 
+// An assertion of a library ends the program: what was measured before is kept, the next run goes on without
+// it.
+TEST_F(Binary, AContestantThatAbortsIsReportedAndLeftOut) {
+  ASSERT_EQ(kbvh("run " + tiny + "--strategies honest --seed 2 --out out", "", KBVH_FAULTY_PROGRAM).code, 0);
+  // At the first frame, while it is verified; and when it is played, after it has held.
+  for (const auto& [advances, doing] : {std::pair{"0", "verifying"}, std::pair{"5", "timing"}})
+    for (const std::string command : {"run ", "bench "}) {
+      SCOPED_TRACE(command + doing);
+      const std::string out = command.substr(0, 1) + advances;
+      std::filesystem::copy(folder_ / "out", folder_ / out, std::filesystem::copy_options::recursive);
+      const std::string arguments = command + tiny + "--strategies honest,aborts,admits_to_lose --out " + out;
+      const Outcome first = kbvh(arguments, std::string("KBVH_TEST_ABORT=") + advances, KBVH_FAULTY_PROGRAM);
+      EXPECT_EQ(first.code, 128 + 6) << first.err;
+      EXPECT_NE(first.err.find(std::string("aborted (SIGABRT) while ") + doing + " aborts on waving_sheet"),
+                std::string::npos)
+          << first.err;
+      EXPECT_EQ(records(out + "/results.jsonl").size(), 1u) << "what was measured before is kept";
+
+      const Outcome second = kbvh(arguments, std::string("KBVH_TEST_ABORT=") + advances, KBVH_FAULTY_PROGRAM);
+      EXPECT_EQ(second.code, 1) << second.err;
+      EXPECT_NE(second.err.find("aborts is left out of "), std::string::npos) << second.err;
+      const auto list = records(out + "/results.jsonl");
+      ASSERT_EQ(list.size(), 4u);
+      for (const json& record : list) {
+        const bool aborts = record.at("strategy").at("id") == "aborts";
+        EXPECT_EQ(record.at("times").is_null(), aborts) << record.dump();
+        EXPECT_EQ(record.at("verified").at("holds"), !aborts) << record.dump();
+        if (!aborts) continue;
+        const std::string why = record.at("refused");
+        EXPECT_TRUE(why.starts_with(doing) && why.ends_with(", the program ended by SIGABRT (aborted)"))
+            << why;
+      }
+      const Outcome third = kbvh(arguments, "", KBVH_FAULTY_PROGRAM);
+      EXPECT_EQ(third.code, 1) << "the verdict stays";
+      EXPECT_EQ(records(out + "/results.jsonl").size(), 4u);
+      for (const auto& entry : std::filesystem::directory_iterator(folder_ / out))
+        EXPECT_NE(entry.path().extension(), ".measuring") << entry.path();
+    }
+  // Without a folder, the program says at least what it was doing.
+  const Outcome alone =
+      kbvh("run " + tiny + "--strategies honest,aborts", "KBVH_TEST_ABORT=0", KBVH_FAULTY_PROGRAM);
+  EXPECT_EQ(alone.code, 128 + 6);
+  EXPECT_NE(alone.err.find("while verifying aborts on waving_sheet"), std::string::npos) << alone.err;
+}
+
+// Want of memory is the usual reason: no verdict, and the others of the table are measured by the next run.
+TEST_F(Binary, AContestantThatTerminatesTheProgramIsTriedOnceMoreAfterTheOthers) {
+  const std::string arguments = "run " + tiny + "--strategies honest,needs_memory --out out";
+  EXPECT_EQ(kbvh(arguments, "KBVH_TEST_MEMORY=-1", KBVH_FAULTY_PROGRAM).code, 3);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/results.jsonl"));
+  const Outcome second = kbvh(arguments, "KBVH_TEST_MEMORY=-1", KBVH_FAULTY_PROGRAM);
+  EXPECT_EQ(second.code, 3) << second.err;
+  EXPECT_NE(second.err.find("1 configuration without enough memory; the next run measures it again"),
+            std::string::npos)
+      << second.err;
+  const auto list = records("out/results.jsonl");
+  ASSERT_EQ(list.size(), 2u);
+  for (const json& record : list)
+    EXPECT_EQ(record.value("unfinished", false), record.at("strategy").at("id") == "needs_memory");
+  const Outcome third = kbvh(arguments, "KBVH_TEST_MEMORY=1000", KBVH_FAULTY_PROGRAM);
+  EXPECT_EQ(third.code, 0) << third.err;
+  EXPECT_EQ(records("out/results.jsonl").size(), 3u);
+}
+
 // Wherever memory ends, that is no fault of a contestant.
 TEST_F(Binary, WantOfMemoryIsNeverABrokenGuarantee) {
   if (known_strategy("embree_refit") == nullptr) GTEST_SKIP() << "built without Embree";

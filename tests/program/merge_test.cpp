@@ -4,6 +4,28 @@
 namespace kbvh::experiments::merge_test {
 namespace {
 
+json record(const std::string& key, const std::string& run, const std::string& when);
+
+TEST_F(Binary, ADayThatDoesNotExistIsNotTheNewest) {
+  for (const std::string wrong : {"2999-13-45", "2999-13-45T00:00:00Z", "2999-02-29T00:00:00Z",
+                                  "2999-01-01T24:00:00Z", "2999-01-01 00:00:00Z", "tomorrow", ""}) {
+    SCOPED_TRACE(wrong);
+    write_text(folder_ / "a.jsonl", record("k", "r1", "2026-01-01T00:00:00Z").dump() + "\n");
+    write_text(folder_ / "b.jsonl", record("k", "r2", wrong).dump() + "\n");
+    for (const std::string order : {"a.jsonl b.jsonl", "b.jsonl a.jsonl"}) {
+      std::filesystem::remove_all(folder_ / "m");
+      const Outcome merged = kbvh("merge " + order + " --out m");
+      EXPECT_EQ(merged.code, 0) << merged.err;
+      EXPECT_NE(
+          merged.err.find("1 record of b.jsonl has no valid time (b.jsonl line 1), and counts as older"),
+          std::string::npos)
+          << merged.err;
+      ASSERT_EQ(records("m/results.jsonl").size(), 2u);
+      EXPECT_EQ(records("m/results.jsonl").back().at("run"), "r1");
+    }
+  }
+}
+
 /// A record with the fields that the program checks.
 json record(const std::string& key, const std::string& run, const std::string& when) {
   return {{"schema", 1},

@@ -6,6 +6,7 @@
 
 #include "binary.hpp"
 #include "experiments/cli/program.hpp"
+#include "experiments/study/contestants.hpp"
 
 namespace kbvh::experiments::options_test {
 namespace {
@@ -391,6 +392,58 @@ TEST_F(StandardOutput, AClosedStreamIsNotAFileOfResults) {
       << outcome.err;
   EXPECT_EQ(records().size(), 2u);
   EXPECT_EQ(kbvh("run " + clips + "--l 1,2 --strategies bottom_up --out out").code, 0);
+}
+
+TEST_F(Binary, RaysMeetABodyAlone) {
+  const Outcome rays =
+      kbvh("run --body sphere:triangles=20 --rays coherent:100 --strategies bottom_up --repetitions 1");
+  EXPECT_EQ(rays.code, 0);
+  EXPECT_EQ(rays.err, "");
+  EXPECT_NE(rays.out.find(" true hits in 1 compared frame\n"), std::string::npos) << rays.out;
+}
+
+TEST_F(Binary, AStatedRangeIsKeptAndListed) {
+  const std::string program = KBVH_FAULTY_PROGRAM;
+  const auto run = [&](const std::string& bodies) {
+    return kbvh("run " + bodies + " --body sphere:triangles=20 --strategies honest,only_near --repetitions 1",
+                "", program);
+  };
+  const Outcome within = run("--body sphere:triangles=20,translate=99:0:0");
+  EXPECT_EQ(within.code, 0);
+  EXPECT_EQ(within.err, "");
+  const Outcome beyond = run("--body sphere:triangles=20,translate=101:0:0,name=ball");
+  EXPECT_EQ(beyond.code, 0);
+  EXPECT_NE(beyond.err.find(
+                "only_near is left out of ball+icosphere-20: it takes coordinates up to 100, but vertex "),
+            std::string::npos)
+      << beyond.err;
+  const Outcome later = run("--body sphere:triangles=20,keyframes=3,step=60:0:0,name=ball");
+  EXPECT_NE(later.err.find("of body 'ball' is at x = "), std::string::npos) << later.err;
+  EXPECT_NE(later.err.find(" at keyframe 2\n"), std::string::npos) << later.err;
+  // By a change of plans, for which a peer stands.
+  if (known_strategy("fcl_float_own_verdict") != nullptr) {
+    const auto with_script = [&](const std::string& velocity) {
+      write_text(folder_ / "s.json",
+                 R"({"steps": [{"time": 0, "changes": [{"body": 0, "vertex": 1, "velocity": [)" + velocity +
+                     R"(, 0, 0]}]}]})");
+      return kbvh(
+                 "run --body sphere:triangles=20,keyframes=3,step=0.1:0:0,name=ball --body "
+                 "sphere:triangles=20 "
+                 "--script s.json --strategies bottom_up,fcl_float_own_verdict --repetitions 1")
+          .err;
+    };
+    const std::string slow = with_script("1"), fast = with_script("1e12");
+    EXPECT_EQ(slow.find("coordinates"), std::string::npos) << slow;
+    EXPECT_NE(fast.find("it takes coordinates up to 1e+09, but vertex 1 of body 0 is at x = "),
+              std::string::npos)
+        << fast;
+  }
+  EXPECT_NE(
+      kbvh("list", "", program).out.find("takes coordinates up to 100, and no scene that reaches beyond"),
+      std::string::npos);
+  const json list = json::parse(kbvh("list --json", "", program).out);
+  for (const json& strategy : list.at("strategies"))
+    EXPECT_EQ(strategy.at("max_coordinate"), strategy.at("id") == "only_near" ? json(100.0) : json(nullptr));
 }
 
 TEST_F(Binary, ASceneWithoutPairsSaysSo) {

@@ -212,6 +212,21 @@ TEST(Table, RatiosAreAgainstTheBestRefit) {
       "  wrong is refused a time: it is wrong\n");
 }
 
+TEST(Table, SaysHowManyPairsThereAre) {
+  std::vector<json> records{example_record("threw", "refit", 1), example_record("fast", "refit", 4)};
+  records[0]["verified"].update({{"frames", 1u}, {"pairs", 2u}});
+  records[1]["verified"].update({{"frames", 4u}, {"pairs", 35u}});
+  const auto title = [&] { return results_table(records).substr(0, results_table(records).find('\n')); };
+  EXPECT_EQ(title(), "s, l = 10, float: 5 frames, 7 primitives, 35 true pairs in 4 compared frames");
+  records[1]["verified"].update({{"frames", 1u}, {"pairs", 1u}});
+  records[0]["verified"]["pairs"] = 1u;
+  EXPECT_EQ(title(), "s, l = 10, float: 5 frames, 7 primitives, 1 true pair in 1 compared frame");
+  for (json& record : records) record["scene"]["rays"] = "coherent:4:closest";
+  EXPECT_EQ(title(), "s, l = 10, float: 5 frames, 7 primitives, 1 true hit in 1 compared frame");
+  for (json& record : records) record["verified"]["frames"] = "damaged";
+  EXPECT_EQ(title(), "s, l = 10, float: 5 frames, 7 primitives");
+}
+
 // A refit of one's own is shown in the table, and no ratio is against it unless it is declared a baseline.
 TEST(Table, OnlyDeclaredBaselinesAreTheDenominator) {
   std::vector<json> records{example_record("mine", "refit", 1), example_record("bottom_up", "refit", 4),

@@ -470,13 +470,13 @@ TEST_F(Binary, BrokenGuaranteesAreRefusedATime) {
     EXPECT_NE(run.out.find("throws is refused a time: it threw: out of luck"), std::string::npos) << run.out;
     std::map<std::string, json> by_id;
     for (const json& record : records(out + "/results.jsonl")) by_id[record.at("strategy").at("id")] = record;
-    ASSERT_EQ(by_id.size(), 6u);
+    ASSERT_EQ(by_id.size(), 8u);
     for (const char* id : {"loses", "repeats", "throws"}) {
       EXPECT_TRUE(by_id.at(id).at("times").is_null()) << id;
       EXPECT_FALSE(by_id.at(id).at("verified").at("holds")) << id;
       EXPECT_EQ(by_id.at(id).at("refused"), by_id.at(id).at("verified").at("first_violation")) << id;
     }
-    for (const char* id : {"honest", "admits_to_lose"})
+    for (const char* id : {"honest", "admits_to_lose", "aborts", "only_near"})
       EXPECT_TRUE(by_id.at(id).at("times").is_object()) << id;
     EXPECT_GT(by_id.at("admits_to_lose").at("verified").at("missed"), 0u);
     EXPECT_GT(by_id.at("repeats").at("verified").at("repeated"), 0u);

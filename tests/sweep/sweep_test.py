@@ -169,6 +169,7 @@ exec "$KBVH" "$@" """,
     require(again.returncode == 0 and "; 0 new records" in again.stdout, "again", again)
     require(len(list(attempts(out))) == len(done), "nothing is done again", again)
     require((out / "results.jsonl").read_bytes() == before, "the results are as before")
+    damaged(study, out)
     # What is in the results already is not measured again, whoever has measured it.
     over = study.folder / "over"
     shutil.copytree(study.folder / "whole", over)
@@ -182,6 +183,35 @@ exec "$KBVH" "$@" """,
     listed = study.run("--list", out=over)
     require(listed.stdout.count(" done\n") == JOBS - 1, "the list says what is done", listed)
     require(listed.stdout.count(" guarantee broken\n") == 1, "the list says what is broken", listed)
+
+
+def damaged(study: Study, out: Path) -> None:
+    """Jobs whose file `done` is damaged, or whose records were deleted, are done once more; all others are not."""
+    jobs = sorted(file.parent for file in (out / "jobs").glob("*/done"))
+    before, other_records = (out / "results.jsonl").read_bytes(), list(attempts(out))
+    (jobs[0] / "done").write_text("")
+    (jobs[1] / "done").write_text("{}")
+    lost = {record["key"] for file in jobs[2].glob("*.jsonl") for record in lines_of(file, torn=False)}
+    for file in jobs[2].glob("*.jsonl"):
+        file.unlink()
+    listed = study.run("--list", out=out)
+    require(listed.stdout.count(" open\n") == 2, "damaged jobs are open; records in the results are there", listed)
+    kept = [line for line in before.splitlines(keepends=True) if json.loads(line)["key"] not in lost]
+    (out / "results.jsonl").write_bytes(b"".join(kept))
+    listed = study.run("--list", out=out)
+    require(lost and listed.stdout.count(" open\n") == 3, "deleted records open a job", listed)
+    run = study.run("--cores", "1", out=out)
+    require(run.returncode == 0 and f"{JOBS} of {JOBS} jobs are done" in run.stdout, "damaged jobs", run)
+    require(run.stderr.count("is done once more: ") == 3, "it says which jobs are done once more", run)
+    require(len(list(attempts(out))) == len(other_records) + 3, "three jobs are done once more, and no other", run)
+    study.check(out)
+    # A scene is made once more where a job needs it.
+    job = json.loads((out / "jobs" / "list.json").read_text())["jobs"][0]
+    scene = out / "jobs" / "scenes" / job["scene"] / "done"
+    scene.write_text("")
+    (out / "jobs" / job["id"] / "done").unlink()
+    run = study.run("--cores", "1", out=out)
+    require(run.returncode == 0 and "exit" in json.loads(scene.read_text()), "a scene, too", run)
 
 
 def same_as_merged(study: Study, out: Path) -> None:
@@ -216,6 +246,8 @@ def wrong_use(study: Study) -> None:
         (["--cores", "1", "--", "--drmaa"], "go with --jobs N"),
         (["--jobs", "2"], "--jobs N needs the means after --"),
         (["--cores", "1", "--kbvh", "/nowhere"], "/nowhere is no program"),
+        (["--cores", "1", "--kbvh", "/bin/true"], "/bin/true is another program"),
+        (["--cores", "1", "--kbvh", "/bin/echo"], "/bin/echo is another program"),
         (["--cores", "1", "--study", "none"], "there is no study 'none'"),
     ):
         run = study.run(*words, out=out)

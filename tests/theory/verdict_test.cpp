@@ -14,6 +14,7 @@
 #include "experiments/theory/measure_separation.hpp"
 #include "experiments/theory/theory.hpp"
 #include "experiments/theory/theory_scenes.hpp"
+#include "tests/program/temporary_folder.hpp"
 
 namespace kbvh::theory {
 namespace {
@@ -409,8 +410,8 @@ TEST(Fit, FindsAPowerAndItsInterval) {
 }
 
 TEST(Store, GoesOnWhereItWasAndForgetsOtherPrograms) {
-  const auto file = std::filesystem::temp_directory_path() / "kbvh-theory-store-test.jsonl";
-  std::filesystem::remove(file);
+  const experiments::TemporaryFolder folder;
+  const auto file = folder / "store.jsonl";
   int made = 0;
   const auto measure = [&] {
     ++made;
@@ -429,7 +430,6 @@ TEST(Store, GoesOnWhereItWasAndForgetsOtherPrograms) {
   again.get<CountRun>("b", measure);
   other.get<CountRun>("a", measure);
   EXPECT_EQ(made, 3);
-  std::filesystem::remove(file);
 }
 
 TEST(Table, FitsIntoAHundredAndTwentyColumns) {

@@ -1,5 +1,6 @@
 #include "arrays.hpp"
 
+#include <csignal>
 #include <cstddef>
 #include <limits>
 
@@ -46,8 +47,40 @@ py::object vector3() {
   return py::dtype::from_args(py::make_tuple("f8", py::make_tuple(3)));
 }
 
-std::string in_words(const py::object& given) {
-  return py::str(py::type::of(given).attr("__name__"));
+std::string in_words(const py::handle& given) {
+  return py::str(py::type::handle_of(given).attr("__name__"));
+}
+
+/// Returns what a caller gave as an array of whole or real numbers: neither text, dates nor complex numbers,
+/// which numpy would convert and partly lose.
+py::array real_array(const py::object& given, const std::string& what) {
+  py::array array = py::array::ensure(given);
+  if (!array) {
+    PyErr_Clear();
+    throw std::invalid_argument(what + " is no array of numbers, but " + in_words(given));
+  }
+  const char kind = array.dtype().kind();
+  if (array.size() == 0 || kind == 'f' || kind == 'i' || kind == 'u') return array;
+  if (array.ndim() == 0)
+    throw std::invalid_argument(what + " is no array of numbers, but " + in_words(given));
+  throw std::invalid_argument(what + ": real numbers are needed, not " + std::string(py::str(array.dtype())));
+}
+
+// The work that an interruption is to end.
+std::atomic<bool> interrupted{false};
+int interruptible_calls = 0;  // guarded by the interpreter's lock
+struct sigaction former_action;
+
+extern "C" void note_interruption(int signal) {
+  interrupted = true;
+  if (former_action.sa_handler != SIG_DFL && former_action.sa_handler != SIG_IGN)
+    former_action.sa_handler(signal);
+}
+
+bool in_main_thread() {
+  static const auto main =
+      py::module_::import("threading").attr("main_thread")().attr("ident").cast<unsigned long>();
+  return PyThread_get_thread_ident() == main;
 }
 
 }  // namespace
@@ -66,24 +99,62 @@ Numbers::Numbers(const py::object& given, const std::string& what) {
       return;
     }
   }
-  const auto converted = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(given);
-  if (!converted) {
-    PyErr_Clear();
-    throw std::invalid_argument(what + " is no array of numbers, but " + in_words(given));
-  }
-  array_ = converted;
+  array_ = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(real_array(given, what));
+  if (!array_) throw py::error_already_set();
 }
 
 void Numbers::check_points(const std::string& what) const {
   if (array_.ndim() > 1 && array_.shape(array_.ndim() - 1) != 3)
-    throw std::invalid_argument(what + " has points of " + std::to_string(array_.shape(array_.ndim() - 1)) +
-                                " coordinates, not 3");
+    throw std::invalid_argument(what + ": points have 3 coordinates, not " +
+                                std::to_string(array_.shape(array_.ndim() - 1)));
 }
 
 std::vector<double> doubles_of(const py::object& given, const std::string& what) {
   const Numbers numbers(given, what);
   if (numbers.single()) return {numbers.floats().begin(), numbers.floats().end()};
   return {numbers.doubles().begin(), numbers.doubles().end()};
+}
+
+std::vector<double> points_of(const py::object& given, const std::string& what) {
+  const Numbers numbers(given, what);
+  numbers.check_points(what);
+  if (numbers.size() % 3 != 0)
+    throw std::invalid_argument(what + ": " + std::to_string(numbers.size()) + " coordinates are no points");
+  if (numbers.single()) return {numbers.floats().begin(), numbers.floats().end()};
+  return {numbers.doubles().begin(), numbers.doubles().end()};
+}
+
+std::uint64_t whole_number(const py::handle& given, const std::string& what, std::uint64_t most) {
+  const auto index = py::reinterpret_steal<py::object>(PyNumber_Index(given.ptr()));
+  if (!index) {
+    PyErr_Clear();
+    const bool shown = PyFloat_Check(given.ptr()) != 0;
+    throw py::type_error(what + " is a whole number, not " +
+                         (shown ? std::string(py::str(given)) : in_words(given)));
+  }
+  const unsigned long long value = PyLong_AsUnsignedLongLong(index.ptr());
+  const bool beyond = PyErr_Occurred() != nullptr;
+  PyErr_Clear();
+  if (beyond || value > most)
+    throw std::invalid_argument(what + " is a whole number from 0 to " + std::to_string(most) + ", not " +
+                                std::string(py::str(index)));
+  return value;
+}
+
+EndsOnInterrupt::EndsOnInterrupt() {
+  if (!in_main_thread()) return;
+  if (interruptible_calls++ == 0) {
+    interrupted = false;
+    struct sigaction action {};
+    action.sa_handler = &note_interruption;
+    ::sigaction(SIGINT, &action, &former_action);
+  }
+  interruptible_.emplace(interrupted);
+}
+EndsOnInterrupt::~EndsOnInterrupt() {
+  if (!interruptible_) return;
+  interruptible_.reset();
+  if (--interruptible_calls == 0) ::sigaction(SIGINT, &former_action, nullptr);
 }
 
 Ids::Ids(const py::object& given, const std::string& what) {
@@ -97,6 +168,7 @@ Ids::Ids(const py::object& given, const std::string& what) {
       throw std::invalid_argument(what + " are no ids, but " + in_words(given));
     }
   }
+  axes_ = int(array.ndim());
   if (py::isinstance<py::array_t<std::uint32_t>>(array) && (array.flags() & py::array::c_style) != 0) {
     keep_ = array;
     data_ = static_cast<const std::uint32_t*>(array.data());
@@ -106,14 +178,19 @@ Ids::Ids(const py::object& given, const std::string& what) {
   const char kind = array.dtype().kind();
   if (array.size() > 0 && kind != 'i' && kind != 'u')
     throw std::invalid_argument(what + " are no whole numbers, but " + std::string(py::str(array.dtype())));
-  const auto wide = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(array);
-  copy_.reserve(std::size_t(wide.size()));
-  for (py::ssize_t i = 0; i < wide.size(); ++i) {
-    const std::int64_t id = wide.data()[i];
-    if (id < 0 || id > std::numeric_limits<std::uint32_t>::max())
-      throw std::invalid_argument(what + ": " + std::to_string(id) + " cannot be an id");
-    copy_.push_back(std::uint32_t(id));
-  }
+  const auto take = [&](const auto& wide) {
+    copy_.reserve(std::size_t(wide.size()));
+    for (py::ssize_t i = 0; i < wide.size(); ++i) {
+      const auto id = wide.data()[i];
+      if (id < 0 || id > std::numeric_limits<std::uint32_t>::max())
+        throw std::invalid_argument(what + ": " + std::to_string(id) + " cannot be an id");
+      copy_.push_back(std::uint32_t(id));
+    }
+  };
+  if (kind == 'u')
+    take(py::array_t<std::uint64_t, py::array::c_style | py::array::forcecast>::ensure(array));
+  else
+    take(py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(array));
   data_ = copy_.data();
   size_ = copy_.size();
 }

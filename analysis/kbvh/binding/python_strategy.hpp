@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <set>
 #include <span>
@@ -144,7 +145,7 @@ class PythonStrategy final : public CountedStrategy<S, Counting>,
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       if (!(times[2 * i] >= t0 && times[2 * i] <= times[2 * i + 1] && times[2 * i + 1] <= t1))
         throw std::invalid_argument("'" + id_ + "', spans: span " + std::to_string(i) + " is from " +
-                                    std::to_string(times[2 * i]) + " to " + std::to_string(times[2 * i + 1]));
+                                    number_text(times[2 * i]) + " to " + number_text(times[2 * i + 1]));
       out.push_back({pairs[i], times[2 * i], times[2 * i + 1]});
     }
   }
@@ -190,17 +191,24 @@ class PythonStrategy final : public CountedStrategy<S, Counting>,
 
   std::size_t bytes() const override {
     const py::gil_scoped_acquire locked;
-    const py::int_ bytes = call("bytes");
-    return bytes;
+    return whole_number(call("bytes"), "'" + id_ + "', bytes: the memory",
+                        std::numeric_limits<std::size_t>::max());
   }
 
  private:
   void add_counts(Counters& table) const override {
     const py::gil_scoped_acquire locked;
-    const py::dict counts = call("counters");
-    for (const std::pair<py::handle, py::handle> entry : counts) {
+    const py::object counts = call("counters");
+    if (!py::isinstance<py::dict>(counts))
+      throw py::type_error("'" + id_ + "', counters: returned no dictionary, but " +
+                           std::string(py::str(py::type::of(counts).attr("__name__"))));
+    for (const std::pair<py::handle, py::handle> entry : py::reinterpret_borrow<py::dict>(counts)) {
+      if (!py::isinstance<py::str>(entry.first))
+        throw py::type_error("'" + id_ + "', counters: the name of a counter is a text, not " +
+                             std::string(py::str(entry.first)));
       const std::string counter = py::str(entry.first);
-      const std::uint64_t amount = py::int_(py::reinterpret_borrow<py::object>(entry.second));
+      const std::uint64_t amount = whole_number(entry.second, "'" + id_ + "', counters: '" + counter + "'",
+                                                std::numeric_limits<std::uint64_t>::max());
       std::size_t known = 0;
       while (known < table.values.size() && counter != name(Counter(known))) ++known;
       if (known < table.values.size())

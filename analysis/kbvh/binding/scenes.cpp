@@ -70,7 +70,7 @@ py::tuple played(const LoadedScene& loaded, std::uint32_t per_keyframe) {
   {
     const Unlocked unlocked;
     const Scene<S> scene = assemble<S>(loaded);
-    script = script_of(scene, loaded);
+    script = script_of(scene, loaded, [](const std::string&, double) { Interruptible::check(); });
     frames = frames_of(scene, loaded, script, per_keyframe);
   }
   const auto count = py::ssize_t(frames.size());
@@ -80,7 +80,7 @@ py::tuple played(const LoadedScene& loaded, std::uint32_t per_keyframe) {
 /// Makes the scene that a plan describes: name, seed, notes and bodies. With a precision, also its frames, l
 /// per interval, and its changes of plans in this precision.
 py::dict make_scene(const std::string& description, const std::string& folder, const std::string& precision,
-                    std::uint32_t per_keyframe) {
+                    Whole per_keyframe) {
   const auto parsed = nlohmann::json::parse(description);
   LoadedScene loaded;
   {
@@ -91,7 +91,7 @@ py::dict make_scene(const std::string& description, const std::string& folder, c
                            " scenes; lists of triangles, seed and order are for plans");
     if (specs[0].order == VertexOrder::renumbered)
       throw io::InputError("scene: order: renumbered depends on the precision, so it is for plans");
-    loaded = load(specs[0]);
+    loaded = load(specs[0], [](const std::string&, double) { Interruptible::check(); });
   }
   py::dict out;
   out["name"] = loaded.name;

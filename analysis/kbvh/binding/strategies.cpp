@@ -3,6 +3,7 @@
 #include <pybind11/stl.h>
 
 #include <array>
+#include <limits>
 #include <map>
 
 #include "open_registry.hpp"
@@ -114,7 +115,8 @@ void register_strategy(const py::dict& given, const std::string& about, const py
   }
   for (const py::handle parameter : given["parameters"])
     info.parameters.push_back(parameter_of(parameter.cast<py::dict>()));
-  info.max_primitive_pairs = given["max_primitive_pairs"].cast<std::uint64_t>();
+  info.max_primitive_pairs = whole_number(given["max_primitive_pairs"], what + "max_primitive_pairs",
+                                          std::numeric_limits<std::uint64_t>::max());
   for (const std::string& word : given["abilities"].cast<std::vector<std::string>>()) {
     bool Capabilities::*const ability =
         chosen<bool Capabilities::*>(word,
@@ -152,35 +154,35 @@ std::string_view lasting(const std::string& text) {
 void bind_strategies(py::module_& module) {
   using py::arg;
   using Handle = MotionHandle;
+  const auto of = [](const py::handle& self, std::uint32_t body) -> const AnyMotion& {
+    return object_of<Handle>(self).of(body);
+  };
   py::class_<Handle, std::shared_ptr<Handle>>(module, "Motion")
-      .def_property_readonly("time", [](const Handle& h) { return h.motion().time(); })
+      .def_property_readonly("time", [](py::handle self) { return object_of<Handle>(self).motion().time(); })
       .def(
-          "positions", [](const Handle& h, std::uint32_t body) { return h.of(body).positions(body); },
+          "positions", [of](py::handle self, Whole body) { return of(self, body).positions(body); },
           arg("body"))
       .def(
           "displacement_bound",
-          [](const Handle& h, std::uint32_t body, double t0, double t1) {
-            return h.of(body).displacement_bound(body, t0, t1);
+          [of](py::handle self, Whole body, Real t0, Real t1) {
+            return of(self, body).displacement_bound(body, t0, t1);
           },
           arg("body"), arg("t0"), arg("t1"))
       .def(
-          "lines_begin", [](const Handle& h, std::uint32_t body) { return h.of(body).lines_begin(body); },
+          "lines_begin", [of](py::handle self, Whole body) { return of(self, body).lines_begin(body); },
           arg("body"))
       .def(
-          "lines_end", [](const Handle& h, std::uint32_t body) { return h.of(body).lines_end(body); },
+          "lines_end", [of](py::handle self, Whole body) { return of(self, body).lines_end(body); },
           arg("body"))
       .def(
           "positions_on_lines",
-          [](const Handle& h, std::uint32_t body, double t) {
-            return h.of(body).positions_on_lines(body, t);
-          },
+          [of](py::handle self, Whole body, Real t) { return of(self, body).positions_on_lines(body, t); },
           arg("body"), arg("t"))
       .def(
-          "keyframe_times",
-          [](const Handle& h, std::uint32_t body) { return h.of(body).keyframe_times(body); }, arg("body"))
+          "keyframe_times", [of](py::handle self, Whole body) { return of(self, body).keyframe_times(body); },
+          arg("body"))
       .def(
-          "keyframe",
-          [](const Handle& h, std::uint32_t body, std::size_t k) { return h.of(body).keyframe(body, k); },
+          "keyframe", [of](py::handle self, Whole body, Whole k) { return of(self, body).keyframe(body, k); },
           arg("body"), arg("k"));
   module.def("register_strategy", &register_strategy, arg("description"), arg("about"), arg("factory"));
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <map>
 
 #include "arrays.hpp"
@@ -67,7 +68,11 @@ class PythonWorld {
     const std::string what = "body '" + name + "'";
     const Ids vertices(indices, what + ", its indices");
     std::unique_ptr<Ids> starts;
-    if (!offsets.is_none()) starts = std::make_unique<Ids>(offsets, what + ", its offsets");
+    if (!offsets.is_none()) {
+      starts = std::make_unique<Ids>(offsets, what + ", its offsets");
+      if (starts->span().empty())
+        throw std::invalid_argument(what + ": offsets begin with 0, but there are none");
+    }
     const Numbers numbers(positions, what + ", its positions");
     numbers.check_points(what + ", its positions");
     const Connectivity connectivity{
@@ -81,15 +86,15 @@ class PythonWorld {
     given_.emplace_back();
     return body;
   }
-  void add_pair(std::uint32_t a, std::uint32_t b) { world_.add_pair(a, b); }
+  void add_pair(Whole a, Whole b) { world_.add_pair(a, b); }
 
-  void start(const std::string& strategy, const Words& params, double t, const Words& topology) {
+  void start(const std::string& strategy, const Words& params, Real t, const Words& topology) {
     alone([&] { world_.start(strategy, params, t, topology); });
   }
-  void reset(double t) {
+  void reset(Real t) {
     move([&] { world_.reset(t); });
   }
-  void advance(double t) {
+  void advance(Real t) {
     move([&] { world_.advance(t); });
   }
   double time() const { return world_.time(); }
@@ -111,7 +116,7 @@ class PythonWorld {
   double next_knot() const { return world_.next_knot(); }
 
   /// Returns whether the array is used where it lies: one of 3n + 1 numbers in the world's precision.
-  bool set_positions(std::uint32_t body, const py::object& positions) {
+  bool set_positions(Whole body, const py::object& positions) {
     const std::string what = "the positions of body " + std::to_string(body);
     const Numbers numbers(positions, what);
     if (numbers.array().ndim() > 1) numbers.check_points(what);
@@ -120,14 +125,14 @@ class PythonWorld {
     return in_place;
   }
 
-  void change_plans(std::uint32_t body, const py::object& vertices, const py::object& velocities,
+  void change_plans(Whole body, const py::object& vertices, const py::object& velocities,
                     const py::object& times, const py::object& positions) {
     const Ids ids(vertices, "the vertices of new plans");
     const std::size_t count = ids.span().size();
-    const std::vector<double> velocity = doubles_of(velocities, "the velocities of new plans");
+    const std::vector<double> velocity = points_of(velocities, "the velocities of new plans");
     std::vector<double> knots, points;
     if (!times.is_none()) knots = doubles_of(times, "the times of new plans");
-    if (!positions.is_none()) points = doubles_of(positions, "the positions of new plans");
+    if (!positions.is_none()) points = points_of(positions, "the positions of new plans");
     if (velocity.size() != 3 * count)
       throw std::invalid_argument(std::to_string(velocity.size()) + " numbers are no velocities of " +
                                   std::to_string(count) + " vertices");
@@ -151,14 +156,21 @@ class PythonWorld {
   void change_geometry(const py::dict& vertices, const py::dict& primitives,
                        const py::dict& removed_primitives, const py::dict& removed_vertices) {
     WorldEdit edit;
+    const auto body_of = [](const py::handle& key) {
+      return std::uint32_t(whole_number(key, "a body", std::numeric_limits<std::uint32_t>::max()));
+    };
     for (const auto& [key, value] : vertices) {
-      const auto body = key.cast<std::uint32_t>();
-      const auto pair = value.cast<std::pair<py::object, py::object>>();
-      const std::vector<double> positions = doubles_of(pair.first, "the positions of new vertices");
-      const std::vector<double> velocities = doubles_of(pair.second, "the velocities of new vertices");
-      if (positions.size() % 3 != 0 || positions.size() != velocities.size())
-        throw std::invalid_argument(std::to_string(positions.size()) + " coordinates and " +
-                                    std::to_string(velocities.size()) + " velocities are no vertices");
+      const std::uint32_t body = body_of(key);
+      if ((!py::isinstance<py::tuple>(value) && !py::isinstance<py::list>(value)) || py::len(value) != 2)
+        throw py::type_error("new vertices of body " + std::to_string(body) +
+                             " are a tuple (positions, velocities), not " +
+                             std::string(py::str(py::type::handle_of(value).attr("__name__"))));
+      const auto pair = py::reinterpret_borrow<py::sequence>(value);
+      const std::vector<double> positions = points_of(pair[0], "the positions of new vertices");
+      const std::vector<double> velocities = points_of(pair[1], "the velocities of new vertices");
+      if (positions.size() != velocities.size())
+        throw std::invalid_argument(std::to_string(positions.size() / 3) + " positions and " +
+                                    std::to_string(velocities.size() / 3) + " velocities of new vertices");
       for (std::size_t i = 0; i < positions.size(); i += 3)
         edit.vertices.push_back({body,
                                  {positions[i], positions[i + 1], positions[i + 2]},
@@ -167,12 +179,15 @@ class PythonWorld {
     for (const auto& [key, value] : primitives)
       for (const py::handle list : value) {
         const Ids ids(py::reinterpret_borrow<py::object>(list), "the vertices of a new primitive");
-        edit.primitives.push_back({key.cast<std::uint32_t>(), {ids.span().begin(), ids.span().end()}});
+        if (ids.axes() != 1)
+          throw std::invalid_argument("a new primitive is a list of vertices, [primitive][corner], not " +
+                                      std::string(py::str(list)));
+        edit.primitives.push_back({body_of(key), {ids.span().begin(), ids.span().end()}});
       }
-    const auto collect = [](const py::dict& from, std::vector<WorldEdit::Id>& to, const char* what) {
+    const auto collect = [&](const py::dict& from, std::vector<WorldEdit::Id>& to, const char* what) {
       for (const auto& [key, value] : from) {
         const Ids ids(py::reinterpret_borrow<py::object>(value), what);
-        for (const std::uint32_t id : ids.span()) to.push_back({key.cast<std::uint32_t>(), id});
+        for (const std::uint32_t id : ids.span()) to.push_back({body_of(key), id});
       }
     };
     collect(removed_primitives, edit.removed_primitives, "removed primitives");
@@ -196,12 +211,12 @@ class PythonWorld {
     return py::make_tuple(records_of(std::move(begun), pair_type()),
                           records_of(std::move(ended), pair_type()));
   }
-  py::array spans(double t) {
+  py::array spans(Real t) {
     std::vector<WorldSpan> out;
     move([&] { world_.spans(t, out); });
     return records_of(std::move(out), span_type());
   }
-  py::array contacts(double t) {
+  py::array contacts(Real t) {
     for (std::size_t body = 0; body < given_.size(); ++body)
       if (const Given& given = given_[body]; !given.pending.empty() && !given.current.empty() &&
                                              given.pending.back().data() == given.current.back().data())
@@ -212,7 +227,7 @@ class PythonWorld {
     return records_of(std::move(out), contact_type());
   }
 
-  py::array positions(std::uint32_t body) {
+  py::array positions(Whole body) {
     const WorldPositions found = alone([&] { return world_.current_positions(body); });
     const std::vector<py::ssize_t> shape{py::ssize_t(found.vertices), 3};
     py::array out(found.precision == Precision::float32 ? py::dtype::of<float>() : py::dtype::of<double>(),
@@ -220,17 +235,17 @@ class PythonWorld {
     if (found.vertices > 0) std::memcpy(out.mutable_data(), found.data, std::size_t(out.nbytes()));
     return out;
   }
-  std::uintptr_t positions_address(std::uint32_t body) {
+  std::uintptr_t positions_address(Whole body) {
     return reinterpret_cast<std::uintptr_t>(alone([&] { return world_.current_positions(body); }).data);
   }
-  py::object hierarchy(std::uint32_t body) {
+  py::object hierarchy(Whole body) {
     WorldHierarchy out;
     if (!alone([&] { return world_.hierarchy(body, out); })) return py::none();
     const auto primitives = py::ssize_t(out.primitives.size());
     return py::make_tuple(records_of(std::move(out.nodes), node_type()),
                           numbers_of(std::move(out.primitives), {primitives}));
   }
-  py::object realisers(std::uint32_t body) {
+  py::object realisers(Whole body) {
     std::vector<std::uint32_t> out;
     if (!alone([&] { return world_.realisers(body, out); })) return py::none();
     const auto nodes = py::ssize_t(out.size() / 6);
@@ -241,7 +256,7 @@ class PythonWorld {
     alone([&] { world_.watched_pairs(out); });
     return records_of(std::move(out), watch_type());
   }
-  py::object audit(std::uint32_t body) {
+  py::object audit(Whole body) {
     WorldAudit out;
     if (!alone([&] { return world_.audit(body, out); })) return py::none();
     return plain(out);
@@ -252,9 +267,7 @@ class PythonWorld {
     return out;
   }
 
-  std::vector<double> frame_times(std::uint32_t per_keyframe) const {
-    return world_.frame_times(per_keyframe);
-  }
+  std::vector<double> frame_times(Whole per_keyframe) const { return world_.frame_times(per_keyframe); }
   py::dict verify(const std::string& strategy, const py::object& frames, const Words& params,
                   const Words& topology) {
     const std::vector<double> times = doubles_of(frames, "frames");
@@ -268,7 +281,7 @@ class PythonWorld {
     alone([&] { world_.scheduled_events(out); });
     return records_of(std::move(out), event_type());
   }
-  py::object step_event(double until) {
+  py::object step_event(Real until) {
     WorldStep out;
     if (!alone([&] { return world_.step_event(until, out); })) return py::none();
     std::vector<WorldEvent> event{out.event};
@@ -361,6 +374,7 @@ py::list listed() {
     one["width"] = strategy.width;
     one["leaf_size"] = strategy.leaf_size;
     one["max_primitive_pairs"] = strategy.max_primitive_pairs;
+    one["max_coordinate"] = strategy.max_coordinate;
     one["parameters"] = parameters;
     out.append(one);
   }
@@ -373,39 +387,40 @@ void bind_world(py::module_& module) {
   using py::arg;
   py::class_<PythonWorld>(module, "World")
       .def(py::init<const std::string&>(), arg("precision"))
-      .def_property_readonly("precision", &PythonWorld::precision)
-      .def_property_readonly("time", &PythonWorld::time)
-      .def("add_body", &PythonWorld::add_body, arg("name"), arg("indices"), arg("offsets"), arg("shape"),
-           arg("times"), arg("positions"))
-      .def("add_pair", &PythonWorld::add_pair, arg("body_a"), arg("body_b"))
-      .def("start", &PythonWorld::start, arg("strategy"), arg("params"), arg("t"), arg("topology"))
-      .def("reset", &PythonWorld::reset, arg("t"))
-      .def("advance", &PythonWorld::advance, arg("t"))
-      .def("next_knot", &PythonWorld::next_knot)
-      .def("set_positions", &PythonWorld::set_positions, arg("body"), arg("positions"))
-      .def("change_plans", &PythonWorld::change_plans, arg("body"), arg("vertices"), arg("velocities"),
-           arg("times"), arg("positions"))
-      .def("change_geometry", &PythonWorld::change_geometry, arg("vertices"), arg("primitives"),
+      .def_property_readonly("precision", method(&PythonWorld::precision))
+      .def_property_readonly("time", method(&PythonWorld::time))
+      .def("add_body", method(&PythonWorld::add_body), arg("name"), arg("indices"), arg("offsets"),
+           arg("shape"), arg("times"), arg("positions"))
+      .def("add_pair", method(&PythonWorld::add_pair), arg("body_a"), arg("body_b"))
+      .def("start", method(&PythonWorld::start), arg("strategy"), arg("params"), arg("t"), arg("topology"))
+      .def("reset", method(&PythonWorld::reset), arg("t"))
+      .def("advance", method(&PythonWorld::advance), arg("t"))
+      .def("next_knot", method(&PythonWorld::next_knot))
+      .def("set_positions", method(&PythonWorld::set_positions), arg("body"), arg("positions"))
+      .def("change_plans", method(&PythonWorld::change_plans), arg("body"), arg("vertices"),
+           arg("velocities"), arg("times"), arg("positions"))
+      .def("change_geometry", method(&PythonWorld::change_geometry), arg("vertices"), arg("primitives"),
            arg("removed_primitives"), arg("removed_vertices"))
-      .def("pairs", &PythonWorld::pairs)
-      .def("true_pairs", &PythonWorld::true_pairs)
-      .def("changes", &PythonWorld::changes)
-      .def("spans", &PythonWorld::spans, arg("t"))
-      .def("contacts", &PythonWorld::contacts, arg("t"))
-      .def("hits", &PythonWorld::hits, arg("rays"), arg("any"))
-      .def("positions", &PythonWorld::positions, arg("body"))
-      .def("positions_address", &PythonWorld::positions_address, arg("body"))
-      .def("hierarchy", &PythonWorld::hierarchy, arg("body"))
-      .def("realisers", &PythonWorld::realisers, arg("body"))
-      .def("watched_pairs", &PythonWorld::watched_pairs)
-      .def("audit", &PythonWorld::audit, arg("body"))
-      .def("counters", &PythonWorld::counters)
-      .def("frame_times", &PythonWorld::frame_times, arg("per_keyframe"))
-      .def("verify", &PythonWorld::verify, arg("strategy"), arg("frames"), arg("params"), arg("topology"))
-      .def("has_events", &PythonWorld::has_events)
-      .def("next_event_time", &PythonWorld::next_event_time)
-      .def("scheduled_events", &PythonWorld::scheduled_events)
-      .def("step_event", &PythonWorld::step_event, arg("until"));
+      .def("pairs", method(&PythonWorld::pairs))
+      .def("true_pairs", method(&PythonWorld::true_pairs))
+      .def("changes", method(&PythonWorld::changes))
+      .def("spans", method(&PythonWorld::spans), arg("t"))
+      .def("contacts", method(&PythonWorld::contacts), arg("t"))
+      .def("hits", method(&PythonWorld::hits), arg("rays"), arg("any"))
+      .def("positions", method(&PythonWorld::positions), arg("body"))
+      .def("positions_address", method(&PythonWorld::positions_address), arg("body"))
+      .def("hierarchy", method(&PythonWorld::hierarchy), arg("body"))
+      .def("realisers", method(&PythonWorld::realisers), arg("body"))
+      .def("watched_pairs", method(&PythonWorld::watched_pairs))
+      .def("audit", method(&PythonWorld::audit), arg("body"))
+      .def("counters", method(&PythonWorld::counters))
+      .def("frame_times", method(&PythonWorld::frame_times), arg("per_keyframe"))
+      .def("verify", method(&PythonWorld::verify), arg("strategy"), arg("frames"), arg("params"),
+           arg("topology"))
+      .def("has_events", method(&PythonWorld::has_events))
+      .def("next_event_time", method(&PythonWorld::next_event_time))
+      .def("scheduled_events", method(&PythonWorld::scheduled_events))
+      .def("step_event", method(&PythonWorld::step_event), arg("until"));
   module.def("list_strategies", &listed);
   module.def("counter_meanings", [] {
     py::dict out;
