@@ -14,6 +14,7 @@
 #include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/bytes.hpp"
+#include "experiments/results/record.hpp"
 
 namespace kbvh::experiments {
 
@@ -118,6 +119,7 @@ bool ResultStore::read(const std::filesystem::path& file) {
       ++unreadable_;
       continue;
     }
+    if (record.contains("schema") && record.at("schema") != json(results_schema)) ++other_schemas_;
     known_.insert_or_assign(key->get<std::string>(), record);
     place_of_.insert_or_assign(key->get<std::string>(), file.string() + " line " + std::to_string(line));
     ++records_;

@@ -22,15 +22,15 @@ def scene(name: str, ratio: Optional[float], counts: bool, **others: Any) -> dic
     side = {"label": "flat [leaf=4]", "ms": 2.0, "repetitions": 5, "run": "r"}
     return {
         "scene": name, "order": "given", "triangles": 65522, "counts": counts, "ratio": ratio,
-        "confidence_interval": None if ratio is None else [ratio - 1, ratio + 1],
+        "confidence_interval": None if ratio is None else [ratio - 1, ratio + 1], "range": None,
         "numerator": None if ratio is None else dict(side, label="peer | <b>", ms=2.0 * ratio), "denominator": side, **others,
     }  # fmt: skip
 
 
 def target(what: str, measured: Optional[float], verdict: str, scenes: list[dict[str, Any]], **others: Any) -> dict[str, Any]:
     return {
-        "schema": 1, "plan": "baseline", "what": what, "measured": measured, "at_least": 20.0, "aim": 30.0,
-        "confidence_interval": None if measured is None else [measured - 1, measured + 1], "verdict": verdict,
+        "schema": 2, "plan": "baseline", "what": what, "measured": measured, "at_least": 20.0, "aim": 30.0,
+        "confidence_interval": None if measured is None else [measured - 1, measured + 1], "range": None, "verdict": verdict,
         "scene": None if measured is None else "cloth 65k", "scenes": ["cloth 65k"], "per_scene": scenes, "note": "",
         "commit": "0123456789abcdef", "dirty": False, "machine": synthetic.MACHINE, "when": "2025-01-31T12:00:00Z",
         "runs": ["r"], **others,
