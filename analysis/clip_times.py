@@ -35,18 +35,18 @@ class RawTimes:
     by_clips: bool
     session: str
     disturbed: str = ""
-    _known: dict[tuple[bool, bool, int], tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
+    _known: dict[tuple[bool, bool], tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
 
     @property
     def repetitions(self) -> int:
         """The number of repetitions."""
         return len(self.totals)
 
-    def resampled(self, by_clips: bool, steady: bool, stream: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def resampled(self, by_clips: bool, steady: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Returns motion, total and shares of the total ([PARTS]) of every resample; made once."""
-        key = (by_clips, steady, stream)
+        key = (by_clips, steady)
         if key not in self._known:
-            draws = resamples(self.repetitions, stream)
+            draws = resamples(self.repetitions)
             most = max(1, 4_000_000 // self.totals.size)  # at once
             found = [_combined(self, draws[begin : begin + most], by_clips, steady) for begin in range(0, DRAWS, most)]
             motion, total, shares = (np.concatenate(list(one)) for one in zip(*found))
@@ -87,15 +87,20 @@ def time_of(times: RawTimes, phases: Sequence[str], by_clips: Optional[bool] = N
     return float(_of_phases(_combined(times, every, times.by_clips if by_clips is None else by_clips, steady), phases)[0])
 
 
+def replicates(times: RawTimes, phases: Sequence[str], by_clips: bool = False, steady: bool = False) -> np.ndarray:
+    """Returns the time over each resample of the rounds."""
+    return _of_phases(times.resampled(by_clips, steady), phases)
+
+
 def single_times(times: RawTimes, phases: Sequence[str]) -> np.ndarray:
     """Returns the time of each repetition alone."""
     return _of_phases(_combined(times, np.arange(times.repetitions)[:, None], times.by_clips, False), phases)
 
 
 @lru_cache(maxsize=None)
-def resamples(repetitions: int, stream: int) -> np.ndarray:
+def resamples(repetitions: int) -> np.ndarray:
     """Returns the resampled rounds, [draw][repetition]: the same on every machine and in the program (Steele, Lea and Flood 2014)."""
-    state, mask, found = stream, (1 << 64) - 1, []
+    state, mask, found = 1, (1 << 64) - 1, []
     for _ in range(DRAWS):
         draw = []
         for _ in range(repetitions):
@@ -130,9 +135,10 @@ def ratio_of(numerator: RawTimes, denominator: RawTimes, phases: Sequence[str], 
     paired = n == m and numerator.session == denominator.session
     middle = top / bottom
     if min(n, m) >= FEWEST_OF_AN_INTERVAL:
-        above = _of_phases(numerator.resampled(by_clips, steady, 1), phases)
-        below = _of_phases(denominator.resampled(by_clips, steady, 1 if paired else 2), phases)
-        ends = np.sort(above / below)
+        above = replicates(numerator, phases, by_clips, steady)
+        below = replicates(denominator, phases, by_clips, steady)
+        # Reversed, the draws of other rounds are independent.
+        ends = np.sort(above / (below if paired else below[::-1]))
         return Ratio(middle, min(float(ends[LEFT_OUT]), middle), max(float(ends[-1 - LEFT_OUT]), middle), paired, True)
     above, below = (
         _of_phases(_combined(side, np.arange(side.repetitions)[:, None], by_clips, steady), phases) for side in (numerator, denominator)

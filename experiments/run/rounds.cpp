@@ -23,8 +23,8 @@ bool narrow_enough(std::span<const RawTimes> contestants, std::span<const std::u
         (refit == nullptr || time_of(contestants[i], "total") < time_of(*refit, "total")))
       refit = &contestants[i];
   const auto is_narrow = [&](const std::vector<double>& above, const std::vector<double>& below,
-                             double middle) {
-    const auto [low, high] = middle_of_quotients(above, below);
+                             Rounds rounds, double middle) {
+    const auto [low, high] = middle_of_quotients(above, below, rounds);
     return high - low < width * middle;
   };
   std::vector<double> of_refit[2];  // by frames and by clips, where asked for
@@ -33,20 +33,19 @@ bool narrow_enough(std::span<const RawTimes> contestants, std::span<const std::u
     if (&one == refit && contestants.size() > 1) continue;
     const By by =
         one.by == By::clips || (refit != nullptr && refit->by == By::clips) ? By::clips : By::frames;
-    const Draw all = every_repetition(one.repetitions());
-    const double own = time_of(one, "total", Part::clip, by, all);
+    const double own = time_of(one, "total", Part::clip, by, every_repetition(one.repetitions()));
     if (!(own > 0)) continue;
     const std::vector<double> below = replicates(one, "total", Part::clip, by);
     if (refit == nullptr || &one == refit) {
-      // Nothing to compare with: its time over itself, from independent draws.
-      if (!is_narrow(replicates(one, "total", Part::clip, by, 2), below, 1)) return false;
+      // Nothing to compare with: its time over itself, as if of other rounds.
+      if (!is_narrow(below, below, Rounds::others, 1)) return false;
       continue;
     }
     std::vector<double>& above = of_refit[by == By::clips ? 1 : 0];
     if (above.empty()) above = replicates(*refit, "total", Part::clip, by);
     const double middle =
         time_of(*refit, "total", Part::clip, by, every_repetition(refit->repetitions())) / own;
-    if (!is_narrow(above, below, middle)) return false;
+    if (!is_narrow(above, below, Rounds::same, middle)) return false;
   }
   return true;
 }

@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t draws = 200, left_out = draws / 40;
 
-std::vector<Draw> resamples(std::size_t repetitions, std::uint64_t seed) {
-  Chance chance(seed);
+std::vector<Draw> resamples(std::size_t repetitions) {
+  Chance chance(1);
   std::vector<Draw> all(draws, Draw(repetitions));
   for (Draw& draw : all)
     for (std::uint32_t& one : draw) one = chance.below(repetitions);
@@ -92,18 +92,18 @@ double time_of(const RawTimes& times, std::string_view phase, Part part) {
   return time_of(times, phase, part, times.by, every_repetition(times.repetitions()));
 }
 
-std::vector<double> replicates(const RawTimes& times, std::string_view phase, Part part, By by,
-                               std::uint64_t stream) {
+std::vector<double> replicates(const RawTimes& times, std::string_view phase, Part part, By by) {
   std::vector<double> values;
-  for (const Draw& draw : resamples(times.repetitions(), stream))
+  for (const Draw& draw : resamples(times.repetitions()))
     values.push_back(time_of(times, phase, part, by, draw));
   return values;
 }
 
 std::pair<double, double> middle_of_quotients(const std::vector<double>& above,
-                                              const std::vector<double>& below) {
+                                              const std::vector<double>& below, Rounds rounds) {
   std::vector<double> ratios;
-  for (std::size_t i = 0; i < above.size(); ++i) ratios.push_back(above[i] / below[i]);
+  for (std::size_t i = 0; i < draws; ++i)
+    ratios.push_back(above[i] / below[rounds == Rounds::same ? i : draws - 1 - i]);
   std::sort(ratios.begin(), ratios.end());
   return {ratios[left_out], ratios[ratios.size() - 1 - left_out]};
 }
@@ -124,7 +124,8 @@ std::optional<RatioOfTimes> ratio_of(const TimeOf& numerator, const TimeOf& deno
   double low = ratio.middle, high = ratio.middle;
   if (is_interval) {
     std::tie(low, high) = middle_of_quotients(replicates(above, numerator.phase, part, by),
-                                              replicates(below, denominator.phase, part, by, paired ? 1 : 2));
+                                              replicates(below, denominator.phase, part, by),
+                                              paired ? Rounds::same : Rounds::others);
   } else {
     for (std::uint32_t i = 0; i < n; ++i)
       for (std::uint32_t j = 0; j < m; ++j) {

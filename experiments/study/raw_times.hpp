@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -55,12 +56,14 @@ double time_of(const RawTimes& times, std::string_view phase, Part part, By by,
 /// The same over all repetitions.
 double time_of(const RawTimes& times, std::string_view phase, Part part = Part::clip);
 
-/// Returns times of a phase over resampled repetitions, 200 of them; by another `stream` independent ones.
-std::vector<double> replicates(const RawTimes& times, std::string_view phase, Part part, By by,
-                               std::uint64_t stream = 1);
-/// Returns the middle 95 % of the quotients of replicates, which share a stream if the rounds are the same.
+/// Returns times of a phase over resampled repetitions, 200 of them; the same resamples on every machine.
+std::vector<double> replicates(const RawTimes& times, std::string_view phase, Part part, By by);
+/// Whether repetitions of two contestants are of the same rounds, and therefore drawn together.
+enum class Rounds : std::uint8_t { same, others };
+/// Returns the middle 95 % of the quotients of replicates. Those of other rounds are paired in reversed
+/// order, which makes their draws independent.
 std::pair<double, double> middle_of_quotients(const std::vector<double>& above,
-                                              const std::vector<double>& below);
+                                              const std::vector<double>& below, Rounds rounds);
 
 /// How sure a ratio is: an interval of 95 % (percentile bootstrap over whole rounds) or, with fewer than five
 /// repetitions, the range over single repetitions.

@@ -65,9 +65,9 @@ class TestMarkdown(TargetsCase):
         code, out, _ = self.run_main(rows())
         self.assertEqual(code, 0)
         lines = out.splitlines()
-        self.assertEqual(lines[0], "| what | measured [95 % interval] | at least | aim | verdict |")
-        self.assertEqual(lines[2], "| refit over FCL | 45.2x [44.2, 46.2] | 20x | 30x | aim reached |")
-        self.assertEqual(lines[3], "| query | 19.9x [18.9, 20.9] | 20x | 30x | missed |")
+        self.assertEqual(lines[0], "| what | measured (95 % interval) or [range] | at least | aim | verdict |")
+        self.assertEqual(lines[2], "| refit over FCL | 45.2x (44.2–46.2) | 20x | 30x | aim reached |")
+        self.assertEqual(lines[3], "| query | 19.9x (18.9–20.9) | 20x | 30x | missed |")
         self.assertEqual(lines[4], "| peer | – | 20x | 30x | not measured: cloth 65k: no peer |")
         self.assertIn("commit 0123456789ab, 2025-01-31", lines[6])
         self.assertEqual(lines[8], "| what | cloth 2k | cloth 65k | cloth 65k-shuffled |")
@@ -92,6 +92,14 @@ class TestMarkdown(TargetsCase):
         lines = rows()
         lines[0]["confidence_interval"] = None
         self.assertIn("| refit over FCL | 45.2x | 20x |", self.run_main(lines)[1])
+
+    def test_ranges_and_disturbed_ratios_look_different(self) -> None:
+        lines = rows()
+        lines[0].update(confidence_interval=None, range=[40.0, 50.0])
+        lines[0]["per_scene"][0]["denominator"] = dict(lines[0]["per_scene"][0]["denominator"], disturbed="30 involuntary switches")
+        out = self.run_main(lines)[1]
+        self.assertIn("| refit over FCL | 45.2x [40.0–50.0] | 20x |", out)
+        self.assertIn("| refit over FCL | 12.0x? | **45.2x** | – |", out)
 
 
 class TestWrite(TargetsCase):
@@ -162,7 +170,7 @@ class TestReport(TargetsCase):
         self.assertIn("aim reached", page)
         self.assertIn("not measured: cloth 65k: no peer", page)
         self.assertIn("peer | &lt;b&gt;", page)
-        self.assertIn("| query | 19.9x [18.9, 20.9] |", page, "printed as text, too")
+        self.assertIn("| query | 19.9x (18.9–20.9) |", page, "printed as text, too")
 
     def test_no_targets_no_section(self) -> None:
         code, page = self.page()
