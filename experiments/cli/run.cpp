@@ -225,8 +225,9 @@ void add_command(CLI::App& program, Action& action, const char* name, const char
   add_jobs(*command, options);
   command->callback([&action, options, note] {
     action = [options, note] {
+      const int code = run_study(*options);
       if (note != nullptr) say(note);
-      return run_study(*options);
+      return code;
     };
   });
 }

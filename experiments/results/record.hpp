@@ -13,6 +13,8 @@ namespace kbvh::experiments {
 /// Version of the records; RESULTS.md documents it. Times of schema 1 have no beginning: they leave out the
 /// first frame.
 inline constexpr int results_schema = 2;
+/// The oldest version that is still read, apart from newer ones.
+inline constexpr int oldest_results_schema = 1;
 
 /// Returns the word used in result files.
 const char* word(PrimitiveKind kind);

@@ -100,6 +100,9 @@ std::string wrong_frames(const json& times, const json& repetition) {
         return std::string("times.repetitions.") + name + " has an entry that is not " +
                kind_name(Kind::number);
   }
+  for (const char* text : {"by", "disturbed"})
+    if (std::string what = wrong(times, "times.", {{text, Kind::text}}); !what.empty()) return what;
+  if (std::string what = wrong(times, "times.", {{"build_ms", Kind::number}}); !what.empty()) return what;
   const auto steady = times.find("steady_from");
   if (steady == times.end() || steady->is_null()) return {};
   if (!is(*steady, Kind::whole) || steady->get<std::uint64_t>() >= frames)
@@ -111,7 +114,8 @@ std::string wrong_frames(const json& times, const json& repetition) {
                 {"update", Kind::number},
                 {"traversal", Kind::number},
                 {"triangle_tests", Kind::number},
-                {"plan_changes", Kind::number}});
+                {"plan_changes", Kind::number},
+                {"geometry_changes", Kind::number}});
 }
 
 std::string wrong_times(const json& times) {

@@ -20,11 +20,11 @@ bool narrow_enough(std::span<const RawTimes> contestants, std::span<const std::u
 
 /// Plays rounds: in each, every timed contestant once, in an order of its own. Of the repetitions, the study
 /// says the least number. Where that is five or more, goes on until all ratios are narrow enough, the study's
-/// seconds are used up, or ten times as many were played. `before` is called before each clip.
+/// seconds are used up, or four times as many were played. `before` is called before each clip.
 template <class M>
 void play_rounds(M& measurement, const Study& study, std::uint64_t seed,
                  const std::function<void(std::size_t contestant, std::uint32_t round)>& before) {
-  constexpr std::uint32_t most = 10;  // times the least number
+  constexpr std::uint32_t most = 4;  // times the least number
   std::vector<std::size_t> timed;
   for (std::size_t i = 0; i < measurement.size(); ++i)
     if (measurement.timed(i)) timed.push_back(i);

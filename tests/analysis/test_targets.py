@@ -134,12 +134,14 @@ class TestRefusals(TargetsCase):
     def test_wrong_files_end_in_one_sentence(self) -> None:
         lacking, schema, verdict, ratio = (copy.deepcopy(rows()) for _ in range(4))
         del lacking[1]["at_least"]
-        schema[0]["schema"] = 2
+        old = copy.deepcopy(rows())
+        schema[0]["schema"], old[0]["schema"] = 3, 1
         verdict[0]["verdict"] = "splendid"
         ratio[2]["per_scene"][0]["ratio"] = "many"
         for value, words in (
             ("{", "is not JSON"), ({}, "a list of targets is expected"), ([3], "row 1: an object is expected"),
-            (lacking, "row 2: the field at_least is missing"), (schema, "row 1: schema 2 is not known"),
+            (lacking, "row 2: the field at_least is missing"), (schema, "row 1: schema 3 is not known"),
+            (old, "row 1: schema 1 is not known: its times leave out the beginning of the clip"),
             (verdict, 'row 1: verdict is "splendid"'), (ratio, "row 3: "),
         ):  # fmt: skip
             with self.subTest(words):

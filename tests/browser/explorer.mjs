@@ -319,7 +319,7 @@ await check("the program accepts the commands", async () => {
   await page.close();
   const shapes = await open("merged");
   const text = await shapes.evaluate(() => window.explorer.command(window.explorer.model.runs[0]).text);
-  assert.match(text, /cat > again.json <<'PLAN'[^]*"shape": "sphere"[^]*kbvh bench --plan again.json --out again/);
+  assert.match(text, /cat > again.json <<'PLAN'[^]*"shape": "sphere"[^]*kbvh run --plan again.json --out again/);
   await shapes.close();
 });
 

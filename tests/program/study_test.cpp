@@ -269,8 +269,8 @@ TEST_F(Binary, TargetsFollowFromTheRecords) {
       }
       return above / below;
     };
-    const auto expect_measured = [](const json& row, double ratio) {
-      EXPECT_NEAR(row.at("measured").get<double>(), ratio, 1e-9 * ratio);
+    const auto expect_measured = [](const json& row, double expected) {
+      EXPECT_NEAR(row.at("measured").get<double>(), expected, 1e-9 * expected);
     };
     expect_measured(rows[0], std::min(ratio("small", "update", true), ratio("large", "update", true)));
     EXPECT_EQ(rows[0].at("verdict"), "reached");
@@ -454,7 +454,10 @@ TEST_F(Binary, WhoAnswersOtherwiseWhileItIsTimedIsRefused) {
 }
 
 TEST_F(Binary, RoundsAreShuffledAndRecorded) {
-  const Outcome run = kbvh("run " + tiny + "--strategies family:refit --repetitions 6 --seconds 0 --out out");
+  const Outcome run = kbvh(
+      "run --scene waving_sheet --triangles 100 --keyframes 3 --l 2 --strategies family:refit --repetitions "
+      "6 "
+      "--seconds 0 --out out");
   ASSERT_EQ(run.code, 0) << run.err;
   const auto list = records();
   ASSERT_GT(list.size(), 3u);

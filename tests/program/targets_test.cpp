@@ -414,15 +414,16 @@ TEST(Targets, TableShowsRowsAndScenes) {
   EXPECT_EQ(
       table,
       "Targets: how many times slower the other is, on the scenes that count\n"
-      "target            measured  95 % interval  at least  aim  verdict    on\n"
-      "flat over period       2.5       2.5 to 3         2    4  reached  soup\n"
+      "target            measured  interval or [range]  at least  aim  verdict    on\n"
+      "flat over period       2.5           [2.5 to 3]         2    4  reached  soup\n"
       "\n"
-      "All scenes (* counts)\n"
+      "All scenes (* counts, ? disturbed)\n"
       "\n"
-      "flat over period  ratio    95 % interval  ms                         of  ms                  of\n"
-      "  sheet *             3  0.2667 to 3.333   9  bottom_up_period [leaf=1]   3  bottom_up [leaf=4]\n"
-      "  soup *            2.5         2.5 to 3  10  bottom_up_period [leaf=1]   4  bottom_up [leaf=1]\n"
-      "  other             0.5       0.5 to 0.5   1  bottom_up_period [leaf=1]   2  bottom_up [leaf=1]\n");
+      "flat over period  ratio  interval or [range]  ms                         of  ms                  of\n"
+      "  sheet *             3        [0.3333 to 3]   9  bottom_up_period [leaf=1]   3  bottom_up [leaf=4]\n"
+      "  soup *            2.5           [2.5 to 3]  10  bottom_up_period [leaf=1]   4  bottom_up [leaf=1]\n"
+      "  other             0.5         [0.5 to 0.5]   1  bottom_up_period [leaf=1]   2  bottom_up "
+      "[leaf=1]\n");
 }
 
 TEST(Targets, RowsOfTheSamePlanAreReplacedAndOthersStay) {

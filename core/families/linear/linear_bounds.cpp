@@ -144,6 +144,7 @@ void LinearBounds<S>::start() {
   last_ = motion_.time();
   step_ = 0;
   foreseen_ = 1;
+  came_ahead_ = false;
   horizon_.start_over();
   repairs_ = {};
   near_bodies_.start_over();
