@@ -67,8 +67,9 @@ class Results:
 
         `ratio` is that of the clips' times, `low` and `high` are the ends of its 95 % interval (a bootstrap over whole rounds) or,
         where `interval` is false, of the range over fewer than five repetitions (nan for a single one); `paired` says whether
-        repetitions ran next to each other, `disturbed` whether the machine was, `reference` is the reference's run. `measure` is with_motion, without_motion, update or query. Runs without a reference are left out. The
-        report and its explorer show the same numbers. Raises ValueError for another measure.
+        repetitions ran next to each other, `disturbed` whether the machine was, `reference` is the reference's run. `measure` is
+        with_motion, without_motion, update or query. Runs without a reference are left out. The report and its explorer show the
+        same numbers. Raises ValueError for another measure.
         """
         rules = _shared("ratios")
         if measure not in rules.SCOPES:

@@ -1,5 +1,5 @@
-// What the conformance suite cannot see of bounds over segments: what they leave out, what they remember, and
-// that work ahead of time is spread.
+// What the conformance suite cannot see of bounds over segments: what they leave out, and that work
+// ahead of time is spread.
 
 #include <gtest/gtest.h>
 
