@@ -119,7 +119,11 @@ bool ResultStore::read(const std::filesystem::path& file) {
       ++unreadable_;
       continue;
     }
-    if (record.contains("schema") && record.at("schema") != json(results_schema)) ++other_schemas_;
+    // Times of another schema have another meaning: such a record stands for no configuration.
+    if (record.contains("schema") && record.at("schema") != json(results_schema)) {
+      ++other_schemas_;
+      continue;
+    }
     known_.insert_or_assign(key->get<std::string>(), record);
     place_of_.insert_or_assign(key->get<std::string>(), file.string() + " line " + std::to_string(line));
     ++records_;

@@ -72,9 +72,11 @@ class Runner {
     if (const auto file = out / "targets.json"; std::filesystem::is_directory(file, error))
       throw io::InputError(file.string() + ": is a folder, but a file must be written there");
     if (store_->other_schemas() > 0)
-      say("note: " + std::to_string(store_->other_schemas()) + " records of " +
-          (out / "results.jsonl").string() + " are not of schema " + std::to_string(results_schema) +
-          ": their times leave out the beginning of the clip, and are not compared with new ones");
+      say("note: " + (out / "results.jsonl").string() + " holds " +
+          counted(store_->other_schemas(), "record") + " of another schema than " +
+          std::to_string(results_schema) +
+          ", left alone: their times have another meaning (those of schema 1 leave out the beginning of a "
+          "clip)");
     if (store_->unreadable_lines() > 0)
       say("note: " + (job.empty() ? out / "results.jsonl" : out / "jobs" / job).string() + " has " +
           std::to_string(store_->unreadable_lines()) +

@@ -141,6 +141,21 @@ TEST_F(Binary, RecordsThatCannotBeUsedAreNamedAndMeasuredAgain) {
   }
 }
 
+TEST_F(Binary, RecordsOfAnOlderSchemaStayAndAreNeverUsed) {
+  ASSERT_EQ(kbvh("run " + one + "--out out").code, 0);
+  json old = records().at(0);
+  old["schema"] = 1;
+  write_text(folder_ / "out/results.jsonl", old.dump() + "\n");
+  const Outcome run = kbvh("run " + one + "--out out");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.err.find("out/results.jsonl holds 1 record of another schema than 2"), std::string::npos)
+      << run.err;
+  EXPECT_NE(run.err.find("1 configuration measured, 0 were in"), std::string::npos) << run.err;
+  ASSERT_EQ(records().size(), 2u);
+  EXPECT_EQ(records().at(0), old);
+  EXPECT_EQ(records().at(1).at("schema"), 2);
+}
+
 TEST_F(Binary, EveryFieldThatIsTakenOutIsNoticedOrNotNeeded) {
   ASSERT_EQ(kbvh("run " + one + "--out out").code, 0);
   const json whole = records().at(0);
