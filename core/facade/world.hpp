@@ -23,8 +23,8 @@ enum class Shape : std::uint8_t { polygons, points, control_nets };
 
 /// The connectivity of a body: primitive p has the vertices indices[offsets[p] .. offsets[p + 1]). Without
 /// offsets the primitives are triangles: three indices each. A polygon of more than three corners is cut into
-/// triangles once, when it is added (at its first keyframe, or the positions given then) or inserted; from then
-/// on it is their union. The cut does not depend on the first corner.
+/// triangles once, when it is added (at its first keyframe, or the positions given then) or inserted; from
+/// then on it is their union. The cut does not depend on the first corner.
 struct Connectivity {
   std::span<const std::uint32_t> indices;
   std::span<const std::uint32_t> offsets{};
