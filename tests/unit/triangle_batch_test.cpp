@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "core/scene/cut_polygons.hpp"
 #include "core/scene/pairs.hpp"
 #include "core/scene/playback.hpp"
 #include "tests/unit/triangle_pairs.hpp"
