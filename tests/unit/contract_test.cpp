@@ -297,6 +297,13 @@ std::vector<std::string> undeclared_refits(const std::vector<StrategyEntry>& ent
 }
 
 // A refit that is left out of the best refit flatters everything that is compared with it.
+TEST(Contract, RefitsAnswerPairsWithinABody) {
+  for (const char* id : {"bottom_up", "leaf_slabs"}) EXPECT_TRUE(find_strategy(id).info.can.self_pairs) << id;
+  // Both halves of Registry.SelfPairsAreDeclaredOrRefused have members.
+  EXPECT_TRUE(std::any_of(registry().begin(), registry().end(),
+                          [](const StrategyEntry& entry) { return !entry.info.can.self_pairs; }));
+}
+
 TEST(Contract, RefitsWithoutForesightAreBaselinesOrExcused) {
   EXPECT_EQ(undeclared_refits(registry(), excused_refits()), std::vector<std::string>{});
 }
