@@ -42,7 +42,11 @@ class BulletDbvt final : public Contestant<Count> {
       : Contestant<Count>(scene, motion),
         refits_(params.word("update") == "refit"),
         bodies_(scene.body_count()) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body) build(body);
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+      build(body);
+      copy_built(body);
+      if (refits_) bodies_[body].built.clear();  // its copy keeps its shape
+    }
   }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
@@ -92,7 +96,7 @@ class BulletDbvt final : public Contestant<Count> {
       const auto leaves = std::size_t(state.tree.m_leaves);
       // Bullet aligns each node to 16 bytes within a block, and keeps the block's address before it.
       constexpr std::size_t node_bytes = heap_block_bytes(sizeof(btDbvtNode) + sizeof(void*) + 16);
-      total += sizeof(btDbvt) + (leaves == 0 ? 0 : 2 * leaves - 1) * node_bytes +
+      total += 2 * sizeof(btDbvt) + (refits_ ? 1 : 2) * (leaves == 0 ? 0 : 2 * leaves - 1) * node_bytes +
                state.nodes.capacity() * sizeof(btDbvtNode*) +
                std::size_t(state.tree.m_stkStack.capacity()) * sizeof(state.tree.m_stkStack[0]);
     }
@@ -101,6 +105,8 @@ class BulletDbvt final : public Contestant<Count> {
 
  private:
   struct BodyState {
+    btDbvt
+        built;  // as it was built: updates of leaves change the shape of `tree`, and a clip begins with this
     btDbvt tree;
     std::vector<btDbvtNode*> nodes;  // refit: all, children before parents; else leaves by primitive
   };
@@ -115,22 +121,27 @@ class BulletDbvt final : public Contestant<Count> {
     BodyState& state = bodies_[body];
     const std::uint32_t count = this->scene_.primitives(body).count();
     if (count == 0) return;
-    {
-      // Insertion and optimizeTopDown() multiply extents: far from 1 they overflow, and optimizeTopDown()
-      // then writes out of bounds. The shape of the tree is decided at a moderate scale; true volumes follow
-      // below.
-      const float scale = sane_scale(body);
-      btDbvt grown;
-      for (int p = 0; p < int(count); ++p) {
-        const btDbvtVolume real = volume(body, p);
-        grown.insert(btDbvtVolume::FromMM(real.Mins() * scale, real.Maxs() * scale), nullptr)->dataAsInt = p;
-      }
-      grown.optimizeTopDown();
-      // The copy has its nodes in memory in the order of a descent: both refits and queries profit.
-      btDbvt::IClone nothing_more;
-      grown.clone(state.tree, &nothing_more);
-      state.tree.m_leaves = grown.m_leaves;  // not copied by clone()
+    // Insertion and optimizeTopDown() multiply extents: far from 1 they overflow, and optimizeTopDown() then
+    // writes out of bounds. The shape of the tree is decided at a moderate scale; true volumes follow.
+    const float scale = sane_scale(body);
+    for (int p = 0; p < int(count); ++p) {
+      const btDbvtVolume real = volume(body, p);
+      state.built.insert(btDbvtVolume::FromMM(real.Mins() * scale, real.Maxs() * scale), nullptr)->dataAsInt =
+          p;
     }
+    state.built.optimizeTopDown();
+  }
+
+  /// Copies the tree as it was built, with the volumes of now.
+  void copy_built(std::uint32_t body) {
+    BodyState& state = bodies_[body];
+    const std::uint32_t count = this->scene_.primitives(body).count();
+    if (count == 0) return;
+    // The copy has its nodes in memory in the order of a descent: both refits and queries profit.
+    btDbvt::IClone nothing_more;
+    state.built.clone(state.tree, &nothing_more);
+    state.tree.m_leaves = state.built.m_leaves;  // not copied by clone()
+    state.nodes.clear();
     state.nodes.resize(refits_ ? 0 : count);
     std::vector<btDbvtNode*> stack{state.tree.m_root};
     while (!stack.empty()) {
@@ -197,7 +208,11 @@ class BulletDbvt final : public Contestant<Count> {
     this->count_.add(Counter::vertex_reads, 3 * state.nodes.size());
   }
   void update_all() override {
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
+      if (refits_)
+        update(body);
+      else
+        copy_built(body);
   }
   void update_moving() override {
     for (std::uint32_t body = 0; body < bodies_.size(); ++body)

@@ -8,8 +8,9 @@ from typing import Any, Optional
 
 import numpy as np
 
+import clip_times
 import text
-from load import PHASES, Study
+from load import Study
 
 #: Phases that make up a time, in the names of claims.json.
 TIMES: dict[str, tuple[str, ...]] = {
@@ -129,8 +130,7 @@ class Table:
         self.rows = rows.assign(size=rows["bodies"].map(largest_moving)).copy() if len(rows) else rows.assign(size=[])
         self.rows["size"] = self.rows["size"].where(self.rows["size"] > 0, self.rows["primitives"])
         self._row: dict[int, dict[str, Any]] = {int(row["run"]): row for row in self.rows.to_dict("records")}
-        repetitions = study.repetitions.sort_values(["run", "repetition"])
-        self._times = {int(run): times[list(PHASES)].to_numpy(dtype=float) for run, times in repetitions.groupby("run")}
+        self._raw = study.raw
         self._places: dict[str, list[Place]] = {}
 
     def places(self, scene: str) -> list[Place]:
@@ -145,12 +145,30 @@ class Table:
         self._places[scene] = [(size, l, rows) for (size, l), rows in sorted(last.items(), key=lambda item: item[0])]
         return self._places[scene]
 
-    def values(self, run: int, quantity: str) -> np.ndarray:
-        """Returns the quantity of each repetition of a run; a single number for counts; empty if unknown."""
-        row = self._row[run]
-        scale = row["l"] if quantity.endswith("per keyframe") else 1.0
+    def _scale(self, run: int, quantity: str) -> float:
+        return float(self._row[run]["l"]) if quantity.endswith("per keyframe") else 1.0
+
+    def value(self, run: int, quantity: str) -> Optional[Value]:
+        """Returns the quantity of a run, with the extremes of its repetitions; None if unknown."""
         if quantity in TIMES:
-            return self._times[run][:, [PHASES.index(name) for name in TIMES[quantity]]].sum(axis=1) * scale
+            middle = clip_times.time_of(self._raw[run], TIMES[quantity]) * self._scale(run, quantity)
+            each = clip_times.single_times(self._raw[run], TIMES[quantity]) * self._scale(run, quantity)
+            return Value(middle, min(middle, float(each.min())), max(middle, float(each.max())))
+        known = self.values(run, quantity)
+        return Value(float(known[0]), float(known[0]), float(known[0])) if len(known) else None
+
+    def ratio(self, above: int, below: int, quantity: str) -> Optional[Value]:
+        """Returns the ratio of the times of two runs, with its interval or range."""
+        found = clip_times.ratio_of(self._raw[above], self._raw[below], TIMES[quantity])
+        scale = self._scale(above, quantity) / self._scale(below, quantity)
+        return None if found is None else Value(found.middle * scale, found.low * scale, found.high * scale)
+
+    def values(self, run: int, quantity: str) -> np.ndarray:
+        """Returns the counted quantity of a run, as a single number; empty if unknown."""
+        row = self._row[run]
+        scale = self._scale(run, quantity)
+        if quantity in TIMES:
+            return np.array([clip_times.time_of(self._raw[run], TIMES[quantity]) * scale])
         if quantity == "values per event":
             events = row["certificates_failed_per_frame"]
             known = [row["values_written_per_frame"] / events] if events > 0 else []
@@ -175,8 +193,8 @@ class Table:
             if not _fits(row, term, quantity):
                 continue
             known = self.values(row["run"], by)
-            if len(known) and (best is None or float(np.median(known)) < best[0]):
-                best = (float(np.median(known)), int(row["run"]))
+            if len(known) and (best is None or float(known[0]) < best[0]):
+                best = (float(known[0]), int(row["run"]))
         return best[1] if best is not None and len(self.values(best[1], quantity)) else None
 
     def row(self, run: int) -> dict[str, Any]:
@@ -215,15 +233,13 @@ def largest_moving(bodies: Any) -> float:
 
 
 def quotient(table: Table, above: int, below: int, quantity: str) -> Optional[Value]:
-    """Divides one run's quantity by another's: repetition by repetition within a session, else by medians."""
+    """Divides one run's quantity by another's; times with the interval or range of their ratio."""
+    if quantity in TIMES:
+        return table.ratio(above, below, quantity)
     a, b = table.values(above, quantity), table.values(below, quantity)
-    if not len(a) or not len(b) or b.min() <= 0:
+    if not len(a) or not len(b) or b[0] <= 0:
         return None
-    together = table.row(above)["session"] == table.row(below)["session"]
-    if together and len(a) == len(b):
-        each = a / b
-        return Value(float(np.median(each)), float(each.min()), float(each.max()))
-    return Value(float(np.median(a) / np.median(b)), float(a.min() / b.max()), float(a.max() / b.min()))
+    return Value(*[float(a[0] / b[0])] * 3)
 
 
 def words_of(term: dict[str, Any]) -> str:
@@ -376,8 +392,7 @@ class Looker:
         for size, l, rows in places:
             run = self.table.chosen(rows, of, quantity)
             if run is not None:
-                known = self.table.values(run, quantity)
-                value = Value(float(np.median(known)), float(known.min()), float(known.max()))
+                value = self.table.value(run, quantity)
                 points += self._point(check, quantity, corner, scene, size, l, value, [run])
         return points
 
@@ -388,7 +403,7 @@ class Looker:
             found = []
             for size, l, rows in places:
                 run = self.table.chosen(rows, of, quantity) if l == depth else None
-                if run is not None and (known := float(np.median(self.table.values(run, quantity)))) > 0:
+                if run is not None and (known := float(self.table.values(run, quantity)[0])) > 0:
                     found.append((size, known, run))
             if len(found) < max(check["least_sizes"], 2):
                 continue

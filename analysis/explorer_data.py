@@ -15,6 +15,7 @@ import pandas as pd
 
 import claim_pictures
 import claims as paper_claims
+import clip_times
 import colours
 import profiles
 import text
@@ -31,7 +32,9 @@ NUMBERS = ("p50", "p99", "worst", "bytes", "build_ms", "pairs", "candidates", "m
 #: Counters that the page has, per frame.
 COUNTERS = ("certificates_failed", "values_written", "nodes_visited", "box_tests", "triangle_tests")
 COLUMNS = ("cell", "contestant", "session", "plan", "when", "kind", "repetitions", "limit", "every", *NUMBERS, *COUNTERS, "refused",
-           "times", "pace", "quality")  # fmt: skip
+           "disturbed", "clips", "times", "middle", "draws", "pace", "quality")  # fmt: skip
+#: The sums of phases that the page has for each resample of the rounds.
+DRAWN = (("motion",), ("update", "plan_changes"), ("traversal", "triangle_tests"))
 
 
 def number(value: Any, digits: Optional[int] = None) -> Optional[float]:
@@ -84,6 +87,11 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
         mine = times.get(int(row["run"]))
         columns["times"].append([] if mine is None else [[number(v) for v in line] for line in mine[list(PHASES)].to_numpy()])
         columns["repetitions"].append(len(columns["times"][-1]))
+        raw = study.raw.get(int(row["run"]))
+        columns["disturbed"].append(row["disturbed"])
+        columns["clips"].append(raw is None or raw.by_clips)
+        columns["middle"].append([] if raw is None else [number(clip_times.time_of(raw, (phase,), False)) for phase in PHASES])
+        columns["draws"].append([] if raw is None else _draws(raw))
         again = row["again"]
         columns["limit"].append(again.get("frames_limit", _limit(row)))
         columns["every"].append(number(again.get("oracle_every", row["sampled_every"])))
@@ -108,6 +116,14 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
         "claims": _claims(claims),
         "report": "report.html" if (folder / "report.html").exists() else "",
     }
+
+
+def _draws(raw: clip_times.RawTimes) -> list[list[Optional[float]]]:
+    """Returns the sums of DRAWN over resampled rounds, by frames; empty where there is no interval, and for contestants that count by
+    clips, whose resamples the page makes from their repetitions."""
+    if raw.by_clips or raw.repetitions < clip_times.FEWEST_OF_AN_INTERVAL:
+        return []
+    return [[number(v, 5) for v in clip_times.replicates(raw, phases)] for phases in DRAWN]
 
 
 def _limit(row: pd.Series) -> int:

@@ -107,9 +107,9 @@ class Case:
         found = ratios.ratio(self.study, own, other, "with_motion")
         if found is None:
             return text.MISSING
-        ends = ratios.interval(*(ratios.times_of(self.study, one, "with_motion") for one in (own, other)), found.paired)
-        within = "" if ends is None else f" [{text.factor(ends[0])}, {text.factor(ends[1])}]"
-        return f"{text.factor(found.middle)}x{within}"
+        low, high = text.factor(found.low), text.factor(found.high)
+        ends = "" if found.low == found.high else f" ({low}–{high})" if found.is_interval else f" [{low}–{high}]"
+        return f"{text.factor(found.middle)}x{' ?' if found.disturbed else ''}{ends}"
 
 
 def cases(study: Study) -> list[Case]:
@@ -150,10 +150,12 @@ def facts(all_cases: list[Case]) -> str:
     found = "no pair was missed, none was extra" if not any(wrong.values()) else f"{wrong['missed']} pairs were missed, {wrong['extra']} were extra"
     protruding = int((rows["protrusion"].fillna(0) > 0).sum())
     boxes = "no box was too small" if not protruding else f"{text.plural(protruding, 'contestant')} had a box that was too small"
+    disturbed = [str(why) for why in rows["disturbed"] if why]
+    quiet = "the machine was quiet" if not disturbed else f"{text.plural(len(disturbed), 'disturbed clip')} of {len(rows)} (?): {disturbed[0]}"
     kernels = text.listing(sorted({str(word) for word in rows["kernels"] if word}))
     return (
         f"One thread of {first['cpu'] or 'an unknown processor'} ({kernels or 'unknown'} kernels), float, medians of {counts} repetitions{few}, commit "
-        f"{str(first['commit'])[:12] or 'unknown'}{state}, {str(first['when'])[:10] or 'undated'}. In the "
+        f"{str(first['commit'])[:12] or 'unknown'}{state}, {str(first['when'])[:10] or 'undated'}; {quiet}. In the "
         f"{text.count(frames)} frames that were compared with the oracle, summed over contestants and scenes, {found}; {boxes} where boxes can be seen."
     )
 
@@ -186,7 +188,7 @@ def strategies(all_cases: list[Case], rows: list[Contestant]) -> str:
         lines.append((ratios.clip_total(case.study, int(run["run"])), _row(cells)))
         if tuned:
             remarks.append(f"{TUNED} `auto` was tuned on this scene; the table of cases has some that it was not.")
-    head = ["strategy", "update", "query", "positions", "clip: times as fast as the best refit [95 % interval]"]
+    head = ["strategy", "update", "query", "positions", "clip: times as fast as the best refit (95 % interval)"]
     table = [_row(head), _row(["---"] * len(head)), *(line for _, line in sorted(lines, key=lambda line: line[0]))]
     return "\n".join([*table, "", " ".join([*dict.fromkeys(remarks), facts([case])])]) + "\n"
 
@@ -208,7 +210,7 @@ def by_case(all_cases: list[Case]) -> str:
         lines.append(_row(cells))
     said = (
         f"ms: a frame of the best refit, positions included; update and query: their shares of it. The other columns: times as fast as the best "
-        f"refit, over the whole clip [95 % interval]; Embree by user geometry, the only one that it can collide, whose refit calls back for each "
+        f"refit, over the whole clip (95 % interval); Embree by user geometry, the only one that it can collide, whose refit calls back for each "
         f"primitive. {TUNED}: `auto` was tuned on the scene. {text.MISSING}: not measured, or cannot answer: pairs of a body with "
         f"itself are those of refits only."
     )

@@ -18,10 +18,13 @@ from typing import Any, Optional
 import numpy as np
 import pandas as pd
 
+import clip_times
 import files
 import scene_names
 
-SCHEMA = 1
+SCHEMA = 2
+#: Times of schema 1 leave out the beginning of the clip. They are shown, but in groups of their own.
+OLD_SCHEMA = 1
 FILE_NAME = "results.jsonl"
 PHASES = ("motion", "update", "traversal", "triangle_tests", "plan_changes")
 #: Counters that tables and figures read. Others become columns, too, if the results have them.
@@ -51,14 +54,15 @@ class Study:
     """The input of a report.
 
     `runs` has one row per contestant and group (scene, scalar, interpolated frames, machine); `repetitions` has one row per
-    repetition with the mean time per frame of each phase in ms. Both share the column `run`. `notes` are sentences about
-    skipped data.
+    repetition with the mean time per frame of each phase in ms. Both share the column `run`. `raw` has the raw times of each
+    timed run, from which ratios are computed. `notes` are sentences about skipped data.
     """
 
     source: Path
     runs: pd.DataFrame
     repetitions: pd.DataFrame
     notes: list[str]
+    raw: dict[int, clip_times.RawTimes] = field(default_factory=dict, repr=False, compare=False)
     _times: dict[tuple[str, ...], dict[int, np.ndarray]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def groups(self) -> list[pd.DataFrame]:
@@ -155,6 +159,7 @@ def load(folder: Path, newest_of: tuple[str, ...] = ONE_OF_ALL_COMMITS) -> Study
     notes: list[str] = []
     rows: list[dict[str, Any]] = []
     repetitions: list[dict[str, float]] = []
+    raw: dict[int, clip_times.RawTimes] = {}
     last = max((i for i, line in enumerate(lines) if line.strip()), default=-1)
     for index, line in enumerate(lines):
         if not line.strip():
@@ -171,13 +176,15 @@ def load(folder: Path, newest_of: tuple[str, ...] = ONE_OF_ALL_COMMITS) -> Study
             continue
         record = _Record(data, place)
         schema = record.get("schema")
-        if schema != SCHEMA or isinstance(schema, bool):
+        if schema not in (SCHEMA, OLD_SCHEMA) or isinstance(schema, bool):
             raise ResultError(
-                f"{place}: schema {json.dumps(schema)} is not known to this report, which reads schema {SCHEMA}."
+                f"{place}: schema {json.dumps(schema)} is not known to this report, which reads schema {SCHEMA} and {OLD_SCHEMA}."
             )
         try:
             row = _row(record, index)
             times = _repetitions(record, index, row)
+            if times:
+                raw[index] = _raw(record, row, times)
         except ResultError as problem:
             notes.append(f"Line {index + 1} of {FILE_NAME} was skipped: {str(problem).removeprefix(place).lstrip(':, ')}")
             continue
@@ -200,7 +207,14 @@ def load(folder: Path, newest_of: tuple[str, ...] = ONE_OF_ALL_COMMITS) -> Study
     measured = pd.DataFrame(repetitions, columns=["run", "repetition", *PHASES])
     measured = measured.astype({"run": int, "repetition": int, **{name: float for name in PHASES}})
     times = measured[measured["run"].isin(runs["run"])].reset_index(drop=True)
-    return Study(path, _with_times(runs, times), times, notes)
+    raw = {run: raw[run] for run in map(int, runs["run"]) if run in raw}
+    old = int((runs["schema"] == OLD_SCHEMA).sum())
+    if old:
+        notes.append(
+            f"{old} of {len(runs)} results are of schema {OLD_SCHEMA}: their times leave out the beginning of the clip (the reset and "
+            "the first frame), and are never compared with newer ones."
+        )
+    return Study(path, _with_times(runs, times, raw), times, notes, raw)
 
 
 def _row(record: _Record, index: int) -> dict[str, Any]:
@@ -232,6 +246,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
     bodies = record.get("scene.bodies", [])
     row: dict[str, Any] = {
         "run": index,
+        "schema": int(record.number("schema")),
         "key": str(record.get("key", "")),
         "session": str(record.get("run", "")),
         "kind": record.text("kind"),
@@ -292,6 +307,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "p99": record.number("times.total_p99", math.nan),
         "worst": record.number("times.total_worst", math.nan),
         "build_ms": record.number("times.build_ms", math.nan),
+        "disturbed": record.text("times.disturbed", ""),
         "bytes": record.number("bytes", math.nan),
     }
     for name in ("frames", "pairs", "candidates", "missed_candidates", "missed", "extra", "repeated", "malformed",
@@ -309,6 +325,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
     )
     row["group"] = json.dumps(
         [row["scene_name"], row["hash"], row["primitives"], row["scalar"], row["l"], str(row["frames"]), row["machine"]]
+        + ([f"schema {row['schema']}"] if row["schema"] != SCHEMA else [])
     )
     return row
 
@@ -408,6 +425,38 @@ def _instructions(record: _Record, params: dict[str, Any], machine: dict[str, st
     return record.text("strategy.instructions", "") or (chosen if chosen != "auto" else machine["kernels"])
 
 
+def _raw(record: _Record, row: dict[str, Any], means: list[dict[str, float]]) -> clip_times.RawTimes:
+    """Returns the raw times of a record with times, whose means per frame are known."""
+    sums = np.array([[one[name] for name in clip_times.PARTS] for one in means])
+    session, disturbed = row["session"], row["disturbed"]
+    listed = record.get("times.repetitions")
+    if not all(isinstance(one, dict) and "totals" in one for one in listed):
+        if row["schema"] == SCHEMA:
+            raise ResultError(f"{record.place}: times.repetitions: totals are missing.")
+        motions = np.array([[one["motion"]] for one in means])
+        return clip_times.RawTimes(sums.sum(axis=1, keepdims=True), motions, sums, None, None, True, session, disturbed)
+    try:
+        totals, motions = (np.array([one[name] for one in listed], dtype=float) for name in ("totals", "motions"))
+    except (KeyError, TypeError, ValueError) as problem:
+        raise ResultError(f"{record.place}: times.repetitions: totals and motions should be lists of numbers: {problem}.") from None
+    if totals.ndim != 2 or totals.shape != motions.shape or not totals.size or not np.isfinite([totals, motions]).all():
+        raise ResultError(f"{record.place}: times.repetitions: totals and motions should have a number for each frame.")
+    begin, steady = record.get("times.steady_from", None), None
+    if begin is not None:
+        if isinstance(begin, bool) or not isinstance(begin, int) or not 0 <= begin < totals.shape[1]:
+            raise ResultError(f"{record.place}: times.steady_from should be a frame.")
+        steady = []
+        for number, entry in enumerate(listed):
+            one = _Record(entry, f"{record.place}, repetition {number + 1}")
+            parts = [one.number(f"steady.{name}") for name in clip_times.PARTS]
+            parts[-1] += one.number("steady.geometry_changes", 0.0)
+            steady.append(parts)
+    by_clips = record.text("times.by", "frames") != "frames"
+    return clip_times.RawTimes(
+        totals, motions, sums, None if steady is None else np.array(steady), begin, by_clips, session, disturbed
+    )  # fmt: skip
+
+
 def _threads(params: dict[str, Any]) -> int:
     """Returns the threads that a contestant shared its work among."""
     try:
@@ -452,28 +501,34 @@ def _newest(runs: pd.DataFrame, columns: tuple[str, ...]) -> tuple[pd.DataFrame,
     return newest.reset_index(drop=True), len(runs) - len(newest)
 
 
-def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Adds medians over repetitions of each phase and of the sums, in ms per frame, their spread, and `middle_` and a phase:
-    that phase in the repetition with the median total.
+#: Times of runs, by the phases that they add up.
+SUMS = {
+    **{name: (name,) for name in PHASES},
+    "query": ("traversal", "triangle_tests"),
+    "updating": ("update", "plan_changes"),
+    "total": clip_times.PARTS,
+    "total_motion": PHASES,
+}
+
+
+def _with_times(runs: pd.DataFrame, times: pd.DataFrame, raw: dict[int, clip_times.RawTimes]) -> pd.DataFrame:
+    """Adds the time of each phase and of the sums, in ms per frame (clip_times.time_of), the spread of the repetitions, the steady
+    total, and `middle_` and a phase: that phase in the repetition with the median total.
     """
-    sums = times.assign(
-        query=times["traversal"] + times["triangle_tests"],
-        updating=times["update"] + times["plan_changes"],
-        total=times["update"] + times["plan_changes"] + times["traversal"] + times["triangle_tests"],
-        total_motion=times[list(PHASES)].sum(axis=1),
+    found = pd.DataFrame(
+        {name: [clip_times.time_of(one, phases) for one in raw.values()] for name, phases in SUMS.items()}, index=list(raw), dtype=float
     )
-    names = [*PHASES, "query", "updating", "total", "total_motion"]
-    grouped = sums.groupby("run")
-    medians = grouped[names].median()
-    extremes = grouped["total_motion"].agg(["min", "max", "count"])
-    medians["spread"] = (extremes["max"] - extremes["min"]) / medians["total_motion"].where(medians["total_motion"] > 0)
-    medians["repetitions"] = extremes["count"]
+    found["steady"] = [clip_times.time_of(one, clip_times.PARTS, steady=True) for one in raw.values()]
+    sums = times.assign(total_motion=times[list(PHASES)].sum(axis=1))
+    extremes = sums.groupby("run")["total_motion"].agg(["min", "max", "count", "median"])
+    found["spread"] = (extremes["max"] - extremes["min"]) / extremes["median"].where(extremes["median"] > 0)
+    found["repetitions"] = extremes["count"]
     # The repetition in the middle (the lower one of two), whose phases add up to its total.
     ordered = sums.sort_values(["run", "total_motion", "repetition"])
     same = ordered.groupby("run")["run"]
     middle = ordered[same.cumcount() == (same.transform("size") - 1) // 2].set_index("run")[list(PHASES)]
-    medians = medians.join(middle.add_prefix("middle_").astype(float))
-    joined = runs.merge(medians, how="left", left_on="run", right_index=True)
+    found = found.join(middle.add_prefix("middle_").astype(float))
+    joined = runs.merge(found, how="left", left_on="run", right_index=True)
     joined["repetitions"] = joined["repetitions"].fillna(0).astype(int)
     false = joined["candidates"] - joined["pairs"] + joined["missed_candidates"].fillna(0)
     joined["false_candidates"] = false / np.maximum(joined["pairs"], 1)

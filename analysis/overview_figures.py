@@ -107,7 +107,8 @@ def profile(found: Sequence[Profile], looks: dict[str, Look], titles: dict[str, 
 
 
 def against_refit(study: Study, glance: Sequence[tables.Glance], looks: dict[str, Look]) -> Optional[Figure]:
-    """Draws a row a table: the ratio of the fastest other contestant to the best refit, with its interval."""
+    """Draws a row a table: the ratio of the fastest other contestant to the best refit, with its interval or range
+    (dotted if the machine was disturbed)."""
     rows = []
     for line in glance:
         if line.exact_run is None:
@@ -115,8 +116,7 @@ def against_refit(study: Study, glance: Sequence[tables.Glance], looks: dict[str
         found = ratios.ratio(study, line.exact_run, line.refit_run, "with_motion")
         if found is None:
             continue
-        times = (ratios.times_of(study, run, "with_motion") for run in (line.exact_run, line.refit_run))
-        rows.append((line, found, ratios.interval(*times, found.paired) or (found.low, found.high)))
+        rows.append((line, found, (found.low, found.high)))
     if not rows:
         return None
     scalars = {line.scalar for line, *_ in rows}
@@ -132,9 +132,10 @@ def against_refit(study: Study, glance: Sequence[tables.Glance], looks: dict[str
     right = axes.get_yaxis_transform()
     for place, (line, found, (low, high)) in enumerate(rows):
         look = looks[line.exact_contestant]
-        axes.plot([low, high], [place, place], color=look.colour, linewidth=1.6, zorder=2)
+        style = ":" if found.disturbed else "-"
+        axes.plot([low, high], [place, place], color=look.colour, linewidth=1.6, linestyle=style, zorder=2)
         mark(axes, found.middle, place, look, 6)
         name = line.exact.split(" (")[0]
-        axes.text(1.01, place, f"{text.factor(found.middle)}  {name}", transform=right, va="center", fontsize=7.5, color="#333333")
+        axes.text(1.01, place, f"{text.factor(found.middle)}{'?' if found.disturbed else ''}  {name}", transform=right, va="center", fontsize=7.5, color="#333333")
     axes.set_xlabel("times as fast as the best refit")
     return figure

@@ -30,7 +30,7 @@ COSTS: dict[str, tuple[float, float]] = {
 }  # fmt: skip
 UNKNOWN = (0.3, 1.5)  #: of strategies that are not listed
 MOTION = 0.006  #: per frame, for 1000 polygons
-CLIPS = 2  #: besides the repetitions: one that is verified and counted, one to warm up
+CLIPS = 2  #: besides the repetitions: one that is verified, one that is replayed and counted
 ORACLE = 0.7  #: true pairs of one frame, once, and looking at all boxes for each contestant, for 1000 polygons
 KEYFRAMES, TRIANGLES = 60, 16000  #: where a plan does not say
 LONGEST = 45  #: minutes that a piece should take at most
@@ -82,7 +82,7 @@ def minutes(study: dict[str, Any]) -> float:
             for name, count in contestants(study):
                 per_frame, per_interval = COSTS.get(name, UNKNOWN)
                 clip = frames * (per_frame + MOTION) + (frames / l) * per_interval
-                once = clip * (study.get("repetitions", 3) + CLIPS) + checked * ORACLE
+                once = clip * (study.get("repetitions", 5) + CLIPS) + checked * ORACLE
                 total += count * once * thousands
     return total / 60000
 

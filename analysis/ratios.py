@@ -9,6 +9,7 @@ from typing import Optional
 import numpy as np
 import pandas as pd
 
+import clip_times
 from load import PHASES, Study
 
 #: The phases of a ratio.
@@ -19,23 +20,13 @@ SCOPES: dict[str, tuple[str, ...]] = {
     "query": ("traversal", "triangle_tests"),
 }
 
-#: The share of a bootstrap distribution inside its interval.
-CONFIDENCE = 0.95
-
 
 @dataclass(frozen=True)
-class Ratio:
-    """Reference time over own time: above 1 is faster than the reference.
+class Ratio(clip_times.Ratio):
+    """Reference time over own time: above 1 is faster than the reference."""
 
-    `low` and `high` are the extremes over repetitions if `paired` (repetition i against repetition i of the same session,
-    which ran next to each other), else the extremes over any two repetitions.
-    """
-
-    middle: float
-    low: float
-    high: float
-    paired: bool
     reference: int
+    disturbed: bool  #: on one of the sides
 
 
 def times_of(study: Study, run: int, scope: str) -> np.ndarray:
@@ -44,11 +35,11 @@ def times_of(study: Study, run: int, scope: str) -> np.ndarray:
 
 
 def clip_total(study: Study, run: int) -> float:
-    """Returns the time of a run's whole clip, in ms per frame, by which the best refit is chosen: the median over repetitions of all
-    phases. The evaluation of positions counts: some baselines fetch them in their own phases. `clip_total` of
-    experiments/results/table.hpp and `clipTotal` of the explorer are the same number; tests compare the choices.
+    """Returns the time of a run's whole clip, in ms per frame, by which the best refit is chosen: all phases, positions included (some
+    baselines fetch them in their own phases). `shortest_clip` of experiments/results/table.hpp and `clipTotal` of the explorer are the
+    same number; tests compare the choices. NaN without times.
     """
-    return float(np.median(times_of(study, run, "with_motion")))
+    return clip_times.time_of(study.raw[run], SCOPES["with_motion"]) if run in study.raw else math.nan
 
 
 def best_refit(study: Study, group: pd.DataFrame) -> Optional[int]:
@@ -57,81 +48,20 @@ def best_refit(study: Study, group: pd.DataFrame) -> Optional[int]:
     It is the one denominator of the group: its phases are the denominators of ratios of phases.
     """
     refits = group[group["baseline"] & (group["guarantee"] != "approximate") & (group["refused"] == "")]
-    totals = {int(run): clip_total(study, int(run)) for run in refits["run"]}
+    totals = {int(run): clip_total(study, int(run)) for run in refits["run"] if int(run) in study.raw}
     return min(totals, key=lambda run: (totals[run], run)) if totals else None
 
 
-def ratio(study: Study, run: int, reference: int, scope: str) -> Optional[Ratio]:
+def ratio(study: Study, run: int, reference: int, scope: str, steady: bool = False) -> Optional[Ratio]:
     """Returns how many times faster `run` is than `reference`; None if one of them has no time."""
-    own = times_of(study, run, scope)
-    other = times_of(study, reference, scope)
-    if not len(own) or not len(other) or own.min() <= 0:
+    if run not in study.raw or reference not in study.raw:
         return None
-    if len(own) == len(other) and study.sessions[run] == study.sessions[reference]:
-        quotients = other / own
-        return Ratio(float(np.median(quotients)), float(quotients.min()), float(quotients.max()), True, reference)
-    return Ratio(
-        float(np.median(other) / np.median(own)),
-        float(other.min() / own.max()),
-        float(other.max() / own.min()),
-        False,
-        reference,
-    )
-
-
-def interval(own: np.ndarray, other: np.ndarray, paired: bool) -> Optional[tuple[float, float]]:
-    """Returns the percentile bootstrap's 95 % interval of a ratio other / own; None for a single repetition.
-
-    Paired repetitions are drawn together, others independently. The distribution is not sampled but exact, so that the
-    explorer computes the same interval in the browser; targets.json has 4,000 draws of the independent one.
-    """
-    if len(own) < 2 or len(other) < 2 or own.min() <= 0:
+    own, other = study.raw[run], study.raw[reference]
+    found = clip_times.ratio_of(other, own, SCOPES[scope], steady)
+    if found is None:
         return None
-    if paired:
-        return _percentiles(_medians(other / own))
-    mine = _medians(own)
-    return _percentiles([(m / n, p * q) for m, p in _medians(other) for n, q in mine])
-
-
-def _medians(values: np.ndarray) -> list[tuple[float, float]]:
-    """Returns the medians of all resamples (as many values, drawn with replacement), each with its probability."""
-    x = sorted(map(float, values))
-    n = len(x)
-
-    def at_least(k: int, i: int) -> float:
-        """The probability that k or more of n draws are among the i smallest values."""
-        return sum(math.comb(n, j) * (i / n) ** j * (1 - i / n) ** (n - j) for j in range(k, n + 1))
-
-    half = (n + 1) // 2  # the order of the median, or of the lower of the two values in the middle
-    lower = [at_least(half, i + 1) - at_least(half, i) for i in range(n)]
-    if n % 2:
-        return list(zip(x, lower))
-    result = []
-    for i in range(n):
-        alone = lower[i]
-        for j in range(i + 1, n):
-            share = ((i + 1) / n) ** half - (i / n) ** half
-            share *= ((n - j) / n) ** half - ((n - j - 1) / n) ** half
-            share *= math.comb(n, half)
-            alone -= share
-            result.append(((x[i] + x[j]) / 2, share))
-        result.append((x[i], alone))
-    return result
-
-
-def _percentiles(weighted: list[tuple[float, float]]) -> tuple[float, float]:
-    """Returns the ends of the middle 95 % of a distribution."""
-    outside = (1 - CONFIDENCE) / 2
-    weighted = sorted(weighted)
-    below, low, high = 0.0, weighted[0][0], weighted[-1][0]
-    for value, share in weighted:
-        if below <= outside:
-            low = value
-        below += share
-        if below >= 1 - outside:
-            high = value
-            break
-    return low, high
+    disturbed = bool(own.disturbed or other.disturbed)
+    return Ratio(found.middle, found.low, found.high, found.paired, found.is_interval, reference, disturbed)
 
 
 def ratios(study: Study, scope: str) -> dict[int, Ratio]:

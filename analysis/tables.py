@@ -7,9 +7,10 @@ from typing import Optional
 
 import pandas as pd
 
+import clip_times
 import ratios
 import text
-from load import Study
+from load import OLD_SCHEMA, Study
 from ratios import Ratio
 
 GUARANTEE_NAMES = {"exact": "exact", "candidate_superset": "superset", "approximate": "approximate"}
@@ -17,10 +18,13 @@ GUARANTEE_NAMES = {"exact": "exact", "candidate_superset": "superset", "approxim
 
 @dataclass(frozen=True)
 class Shown:
-    """A ratio as text: the median over repetitions and their range, which is empty for a single repetition."""
+    """A ratio as text, and its interval (in parentheses) or its range over fewer than five repetitions (in brackets), which is
+    empty for a single repetition. `disturbed` ratios look different.
+    """
 
     middle: str
     range: str
+    disturbed: bool = False
 
     def __str__(self) -> str:
         return f"{self.middle} {self.range}".rstrip()
@@ -41,6 +45,9 @@ class Row:
     total: str
     ratio: Shown
     ratio_without_motion: Shown
+    steady: Shown  #: without motion, of the frames from the second knot on
+    paid_from: str  #: the frame from which preparation and beginning have paid
+    disturbed: str  #: why, or empty
     missed: str
     extra: str
     protrusion: str
@@ -92,6 +99,15 @@ class Ratios:
     def __init__(self, study: Study) -> None:
         self.with_motion = ratios.ratios(study, "with_motion")
         self.without_motion = ratios.ratios(study, "without_motion")
+        self.steady: dict[int, Optional[Ratio]] = {}
+        self.paid_from: dict[int, str] = {}
+        build = dict(zip(map(int, study.runs["run"]), study.runs["build_ms"]))
+        for run, one in self.without_motion.items():
+            self.steady[run] = ratios.ratio(study, run, one.reference, "without_motion", steady=True)
+            known = run != one.reference and study.raw[run].totals.shape[1] > 1 and build[run] == build[run]
+            if known and build[one.reference] == build[one.reference]:
+                frame = clip_times.paid_from(study.raw[run], build[run], study.raw[one.reference], build[one.reference])
+                self.paid_from[run] = "never" if frame is None else str(frame)
 
 
 def groups(study: Study, all_ratios: Ratios) -> list[Group]:
@@ -155,6 +171,9 @@ def _row(row: object, all_ratios: Ratios) -> Row:
         total=text.milliseconds(row.total_motion),
         ratio=shown_ratio(with_motion),
         ratio_without_motion=shown_ratio(without),
+        steady=shown_ratio(all_ratios.steady.get(run)),
+        paid_from=all_ratios.paid_from.get(run, text.MISSING),
+        disturbed=row.disturbed,
         missed=text.count(row.missed),
         extra=text.count(row.extra),
         protrusion=text.significant(row.protrusion, 2),
@@ -167,19 +186,22 @@ def _row(row: object, all_ratios: Ratios) -> Row:
 
 
 def _faster(one: Ratio) -> Optional[bool]:
-    """Returns True or False if all repetitions agree; None otherwise."""
+    """Returns True or False if the interval, or else all repetitions, agree; None otherwise."""
     if one.low > 1:
         return True
     return False if one.high < 1 else None
 
 
 def shown_ratio(one: Optional[Ratio]) -> Shown:
-    """Formats a ratio with its range over repetitions; ~ where repetitions could not be paired."""
+    """Formats a ratio: (interval) or [range over fewer than five repetitions]; ~ where repetitions could not be paired, and ? where
+    the machine was disturbed.
+    """
     if one is None:
         return Shown(text.MISSING, "")
     low, high = text.factor(one.low), text.factor(one.high)
-    middle = ("" if one.paired else "~\u2009") + text.factor(one.middle)
-    return Shown(middle, "" if one.low == one.high else f"({low}–{high})")
+    middle = ("" if one.paired else "~\u2009") + text.factor(one.middle) + ("\u2009?" if one.disturbed else "")
+    ends = f"({low}–{high})" if one.is_interval else f"[{low}–{high}]"
+    return Shown(middle, "" if one.low == one.high else ends, one.disturbed)
 
 
 def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
@@ -191,7 +213,12 @@ def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
     if with_motion and lost:
         notes.append(f"No ratio for {text.listing(lost)}: measured at another commit than any refit here.")
     if any(not all_ratios.with_motion[run].paired for run in timed["run"] if run in all_ratios.with_motion):
-        notes.append("~ marks ratios whose repetitions could not be paired; their range is the widest possible.")
+        notes.append("~ marks ratios whose repetitions could not be paired; their interval or range is wider.")
+    if len(timed) and (timed["schema"] == OLD_SCHEMA).all():
+        notes.append("Measured before the clock counted the beginning of a clip: reset and first frame are missing in these times.")
+    elif len(timed):
+        why = [f"{row.label}: {row.disturbed}" for row in timed[["label", "disturbed"]].itertuples() if row.disturbed]
+        notes.append(f"Disturbed (?): {'; '.join(why)}." if why else "Quiet: no contestant waited for a processor.")
     sampled = sorted({int(every) for every in timed["sampled_every"] if every > 1})
     if sampled:
         notes.append(f"Verified on every {text.listing([text.ordinal(s) for s in sampled])} frame and the last.")
@@ -248,14 +275,14 @@ def _first(rows: pd.DataFrame) -> Optional[pd.Series]:
     return rows.iloc[0] if len(rows) else None
 
 
-PLAIN_COLUMNS = ("strategy", "guarantee", "code", "motion", "update", "query", "total", "ratio", "w/o motion", "missed",
+PLAIN_COLUMNS = ("strategy", "guarantee", "code", "motion", "update", "query", "total", "ratio", "w/o motion", "steady", "paid from", "missed",
                  "extra", "protrusion", "looseness", "memory")  # fmt: skip
 
 
 def plain(scene: str, group: Group) -> str:
     """Formats a group as text for a terminal."""
     cells = [PLAIN_COLUMNS] + [
-        (row.label, row.guarantee, row.instructions, row.motion, row.update, row.query, row.total, row.ratio, row.ratio_without_motion,
+        (row.label, row.guarantee, row.instructions, row.motion, row.update, row.query, row.total, row.ratio, row.ratio_without_motion, row.steady, row.paid_from,
          row.missed, row.extra, row.protrusion, row.looseness, row.memory)
         for row in group.rows
     ]  # fmt: skip

@@ -17,9 +17,18 @@ import files
 import text
 from load import ResultError
 
-SCHEMA = 1
+SCHEMA = 2
 FILE_NAME = "targets.json"
 VERDICTS = {"reached_aim": "aim reached", "reached": "reached", "missed": "missed", "unmeasured": "not measured"}
+
+
+@dataclass(frozen=True)
+class Within:
+    """The 95 % interval of a ratio, or the range over fewer than five repetitions."""
+
+    low: float
+    high: float
+    is_interval: bool
 
 
 @dataclass(frozen=True)
@@ -31,7 +40,8 @@ class Scene:
     triangles: Optional[float]
     counts: bool
     ratio: Optional[float]
-    interval: Optional[tuple[float, float]]
+    interval: Optional[Within]
+    disturbed: bool
     numerator: str
     numerator_ms: Optional[float]
     denominator: str
@@ -45,7 +55,7 @@ class Target:
 
     what: str
     measured: Optional[float]
-    interval: Optional[tuple[float, float]]
+    interval: Optional[Within]
     at_least: float
     aim: float
     verdict: str
@@ -67,7 +77,7 @@ def load_targets(path: Path) -> list[Target]:
     try:
         rows = files.read_json(path)
     except FileNotFoundError:
-        raise ResultError(f"{path} does not exist: `kbvh bench --plan PLAN --out DIR` writes it for a plan with targets.") from None
+        raise ResultError(f"{path} does not exist: `kbvh run --plan PLAN --out DIR` writes it for a plan with targets.") from None
     except OSError as error:
         raise ResultError(f"{path} cannot be read: {error.strerror}.") from None
     except ValueError:
@@ -89,7 +99,9 @@ def _target(row: dict[str, Any]) -> Target:
     if not isinstance(row, dict):
         raise ValueError("an object is expected")
     if row["schema"] != SCHEMA:
-        raise ValueError(f"schema {json.dumps(row['schema'])} is not known, only {SCHEMA}")
+        older = row["schema"] == 1
+        why = "its times leave out the beginning of the clip; `kbvh run --plan PLAN --out DIR` makes it again" if older else f"only {SCHEMA}"
+        raise ValueError(f"schema {json.dumps(row['schema'])} is not known: {why}" if older else f"schema {json.dumps(row['schema'])} is not known, {why}")
     if row["verdict"] not in VERDICTS:
         raise ValueError(f"verdict is {json.dumps(row['verdict'])}, but should be one of {', '.join(VERDICTS)}")
     machine = row.get("machine") or {}
@@ -123,6 +135,7 @@ def _scene(one: dict[str, Any]) -> Scene:
         counts=bool(one["counts"]),
         ratio=_number(one, "ratio"),
         interval=_interval(one),
+        disturbed=bool(above.get("disturbed") or below.get("disturbed")),
         numerator=above.get("label", ""),
         numerator_ms=_number(above, "ms") if above else None,
         denominator=below.get("label", ""),
@@ -136,12 +149,12 @@ def _number(row: dict[str, Any], key: str) -> Optional[float]:
     return None if value is None else float(value)
 
 
-def _interval(row: dict[str, Any]) -> Optional[tuple[float, float]]:
-    interval = row["confidence_interval"]
-    if interval is None:
-        return None
-    low, high = interval
-    return float(low), float(high)
+def _interval(row: dict[str, Any]) -> Optional[Within]:
+    for name in ("confidence_interval", "range"):
+        if row[name] is not None:
+            low, high = row[name]
+            return Within(float(low), float(high), name == "confidence_interval")
+    return None
 
 
 def times(value: Optional[float]) -> str:
@@ -154,9 +167,12 @@ def wanted(value: float) -> str:
     return f"{value:g}x"
 
 
-def within(interval: Optional[tuple[float, float]]) -> str:
-    """Formats an interval as [44.1, 46.3], or nothing."""
-    return "" if interval is None else f"[{text.factor(interval[0])}, {text.factor(interval[1])}]"
+def within(interval: Optional[Within]) -> str:
+    """Formats an interval as (44.1–46.3), a range over fewer than five repetitions as [44.1–46.3]; or nothing."""
+    if interval is None:
+        return ""
+    ends = f"{text.factor(interval.low)}–{text.factor(interval.high)}"
+    return f"({ends})" if interval.is_interval else f"[{ends}]"
 
 
 def facts(targets: list[Target]) -> str:
@@ -180,7 +196,7 @@ def markdown(targets: list[Target]) -> str:
     """Returns both tables: the targets, then every size and order."""
     if not targets:
         return "No targets.\n"
-    lines = [_row(["what", "measured [95 % interval]", "at least", "aim", "verdict"]), _row(["---"] * 5)]
+    lines = [_row(["what", "measured (95 % interval) or [range]", "at least", "aim", "verdict"]), _row(["---"] * 5)]
     for target in targets:
         measured = f"{times(target.measured)} {within(target.interval)}".rstrip()
         verdict = VERDICTS[target.verdict] + (f": {target.reason}" if target.reason else "")
@@ -192,12 +208,12 @@ def markdown(targets: list[Target]) -> str:
     meaning = (
         "A number is the speed of the side named first over that of the other, on the scenes that count: their geometric mean "
         "or the least of them, as the plan says. The verdict compares this number, not its interval; the table below has "
-        "every scene, in bold if it counts."
+        "every scene, in bold if it counts, with ? if the machine was disturbed. A range is over fewer than five repetitions."
     )
     lines += ["", f"{facts(targets)} {meaning}", ""]
     lines += [_row(["what", *names]), _row(["---"] * (1 + len(names)))]
     for target in targets:
-        cells = {scene.name: times(scene.ratio) for scene in target.scenes}
+        cells = {scene.name: times(scene.ratio) + ("?" if scene.disturbed else "") for scene in target.scenes}
         counted = {scene.name for scene in target.scenes if scene.counts}
         shown = [f"**{cells[name]}**" if name in counted else cells.get(name, text.MISSING) for name in names]
         lines.append(_row([target.what, *shown]))
@@ -230,7 +246,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
         description="Prints the targets of a plan and their measurements as Markdown.",
         epilog="example: targets_table.py results/targets.json --write analysis/guides/results.md",
     )
-    parser.add_argument("file", metavar="targets.json", type=Path, help="written by `kbvh bench --plan PLAN --out DIR`")
+    parser.add_argument("file", metavar="targets.json", type=Path, help="written by `kbvh run --plan PLAN --out DIR`")
     parser.add_argument("--write", metavar="PAGE", type=Path, help="write the tables between the plan's markers in this file")
     options = parser.parse_args(arguments)
     try:

@@ -1,4 +1,4 @@
-// Bounds updated from reduced coordinates (BD-tree, James & Pai 2004): before the clip begins, the motion of
+// Bounds updated from reduced coordinates (BD-tree, James & Pai 2004): at the first frame, the motion of
 // each body is reduced to a few displacement fields ("modes", the principal components of its keyframes), and
 // each node gets the ranges of these fields below it. At a frame the box of a node is a linear function of
 // the coordinates and of their magnitudes, computed at the nodes that the query visits, in any order, in time
@@ -21,21 +21,28 @@ template <class S, class Count>
 class BdTree final : public BlendedStrategy<S, Count> {
  public:
   BdTree(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params& params)
-      : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {
-    const auto most = std::uint32_t(params.number("modes"));
-    const double tolerance = params.number("tolerance");
-    constexpr std::uint32_t described = 8;
-    this->make_sources([&](std::uint32_t index, WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans) {
-      auto source = std::make_unique<ReducedBoxes<S>>(hierarchy, plans, most, tolerance);
-      if (index < described)
-        choice_ += (choice_.empty() ? "modes of body " : ", of body ") + std::to_string(index) + ": " +
-                   std::to_string(source->model().mode_count);
-      return source;
-    });
+      : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)),
+        most_modes_(std::uint32_t(params.number("modes"))),
+        tolerance_(params.number("tolerance")) {}
+  void reset_to(double t) override {
+    choice_.clear();
+    BlendedStrategy<S, Count>::reset_to(t);
   }
   std::string choice() const override { return choice_; }
 
  private:
+  std::unique_ptr<BlendSource<S>> make_source(std::uint32_t body, WideHierarchy<S>& hierarchy,
+                                              const FlightPlans<S>& plans) override {
+    constexpr std::uint32_t described = 8;
+    auto source = std::make_unique<ReducedBoxes<S>>(hierarchy, plans, most_modes_, tolerance_);
+    if (body < described)
+      choice_ += (choice_.empty() ? "modes of body " : ", of body ") + std::to_string(body) + ": " +
+                 std::to_string(source->model().mode_count);
+    return source;
+  }
+
+  std::uint32_t most_modes_;
+  double tolerance_;
   std::string choice_;
 };
 

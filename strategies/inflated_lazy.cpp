@@ -73,6 +73,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
       Body& body = bodies_[index];
       this->hierarchies_[index].positions_changed();
+      this->sampled_.fetch_all(index);
       body.step = 0;
       body.tests = 0;
       body.margin = 0;

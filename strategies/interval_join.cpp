@@ -103,7 +103,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
   void reset_to(double t) override {
     for (Joins<S>* one : {&now_, &next_})
-      for (auto& answers : one->answers) answers.clear_counts();
+      for (auto& answers : one->answers) answers.start_over();
     bounds_.start();
     ray_boxes_are_old_ = true;
     changes_.start_over();

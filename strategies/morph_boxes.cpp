@@ -1,5 +1,5 @@
 // Boxes of morph targets, blended by the weights of the targets (Larsson & Akenine-Moeller 2003). Targets are
-// the keyframes: the boxes of all keyframes are computed before the clip begins, and a frame blends the boxes
+// the keyframes: the boxes of all keyframes are computed at the first frame, and each frame blends the boxes
 // of two keyframes at the nodes that its query visits, top-down. Frames update nothing else. At keyframes the
 // boxes are tight.
 //
@@ -21,10 +21,12 @@ class MorphBoxes final : public BlendedStrategy<S, Count> {
  public:
   MorphBoxes(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
              const Params& /*params*/)
-      : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {
-    this->make_sources([](std::uint32_t, const WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans) {
-      return std::make_unique<TargetBoxes<S>>(hierarchy, plans);
-    });
+      : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {}
+
+ private:
+  std::unique_ptr<BlendSource<S>> make_source(std::uint32_t /*body*/, WideHierarchy<S>& hierarchy,
+                                              const FlightPlans<S>& plans) override {
+    return std::make_unique<TargetBoxes<S>>(hierarchy, plans);
   }
 };
 

@@ -7,27 +7,24 @@
 namespace kbvh {
 namespace {
 
-/// Returns the topologies, those of moving bodies built anew for `samples` times of the clip.
+/// Returns a topology of a body for `samples` times of the clip, with the width and leaf size of `before`;
+/// nothing for a body that does not move as its keyframes say.
 template <class S>
-Topologies over_clip(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
-                     std::size_t samples) {
-  for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
-    const FlightPlans<S>& plans = motion.plans(body);
-    const auto times = plans.keyframe_times();
-    if (!scene.moving(body) || times.size() < 2) continue;
-    std::vector<std::vector<S>> positions(samples);
-    std::vector<const S*> rows;
-    for (std::size_t i = 0; i < samples; ++i) {
-      const double share = double(i) / double(samples - 1);
-      positions[i].resize(std::size_t(3) * scene.vertex_count(body) + 1);
-      plans.evaluate(times.front() + share * (times.back() - times.front()), positions[i].data());
-      rows.push_back(positions[i].data());
-    }
-    topologies[body] = build_topology_over_time<S>(
-        scene.primitives(body), rows,
-        {.width = topologies[body].width, .leaf_size = topologies[body].leaf_size});
+std::optional<Topology> over_clip(const SceneView<S>& scene, const ClipMotion<S>& motion, std::uint32_t body,
+                                  const Topology& before, std::size_t samples) {
+  const FlightPlans<S>& plans = motion.plans(body);
+  const auto times = plans.keyframe_times();
+  if (!scene.moving(body) || times.size() < 2 || plans.has_own_plans()) return {};
+  std::vector<std::vector<S>> positions(samples);
+  std::vector<const S*> rows;
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double share = double(i) / double(samples - 1);
+    positions[i].resize(std::size_t(3) * scene.vertex_count(body) + 1);
+    plans.evaluate(times.front() + share * (times.back() - times.front()), positions[i].data());
+    rows.push_back(positions[i].data());
   }
-  return topologies;
+  return build_topology_over_time<S>(scene.primitives(body), rows,
+                                     {.width = before.width, .leaf_size = before.leaf_size});
 }
 
 template <class S, class Count>
@@ -39,8 +36,18 @@ class Tsah final : public StoredHierarchyStrategy<S, Count>,
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
   Tsah(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params& params)
-      : Base(scene, motion,
-             over_clip(scene, motion, std::move(topologies), std::size_t(params.number("samples"))), params) {
+      : Base(scene, motion, std::move(topologies), params),
+        motion_(motion),
+        samples_(std::size_t(params.number("samples"))) {}
+
+  /// The trees are made for the clip, so making them is part of it.
+  void reset_to(double t) override {
+    for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) {
+      WideHierarchy<S>& hierarchy = this->hierarchies_[body];
+      if (auto topology = over_clip(this->scene_, motion_, body, hierarchy.topology(), samples_))
+        hierarchy.assign(std::move(*topology), this->scene_.primitives(body), hierarchy.kernels());
+    }
+    Base::reset_to(t);
   }
 
   void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
@@ -52,6 +59,8 @@ class Tsah final : public StoredHierarchyStrategy<S, Count>,
     this->hierarchies_[body].refit(this->sampled_.positions(body));
     this->count_refit(body);
   }
+  ClipMotion<S> motion_;
+  std::size_t samples_;
 };
 
 }  // namespace

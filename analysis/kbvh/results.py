@@ -66,10 +66,11 @@ class Results:
         scalar, at the same l: the best refit, or the fastest run of the strategy `against`, both by the time of the whole clip, whatever
         the measure. Above 1 is faster than the reference.
 
-        `ratio` is the median over repetitions, `low` and `high` are the ends of its 95 % interval (an exact bootstrap over
-        repetitions; nan for a single one), `paired` says whether repetitions ran next to each other, `reference` is the
-        reference's run. `measure` is with_motion, without_motion, update or query. Runs without a reference are left out. The
-        report and its explorer show the same numbers. Raises ValueError for another measure.
+        `ratio` is that of the clips' times, `low` and `high` are the ends of its 95 % interval (a bootstrap over whole rounds) or,
+        where `interval` is false, of the range over fewer than five repetitions (nan for a single one); `paired` says whether
+        repetitions ran next to each other, `disturbed` whether the machine was, `reference` is the reference's run. `measure` is
+        with_motion, without_motion, update or query. Runs without a reference are left out. The report and its explorer show the
+        same numbers. Raises ValueError for another measure.
         """
         rules = _shared("ratios")
         if measure not in rules.SCOPES:
@@ -80,14 +81,13 @@ class Results:
             reference = rules.best_refit(self._study, mine)
             if reference is None:
                 continue
-            theirs = rules.times_of(self._study, reference, measure)
             for run, id, label in zip(group["run"], group["id"], group["label"]):
                 found = rules.ratio(self._study, int(run), reference, measure)
                 if found is not None:
-                    ends = rules.interval(rules.times_of(self._study, int(run), measure), theirs, found.paired)
-                    low, high = ends or (float("nan"), float("nan"))
-                    rows.append((run, id, label, found.middle, low, high, found.paired, reference))
-        names = ["run", "id", "label", "ratio", "low", "high", "paired", "reference"]
+                    several = min(self._study.raw[one].repetitions for one in (int(run), reference)) > 1
+                    low, high = (found.low, found.high) if several else (float("nan"), float("nan"))
+                    rows.append((run, id, label, found.middle, low, high, found.is_interval, found.paired, found.disturbed, reference))
+        names = ["run", "id", "label", "ratio", "low", "high", "interval", "paired", "disturbed", "reference"]
         return pd.DataFrame(rows, columns=names).set_index("run")
 
     def profiles(self, within: Sequence[float] = (1, 1.25, 2)) -> pd.DataFrame:

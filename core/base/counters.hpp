@@ -36,7 +36,6 @@ namespace kbvh {
   X(bodies_skipped, "bodies for which a frame read at most one box")                                 \
   X(nodes_skipped, "nodes that an update skipped because no query of the frame could read them")     \
   X(bodies_translated, "bodies whose boxes were translated for a whole segment instead of refitted") \
-  X(bodies_remembered, "bodies whose boxes were reused from an earlier play of the clip")            \
   X(bytes, "memory held by the strategy's own structures, in bytes (a level, not a sum)")
 
 /// The shared counters of strategies; reports and theory checks loop over them.

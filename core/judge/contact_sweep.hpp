@@ -21,7 +21,7 @@ class ContactSweep {
   template <class Seek>
   std::size_t find(Strategy<S>& strategy, Playback<S>& playback, double t, const Seek& seek,
                    ContactBuffer& out, PhaseTimes& times) {
-    playback.evaluate_all();
+    timed(times.motion, [&] { playback.evaluate_all(); });  // current already, but for the first interval
     finder_.start(playback);
     const double from = playback.time();
     timed(times.update, [&] { strategy.start_sweep(from); });

@@ -195,6 +195,16 @@ const PairBuffer& Oracle<S>::pairs(Playback<S>& playback, const Scene<S>& scene,
   return entry->second;
 }
 
+template <class S>
+const PairBuffer* Oracle<S>::known(double t, std::uint32_t changes) const {
+  if (changes == 0) {
+    const auto entry = known_.find(t);
+    return entry == known_.end() ? nullptr : &entry->second;
+  }
+  const auto entry = changed_.find({changes, t});
+  return entry == changed_.end() ? nullptr : &entry->second;
+}
+
 /// File format: magic, number of times, size in bytes; for each time t, number of pairs, pairs; hash of all
 /// preceding bytes.
 template <class S>

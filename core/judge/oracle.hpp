@@ -38,6 +38,8 @@ class Oracle {
   /// The same after the first `changes` changes of geometry that the script makes; `scene` is as these have
   /// left it. Without such changes, as above. With them, pairs are kept in memory only.
   const PairBuffer& pairs(Playback<S>& playback, const Scene<S>& scene, std::uint32_t changes);
+  /// Returns the pairs at t after so many changes of geometry if `pairs` has returned them before; else null.
+  const PairBuffer* known(double t, std::uint32_t changes) const;
   /// Writes new entries to the cache, as the destructor does.
   void keep();
   /// Returns a sentence about a defect of the cache, or an empty text. Such a defect costs time but changes

@@ -10,6 +10,15 @@ struct PhaseTimes {
   double motion = 0, update = 0, traversal = 0, triangle_tests = 0, plan_changes = 0, geometry_changes = 0;
   double query() const { return traversal + triangle_tests; }
   double total() const { return update + traversal + triangle_tests + plan_changes + geometry_changes; }
+  PhaseTimes& operator+=(const PhaseTimes& other) {
+    motion += other.motion;
+    update += other.update;
+    traversal += other.traversal;
+    triangle_tests += other.triangle_tests;
+    plan_changes += other.plan_changes;
+    geometry_changes += other.geometry_changes;
+    return *this;
+  }
 };
 
 /// Adds the time that `work` takes to `seconds`.

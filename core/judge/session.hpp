@@ -46,10 +46,19 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Starts at time t, with the scene's original plans and geometry. If the geometry was changed, the
-  /// instance is created anew, and references to the old one become invalid. Throws std::invalid_argument and
-  /// changes nothing if t is not finite or not admissible (motion/admissible.hpp).
+  /// Starts at time t, with the scene's original plans and geometry: `restore`, then `start`; afterwards all
+  /// positions are current. If the geometry was changed, the instance is created anew, and references to the
+  /// old one become invalid. Throws std::invalid_argument and changes nothing if t is not finite or not
+  /// admissible (motion/admissible.hpp).
   void reset(double t) {
+    PhaseTimes ignored;
+    restore(t);
+    start(ignored);
+    playback_.evaluate_all();
+  }
+  /// Restores the scene's plans and geometry at time t, before a clip begins; `start` must follow. Throws
+  /// like `reset`.
+  void restore(double t) {
     Interruptible::check();
     check_time(t, "cannot start");
     playback_.restore_plans();
@@ -62,8 +71,12 @@ class Session {
     }
     watch_.start(playback_);
     seek(t);
-    playback_.evaluate_all();
-    strategy_->reset(t);
+  }
+  /// Starts the strategy at the restored time: the beginning of a clip. Positions are evaluated unless the
+  /// strategy declares that it fetches those that it reads; the strategy's `reset` counts as update.
+  void start(PhaseTimes& times) {
+    if (info_->positions != PositionUse::fetched) timed(times.motion, [&] { playback_.evaluate_all(); });
+    timed(times.update, [&] { strategy_->reset(playback_.time()); });
   }
   /// Stores an array with a body's positions for the next call that moves to another time (`reset`,
   /// `advance`, `contacts`), and for the frames after it (Playback::hand_in). For contacts, the array handed

@@ -39,7 +39,9 @@ FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> time
     check_value(positions[i], "coordinate", point / vertex_count, point % vertex_count, int(i % 3));
     if (positions[i] == S(0)) positions[i] = S(0);  // truth B holds no negative zero
   }
+  // Not at the first request: plans are restored for every play, and frames allocate nothing.
   longest_steps_.assign(times.size(), -1.0);
+  translations_.resize(times.size());
   positions.push_back(S(0));  // readers may load four scalars
   keyframes_ = std::make_shared<const Keyframes>(Keyframes{std::move(times), std::move(positions)});
 }
@@ -226,7 +228,6 @@ template <class S>
 std::optional<Translation<S>> FlightPlans<S>::translation(double t) const {
   const auto& times = keyframes_->times;
   if (!own_plans_.empty() || keyframed_count_ == 0 || t < times.front() || t >= times.back()) return {};
-  if (translations_.empty()) translations_.resize(times.size());
   auto& known = translations_[segment_at(t)];
   if (!known) known = find_translation(segment_at(t));
   return *known;

@@ -227,8 +227,11 @@ void Playback<S>::change_plans(double t, std::span<const PlanChange<S>> changes)
 template <class S>
 void Playback<S>::restore_plans() {
   for (auto& state : bodies_) {
-    if (!state.plans.has_own_plans()) continue;
+    // Assigned even where no plan changed: the copy knows nothing of its segments (steps, translations) until
+    // it is asked, so no play profits from an earlier one.
+    const bool changed = state.plans.has_own_plans();
     state.plans = state.scene_plans;
+    if (!changed) continue;
     state.positions.resize(std::size_t(3) * state.plans.vertex_count() + 1);
     state.positions.back() = S(0);
     state.stamp.resize(state.plans.vertex_count());

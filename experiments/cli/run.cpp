@@ -26,13 +26,10 @@ A body is a file (.obj .ply .gltf .glb, or a folder of numbered frames) or a sha
 separated by commas: motion clip fps weld=false (files), name scale rotate=axis:degrees translate=x:y:z as=triangles|points
 (all); `kbvh list` shows the shapes. Polygons of more than three corners are cut into triangles once, at the first keyframe,
 whatever their first corner; from then on a polygon is the union of these triangles.
+A clip is timed from its first frame on: positions, the strategy's reset and its first answer count. Every contestant
+is verified, replayed, and then played in rounds, each in an order of its own, until the intervals of all ratios are
+narrow enough or the time is used up. RESULTS.md explains the table.
 Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input, 3 other error.)";
-
-constexpr const char* bench_examples = R"(Examples:
-  kbvh bench --scene tablecloth --triangles 2000,16000 --l 1,10 --repetitions 5 --out results
-  kbvh bench --plan experiments/plans/default.json --out results
-One iteration is a whole clip, timed by phases; repetitions are randomly interleaved and all kept, in
-DIR/benchmark.json and DIR/results.jsonl. A contestant that breaks its guarantee gets no time.)";
 
 /// Converts parameters to the form of a plan: "key=a,b" becomes {"key": ["a", "b"]}.
 json params_of(const std::vector<std::string>& assignments) {
@@ -86,6 +83,8 @@ void set_common(json& plan, const StudyOptions& options) {
   if (options.repetitions > 0) plan["repetitions"] = options.repetitions;
   if (options.frames_limit > 0) plan["frames_limit"] = options.frames_limit;
   if (options.oracle_every > 0) plan["oracle_every"] = options.oracle_every;
+  if (options.interval_width >= 0) plan["interval_width"] = options.interval_width;
+  if (options.seconds >= 0) plan["seconds"] = options.seconds;
 }
 
 int list_jobs(const Plan& plan) {
@@ -96,7 +95,7 @@ int list_jobs(const Plan& plan) {
   return success;
 }
 
-int run_study(const StudyOptions& options, Harness harness) {
+int run_study(const StudyOptions& options) {
   Plan plan;
   if (options.plan_file.empty()) {
     const json said = plan_of(options);
@@ -128,7 +127,7 @@ int run_study(const StudyOptions& options, Harness harness) {
     return success;
   }
   if (!options.job.empty()) plan = plan_of_job(plan, options.job);
-  const StudyOutcome outcome = run_plan(plan, harness, options.out, options.job);
+  const StudyOutcome outcome = run_plan(plan, options.out, options.job);
   if (!options.out.empty())
     say(counted(outcome.measured, "configuration") + " measured, " + std::to_string(outcome.skipped) +
         (outcome.skipped == 1 ? " was in " : " were in ") +
@@ -196,8 +195,14 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
       add_wholes(command, "--l", o->l, ranges::frames_per_keyframe,
                  "frames for each keyframe interval (10); a list sweeps"),
       add_words(command, "--scalar", o->scalars, "float, double (float)")};
-  add_whole(command, "--repetitions", o->repetitions, ranges::repetitions,
-            "timed clips of each contestant (3)");
+  add_whole(
+      command, "--repetitions", o->repetitions, ranges::repetitions,
+      "least number of timed clips of each contestant (5); with fewer than five: exactly so many, and ranges "
+      "instead of intervals");
+  add_number(command, "--interval-width", o->interval_width, 0, 10,
+             "repeat until the 95 % interval of each ratio is narrower, relative to the ratio (0.05)");
+  add_number(command, "--seconds", o->seconds, 0, 1e6,
+             "longest time for further rounds of one table after the least number (10); 0: none");
   add_whole(command, "--frames-limit", o->frames_limit, ranges::positive,
             "play only this many first frames (intervals with --continuous)");
   add_whole(command, "--oracle-every", o->oracle_every, ranges::positive,
@@ -211,15 +216,24 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
   for (CLI::Option* option : said_by_plan) plan->excludes(option);
 }
 
-void add_command(CLI::App& program, Action& action, const char* name, const char* meaning, const char* footer,
-                 Harness harness) {
+/// Says what the alias is for.
+constexpr const char* bench_note =
+    "note: `kbvh bench` is `kbvh run` now, and will go with the next release; micro-benchmarks are "
+    "kbvh_microbench";
+
+void add_command(CLI::App& program, Action& action, const char* name, const char* meaning, const char* note) {
   CLI::App* command = program.add_subcommand(name, meaning);
-  command->footer(footer);
+  command->footer(run_examples);
   auto options = std::make_shared<StudyOptions>();
   add_study(*command, options);
-  if (harness == Harness::rounds) add_jobs(*command, options);
-  command->callback(
-      [&action, options, harness] { action = [options, harness] { return run_study(*options, harness); }; });
+  add_jobs(*command, options);
+  command->callback([&action, options, note] {
+    action = [options, note] {
+      const int code = run_study(*options);
+      if (note != nullptr) say(note);
+      return code;
+    };
+  });
 }
 
 }  // namespace
@@ -264,13 +278,11 @@ json plan_of(const StudyOptions& options) {
 }
 
 void add_run(CLI::App& program, Action& action) {
-  add_command(program, action, "run", "verify and time contestants on scenes, and print tables", run_examples,
-              Harness::rounds);
+  add_command(program, action, "run", "verify and time contestants on scenes, and print tables", nullptr);
 }
 
 void add_bench(CLI::App& program, Action& action) {
-  add_command(program, action, "bench", "verify and time contestants under Google Benchmark", bench_examples,
-              Harness::google_benchmark);
+  add_command(program, action, "bench", "another name of run, for one more release", bench_note);
 }
 
 }  // namespace kbvh::experiments

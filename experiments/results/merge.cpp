@@ -67,9 +67,11 @@ std::string text_at(const json& object, const char* name) {
 /// Returns why a JSON value is no record that can be merged; "" for a record.
 std::string no_record(const json& value) {
   if (!value.is_object() || !value.contains("schema")) return "is no record of results: it has no schema";
-  if (value.at("schema") != json(results_schema))
+  // Readers show older records apart from newer ones.
+  if (value.at("schema") != json(results_schema) && value.at("schema") != json(oldest_results_schema))
     return "has schema " + value.at("schema").dump(-1, ' ', false, json::error_handler_t::replace) +
-           ", but this program merges schema " + std::to_string(results_schema);
+           ", but this program merges schemas " + std::to_string(oldest_results_schema) + " to " +
+           std::to_string(results_schema);
   if (!value.contains("key") || !value.at("key").is_string() || value.at("key").get<std::string>().empty())
     return "is no record of results: it has no key";
   if (!value.contains("machine") || !value.at("machine").is_object())

@@ -23,10 +23,6 @@ const char* word(SceneOrigin origin) {
   return "shapes";
 }
 
-const char* word(Harness harness) {
-  return harness == Harness::rounds ? "run" : "bench";
-}
-
 namespace {
 std::uint64_t hash_of_times(std::span<const double> times) {
   Hasher hasher;
@@ -89,17 +85,18 @@ json again_record(const json& scene_object, const json& scene, const json& strat
             {"scalars", json::array({scene.at("scalar")})},
             {"l", json::array({scene.at("per_keyframe")})},
             {"repetitions", study.repetitions},
+            {"interval_width", study.interval_width},
+            {"seconds", study.seconds},
             {"oracle_every", study.oracle_every}};
   if (study.frames_limit > 0) plan["frames_limit"] = study.frames_limit;
   plan.update(asked_of(study));
   return plan;
 }
 
-std::string configuration_key(Harness harness, const std::string& program, const json& scene,
-                              const json& strategy, const Study& study, const json& machine) {
+std::string configuration_key(const std::string& program, const json& scene, const json& strategy,
+                              const Study& study, const json& machine) {
   // nlohmann's objects are sorted by key, so the text does not depend on the order of insertion.
   json all{{"schema", results_schema},
-           {"kind", word(harness)},
            {"program", program},
            {"scene", scene.at("hash")},
            {"name", scene.value("name", "")},
@@ -111,6 +108,8 @@ std::string configuration_key(Harness harness, const std::string& program, const
            {"params", strategy.at("params")},
            {"builder", strategy.at("builder")},
            {"repetitions", study.repetitions},
+           {"interval_width", study.interval_width},
+           {"seconds", study.seconds},
            {"oracle_every", study.oracle_every},
            {"machine",
             {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),

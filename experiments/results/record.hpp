@@ -10,12 +10,14 @@
 
 namespace kbvh::experiments {
 
-/// Version of the records; RESULTS.md documents it.
-inline constexpr int results_schema = 1;
+/// Version of the records; RESULTS.md documents it. Times of schema 1 have no beginning: they leave out the
+/// first frame.
+inline constexpr int results_schema = 2;
+/// The oldest version that is still read, apart from newer ones.
+inline constexpr int oldest_results_schema = 1;
 
 /// Returns the word used in result files.
 const char* word(PrimitiveKind kind);
-const char* word(Harness harness);
 const char* word(SceneOrigin origin);
 
 /// Makes the "scene" of a record: the played scene, its times, and the script that is replayed until the last
@@ -35,7 +37,7 @@ nlohmann::json again_record(const nlohmann::json& scene_object, const nlohmann::
 
 /// Computes the key of a configuration: a hash of everything that affects the measurement. `scene` and
 /// `strategy` are as above; `program` is program_identity().
-std::string configuration_key(Harness harness, const std::string& program, const nlohmann::json& scene,
+std::string configuration_key(const std::string& program, const nlohmann::json& scene,
                               const nlohmann::json& strategy, const Study& study,
                               const nlohmann::json& machine);
 

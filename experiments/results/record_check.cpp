@@ -11,7 +11,7 @@ namespace {
 
 enum class Kind : std::uint8_t { text, whole, number, truth, object, list };
 
-const char* name(Kind kind) {
+const char* kind_name(Kind kind) {
   switch (kind) {
     case Kind::text:
       return "a text";
@@ -57,7 +57,7 @@ std::string wrong(const json& object, const std::string& place, std::initializer
   for (const Field& field : fields) {
     const auto found = object.find(field.name);
     if (found == object.end()) return "the field " + place + field.name + " is missing";
-    if (!is(*found, field.kind)) return place + field.name + " is not " + name(field.kind);
+    if (!is(*found, field.kind)) return place + field.name + " is not " + kind_name(field.kind);
   }
   return {};
 }
@@ -96,6 +96,38 @@ std::string wrong_scene(const json& scene) {
   return wrong(scene.at("script"), "scene.script.", {{"steps", Kind::whole}, {"changes", Kind::whole}});
 }
 
+/// Checks the times of single frames, and the means of the steady ones.
+std::string wrong_frames(const json& times, const json& repetition) {
+  const std::size_t frames = times.at("repetitions")[0].value("totals", json::array()).size();
+  for (const char* name : {"totals", "motions"}) {
+    if (std::string what = wrong(repetition, "times.repetitions.", {{name, Kind::list}}); !what.empty())
+      return what;
+    const json& list = repetition.at(name);
+    if (list.empty() || list.size() != frames)
+      return std::string("times.repetitions.") + name + " has not as many entries as there are frames";
+    for (const json& value : list)
+      if (!is(value, Kind::number))
+        return std::string("times.repetitions.") + name + " has an entry that is not " +
+               kind_name(Kind::number);
+  }
+  for (const char* text : {"by", "disturbed"})
+    if (std::string what = wrong(times, "times.", {{text, Kind::text}}); !what.empty()) return what;
+  if (std::string what = wrong(times, "times.", {{"build_ms", Kind::number}}); !what.empty()) return what;
+  const auto steady = times.find("steady_from");
+  if (steady == times.end() || steady->is_null()) return {};
+  if (!is(*steady, Kind::whole) || steady->get<std::uint64_t>() >= frames)
+    return "times.steady_from is not a frame";
+  if (std::string what = wrong(repetition, "times.repetitions.", {{"steady", Kind::object}}); !what.empty())
+    return what;
+  return wrong(repetition.at("steady"), "times.repetitions.steady.",
+               {{"motion", Kind::number},
+                {"update", Kind::number},
+                {"traversal", Kind::number},
+                {"triangle_tests", Kind::number},
+                {"plan_changes", Kind::number},
+                {"geometry_changes", Kind::number}});
+}
+
 std::string wrong_times(const json& times) {
   if (times.is_null()) return {};
   if (!times.is_object()) return "times is neither an object nor null";
@@ -111,6 +143,7 @@ std::string wrong_times(const json& times) {
                               {"plan_changes", Kind::number}});
     if (what.empty() && repetition.contains("geometry_changes"))
       what = wrong(repetition, "times.repetitions.", {{"geometry_changes", Kind::number}});
+    if (what.empty()) what = wrong_frames(times, repetition);
     if (!what.empty()) return what;
   }
   return {};

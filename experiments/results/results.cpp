@@ -14,6 +14,7 @@
 #include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/bytes.hpp"
+#include "experiments/results/record.hpp"
 
 namespace kbvh::experiments {
 
@@ -116,6 +117,11 @@ bool ResultStore::read(const std::filesystem::path& file) {
     const auto key = record.is_object() ? record.find("key") : record.end();
     if (!record.is_object() || key == record.end() || !key->is_string()) {
       ++unreadable_;
+      continue;
+    }
+    // Times of another schema have another meaning: such a record stands for no configuration.
+    if (record.contains("schema") && record.at("schema") != json(results_schema)) {
+      ++other_schemas_;
       continue;
     }
     known_.insert_or_assign(key->get<std::string>(), record);

@@ -40,6 +40,8 @@ class ResultStore {
   const std::filesystem::path& folder() const { return folder_; }
   std::size_t records() const { return records_; }
   std::size_t unreadable_lines() const { return unreadable_; }
+  /// Returns the number of records that are of another schema than this program's; they stay in the file.
+  std::size_t other_schemas() const { return other_schemas_; }
 
  private:
   /// Returns whether the file ends in the middle of a line.
@@ -48,7 +50,7 @@ class ResultStore {
   std::filesystem::path folder_, file_;
   std::map<std::string, nlohmann::json> known_;
   std::map<std::string, std::string> place_of_;
-  std::size_t records_ = 0, unreadable_ = 0;
+  std::size_t records_ = 0, unreadable_ = 0, other_schemas_ = 0;
   bool broken_end_ = false;
 };
 

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "core/base/counters.hpp"
 #include "experiments/common/text.hpp"
+#include "experiments/results/record_times.hpp"
 
 namespace kbvh::experiments {
 
@@ -17,17 +19,6 @@ namespace {
 /// Returns the width in characters, not bytes, of UTF-8 text.
 std::size_t width_of(const std::string& text) {
   return std::size_t(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; }));
-}
-
-double phase_of(const json& repetition, const std::string& phase) {
-  const auto get = [&](const char* name) { return repetition.at(name).get<double>(); };
-  const auto changes = [&] { return get("plan_changes") + repetition.value("geometry_changes", 0.0); };
-  if (phase == "query") return get("traversal") + get("triangle_tests");
-  if (phase == "upkeep") return get("update") + changes();
-  if (phase == "candidates") return get("update") + get("traversal") + changes();
-  if (phase == "total") return get("update") + get("traversal") + get("triangle_tests") + changes();
-  if (phase == "total_with_motion") return get("motion") + phase_of(repetition, "total");
-  return get(phase.c_str());
 }
 
 std::string milliseconds(double value) {
@@ -105,29 +96,45 @@ bool has_times(const json& record) {
   return record.at("times").is_object();
 }
 
-std::vector<double> phase_values(const json& record, const std::string& phase) {
-  std::vector<double> values;
-  const bool per_event = phase == "update_per_event";
-  double events = 1;  // per frame
-  if (per_event) {
-    // Counters are of the whole clip, times of a frame.
-    using json_pointer = json::json_pointer;
-    const double frames = record.value(json_pointer("/scene/frames"), 0.0);
-    events = frames > 0 ? record.value(json_pointer("/counters/certificates_failed"), 0.0) / frames : 0;
+namespace {
+/// Returns the certificates that failed per frame: counters are of the whole clip, times of a frame.
+double events_per_frame(const json& record) {
+  using json_pointer = json::json_pointer;
+  const double frames = record.value(json_pointer("/scene/frames"), 0.0);
+  return frames > 0 ? record.value(json_pointer("/counters/certificates_failed"), 0.0) / frames : 0;
+}
+constexpr const char* per_event = "update_per_event";
+std::string timed_phase(const std::string& phase) {
+  return phase == per_event ? "update" : phase;
+}
+}  // namespace
+
+double time_of(const json& record, const std::string& phase) {
+  const double time = time_of(raw_times(record), timed_phase(phase));
+  if (phase != per_event) return time;
+  const double events = events_per_frame(record);
+  return events > 0 ? time / events : 0;
+}
+
+std::optional<RatioOfTimes> ratio_of(const json& numerator, const std::string& phase, const json& denominator,
+                                     const std::string& phase_below) {
+  const RawTimes above = raw_times(numerator), below = raw_times(denominator);
+  double events = 1;
+  if (phase == per_event) events /= events_per_frame(numerator);
+  if (phase_below == per_event) events *= events_per_frame(denominator);
+  const std::string numerator_phase = timed_phase(phase), denominator_phase = timed_phase(phase_below);
+  std::optional<RatioOfTimes> ratio = ratio_of({above, numerator_phase}, {below, denominator_phase});
+  if (!ratio || !(events > 0) || !std::isfinite(events)) return {};
+  ratio->middle *= events;
+  if (ratio->within) {
+    ratio->within->low *= events;
+    ratio->within->high *= events;
   }
-  for (const json& repetition : record.at("times").at("repetitions"))
-    values.push_back(events > 0 ? phase_of(repetition, per_event ? "update" : phase) / events : 0);
-  return values;
+  return ratio;
 }
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
-}
-
-double median_phase(const json& record, const std::string& phase) {
-  return median(phase_values(record, phase));
+std::string disturbed(const json& record) {
+  return has_times(record) ? record.at("times").value("disturbed", std::string()) : std::string();
 }
 
 bool is_baseline(const json& record) {
@@ -138,7 +145,7 @@ bool is_baseline(const json& record) {
 }
 
 double clip_total(const json& record) {
-  return median_phase(record, "total_with_motion");
+  return time_of(record, "total_with_motion");
 }
 
 const json* shortest_clip(const std::vector<const json*>& records) {
@@ -164,63 +171,167 @@ std::string instructions_of(const json& record) {
   return record.value("machine", json::object()).value("kernels", "-");
 }
 
-std::string results_table(const std::vector<json>& records) {
-  if (records.empty()) return {};
-  const json& scene = records[0].at("scene");
+namespace {
+
+/// The records of one table, with the ratios to the best refit.
+class Table {
+ public:
+  explicit Table(const std::vector<json>& records) : records_(records), refit_(best_refit(records)) {
+    for (const json& record : records) times_.push_back(has_times(record) ? raw_times(record) : RawTimes{});
+    for (std::size_t i = 0; i < records.size(); ++i)
+      if (&records[i] == refit_) refit_times_ = &times_[i];
+  }
+
+  std::string text();
+
+ private:
+  void head_lines();
+  void choose_columns();
+  std::vector<std::string> row(std::size_t i);
+  void ratio_cells(std::size_t i, std::vector<std::string>& row);
+  std::string paid_cell(std::size_t i) const;
+  std::string ratio_cell(std::size_t i, const char* phase, Part part) const;
+  std::string within_cell(std::size_t i) const;
+  void disturbances();
+
+  const std::vector<json>& records_;
+  const json* refit_;
+  std::vector<RawTimes> times_;
+  const RawTimes* refit_times_ = nullptr;
+  std::string text_, below_;
+  std::vector<const char*> phases_{"motion", "update", "query"};
+  std::vector<std::string> head_{"strategy", "motion", "update", "query"};
+  bool has_steady_ = false, has_intervals_ = false, has_ranges_ = false;
+};
+
+void Table::head_lines() {
+  const json& scene = records_[0].at("scene");
   const char* const step = scene.value("continuous", false) ? "interval" : "frame";
-  std::string text = fmt::format(
-      "{}, l = {}, {}: {}, {}{}\n", scene.at("name").get<std::string>(),
-      scene.at("per_keyframe").get<std::uint64_t>(), scene.at("scalar").get<std::string>(),
-      counted(scene.at("frames").get<std::uint64_t>(), step),
-      counted(scene.at("primitives").get<std::uint64_t>(), "primitive"), truth_of(records, scene, step));
-  const json* refit = best_refit(records);
-  std::vector<const char*> phases{"motion", "update", "query"};
-  std::vector<std::string> head{"strategy", "motion", "update", "query"};
+  text_ = fmt::format("{}, l = {}, {}: {}, {}", scene.at("name").get<std::string>(),
+                      scene.at("per_keyframe").get<std::uint64_t>(), scene.at("scalar").get<std::string>(),
+                      counted(scene.at("frames").get<std::uint64_t>(), step),
+                      counted(scene.at("primitives").get<std::uint64_t>(), "primitive"));
+  std::size_t least = SIZE_MAX, most = 0;
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    if (!has_times(records_[i])) continue;
+    least = std::min(least, times_[i].repetitions());
+    most = std::max(most, times_[i].repetitions());
+  }
+  if (most > 0)
+    text_ += ", " + (least == most ? "" : std::to_string(least) + " to ") + counted(most, "repetition");
+  text_ += truth_of(records_, scene, step) + "\n";
   if (scene.contains("script")) {
     const json& script = scene.at("script");
-    text += fmt::format("  plans change while it runs: {} at {}, column plans\n",
-                        counted(script.at("changes").get<std::uint64_t>(), "change"),
-                        counted(script.at("steps").get<std::uint64_t>(), "frame"));
-    phases.push_back("plan_changes");
-    head.push_back("plans");
+    text_ += fmt::format("  plans change while it runs: {} at {}, column plans\n",
+                         counted(script.at("changes").get<std::uint64_t>(), "change"),
+                         counted(script.at("steps").get<std::uint64_t>(), "frame"));
+    phases_.push_back("plan_changes");
+    head_.push_back("plans");
   }
   const json bodies = scene.value("bodies", json::array());
   for (const std::string kind : {"points", "control_nets"})
     if (std::any_of(bodies.begin(), bodies.end(),
                     [&](const json& body) { return body.value("kind", std::string()) == kind; }))
-      text += fmt::format("  pairs with {} are candidates: overlapping boxes, without a test of contact\n",
-                          kind == "points" ? "points" : "control nets");
-  const bool as_changes = scene.contains("changes");
-  if (as_changes) head.push_back("changes");
-  head.push_back("code");
-  for (const char* column : {"x refit", "with motion", "missed", "extra", "protrusion", "looseness"})
-    head.push_back(column);
-  std::vector<std::vector<std::string>> rows{head};
-  std::string refusals, choices, counted_by;
+      text_ += fmt::format("  pairs with {} are candidates: overlapping boxes, without a test of contact\n",
+                           kind == "points" ? "points" : "control nets");
+}
+
+void Table::choose_columns() {
+  if (records_[0].at("scene").contains("changes")) head_.push_back("changes");
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    has_steady_ = has_steady_ || times_[i].steady_from.has_value();
+    if (refit_times_ == nullptr || times_[i].repetitions() < 2 || &records_[i] == refit_) continue;
+    const std::size_t fewest = std::min(times_[i].repetitions(), refit_times_->repetitions());
+    (fewest >= fewest_of_an_interval ? has_intervals_ : has_ranges_) = true;
+  }
+  head_.push_back("code");
+  head_.push_back("x refit");
+  if (has_intervals_ || has_ranges_)
+    head_.push_back(!has_ranges_ ? "95 % interval" : !has_intervals_ ? "range" : "interval or [range]");
+  head_.push_back("with motion");
+  if (has_steady_) head_.push_back("steady");
+  head_.push_back("paid from");
+  for (const char* column : {"missed", "extra", "protrusion", "looseness"}) head_.push_back(column);
+}
+
+std::string Table::ratio_cell(std::size_t i, const char* phase, Part part) const {
+  if (refit_times_ == nullptr) return "-";
+  const auto ratio = ratio_of({*refit_times_, phase}, {times_[i], phase}, part);
+  if (!ratio) return "-";
+  const bool doubtful = !disturbed(records_[i]).empty() || !disturbed(*refit_).empty();
+  return fmt::format("{:.3g}{}", ratio->middle, doubtful ? "?" : "");
+}
+
+std::string Table::within_cell(std::size_t i) const {
+  if (refit_times_ == nullptr || &records_[i] == refit_) return "-";
+  const auto ratio = ratio_of({*refit_times_, "total"}, {times_[i], "total"});
+  if (!ratio || !ratio->within) return "-";
+  const std::string text = fmt::format("{:.3g} to {:.3g}", ratio->within->low, ratio->within->high);
+  return has_intervals_ && !ratio->within->is_interval ? "[" + text + "]" : text;
+}
+
+std::string Table::paid_cell(std::size_t i) const {
+  if (refit_ == nullptr || &records_[i] == refit_) return "-";
+  const json &own = records_[i].at("times"), &other = refit_->at("times");
+  if (!own.contains("build_ms") || !other.contains("build_ms")) return "-";
+  const auto frame = paid_from(times_[i], own.at("build_ms").get<double>(), *refit_times_,
+                               other.at("build_ms").get<double>());
+  return frame ? std::to_string(*frame) : "never";
+}
+
+void Table::ratio_cells(std::size_t i, std::vector<std::string>& row) {
+  row.push_back(ratio_cell(i, "total", Part::clip));
+  if (has_intervals_ || has_ranges_) row.push_back(within_cell(i));
+  row.push_back(ratio_cell(i, "total_with_motion", Part::clip));
+  if (has_steady_) row.push_back(ratio_cell(i, "total", Part::steady));
+  row.push_back(paid_cell(i));
+}
+
+std::vector<std::string> Table::row(std::size_t i) {
+  const json &record = records_[i], &verified = record.at("verified");
+  const std::string label = record.at("strategy").at("label").get<std::string>();
+  std::vector<std::string> row{label};
+  if (has_times(record)) {
+    for (const char* phase : phases_) row.push_back(milliseconds(time_of(times_[i], phase)));
+    if (record.at("scene").contains("changes")) row.push_back(changes_per_frame(record));
+    row.push_back(instructions_of(record));
+    ratio_cells(i, row);
+  } else {
+    row.push_back("refused");
+    row.resize(head_.size() - 4);
+    below_ += "  " + label + " is refused a time: " + record.value("refused", std::string()) + "\n";
+  }
+  row.push_back(std::to_string(verified.at("missed").get<std::uint64_t>()));
+  row.push_back(std::to_string(verified.at("extra").get<std::uint64_t>()));
+  const bool audited = verified.at("audited").get<bool>();
+  row.push_back(audited ? fraction(verified.at("protrusion").get<double>()) : "-");
+  row.push_back(audited ? fraction(verified.at("looseness").get<double>()) : "-");
+  return row;
+}
+
+/// Says whether the machine was quiet, as far as the records know.
+void Table::disturbances() {
+  std::string reasons;
+  bool known = false;
+  for (const json& record : records_) {
+    known = known || (has_times(record) && record.at("times").contains("disturbed"));
+    if (const std::string why = disturbed(record); !why.empty())
+      reasons += "  ? disturbed: " + record.at("strategy").at("label").get<std::string>() + ": " + why + "\n";
+  }
+  if (known) text_ += reasons.empty() ? "  quiet\n" : reasons;
+}
+
+std::string Table::text() {
+  head_lines();
+  choose_columns();
+  std::vector<std::vector<std::string>> rows{head_};
+  std::string choices, counted_by;
   std::vector<std::string> peers;
-  for (const json& record : records) {
-    const json& verified = record.at("verified");
+  std::set<std::string> runs;
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    const json& record = records_[i];
     const std::string label = record.at("strategy").at("label").get<std::string>();
-    std::vector<std::string> row{label};
-    if (has_times(record)) {
-      for (const char* phase : phases) row.push_back(milliseconds(median_phase(record, phase)));
-      if (as_changes) row.push_back(changes_per_frame(record));
-      row.push_back(instructions_of(record));
-      for (const char* phase : {"total", "total_with_motion"})
-        row.push_back(refit == nullptr
-                          ? "-"
-                          : fmt::format("{:.3g}", median_phase(*refit, phase) / median_phase(record, phase)));
-    } else {
-      row.push_back("refused");
-      row.resize(head.size() - 4);
-      refusals += "  " + label + " is refused a time: " + record.value("refused", std::string()) + "\n";
-    }
-    row.push_back(std::to_string(verified.at("missed").get<std::uint64_t>()));
-    row.push_back(std::to_string(verified.at("extra").get<std::uint64_t>()));
-    const bool audited = verified.at("audited").get<bool>();
-    row.push_back(audited ? fraction(verified.at("protrusion").get<double>()) : "-");
-    row.push_back(audited ? fraction(verified.at("looseness").get<double>()) : "-");
-    rows.push_back(std::move(row));
+    rows.push_back(row(i));
     if (const std::string own = own_counters(record); !own.empty())
       counted_by += "  " + label + " counted " + own + "\n";
     const json& strategy = record.at("strategy");
@@ -231,17 +342,23 @@ std::string results_table(const std::vector<json>& records) {
     }
     if (record.contains("choice"))
       choices += "  " + label + " chose " + record.at("choice").get<std::string>() + "\n";
+    runs.insert(record.value("run", std::string()));
   }
-  text += columns(rows);
-  if (refit != nullptr)
-    text += "  x refit and with motion: against " + refit->at("strategy").at("label").get<std::string>() +
-            ", the baseline with the shortest clip\n";
-  for (const std::string& peer : peers) text += peer + "\n";
-  text += refusals + choices + counted_by;
-  std::set<std::string> runs;
-  for (const json& record : records) runs.insert(record.value("run", std::string()));
-  if (runs.size() > 1) text += "  (from several runs: the machine may have differed)\n";
-  return text;
+  text_ += columns(rows);
+  if (refit_ != nullptr)
+    text_ += "  x refit and with motion: against " + refit_->at("strategy").at("label").get<std::string>() +
+             ", the baseline with the shortest clip\n";
+  for (const std::string& peer : peers) text_ += peer + "\n";
+  text_ += below_ + choices + counted_by;
+  disturbances();
+  if (runs.size() > 1) text_ += "  (from several runs: the machine may have differed)\n";
+  return text_;
+}
+
+}  // namespace
+
+std::string results_table(const std::vector<json>& records) {
+  return records.empty() ? std::string() : Table(records).text();
 }
 
 }  // namespace kbvh::experiments

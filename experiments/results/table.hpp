@@ -1,25 +1,29 @@
 #pragma once
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "experiments/study/raw_times.hpp"
 
 namespace kbvh::experiments {
 
 /// Lays out cells in columns: the first column to the left, the others to the right. `rows[0]` is the head.
 std::string columns(const std::vector<std::vector<std::string>>& rows);
 
-/// Returns the times of one phase in every repetition, in ms per frame; phases as in `median_phase`.
-std::vector<double> phase_values(const nlohmann::json& record, const std::string& phase);
-
-/// Returns the median of at least one value; of an even number, the mean of the two middle values.
-double median(std::vector<double> values);
-
 /// Returns whether the contestant was timed, or refused a time.
 bool has_times(const nlohmann::json& record);
 
-/// Returns the median over the repetitions of one phase, in ms per frame ("motion", "update", "query", or
-/// "total" for update, query and plan changes); the record must have times.
-double median_phase(const nlohmann::json& record, const std::string& phase);
+/// Returns the time of a phase of the clip in ms per frame (time_of in raw_times.hpp); the record must have
+/// times. Also "update_per_event": the update divided by the certificates that failed; 0 without such.
+double time_of(const nlohmann::json& record, const std::string& phase);
+
+/// Returns the ratio of two records' times of phases (ratio_of in raw_times.hpp). Both must have times.
+std::optional<RatioOfTimes> ratio_of(const nlohmann::json& numerator, const std::string& phase,
+                                     const nlohmann::json& denominator, const std::string& phase_below);
+
+/// Returns why the times of a record were disturbed, or ""; also for records that do not say it.
+std::string disturbed(const nlohmann::json& record);
 
 /// Returns whether the record is of a baseline (Info::baseline). Records from before baselines were declared
 /// are classified by the family "refit".
@@ -43,10 +47,11 @@ const nlohmann::json* best_refit(const std::vector<nlohmann::json>& records);
 /// or of the kernels in use; "-" in records that do not tell.
 std::string instructions_of(const nlohmann::json& record);
 
-/// Formats the table that `run` and `bench` print for records of one scene, l and scalar: times in ms per
-/// frame (medians over repetitions), the instruction set, speed relative to the best refit (above 1 is
-/// faster) without and with motion evaluation, and the results of the verification. Below it stand the
-/// versions of peer libraries, with a remark about their times.
+/// Formats the table of records of one scene, l and scalar: times in ms per frame, the instruction set, speed
+/// relative to the best refit (above 1 is faster) without and with motion evaluation, and of the steady
+/// frames; the frame from which a contestant has paid for preparation and beginning; and the results of the
+/// verification. Ratios with "?" are disturbed; lines below say why, or that the machine was quiet, and name
+/// versions of peers.
 std::string results_table(const std::vector<nlohmann::json>& records);
 
 }  // namespace kbvh::experiments

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <set>
+#include <stdexcept>
 
 #include "experiments/common/machine.hpp"
 #include "experiments/common/progress.hpp"
@@ -22,8 +23,8 @@ namespace {
 /// The result of a selector in one table.
 struct Side {
   const json* record = nullptr;  ///< of the configuration whose clip takes the shortest time
-  std::vector<double> times;     ///< of its repetitions, ms per frame
-  double middle = 0;
+  std::string phase;
+  double middle = 0;    ///< ms per frame
   std::string missing;  ///< why there is none
 };
 
@@ -45,50 +46,12 @@ Side side_of(const TargetSelector& selector, const std::vector<json>& records) {
                                          : described(selector) + " takes no part";
     return side;
   }
-  side.times = phase_values(*side.record, selector.phase);
-  side.middle = median(side.times);
+  side.phase = selector.phase;
+  side.middle = time_of(*side.record, selector.phase);
   if (side.middle <= 0)
     side.missing = side.record->at("strategy").at("label").get<std::string>() + " spends no time in '" +
                    selector.phase + "'";
   return side;
-}
-
-/// A fixed-seed random generator for the bootstrap (Steele, Lea and Flood 2014, "Fast splittable pseudorandom
-/// number generators"), the same on every machine.
-class Chance {
- public:
-  std::size_t below(std::size_t count) {
-    std::uint64_t x = state_ += 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return std::size_t(((x ^ (x >> 31)) >> 32) * count >> 32);
-  }
-
- private:
-  std::uint64_t state_ = 1;
-};
-
-double resampled_median(const std::vector<double>& values, Chance& chance, std::vector<double>& buffer) {
-  buffer.clear();
-  for (std::size_t i = 0; i < values.size(); ++i) buffer.push_back(values[chance.below(values.size())]);
-  return median(buffer);
-}
-
-/// Computes the middle 95 % of the ratio of medians over resampled repetitions; null if a side has a single
-/// repetition.
-json confidence_interval(const Side& numerator, const Side& denominator) {
-  if (numerator.times.size() < 2 || denominator.times.size() < 2) return nullptr;
-  constexpr std::size_t draws = 4000, left_out = draws / 40;
-  Chance chance;
-  std::vector<double> ratios, buffer;
-  for (std::size_t i = 0; i < draws; ++i) {
-    const double above = resampled_median(numerator.times, chance, buffer);
-    ratios.push_back(above / resampled_median(denominator.times, chance, buffer));
-  }
-  std::sort(ratios.begin(), ratios.end());
-  const double low = ratios[left_out], high = ratios[draws - 1 - left_out];
-  if (!std::isfinite(low) || !std::isfinite(high)) return nullptr;
-  return {low, high};
 }
 
 json side_json(const Side& side) {
@@ -96,7 +59,8 @@ json side_json(const Side& side) {
   const json& record = *side.record;
   return {{"label", record.at("strategy").at("label")},
           {"ms", side.middle},
-          {"repetitions", side.times.size()},
+          {"repetitions", record.at("times").at("repetitions").size()},
+          {"disturbed", disturbed(record)},
           {"run", record.value("run", std::string())}};
 }
 
@@ -141,6 +105,7 @@ json scene_row(const Target& target, const TargetGroup& group, const std::vector
            {"counts", is_counted(target, group.scene.at("name").get<std::string>())},
            {"ratio", nullptr},
            {"confidence_interval", nullptr},
+           {"range", nullptr},
            {"numerator", side_json(numerator)},
            {"denominator", side_json(denominator)}};
   std::string missing = numerator.missing;
@@ -150,8 +115,12 @@ json scene_row(const Target& target, const TargetGroup& group, const std::vector
     row["reason"] = missing;
     return row;
   }
-  row["ratio"] = numerator.middle / denominator.middle;
-  row["confidence_interval"] = confidence_interval(numerator, denominator);
+  const auto ratio = ratio_of(*numerator.record, numerator.phase, *denominator.record, denominator.phase);
+  if (!ratio) throw std::logic_error("a ratio of times that are not 0 is missing");
+  row["ratio"] = ratio->middle;
+  if (ratio->within)
+    row[ratio->within->is_interval ? "confidence_interval" : "range"] = {ratio->within->low,
+                                                                         ratio->within->high};
   return row;
 }
 
@@ -184,6 +153,7 @@ json scene_rows(const Target& target, const std::vector<TargetGroup>& groups) {
                       {"counts", true},
                       {"ratio", nullptr},
                       {"confidence_interval", nullptr},
+                      {"range", nullptr},
                       {"numerator", nullptr},
                       {"denominator", nullptr},
                       {"reason", "the scene was left out"}});
@@ -198,10 +168,12 @@ json selector_json(const TargetSelector& selector) {
 /// the same end at once, so the result is wider than a 95 % interval.
 class Mean {
  public:
+  /// `kind`: confidence_interval or range.
+  explicit Mean(const char* kind) : kind_(kind) {}
   void add(const json& scene) {
     ++count_;
     ratio_ += std::log(scene.at("ratio").get<double>());
-    const json& interval = scene.at("confidence_interval");
+    const json& interval = scene.at(kind_);
     known_ = known_ && interval.is_array();
     if (!known_) return;
     low_ += std::log(interval[0].get<double>());
@@ -214,6 +186,7 @@ class Mean {
   }
 
  private:
+  const char* kind_;
   double count_ = 0, ratio_ = 0, low_ = 0, high_ = 0;
   bool known_ = true;
 };
@@ -225,6 +198,7 @@ json target_row(const Target& target, const std::vector<TargetGroup>& groups) {
            {"aim", target.aim},
            {"confidence_interval", nullptr},
            {"confidence", 0.95},
+           {"range", nullptr},
            {"verdict", "unmeasured"},
            {"scene", nullptr},
            {"scenes", target.scenes},
@@ -237,7 +211,7 @@ json target_row(const Target& target, const std::vector<TargetGroup>& groups) {
            {"note", target.note},
            {"per_scene", scene_rows(target, groups)}};
   const json* worst = nullptr;
-  Mean mean;
+  Mean mean("confidence_interval"), mean_of_ranges("range");
   std::set<std::string> runs;
   for (const json& one : row["per_scene"]) {
     if (!one.at("counts").get<bool>()) continue;
@@ -250,10 +224,12 @@ json target_row(const Target& target, const std::vector<TargetGroup>& groups) {
       runs.insert(one.at(side).at("run").get<std::string>());
     if (worst == nullptr || one.at("ratio").get<double>() < worst->at("ratio").get<double>()) worst = &one;
     mean.add(one);
+    mean_of_ranges.add(one);
   }
   const double measured = target.mean ? mean.ratio() : worst->at("ratio").get<double>();
   row["measured"] = measured;
   row["confidence_interval"] = target.mean ? mean.interval() : worst->at("confidence_interval");
+  row["range"] = target.mean ? mean_of_ranges.interval() : worst->at("range");
   row["scene"] = worst->at("scene");
   row["verdict"] = measured >= target.aim        ? "reached_aim"
                    : measured >= target.at_least ? "reached"
@@ -283,8 +259,20 @@ std::string number_text(const json& value) {
   return value.is_number() ? fmt::format("{:.4g}", value.get<double>()) : "-";
 }
 
-std::string interval_text(const json& interval) {
-  return interval.is_array() ? number_text(interval[0]) + " to " + number_text(interval[1]) : "-";
+/// Formats the interval or, in brackets, the range of a row.
+std::string interval_text(const json& row) {
+  const json &interval = row.at("confidence_interval"), &range = row.at("range");
+  if (interval.is_array()) return number_text(interval[0]) + " to " + number_text(interval[1]);
+  return range.is_array() ? "[" + number_text(range[0]) + " to " + number_text(range[1]) + "]" : "-";
+}
+
+/// Formats the ratio of a scene, with "?" if a side was disturbed.
+std::string ratio_text(const json& scene) {
+  bool doubtful = false;
+  for (const char* side : {"numerator", "denominator"})
+    doubtful =
+        doubtful || (scene.at(side).is_object() && !scene.at(side).value("disturbed", std::string()).empty());
+  return number_text(scene.at("ratio")) + (doubtful ? "?" : "");
 }
 
 std::string verdict_text(const json& row) {
@@ -302,12 +290,12 @@ std::string scene_text(const json& row) {
 
 std::string targets_table(const json& rows) {
   std::vector<std::vector<std::string>> summary{
-      {"target", "measured", "95 % interval", "at least", "aim", "verdict", "on"}};
+      {"target", "measured", "interval or [range]", "at least", "aim", "verdict", "on"}};
   std::string reasons, details;
   bool several_runs = false;
   for (const json& row : rows) {
     const std::string what = row.at("what").get<std::string>();
-    summary.push_back({what, number_text(row.at("measured")), interval_text(row.at("confidence_interval")),
+    summary.push_back({what, number_text(row.at("measured")), interval_text(row),
                        number_text(row.at("at_least")), number_text(row.at("aim")), verdict_text(row),
                        scene_text(row)});
     if (const std::string note = row.value("note", ""); !note.empty())
@@ -315,11 +303,12 @@ std::string targets_table(const json& rows) {
     if (row.contains("reason"))
       reasons += "  " + what + ": not measured: " + row.at("reason").get<std::string>() + "\n";
     several_runs = several_runs || (row.contains("runs") && row.at("runs").size() > 1);
-    std::vector<std::vector<std::string>> scenes{{what, "ratio", "95 % interval", "ms", "of", "ms", "of"}};
+    std::vector<std::vector<std::string>> scenes{
+        {what, "ratio", "interval or [range]", "ms", "of", "ms", "of"}};
     for (const json& one : row.at("per_scene")) {
       std::vector<std::string> cells{
           "  " + one.at("scene").get<std::string>() + (one.at("counts").get<bool>() ? " *" : ""),
-          number_text(one.at("ratio")), interval_text(one.at("confidence_interval"))};
+          ratio_text(one), interval_text(one)};
       for (const char* side : {"numerator", "denominator"}) {
         const json& times = one.at(side);
         cells.push_back(times.is_object() ? number_text(times.at("ms")) : "-");
@@ -332,7 +321,7 @@ std::string targets_table(const json& rows) {
   std::string text = "Targets: how many times slower the other is, on the scenes that count\n";
   text += columns(summary) + reasons;
   if (several_runs) text += "  (from several runs: the machine may have differed)\n";
-  return text + "\nAll scenes (* counts)\n" + details;
+  return text + "\nAll scenes (* counts, ? disturbed)\n" + details;
 }
 
 void write_targets(const std::filesystem::path& folder, const json& rows) {

@@ -9,7 +9,7 @@
 namespace kbvh::experiments {
 
 /// Version of the rows in targets.json; RESULTS.md documents them.
-inline constexpr int targets_schema = 1;
+inline constexpr int targets_schema = 2;
 
 /// Records of one table: one scene, one scalar, one l, in one study.
 struct TargetGroup {
@@ -18,10 +18,11 @@ struct TargetGroup {
 };
 
 /// Makes one row per target of the plan, from the records of `groups` (in the order in which they were
-/// measured). Intervals are of 95 %, by a bootstrap over the repetitions with a fixed seed.
+/// measured). Intervals are of 95 %, by a bootstrap over whole rounds with a fixed seed; with fewer than five
+/// repetitions there is a range instead.
 nlohmann::json target_rows(const Plan& plan, const std::vector<TargetGroup>& groups);
 
-/// Formats the tables that `run` and `bench` print for the rows: the scenes that count, then every scene.
+/// Formats the tables that `run` prints for the rows: the scenes that count, then every scene.
 std::string targets_table(const nlohmann::json& rows);
 
 /// Writes the rows to `folder`/targets.json, in place of those of the same plans; rows of other plans stay. A

@@ -19,8 +19,8 @@
 #include "experiments/results/results.hpp"
 #include "experiments/results/table.hpp"
 #include "experiments/results/target_rows.hpp"
-#include "experiments/run/bench_harness.hpp"
 #include "experiments/run/in_progress.hpp"
+#include "experiments/run/rounds.hpp"
 #include "experiments/run/scene_pictures.hpp"
 #include "experiments/study/contact_measurement.hpp"
 #include "experiments/study/ray_measurement.hpp"
@@ -64,9 +64,8 @@ std::unique_ptr<ResultStore> opened(const std::filesystem::path& out, const std:
 /// One run of a plan: the state shared by all its groups.
 class Runner {
  public:
-  Runner(Harness harness, const Plan& plan, const std::filesystem::path& out, const std::string& job)
-      : harness_(harness),
-        plan_{{"name", plan.name}, {"description", plan.description}},
+  Runner(const Plan& plan, const std::filesystem::path& out, const std::string& job)
+      : plan_{{"name", plan.name}, {"description", plan.description}},
         machine_(machine()),
         run_(invocation(job)) {
     if (!out.empty()) store_ = opened(out, job, run_);
@@ -75,9 +74,14 @@ class Runner {
       say("note: an earlier run was ended from outside while " + doing + "; it is measured again");
     if (out.empty()) return;
     std::error_code error;
-    for (const char* name : {"benchmark.json", "targets.json"})
-      if (const auto file = out / name; std::filesystem::is_directory(file, error))
-        throw io::InputError(file.string() + ": is a folder, but a file must be written there");
+    if (const auto file = out / "targets.json"; std::filesystem::is_directory(file, error))
+      throw io::InputError(file.string() + ": is a folder, but a file must be written there");
+    if (store_->other_schemas() > 0)
+      say("note: " + (out / "results.jsonl").string() + " holds " +
+          counted(store_->other_schemas(), "record") + " of another schema than " +
+          std::to_string(results_schema) +
+          ", left alone: their times have another meaning (those of schema 1 leave out the beginning of a "
+          "clip)");
     if (store_->unreadable_lines() > 0)
       say("note: " + (job.empty() ? out / "results.jsonl" : out / "jobs" / job).string() + " has " +
           std::to_string(store_->unreadable_lines()) +
@@ -282,6 +286,8 @@ class Runner {
                    const Unsuitable& why_not) {
     if (!card_.empty()) about_scene["card"] = card_;
     const std::string scalar = about_scene.at("scalar");
+    // Another order for every table, the same whenever it is measured.
+    const std::uint64_t seed = hash_of(title + "/" + scalar) & 0xffffffffu;
     std::vector<json> records;           // in the order of the contestants
     std::vector<std::size_t> record_of;  // of each measured contestant
     std::size_t skipped = 0;
@@ -315,7 +321,8 @@ class Runner {
         continue;
       }
       json record{{"schema", results_schema},
-                  {"kind", word(harness_)},
+                  {"kind", "run"},
+                  {"shuffle", seed},
                   {"run", run_},
                   {"plan", plan_},
                   {"study", study.name},
@@ -326,8 +333,7 @@ class Runner {
                   {"scene", about_scene},
                   {"strategy", strategy_record(spec)}};
       record["again"] = again_record(scene_object_, about_scene, record["strategy"], study);
-      record["key"] =
-          configuration_key(harness_, program_identity(), about_scene, record["strategy"], study, machine_);
+      record["key"] = configuration_key(program_identity(), about_scene, record["strategy"], study, machine_);
       if (const json* known = known_record(record["key"], title + ": " + spec.label)) {
         if (!known->at("verified").at("holds").template get<bool>()) ++outcome_.refused;
         records.push_back(*known);
@@ -352,18 +358,12 @@ class Runner {
     if (skipped > 0)
       note(title + ", " + scalar + ": " + std::to_string(skipped) + " of " +
            counted(records.size(), "configuration") + " in the results already, not measured again");
-    const json benchmarks = play_all(measurement, study.repetitions, title, scalar, [&](std::size_t i) {
+    play_rounds(measurement, study, seed, [&](std::size_t i, std::uint32_t round) {
+      progress_.show(title + ": round " + std::to_string(round + 1) + ", " + measurement[i].spec->label);
       in_progress_->begin(records[record_of[i]]["key"],
                           "timing " + measurement[i].spec->label + " on " + title + ", " + scalar);
     });
     in_progress_->end();
-    // Written before the records: a configuration with a record is not measured again, so its table in
-    // benchmark.json would never be written.
-    if (store_ && !benchmarks.is_null())
-      keep([&] {
-        if (const std::string said = add_to_benchmark_file(store_->folder(), benchmarks); !said.empty())
-          note("warning: " + said);
-      });
     for (std::size_t i = 0; i < measurement.size(); ++i)
       if (!records[record_of[i]].contains("when")) finish(i);
     outcome_.skipped += skipped;
@@ -402,38 +402,6 @@ class Runner {
     if (!measured.unfinished) measured.verification.first_violation = measured.refused;
   }
 
-  /// Plays the repetitions; returns Google Benchmark's report, or null. Calls announce(i) before each clip.
-  template <class M, class Announce>
-  json play_all(M& measurement, std::uint32_t repetitions, const std::string& title,
-                const std::string& scalar, const Announce& announce) {
-    std::vector<std::size_t> timed;
-    for (std::size_t i = 0; i < measurement.size(); ++i)
-      if (measurement.timed(i)) timed.push_back(i);
-    if (timed.empty()) return nullptr;
-    std::size_t done = 0;
-    const auto play = [&](std::size_t i) -> const ClipTimes* {
-      if (!measurement.timed(i)) return nullptr;  // an exception was thrown
-      progress_.show(title + ": clip " + std::to_string(++done) + " of " +
-                     std::to_string(timed.size() * repetitions) + ", " + measurement[i].spec->label);
-      announce(i);
-      return measurement.play(i);
-    };
-    if (harness_ == Harness::rounds) {
-      for (std::uint32_t r = 0; r < repetitions; ++r)
-        for (const std::size_t i : timed) play(i);
-      return nullptr;
-    }
-    std::vector<BenchItem> items;
-    for (const std::size_t i : timed)
-      items.push_back({title + ", " + scalar + "/" + measurement[i].spec->label,
-                       [&play, i]() -> const ClipTimes* { return play(i); }});
-    json runs = run_benchmarks(items, repetitions);
-    runs["context"]["commit"] = commit();
-    runs["context"]["dirty"] = dirty();
-    runs["context"]["machine"] = machine_;
-    return runs;
-  }
-
   static void complete(json& record, const Measured& measured) {
     record["when"] = now_utc();
     record["verified"] = verified_record(measured);
@@ -449,7 +417,6 @@ class Runner {
     if (measured.unfinished) record["unfinished"] = true;
   }
 
-  Harness harness_;
   json plan_;  // its name and description
   json machine_;
   std::string run_;
@@ -469,8 +436,7 @@ class Runner {
 
 }  // namespace
 
-StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::path& out,
-                      const std::string& job) {
+StudyOutcome run_plan(const Plan& plan, const std::filesystem::path& out, const std::string& job) {
   // All errors of the contestants are found before the first measurement.
   std::vector<std::vector<ContestantSpec>> contestants;
   std::vector<std::string> notes;
@@ -479,7 +445,7 @@ StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::
   for (const auto& list : contestants) try_parameters(list);
   check_target_contestants(plan, contestants);
   for (const std::string& text : std::set<std::string>(notes.begin(), notes.end())) say("note: " + text);
-  Runner runner(harness, plan, out, job);
+  Runner runner(plan, out, job);
   for (std::size_t i = 0; i < plan.studies.size(); ++i) runner.study(plan.studies[i], contestants[i]);
   runner.targets(plan);
   if (!job.empty()) runner.write_keys(out / "jobs" / job / "keys");

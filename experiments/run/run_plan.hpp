@@ -15,14 +15,14 @@ struct StudyOutcome {
   std::size_t unfinished = 0;  ///< without a time, because memory ran out; the next run measures them again
 };
 
-/// Performs all studies of the plan: verifies every contestant, then times those whose guarantee holds,
+/// Performs all studies of the plan: verifies and replays every contestant, then times those whose guarantee
+/// holds, in shuffled rounds (rounds.hpp),
 /// prints a table for each scene, scalar and l on stdout, and appends to `out`/results.jsonl (nothing is
 /// written if `out` is empty). A table is printed even if it cannot be written. Configurations that are
 /// already in the results are not measured again. If the plan has targets, their table is printed at the end,
 /// and `out`/targets.json written. With `job`, the id of the job whose plan this is (jobs.hpp), the records
 /// go to a new file in `out`/jobs/ID; records in `out`/results.jsonl and of earlier attempts are known, too.
 /// Throws io::InputError and ConfigError.
-StudyOutcome run_plan(const Plan& plan, Harness harness, const std::filesystem::path& out,
-                      const std::string& job = {});
+StudyOutcome run_plan(const Plan& plan, const std::filesystem::path& out, const std::string& job = {});
 
 }  // namespace kbvh::experiments

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "core/judge/follow_script.hpp"
-#include "experiments/common/stopwatch.hpp"
 #include "experiments/io/animated_mesh.hpp"
 
 namespace kbvh::experiments {
@@ -62,6 +60,8 @@ template <class S>
 ContactMeasurement<S>::ContactMeasurement(const Scene<S>& scene, std::vector<double> knots,
                                           const PlanScript<S>* script)
     : scene_(&scene), knots_(std::move(knots)), script_(script) {
+  const std::span<const double> begins(knots_.data(), knots_.empty() ? 0 : knots_.size() - 1);
+  steady_from_ = steady_frame(scene, begins, script != nullptr);
   try {
     ScriptCursor<S> cursor(script_);
     ContactFinder<S> finder(scene);
@@ -88,59 +88,49 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
   Measured& measured = entrant.measured;
   measured.spec = &spec;
   measured.sampled_every = oracle_every;
+  measured.steady_from = steady_from_;
   entrant.attempt([&] {
     {
       Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
-      PhaseTimes ignored;
-      session.reset(knots_[0]);
-      ScriptCursor<S> cursor(script_);
-      for (std::size_t k = 0; k < truth_.size(); ++k) {
-        follow(session, cursor.at(knots_[k]), ignored);
+      const auto ask = [&](PhaseTimes& times, std::size_t k) {
         contacts_.clear();
-        measured.verification.candidates += session.contacts(knots_[k + 1], contacts_, ignored);
-        if (k % oracle_every != 0 && k + 1 != truth_.size()) continue;
-        std::sort(contacts_.begin(), contacts_.end());
-        compare(contacts_, truth_[k], k, measured.verification);
-      }
+        measured.verification.candidates += session.contacts(knots_[k + 1], contacts_, times);
+        if (k % oracle_every == 0 || k + 1 == truth_.size()) {
+          std::sort(contacts_.begin(), contacts_.end());
+          compare(contacts_, truth_[k], k, measured.verification);
+        }
+        return std::uint64_t(contacts_.size());
+      };
+      measured.answers = play_intervals<S>(session, knots_, script_, ask).answers;
       measured.counters = session.strategy().counters();
       entrant.impacts = session.impact_stats();
     }
     if (!measured.verification.holds()) {
       measured.refused = measured.verification.first_violation;
-    } else {
-      const auto begin = std::chrono::steady_clock::now();
-      entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
-      measured.build_seconds = seconds_since(begin);
-      // Warm-up: buffers grow, and hierarchies for sweeps are created at their first use.
-      PhaseTimes ignored;
-      ScriptCursor<S> cursor(script_);
-      entrant.session->reset(knots_[0]);
-      follow(*entrant.session, cursor.at(knots_[0]), ignored);
-      contacts_.clear();
-      entrant.session->contacts(knots_[1], contacts_, ignored);
+      return;
     }
+    const auto begin = std::chrono::steady_clock::now();
+    entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
+    measured.build_seconds = seconds_since(begin);
   });
   this->entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
-const ClipTimes* ContactMeasurement<S>::play(std::size_t i) {
+void ContactMeasurement<S>::play(std::size_t i) {
   ContactEntrant<S>& entrant = this->entrants_[i];
-  const bool played = entrant.attempt([&] {
-    ClipTimes clip;
-    const auto begin = std::chrono::steady_clock::now();
-    entrant.session->reset(knots_[0]);
-    clip.reset_seconds = seconds_since(begin);
-    ScriptCursor<S> cursor(script_);
-    for (std::size_t k = 1; k < knots_.size(); ++k) {
+  entrant.attempt([&] {
+    Session<S>& session = *entrant.session;
+    const auto ask = [&](PhaseTimes& times, std::size_t k) {
       contacts_.clear();
-      clip.frames.emplace_back();
-      follow(*entrant.session, cursor.at(knots_[k - 1]), clip.frames.back());
-      entrant.session->contacts(knots_[k], contacts_, clip.frames.back());
-    }
-    entrant.measured.repetitions.push_back(std::move(clip));
+      session.contacts(knots_[k + 1], contacts_, times);
+      return std::uint64_t(contacts_.size());
+    };
+    // Buffers grow, and hierarchies for sweeps are created at their first use.
+    const WarmUp warm_up;
+    play_intervals<S>(session, knots_, script_, ask, &warm_up);
+    entrant.keep(play_intervals<S>(session, knots_, script_, ask));
   });
-  return played ? &entrant.measured.repetitions.back() : nullptr;
 }
 
 template <class S>

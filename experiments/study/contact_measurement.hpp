@@ -27,9 +27,9 @@ class ContactMeasurement : public Entrants<ContactEntrant<S>> {
   /// else; null: no script. Throws io::InputError unless all bodies in pairs consist of triangles.
   ContactMeasurement(const Scene<S>& scene, std::vector<double> knots, const PlanScript<S>* script);
 
-  /// Verifies a contestant, comparing every n-th interval and the last.
+  /// Replays a contestant, comparing every n-th interval and the last with the truth.
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
-  const ClipTimes* play(std::size_t i);
+  void play(std::size_t i);
   nlohmann::json extras(std::size_t i) const;
 
  private:
@@ -38,6 +38,7 @@ class ContactMeasurement : public Entrants<ContactEntrant<S>> {
   const PlanScript<S>* script_;
   std::vector<ContactBuffer> truth_;  ///< [interval], sorted
   ContactBuffer contacts_;
+  std::optional<std::size_t> steady_from_;
 };
 
 extern template class ContactMeasurement<float>;

@@ -5,10 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <new>
-#include <numeric>
 
-#include "core/judge/follow_script.hpp"
-#include "experiments/common/stopwatch.hpp"
+#include "core/judge/sort_pairs.hpp"
 
 namespace kbvh::experiments {
 
@@ -16,85 +14,46 @@ using nlohmann::json;
 
 namespace {
 
-/// The warm-up time, in which a contestant's buffers grow; this long, or one clip, suffices.
-constexpr double warm_up_seconds = 0.05;
-
 /// The number of frames at which the quality of a contestant's boxes is recorded.
 constexpr std::uint64_t quality_samples = 16;
 
-/// The number of equal parts of a clip whose times are recorded.
-constexpr std::size_t time_parts = 16;
-
-template <class S>
-ClipTimes play_clip(Session<S>& session, std::span<const double> frames, const PlanScript<S>* script,
-                    FrameQuery& query) {
-  ScriptCursor<S> cursor(script);
-  ClipTimes times;
-  times.frames.reserve(frames.size());
-  const auto begin = std::chrono::steady_clock::now();
-  session.reset(frames[0]);
-  times.reset_seconds = seconds_since(begin);
-  if (frames.size() > 1) {
-    // The first frame belongs to the reset, which has no update to compare; its query runs anyway, because
-    // lazy strategies work there.
-    PhaseTimes ignored;
-    query.ask(session, ignored);
-    follow(session, cursor.at(frames[0]), ignored);
+/// Returns the first pair of `from` that `without` lacks, both sorted; null if there is none.
+const PrimitivePair* lacking(const PairBuffer& from, const PairBuffer& without) {
+  auto other = without.begin();
+  for (const PrimitivePair& pair : from) {
+    while (other != without.end() && *other < pair) ++other;
+    if (other == without.end() || !(*other == pair)) return &pair;
   }
-  for (std::size_t f = frames.size() > 1 ? 1 : 0; f < frames.size(); ++f) {
-    PhaseTimes frame;
-    session.advance(frames[f], frame);
-    query.ask(session, frame);
-    follow(session, cursor.at(frames[f]), frame);
-    times.frames.push_back(frame);
-  }
-  return times;
+  return nullptr;
 }
 
-template <class S>
-void warm_up(Session<S>& session, std::span<const double> frames, const PlanScript<S>* script,
-             FrameQuery& query) {
-  ScriptCursor<S> cursor(script);
-  const auto begin = std::chrono::steady_clock::now();
-  PhaseTimes ignored;
-  session.reset(frames[0]);
-  for (std::size_t f = 0; f < frames.size() && (f == 0 || seconds_since(begin) < warm_up_seconds); ++f) {
-    if (f > 0) session.advance(frames[f], ignored);
-    query.ask(session, ignored);
-    follow(session, cursor.at(frames[f]), ignored);
-  }
+/// Compares an answer of the replay with the truth, both sorted; returns what is wrong, or "".
+std::string compared(const PairBuffer& found, const PairBuffer& truth, bool all_found_are_true) {
+  if (const PrimitivePair* missed = lacking(truth, found)) return "pair " + text(*missed) + " is missed";
+  if (!all_found_are_true) return {};
+  if (const PrimitivePair* extra = lacking(found, truth))
+    return "pair " + text(*extra) + " is reported but does not intersect";
+  return found.size() == truth.size() ? "" : "a pair was reported more than once";
 }
 
-/// Counts over every frame: the verifying instance confirms only the frames that it compares.
+/// Returns the number of changes of geometry before the frame at t.
 template <class S>
-Counters count_clip(const Scene<S>& scene, const Contestant& contestant, std::span<const double> frames,
-                    const PlanScript<S>* script, FrameQuery& query) {
-  Session<S> session(scene, contestant, CountingPolicy::counting);
-  play_clip(session, frames, script, query);
-  return session.strategy().counters();
+std::uint32_t geometry_changes_before(const PlanScript<S>* script, double t) {
+  std::uint32_t changes = 0;
+  if (script != nullptr)
+    for (const auto& step : script->steps) changes += step.time < t && !step.geometry.empty() ? 1 : 0;
+  return changes;
 }
 
 }  // namespace
 
-PhaseTimes ClipTimes::mean() const {
-  PhaseTimes sum;
-  for (const PhaseTimes& frame : frames) {
-    sum.motion += frame.motion;
-    sum.update += frame.update;
-    sum.traversal += frame.traversal;
-    sum.triangle_tests += frame.triangle_tests;
-    sum.plan_changes += frame.plan_changes;
-    sum.geometry_changes += frame.geometry_changes;
-  }
-  const double n = frames.empty() ? 1 : double(frames.size());
-  return {sum.motion / n,         sum.update / n,       sum.traversal / n,
-          sum.triangle_tests / n, sum.plan_changes / n, sum.geometry_changes / n};
-}
-
-double ClipTimes::total() const {
-  double sum = 0;
-  for (const PhaseTimes& frame : frames) sum += frame.total();
-  return sum;
+std::string answers_differ(std::span<const std::uint64_t> timed, std::span<const std::uint64_t> replayed) {
+  for (std::size_t f = 0; f < timed.size(); ++f)
+    if (timed[f] != replayed[f])
+      return "frame " + std::to_string(f) + " has " + std::to_string(timed[f]) +
+             " answers while it is timed, and " + std::to_string(replayed[f]) +
+             " in the replay of the same calls";
+  return {};
 }
 
 void refuse(Measured& measured, const std::exception& thrown) {
@@ -107,9 +66,22 @@ void refuse(Measured& measured, const std::exception& thrown) {
     measured.counters = {};
     return;
   }
-  measured.refused = std::string("it threw: ") + thrown.what();
+  const bool promised = dynamic_cast<const BrokenPromise*>(&thrown) != nullptr;
+  measured.refused = promised ? thrown.what() : std::string("it threw: ") + thrown.what();
   measured.verification.first_violation = measured.refused;
 }
+
+template <class S>
+std::optional<std::size_t> steady_frame(const Scene<S>& scene, std::span<const double> frames,
+                                        bool plans_change) {
+  const std::vector<double> knots = overlaid_keyframes(scene);
+  if (plans_change || knots.size() < 3) return {};
+  const auto first = std::lower_bound(frames.begin(), frames.end(), knots[1]);
+  if (first == frames.end()) return {};
+  return std::size_t(first - frames.begin());
+}
+template std::optional<std::size_t> steady_frame(const Scene<float>&, std::span<const double>, bool);
+template std::optional<std::size_t> steady_frame(const Scene<double>&, std::span<const double>, bool);
 
 template <class S>
 void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every) {
@@ -117,11 +89,11 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
   Measured& measured = entrant.measured;
   measured.spec = &spec;
   measured.sampled_every = oracle_every;
+  measured.steady_from = steady_from_;
   entrant.attempt([&] {
     {
       Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
       measured.verification = verify<S>(session, frames_, *oracle_, script_, {oracle_every, quality_samples});
-      measured.counters = session.strategy().counters();
     }
     if (query_.changes && measured.verification.holds()) {
       Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
@@ -132,25 +104,52 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
     if (!measured.verification.holds()) {
       measured.refused = measured.verification.first_violation;
     } else {
-      if (oracle_every > 1 || query_.changes)
-        measured.counters = count_clip<S>(*scene_, spec.contestant(), frames_, script_, query_);
+      replay(measured);
       const auto begin = std::chrono::steady_clock::now();
       entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
       measured.build_seconds = seconds_since(begin);
-      warm_up<S>(*entrant.session, frames_, script_, query_);
     }
   });
   this->entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
-const ClipTimes* Measurement<S>::play(std::size_t i) {
+void Measurement<S>::replay(Measured& measured) {
+  Session<S> session(*scene_, measured.spec->contestant(), CountingPolicy::counting);
+  const bool promises = session.info().guarantee != Guarantee::approximate;
+  const bool exact = !query_.changes || *query_.changes == Answer::pairs;
+  ChangeReplay added;
+  const auto ask = [&](PhaseTimes& times, std::size_t f) {
+    const std::uint64_t size = query_.ask(session, times);
+    const auto broken = [&](const std::string& what) {
+      throw BrokenPromise("t = " + std::to_string(frames_[f]) + ": in the replay of the timed calls, " +
+                          what);
+    };
+    if (query_.changes)
+      if (const std::string fault = added.add(query_.pairs, query_.ended); !fault.empty()) broken(fault);
+    const bool sampled = f % measured.sampled_every == 0 || f + 1 == frames_.size();
+    if (!promises || !sampled) return size;
+    const PairBuffer* truth = oracle_->known(frames_[f], geometry_changes_before(script_, frames_[f]));
+    if (truth == nullptr) throw std::logic_error("the truth of a frame that was verified is not known");
+    PairBuffer found = query_.changes ? added.pairs() : query_.pairs;
+    if (!query_.changes) sort_pairs(found);
+    if (const std::string what = compared(found, *truth, exact); !what.empty()) broken(what);
+    return size;
+  };
+  measured.answers = play_frames<S>(session, frames_, script_, ask).answers;
+  measured.counters = session.strategy().counters();
+}
+
+template <class S>
+void Measurement<S>::play(std::size_t i) {
   Entrant<S>& entrant = this->entrants_[i];
-  const bool played = entrant.attempt([&] {
-    entrant.measured.repetitions.push_back(play_clip<S>(*entrant.session, frames_, script_, query_));
-    entrant.measured.choice = entrant.session->strategy().choice();
+  entrant.attempt([&] {
+    Session<S>& session = *entrant.session;
+    const auto ask = [&](PhaseTimes& times, std::size_t) { return query_.ask(session, times); };
+    const WarmUp warm_up;
+    play_frames<S>(session, frames_, script_, ask, &warm_up);
+    entrant.keep(play_frames<S>(session, frames_, script_, ask));
   });
-  return played ? &entrant.measured.repetitions.back() : nullptr;
 }
 
 template <class S>
@@ -162,58 +161,6 @@ json Measurement<S>::extras(std::size_t i) const {
 
 template class Measurement<float>;
 template class Measurement<double>;
-
-json times_record(const Measured& measured) {
-  constexpr double ms = 1e3;
-  json repetitions = json::array();
-  for (const ClipTimes& clip : measured.repetitions) {
-    const PhaseTimes mean = clip.mean();
-    repetitions.push_back({{"motion", ms * mean.motion},
-                           {"update", ms * mean.update},
-                           {"traversal", ms * mean.traversal},
-                           {"triangle_tests", ms * mean.triangle_tests},
-                           {"plan_changes", ms * mean.plan_changes},
-                           {"geometry_changes", ms * mean.geometry_changes},
-                           {"reset", ms * clip.reset_seconds}});
-  }
-  std::vector<std::size_t> order(measured.repetitions.size());
-  std::iota(order.begin(), order.end(), std::size_t(0));
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return measured.repetitions[a].total() < measured.repetitions[b].total();
-  });
-  const ClipTimes& median = measured.repetitions[order[(order.size() - 1) / 2]];
-  std::vector<double> totals;
-  for (const PhaseTimes& frame : median.frames) totals.push_back(ms * frame.total());
-  std::sort(totals.begin(), totals.end());
-  // The smallest value that at least this share of the frames does not exceed.
-  const auto quantile = [&](double share) {
-    const auto rank = std::size_t(std::ceil(share * double(totals.size())));
-    return totals[std::max<std::size_t>(rank, 1) - 1];
-  };
-  // The clip in equal parts, so that a structure that ages shows.
-  const std::size_t parts = std::min<std::size_t>(time_parts, totals.size());
-  json over_time = json::array();
-  for (std::size_t part = 0; part < parts; ++part) {
-    const std::size_t begin = part * totals.size() / parts, end = (part + 1) * totals.size() / parts;
-    double update = 0, query = 0;
-    for (std::size_t f = begin; f < end; ++f) {
-      update += median.frames[f].update;
-      query += median.frames[f].traversal + median.frames[f].triangle_tests;
-    }
-    const double frames = double(end - begin);
-    over_time.push_back({{"begin", double(begin) / double(totals.size())},
-                         {"update", ms * update / frames},
-                         {"query", ms * query / frames}});
-  }
-  return {{"unit", "ms"},
-          {"frames", totals.size()},
-          {"repetitions", repetitions},
-          {"total_p50", quantile(0.5)},
-          {"total_p99", quantile(0.99)},
-          {"total_worst", totals.back()},
-          {"build_ms", ms * measured.build_seconds},
-          {"over_time", over_time}};
-}
 
 namespace {
 /// JSON has no infinity: an empty box counts as the largest protrusion.

@@ -9,42 +9,51 @@
 
 #include "core/judge/verify.hpp"
 #include "core/judge/verify_changes.hpp"
+#include "experiments/study/clip.hpp"
 #include "experiments/study/contestants.hpp"
+#include "experiments/study/raw_times.hpp"
 
 namespace kbvh::experiments {
 
-/// The times of one clip played once by one contestant. Script changes after the first frame's query belong
-/// to the first frame, and are not timed.
-struct ClipTimes {
-  double reset_seconds = 0;        ///< `reset` at the first frame: preparation before the motion
-  std::vector<PhaseTimes> frames;  ///< every frame after the first; the only frame if there is just one
-  PhaseTimes mean() const;
-  double total() const;  ///< update and query, summed, in seconds
-};
-
-/// The results of one contestant on one scene: verified first, then timed.
+/// The results of one contestant on one scene: verified and replayed first, then timed.
 struct Measured {
   const ContestantSpec* spec = nullptr;
   Verification verification;
   ChangesVerification changes;  ///< of answers as changes
   std::uint64_t sampled_every = 1;
+  /// Of the replay: the calls that are timed and no others, on a counting instance.
   Counters counters;
-  std::string refused;      ///< the reason for a missing time, or empty
-  bool unfinished = false;  ///< inconclusive: memory ran out this time
-  double build_seconds = 0;
-  std::string choice;  ///< of a strategy that chooses, at the end of the clip
+  std::vector<std::uint64_t> answers;  ///< of the replay: the size of each frame's answer
+  std::string refused;                 ///< the reason for a missing time, or empty
+  bool unfinished = false;             ///< inconclusive: memory ran out this time
+  double build_seconds = 0;            ///< the preparation: topologies, and creating the instance
+  std::string choice;                  ///< of a strategy that chooses, at the end of the clip
   std::vector<ClipTimes> repetitions;
+  std::optional<std::size_t> steady_from;  ///< the first frame that the beginning has no part in
 };
 
 /// Refuses a contestant its time because of an exception: a broken guarantee, or, if memory ran out, no
 /// verdict; the next run measures it again.
 void refuse(Measured& measured, const std::exception& thrown);
 
+/// What a contestant is refused its time for, besides exceptions of its own.
+struct BrokenPromise : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// One contestant with its timed instance; without an instance once it is refused.
 template <class S>
 struct Entrant {
   Measured measured;
   std::unique_ptr<Session<S>> session;
+
+  /// Keeps the times of a clip if it answers like the replay; throws BrokenPromise otherwise.
+  void keep(ClipTimes clip) {
+    if (const std::string what = answers_differ(clip.answers, measured.answers); !what.empty())
+      throw BrokenPromise(what);
+    measured.choice = session->strategy().choice();
+    measured.repetitions.push_back(std::move(clip));
+  }
 
   /// Runs `work`. Refuses the contestant if `work` throws, except for ConfigError, which is passed on.
   /// Returns whether it ran to its end.
@@ -64,8 +73,9 @@ struct Entrant {
 };
 
 /// The contestants of a measurement by their places, as run/ and results/ see them in every kind of
-/// measurement. A kind adds `add` (verifies a contestant), `play` (plays the clip once) and `extras` (members
-/// of its record).
+/// measurement. A kind adds `add` (verifies and replays a contestant), `play` (warms it up, plays the clip
+/// once, compares the sizes of its answers with the replay's, and keeps the times; a contestant that throws
+/// or differs is refused its times and no longer `timed`) and `extras` (members of its record).
 template <class E>
 class Entrants {
  public:
@@ -92,14 +102,23 @@ struct FrameQuery {
   std::optional<Answer> changes{};  ///< the changes of this answer; otherwise the pairs
   PairBuffer pairs{}, ended{};
 
+  /// Returns the size of the answer.
   template <class S>
-  void ask(Session<S>& session, PhaseTimes& times) {
-    if (changes)
-      session.changes(*changes, pairs, ended, times);
-    else
+  std::uint64_t ask(Session<S>& session, PhaseTimes& times) {
+    if (!changes) {
       session.query(pairs, times);
+      return pairs.size();
+    }
+    session.changes(*changes, pairs, ended, times);
+    return pairs.size() + ended.size();
   }
 };
+
+/// Returns the first frame (or interval, by its begin) at or after the second knot of the overlaid plans;
+/// nothing for clips of fewer than three knots, and where plans change at run time.
+template <class S>
+std::optional<std::size_t> steady_frame(const Scene<S>& scene, std::span<const double> frames,
+                                        bool plans_change);
 
 /// Measures contestants on one scene, in one scalar, at one l.
 template <class S>
@@ -109,33 +128,43 @@ class Measurement : public Entrants<Entrant<S>> {
   /// made for it. With `changes`, frames ask for the changes of this answer instead of the pairs.
   Measurement(const Scene<S>& scene, std::vector<double> frames, Oracle<S>& oracle,
               const PlanScript<S>* script = nullptr, std::optional<Answer> changes = {})
-      : scene_(&scene), frames_(std::move(frames)), oracle_(&oracle), script_(script), query_{changes} {}
+      : scene_(&scene),
+        frames_(std::move(frames)),
+        oracle_(&oracle),
+        script_(script),
+        query_{changes},
+        steady_from_(steady_frame(scene, std::span<const double>(frames_), script != nullptr)) {}
 
-  /// Verifies a contestant over all frames, comparing every n-th with the oracle, and counts its work; its
-  /// changes, too, if these are asked. If its guarantee holds, creates the silent instance that will be
-  /// timed. Exceptions of the strategy count as a broken guarantee; ConfigError is passed on.
+  /// Verifies a contestant over all frames, comparing every n-th with the oracle; its changes, too, if these
+  /// are asked. Then plays exactly the timed calls on a second instance, which counts; compares the answers
+  /// of the same frames with the oracle, and keeps the sizes of all. If the guarantee holds, creates the
+  /// silent instance that will be timed. Exceptions of the strategy count as a broken guarantee; ConfigError
+  /// is passed on.
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
 
-  /// Plays the clip once, keeps its times and returns them. If the contestant throws, it is refused its
-  /// times, is no longer `timed`, and nullptr is returned.
-  const ClipTimes* play(std::size_t i);
+  void play(std::size_t i);
   const std::vector<double>& frames() const { return frames_; }
   /// Returns additional members of a contestant's record.
   nlohmann::json extras(std::size_t i) const;
 
  private:
+  void replay(Measured& measured);
+
   const Scene<S>* scene_;
   std::vector<double> frames_;
   Oracle<S>* oracle_;
   const PlanScript<S>* script_;
   FrameQuery query_;
+  std::optional<std::size_t> steady_from_;
 };
 
 extern template class Measurement<float>;
 extern template class Measurement<double>;
 
-/// Makes the times of a result record: means per frame of every repetition, in milliseconds, and the spread
-/// over the frames of the median repetition.
+/// Returns the raw times of a contestant that was timed; `session` names the rounds.
+RawTimes raw_times(const Measured& measured, const std::string& session);
+/// Makes the times of a result record: raw times in ms, and the spread over the frames of the median
+/// repetition.
 nlohmann::json times_record(const Measured& measured);
 /// Makes the verification of a result record.
 nlohmann::json verified_record(const Measured& measured);

@@ -115,6 +115,14 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
   }
   if (const auto count = keys.whole("repetitions", ranges::repetitions))
     study.repetitions = std::uint32_t(*count);
+  const auto not_negative = [&](const char* key, double& target) {
+    const auto value = keys.number(key);
+    if (!value) return;
+    if (!(*value >= 0)) keys.fail(key, "must not be negative");
+    target = *value;
+  };
+  not_negative("interval_width", study.interval_width);
+  not_negative("seconds", study.seconds);
   if (const auto limit = keys.whole("frames_limit", ranges::any)) study.frames_limit = *limit;
   if (const auto continuous = keys.truth("continuous")) study.continuous = *continuous;
   if (const auto answer = keys.word("changes")) study.changes = read_answer(keys, *answer);

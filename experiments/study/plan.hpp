@@ -15,12 +15,6 @@
 
 namespace kbvh::experiments {
 
-/// The order of the repetitions.
-enum class Harness : std::uint8_t {
-  rounds,            ///< `kbvh run`: the first repetition of all contestants, then the second of all, ...
-  google_benchmark,  ///< `kbvh bench`: under Google Benchmark, randomly interleaved
-};
-
 /// A study: every scene with every contestant, l and scalar.
 struct Study {
   std::string name;
@@ -30,7 +24,9 @@ struct Study {
   BuilderRequest builder;                       ///< for all strategies without their own builder
   std::vector<std::uint32_t> per_keyframe{10};  ///< l: frames for each keyframe interval
   std::vector<std::string> scalars{"float"};
-  std::uint32_t repetitions = 3;
+  std::uint32_t repetitions = 5;     ///< at least; fewer than five: exactly so many, and no interval
+  double interval_width = 0.05;      ///< repeat until the interval of each ratio is narrower, relative to it
+  double seconds = 10;               ///< no further rounds after the least ones have taken so much longer
   std::uint64_t frames_limit = 0;    ///< only so many first frames; 0: all
   std::uint64_t oracle_every = 1;    ///< verify every n-th frame (and the last)
   bool continuous = false;           ///< contacts between keyframes instead of pairs at frames

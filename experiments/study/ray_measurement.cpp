@@ -6,8 +6,6 @@
 #include <numbers>
 #include <random>
 
-#include "core/judge/follow_script.hpp"
-#include "experiments/common/stopwatch.hpp"
 #include "experiments/common/text.hpp"
 
 namespace kbvh::experiments {
@@ -157,9 +155,75 @@ RayMeasurement<S>::RayMeasurement(const Scene<S>& scene, std::vector<double> fra
       script_(script),
       rays_(make_rays(study, scene, frames_)),
       truth_(frames_.size()),
-      hits_(rays_.size()) {
+      hits_(rays_.size()),
+      steady_from_(steady_frame(scene, std::span<const double>(frames_), script != nullptr)) {
   const std::size_t stride = (rays_.size() + most_compared - 1) / most_compared;
   for (std::size_t i = stride / 2; i < rays_.size(); i += stride) compared_.push_back(i);
+}
+
+template <class S>
+std::uint64_t RayMeasurement<S>::ask(Session<S>& session, PhaseTimes& times) {
+  session.hits(study_.query, rays_, std::span<RayHit>(hits_), times);
+  return std::uint64_t(
+      std::count_if(hits_.begin(), hits_.end(), [](const RayHit& hit) { return bool(hit); }));
+}
+
+template <class S>
+void RayMeasurement<S>::verify(RayEntrant<S>& entrant, std::uint64_t oracle_every, Answers& answers) {
+  Measured& measured = entrant.measured;
+  Session<S> session(*scene_, measured.spec->contestant(), CountingPolicy::counting);
+  std::vector<Ray<S>> rays;
+  for (const std::size_t i : compared_) rays.push_back(rays_[i]);
+  answers.resize(frames_.size());
+  play_frames<S>(session, frames_, script_, [&](PhaseTimes& times, std::size_t f) {
+    const std::uint64_t found = ask(session, times);
+    entrant.hits += found;
+    std::vector<bool> seen(session.scene().bodies.size(), false);
+    for (const RayHit& hit : hits_)
+      if (hit) seen[hit.body] = true;
+    for (std::size_t body = 0; body < seen.size(); ++body)
+      if (!seen[body] && session.scene().bodies[body].primitives.kind == PrimitiveKind::polygons)
+        ++entrant.hidden_bodies;
+    if (f % oracle_every != 0 && f + 1 != frames_.size()) return found;
+    for (const std::size_t i : compared_) answers[f].push_back(hits_[i]);
+    session.playback().evaluate_all();
+    std::vector<RayHit>& truth = truth_[f];
+    if (truth.size() != rays.size()) {
+      truth.resize(rays.size());
+      brute_force_hits<S>(session.scene(), session.playback(), RayQuery::closest, rays,
+                          std::span<RayHit>(truth));
+    }
+    entrant.check.add(
+        compare_hits<S>(session.scene(), session.playback(), study_.query, rays, answers[f], truth));
+    ++measured.verification.frames;
+    return found;
+  });
+  const RayCheck& check = entrant.check;
+  measured.verification.pairs = check.hits;
+  measured.verification.candidates = check.hits;
+  measured.verification.missed = check.missed;
+  measured.verification.extra = check.extra + check.misplaced;
+  if (session.info().rays_guarantee == Guarantee::exact)
+    measured.verification.first_violation = check.first_violation;
+}
+
+template <class S>
+void RayMeasurement<S>::replay(Measured& measured, const Answers& answers) {
+  Session<S> session(*scene_, measured.spec->contestant(), CountingPolicy::counting);
+  const bool exact = session.info().rays_guarantee == Guarantee::exact;
+  const auto same = [&](const RayHit& a, const RayHit& b) {
+    return study_.query == RayQuery::any ? bool(a) == bool(b) : a == b;
+  };
+  const auto asked = [&](PhaseTimes& times, std::size_t f) {
+    const std::uint64_t found = ask(session, times);
+    for (std::size_t c = 0; exact && c < answers[f].size(); ++c)
+      if (!same(hits_[compared_[c]], answers[f][c]))
+        throw BrokenPromise("t = " + std::to_string(frames_[f]) + ": in the replay of the timed calls, ray " +
+                            std::to_string(compared_[c]) + " has another answer than in the verification");
+    return found;
+  };
+  measured.answers = play_frames<S>(session, frames_, script_, asked).answers;
+  measured.counters = session.strategy().counters();
 }
 
 template <class S>
@@ -168,91 +232,32 @@ void RayMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_eve
   Measured& measured = entrant.measured;
   measured.spec = &spec;
   measured.sampled_every = oracle_every;
+  measured.steady_from = steady_from_;
   entrant.attempt([&] {
-    std::vector<Ray<S>> rays;
-    for (const std::size_t i : compared_) rays.push_back(rays_[i]);
-    {
-      Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
-      PhaseTimes ignored;
-      ScriptCursor<S> cursor(script_);
-      for (std::size_t f = 0; f < frames_.size(); ++f) {
-        if (f == 0)
-          session.reset(frames_[0]);
-        else
-          session.advance(frames_[f], ignored);
-        session.hits(study_.query, rays_, std::span<RayHit>(hits_), ignored);
-        std::vector<bool> seen(session.scene().bodies.size(), false);
-        for (const RayHit& hit : hits_) {
-          entrant.hits += hit ? 1 : 0;
-          if (hit) seen[hit.body] = true;
-        }
-        for (std::size_t body = 0; body < seen.size(); ++body)
-          if (!seen[body] && session.scene().bodies[body].primitives.kind == PrimitiveKind::polygons)
-            ++entrant.hidden_bodies;
-        if (f % oracle_every == 0 || f + 1 == frames_.size()) {
-          std::vector<RayHit> found;
-          for (const std::size_t i : compared_) found.push_back(hits_[i]);
-          session.playback().evaluate_all();
-          std::vector<RayHit>& truth = truth_[f];
-          if (truth.size() != rays.size()) {
-            truth.resize(rays.size());
-            brute_force_hits<S>(session.scene(), session.playback(), RayQuery::closest, rays,
-                                std::span<RayHit>(truth));
-          }
-          entrant.check.add(
-              compare_hits<S>(session.scene(), session.playback(), study_.query, rays, found, truth));
-          ++measured.verification.frames;
-        }
-        follow(session, cursor.at(frames_[f]), ignored);
-      }
-      measured.counters = session.strategy().counters();
-    }
-    const RayCheck& check = entrant.check;
-    measured.verification.pairs = check.hits;
-    measured.verification.candidates = check.hits;
-    measured.verification.missed = check.missed;
-    measured.verification.extra = check.extra + check.misplaced;
-    if (spec.entry->info.rays_guarantee == Guarantee::exact)
-      measured.verification.first_violation = check.first_violation;
+    Answers answers;
+    verify(entrant, oracle_every, answers);
     if (!measured.verification.holds()) {
       measured.refused = measured.verification.first_violation;
       return;
     }
+    replay(measured, answers);
     const auto begin = std::chrono::steady_clock::now();
     entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
     measured.build_seconds = seconds_since(begin);
-    PhaseTimes ignored;  // warm-up
-    entrant.session->reset(frames_[0]);
-    entrant.session->hits(study_.query, rays_, std::span<RayHit>(hits_), ignored);
   });
   this->entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
-const ClipTimes* RayMeasurement<S>::play(std::size_t i) {
+void RayMeasurement<S>::play(std::size_t i) {
   RayEntrant<S>& entrant = this->entrants_[i];
-  const bool played = entrant.attempt([&] {
+  entrant.attempt([&] {
     Session<S>& session = *entrant.session;
-    ClipTimes clip;
-    ScriptCursor<S> cursor(script_);
-    PhaseTimes ignored;
-    const auto begin = std::chrono::steady_clock::now();
-    session.reset(frames_[0]);
-    clip.reset_seconds = seconds_since(begin);
-    if (frames_.size() > 1) {
-      session.hits(study_.query, rays_, std::span<RayHit>(hits_), ignored);
-      follow(session, cursor.at(frames_[0]), ignored);
-    }
-    for (std::size_t f = frames_.size() > 1 ? 1 : 0; f < frames_.size(); ++f) {
-      PhaseTimes frame;
-      session.advance(frames_[f], frame);
-      session.hits(study_.query, rays_, std::span<RayHit>(hits_), frame);
-      follow(session, cursor.at(frames_[f]), frame);
-      clip.frames.push_back(frame);
-    }
-    entrant.measured.repetitions.push_back(std::move(clip));
+    const auto asked = [&](PhaseTimes& times, std::size_t) { return ask(session, times); };
+    const WarmUp warm_up;
+    play_frames<S>(session, frames_, script_, asked, &warm_up);
+    entrant.keep(play_frames<S>(session, frames_, script_, asked));
   });
-  return played ? &entrant.measured.repetitions.back() : nullptr;
 }
 
 template <class S>

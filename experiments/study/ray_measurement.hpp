@@ -53,14 +53,21 @@ class RayMeasurement : public Entrants<RayEntrant<S>> {
                  const PlanScript<S>* script);
 
   /// Verifies a contestant, comparing some of the rays of every n-th frame and of the last with brute force.
+  /// Then replays exactly the timed calls: an exact contestant must answer the compared rays as before.
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
-  const ClipTimes* play(std::size_t i);
+  void play(std::size_t i);
   nlohmann::json extras(std::size_t i) const;
   /// Returns why the rays are beyond the range of a contestant, as the end of a sentence that begins with its
   /// id; or "".
   std::string beyond_range(const Info& contestant) const;
 
  private:
+  /// The answers to the compared rays at a frame; empty where none are compared.
+  using Answers = std::vector<std::vector<RayHit>>;
+  void verify(RayEntrant<S>& entrant, std::uint64_t oracle_every, Answers& answers);
+  void replay(Measured& measured, const Answers& answers);
+  std::uint64_t ask(Session<S>& session, PhaseTimes& times);
+
   const Scene<S>* scene_;
   std::vector<double> frames_;
   RayStudy study_;
@@ -69,6 +76,7 @@ class RayMeasurement : public Entrants<RayEntrant<S>> {
   std::vector<std::size_t> compared_;       ///< indices of the rays that are compared with brute force
   std::vector<std::vector<RayHit>> truth_;  ///< [frame], of these; empty until needed
   std::vector<RayHit> hits_;
+  std::optional<std::size_t> steady_from_;
 };
 
 extern template class RayMeasurement<float>;

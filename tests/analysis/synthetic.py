@@ -129,6 +129,23 @@ def record(
     }  # fmt: skip
 
 
+def add_frames(line: dict[str, Any], seed: int = 1) -> dict[str, Any]:
+    """Makes a result one of schema 2: with times of 40 frames, of which some were disturbed."""
+    rng = random.Random(f"{line['key']} {seed}")
+    frames = 40
+    for one in line["times"]["repetitions"]:
+        total = sum(one[name] for name in ("update", "traversal", "triangle_tests", "plan_changes"))
+        weights = [1 + 0.5 * math.sin(f) for f in range(frames)]
+        totals = [total * w * rng.choice([1, 1, 1, 1, 3]) for w in weights]
+        scale = sum(totals) / frames / total if total > 0 else 1
+        for name in ("update", "traversal", "triangle_tests", "plan_changes"):
+            one[name] *= scale
+        one.update(totals=totals, motions=[one["motion"]] * frames)
+    line["schema"] = 2
+    line["times"].update(frames=frames, by="frames", steady_from=None, disturbed="")
+    return line
+
+
 def refused(line: dict[str, Any], reason: str, violation: str = "") -> dict[str, Any]:
     """The same result without a time."""
     line["times"] = None

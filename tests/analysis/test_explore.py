@@ -19,10 +19,10 @@ import synthetic
 import colours
 import explore
 import explorer_data
+import clip_times
 import load
 import numpy as np
 import profiles
-import ratios
 import report
 
 
@@ -47,29 +47,39 @@ class Folder(unittest.TestCase):
 
 
 class TestInterval(unittest.TestCase):
-    def test_is_the_limit_of_many_draws(self) -> None:
+    @staticmethod
+    def raw(values: np.ndarray, session: str = "s") -> clip_times.RawTimes:
+        """Repetitions of one frame each, all of it update."""
+        sums = np.column_stack([values, *[np.zeros(len(values))] * 3])
+        return clip_times.RawTimes(values[:, None], np.zeros((len(values), 1)), sums, None, None, False, session)
+
+    def test_is_about_the_limit_of_many_draws(self) -> None:
         chance = np.random.default_rng(1)
-        for n in (2, 3, 5, 8, 9):
+        for n in (5, 8, 9, 20):
             own, other = chance.lognormal(0, 0.1, n), chance.lognormal(0.2, 0.1, n)
             picks = chance.integers(0, n, (2, 100_000, n))
             drawn = {
-                True: np.median((other / own)[picks[0]], axis=1),
-                False: np.median(other[picks[0]], axis=1) / np.median(own[picks[1]], axis=1),
+                "s": np.median(other[picks[0]], axis=1) / np.median(own[picks[0]], axis=1),
+                "t": np.median(other[picks[0]], axis=1) / np.median(own[picks[1]], axis=1),
             }
-            for paired, values in drawn.items():
-                low, high = ratios.interval(own, other, paired) or (0, 0)
-                # Each end has the share of the distribution beyond it that it should have, itself included.
-                self.assertLessEqual(np.mean(values < low - 1e-12), 0.027, (n, paired))
-                self.assertGreaterEqual(np.mean(values <= low + 1e-12), 0.023, (n, paired))
-                self.assertLessEqual(np.mean(values > high + 1e-12), 0.027, (n, paired))
-                self.assertGreaterEqual(np.mean(values >= high - 1e-12), 0.023, (n, paired))
+            for session, values in drawn.items():
+                found = clip_times.ratio_of(self.raw(other, session), self.raw(own), clip_times.PARTS)
+                assert found is not None
+                self.assertTrue(found.is_interval)
+                # 200 draws: each end has about the share of the distribution beyond it that it should have.
+                self.assertLessEqual(np.mean(values < found.low - 1e-12), 0.07, (n, session))
+                self.assertGreaterEqual(np.mean(values <= found.low + 1e-12), 0.003, (n, session))
+                self.assertLessEqual(np.mean(values > found.high + 1e-12), 0.07, (n, session))
+                self.assertGreaterEqual(np.mean(values >= found.high - 1e-12), 0.003, (n, session))
 
-    def test_single_repetitions_have_none(self) -> None:
-        self.assertIsNone(ratios.interval(np.array([1.0]), np.array([2.0]), True))
-        self.assertIsNone(ratios.interval(np.array([0.0, 0.0]), np.array([2.0, 2.0]), False))
+    def test_single_repetitions_have_no_spread(self) -> None:
+        found = clip_times.ratio_of(self.raw(np.array([2.0])), self.raw(np.array([1.0])), clip_times.PARTS)
+        self.assertEqual((found.middle, found.low, found.high, found.is_interval), (2.0, 2.0, 2.0, False))
+        self.assertIsNone(clip_times.ratio_of(self.raw(np.array([2.0])), self.raw(np.array([0.0])), clip_times.PARTS))
 
     def test_few_repetitions_have_their_range(self) -> None:
-        self.assertEqual(ratios.interval(np.array([1.0, 1.0, 1.0]), np.array([2.0, 4.0, 3.0]), True), (2.0, 4.0))
+        found = clip_times.ratio_of(self.raw(np.array([2.0, 4.0, 3.0])), self.raw(np.ones(3)), clip_times.PARTS)
+        self.assertEqual((found.middle, found.low, found.high, found.is_interval), (3.0, 2.0, 4.0, False))
 
 
 class TestProfiles(Folder):

@@ -13,10 +13,15 @@ from typing import Any
 import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
+import clip_times
 import load
 import numpy as np
 import pandas as pd
 import ratios
+import tables
+
+#: The first resamples of five repetitions.
+PINNED: list[list[int]] = [[2, 3, 4, 2, 2], [3, 4, 2, 1, 3], [2, 3, 2, 2, 2]]
 
 
 def line(strategy: str, family: str, motion: list[float], update: list[float], **other: Any) -> dict[str, Any]:
@@ -39,14 +44,15 @@ def ratios_of(lines: list[dict[str, Any]], scope: str) -> dict[str, ratios.Ratio
 
 
 class TestRatios(unittest.TestCase):
-    def test_paired_over_repetitions(self) -> None:
+    def test_few_repetitions_have_a_range(self) -> None:
         lines = [line("a", "refit", [1, 1, 1], [3, 5, 7]), line("k", "kinetic", [1, 1, 1], [1, 1, 3])]
         with_motion = ratios_of(lines, "with_motion")["k"]
         self.assertTrue(with_motion.paired)
-        # (4/2, 6/2, 8/4) and (3/1, 5/1, 7/3)
-        self.assertEqual((with_motion.middle, with_motion.low, with_motion.high), (2.0, 2.0, 3.0))
+        self.assertFalse(with_motion.is_interval)
+        # 6 / 2 of the medians; (4/2, 6/2, 8/4) and (3/1, 5/1, 7/3) of repetitions
+        self.assertEqual((with_motion.middle, with_motion.low, with_motion.high), (3.0, 2.0, 3.0))
         without = ratios_of(lines, "without_motion")["k"]
-        self.assertEqual((without.middle, without.low, without.high), (3.0, 7 / 3, 5.0))
+        self.assertEqual((without.middle, without.low, without.high), (5.0, 7 / 3, 5.0))
 
     def test_best_refit_is_the_reference_and_has_ratio_one(self) -> None:
         lines = [line("slow", "refit", [0, 0], [9, 9]), line("fast", "refit", [0, 0], [3, 3]), line("r", "rebuild", [0, 0], [6, 6])]
@@ -125,6 +131,92 @@ class TestOneDenominator(unittest.TestCase):
             best = ratios.best_refit(study, group)
             found[float(group["l"].iloc[0])] = None if best is None else ids[best]
         self.assertEqual(found, expected)
+
+
+def clip(strategy: str, family: str, frames: list[list[float]], **times: Any) -> dict[str, Any]:
+    """A result of schema 2 with these totals, [repetition][frame], update and query alike, and 1 ms of motion."""
+    result = synthetic.record(dict(id=strategy, title=strategy, family=family, query=1.0), "s", 2000, "float", 10)
+    result["schema"] = 2
+    steady = times.pop("steady_from", None)
+
+    def phases(part: list[float]) -> dict[str, float]:
+        half = sum(part) / len(part) / 2
+        return {"motion": 1.0, "update": half, "traversal": half, "triangle_tests": 0.0, "plan_changes": 0.0, "geometry_changes": 0.0}
+
+    result["times"].update(
+        repetitions=[
+            {**phases(one), "totals": one, "motions": [1.0] * len(one), **({} if steady is None else {"steady": phases(one[steady:])})}
+            for one in frames
+        ],
+        frames=len(frames[0]), by="frames", steady_from=steady, disturbed="", build_ms=0.0,
+    )  # fmt: skip
+    result["times"].update(times)
+    return result
+
+
+class TestFrames(unittest.TestCase):
+    #: Frame 1 of the second repetition, frame 2 of the third, and all of the last were disturbed.
+    DISTURBED = [[8, 2, 4, 2], [8, 90, 4, 2], [8, 2, 70, 2], [8, 2, 4, 2], [80, 20, 40, 20]]
+
+    def load(self, *lines: dict[str, Any]) -> load.Study:
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as folder:
+            return load.load(synthetic.write(Path(folder), list(lines)))
+
+    def test_a_disturbed_frame_does_not_count(self) -> None:
+        study = self.load(clip("a", "refit", self.DISTURBED, steady_from=2), clip("b", "kinetic", self.DISTURBED, by="clips"))
+        by_frames, by_clips = (study.runs.iloc[i] for i in (0, 1))
+        self.assertEqual((by_frames["total"], by_frames["updating"], by_frames["query"], by_frames["motion"]), (4.0, 2.0, 2.0, 1.0))
+        self.assertEqual((by_frames["total_motion"], by_frames["steady"]), (5.0, 3.0))
+        self.assertEqual(by_clips["total"], 82 / 4)
+        self.assertTrue(math.isnan(by_clips["steady"]))
+
+    def test_one_side_by_clips_makes_both(self) -> None:
+        refit, own = clip("a", "refit", self.DISTURBED), clip("k", "kinetic", [[2, 2, 2, 2]] * 5)
+        self.assertEqual(ratios.ratios(self.load(refit, own), "without_motion")[1].middle, 2.0)
+        own["times"]["by"] = "clips"
+        found = ratios.ratios(self.load(refit, own), "without_motion")[1]
+        self.assertEqual((found.middle, found.is_interval), (82 / 8, True))
+
+    def test_five_repetitions_have_an_interval(self) -> None:
+        def times(repetitions: int, first: float) -> list[list[float]]:
+            return [[first if r == 0 else 4.0] for r in range(repetitions)]
+
+        for repetitions, ends in ((2, (0.5, 1.0)), (4, (0.5, 1.0)), (9, (1.0, 1.0))):
+            study = self.load(clip("a", "refit", times(repetitions, 4)), clip("k", "kinetic", times(repetitions, 8)))
+            found = ratios.ratios(study, "without_motion")[1]
+            self.assertEqual(found.is_interval, repetitions >= 5)
+            self.assertEqual((found.low, found.high), ends, repetitions)
+
+    def test_the_same_draws_as_in_the_program(self) -> None:
+        # Pinned in tests/program/results_test.cpp, too.
+        self.assertEqual(clip_times.resamples(5)[:3].tolist(), PINNED)
+
+    def test_a_beginning_is_paid_for_from_a_frame_on(self) -> None:
+        own, refit = clip("k", "kinetic", [[10, 1, 1, 1, 7, 1, 1, 1, 1]]), clip("a", "refit", [[4] * 9])
+        study = self.load(refit, own)
+        refit_times, times = study.raw[0], study.raw[1]
+        self.assertEqual(clip_times.paid_from(times, 0, refit_times, 0), 2)
+        self.assertEqual(clip_times.paid_from(times, 1, refit_times, 0), 5)
+        self.assertIsNone(clip_times.paid_from(times, 100, refit_times, 0))
+
+    def test_records_of_both_schemas_are_never_compared(self) -> None:
+        old = line("a", "refit", [0], [1])
+        study = self.load(old, clip("k", "kinetic", [[2, 2]] * 5), clip("a", "refit", [[4, 4]] * 5))
+        self.assertEqual(old["schema"], 1)
+        found = ratios.ratios(study, "without_motion")
+        self.assertEqual(found[1].middle, 2.0)
+        self.assertEqual(found[0].middle, 1.0, "alone in its group")
+        self.assertTrue(any("1 of 3 results are of schema 1" in note for note in study.notes), study.notes)
+        with self.assertRaisesRegex(load.ResultError, "schema 3 is not known"):
+            self.load(dict(old, schema=3))
+
+    def test_a_disturbed_machine_is_seen_at_the_ratio(self) -> None:
+        study = self.load(clip("a", "refit", [[4]] * 5), clip("k", "kinetic", [[2]] * 5, disturbed="90 involuntary switches"))
+        found = ratios.ratios(study, "without_motion")
+        self.assertEqual((found[0].disturbed, found[1].disturbed), (False, True))
+        shown = tables.groups(study, tables.Ratios(study))[0]
+        self.assertEqual([row.ratio_without_motion.disturbed for row in shown.rows], [True, False])
+        self.assertTrue(any("Disturbed (?)" in note and "90 involuntary switches" in note for note in shown.notes), shown.notes)
 
 
 class TestPareto(unittest.TestCase):

@@ -175,11 +175,11 @@ class TestShownValues(ReportCase):
 
     def test_missed_and_extra_are_shown(self) -> None:
         row = next(r for r in self.table(small()).splitlines() if r.startswith("FCL with its own"))
-        self.assertEqual(re.split(r"\s{2,}", row)[9:11], ["3", "41"])
+        self.assertEqual(re.split(r"\s{2,}", row)[11:13], ["3", "41"])
 
     def test_looseness_of_hidden_boxes_is_unknown(self) -> None:
         row = next(r for r in self.table(small()).splitlines() if r.startswith("FCL with its own"))
-        self.assertEqual(re.split(r"\s{2,}", row)[11:13], ["–", "–"])
+        self.assertEqual(re.split(r"\s{2,}", row)[13:15], ["–", "–"])
 
 
 class TestLimits(ReportCase):
@@ -232,8 +232,8 @@ class TestRefusals(ReportCase):
         self.assertIn("no result that can be used. Line 1 of results.jsonl was skipped", self.refusal('{"schema": 1, "kind'))
 
     def test_unknown_schema(self) -> None:
-        line = dict(small()[0], schema=2)
-        self.assertIn("line 1: schema 2 is not known", self.refusal(json.dumps(line) + "\n"))
+        line = dict(small()[0], schema=3)
+        self.assertIn("line 1: schema 3 is not known", self.refusal(json.dumps(line) + "\n"))
 
     def test_missing_fields_are_named_with_their_line(self) -> None:
         for path in ("kind", "scene.name", "scene.per_keyframe", "scene.primitives", "strategy.id", "strategy.guarantee",

@@ -65,7 +65,7 @@ class Pieces(unittest.TestCase):
     def test_pieces_are_listed(self) -> None:
         code, said, _ = run(REPRODUCE, "--pieces")
         self.assertEqual(code, 0)
-        self.assertIn("tablecloth, 2k triangles    under 1 min\n", said)
+        self.assertIn("tablecloth, 2k triangles about     1 min\n", said)
         self.assertEqual(said, run(sys.executable, COST, "experiments/plans/default.json")[1])
 
     def test_a_plan_is_relative_to_the_folder_of_the_caller(self) -> None:

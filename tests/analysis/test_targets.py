@@ -22,15 +22,15 @@ def scene(name: str, ratio: Optional[float], counts: bool, **others: Any) -> dic
     side = {"label": "flat [leaf=4]", "ms": 2.0, "repetitions": 5, "run": "r"}
     return {
         "scene": name, "order": "given", "triangles": 65522, "counts": counts, "ratio": ratio,
-        "confidence_interval": None if ratio is None else [ratio - 1, ratio + 1],
+        "confidence_interval": None if ratio is None else [ratio - 1, ratio + 1], "range": None,
         "numerator": None if ratio is None else dict(side, label="peer | <b>", ms=2.0 * ratio), "denominator": side, **others,
     }  # fmt: skip
 
 
 def target(what: str, measured: Optional[float], verdict: str, scenes: list[dict[str, Any]], **others: Any) -> dict[str, Any]:
     return {
-        "schema": 1, "plan": "baseline", "what": what, "measured": measured, "at_least": 20.0, "aim": 30.0,
-        "confidence_interval": None if measured is None else [measured - 1, measured + 1], "verdict": verdict,
+        "schema": 2, "plan": "baseline", "what": what, "measured": measured, "at_least": 20.0, "aim": 30.0,
+        "confidence_interval": None if measured is None else [measured - 1, measured + 1], "range": None, "verdict": verdict,
         "scene": None if measured is None else "cloth 65k", "scenes": ["cloth 65k"], "per_scene": scenes, "note": "",
         "commit": "0123456789abcdef", "dirty": False, "machine": synthetic.MACHINE, "when": "2025-01-31T12:00:00Z",
         "runs": ["r"], **others,
@@ -65,9 +65,9 @@ class TestMarkdown(TargetsCase):
         code, out, _ = self.run_main(rows())
         self.assertEqual(code, 0)
         lines = out.splitlines()
-        self.assertEqual(lines[0], "| what | measured [95 % interval] | at least | aim | verdict |")
-        self.assertEqual(lines[2], "| refit over FCL | 45.2x [44.2, 46.2] | 20x | 30x | aim reached |")
-        self.assertEqual(lines[3], "| query | 19.9x [18.9, 20.9] | 20x | 30x | missed |")
+        self.assertEqual(lines[0], "| what | measured (95 % interval) or [range] | at least | aim | verdict |")
+        self.assertEqual(lines[2], "| refit over FCL | 45.2x (44.2–46.2) | 20x | 30x | aim reached |")
+        self.assertEqual(lines[3], "| query | 19.9x (18.9–20.9) | 20x | 30x | missed |")
         self.assertEqual(lines[4], "| peer | – | 20x | 30x | not measured: cloth 65k: no peer |")
         self.assertIn("commit 0123456789ab, 2025-01-31", lines[6])
         self.assertEqual(lines[8], "| what | cloth 2k | cloth 65k | cloth 65k-shuffled |")
@@ -99,6 +99,14 @@ class TestMarkdown(TargetsCase):
         lines = rows()
         lines[0]["confidence_interval"] = None
         self.assertIn("| refit over FCL | 45.2x | 20x |", self.run_main(lines)[1])
+
+    def test_ranges_and_disturbed_ratios_look_different(self) -> None:
+        lines = rows()
+        lines[0].update(confidence_interval=None, range=[40.0, 50.0])
+        lines[0]["per_scene"][0]["denominator"] = dict(lines[0]["per_scene"][0]["denominator"], disturbed="30 involuntary switches")
+        out = self.run_main(lines)[1]
+        self.assertIn("| refit over FCL | 45.2x [40.0–50.0] | 20x |", out)
+        self.assertIn("| refit over FCL | 12.0x? | **45.2x** | – |", out)
 
 
 class TestWrite(TargetsCase):
@@ -133,12 +141,14 @@ class TestRefusals(TargetsCase):
     def test_wrong_files_end_in_one_sentence(self) -> None:
         lacking, schema, verdict, ratio = (copy.deepcopy(rows()) for _ in range(4))
         del lacking[1]["at_least"]
-        schema[0]["schema"] = 2
+        old = copy.deepcopy(rows())
+        schema[0]["schema"], old[0]["schema"] = 3, 1
         verdict[0]["verdict"] = "splendid"
         ratio[2]["per_scene"][0]["ratio"] = "many"
         for value, words in (
             ("{", "is not JSON"), ({}, "a list of targets is expected"), ([3], "row 1: an object is expected"),
-            (lacking, "row 2: the field at_least is missing"), (schema, "row 1: schema 2 is not known"),
+            (lacking, "row 2: the field at_least is missing"), (schema, "row 1: schema 3 is not known"),
+            (old, "row 1: schema 1 is not known: its times leave out the beginning of the clip"),
             (verdict, 'row 1: verdict is "splendid"'), (ratio, "row 3: "),
         ):  # fmt: skip
             with self.subTest(words):
@@ -169,7 +179,7 @@ class TestReport(TargetsCase):
         self.assertIn("aim reached", page)
         self.assertIn("not measured: cloth 65k: no peer", page)
         self.assertIn("peer | &lt;b&gt;", page)
-        self.assertIn("| query | 19.9x [18.9, 20.9] |", page, "printed as text, too")
+        self.assertIn("| query | 19.9x (18.9–20.9) |", page, "printed as text, too")
 
     def test_no_targets_no_section(self) -> None:
         code, page = self.page()

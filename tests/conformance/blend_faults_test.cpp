@@ -67,11 +67,13 @@ struct Reduced {
   class Strategy : public BlendedStrategy<S, Count> {
    public:
     Strategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params&)
-        : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {
-      this->make_sources([](std::uint32_t, WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans) {
-        return std::make_unique<Faulty<S, ReducedBoxes<S>, fault>>(hierarchy, plans, 3, 0.0,
-                                                                   fault == BlendFault::no_margin ? 0 : 1);
-      });
+        : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {}
+
+   private:
+    std::unique_ptr<BlendSource<S>> make_source(std::uint32_t /*body*/, WideHierarchy<S>& hierarchy,
+                                                const FlightPlans<S>& plans) override {
+      return std::make_unique<Faulty<S, ReducedBoxes<S>, fault>>(hierarchy, plans, 3, 0.0,
+                                                                 fault == BlendFault::no_margin ? 0 : 1);
     }
   };
 };
@@ -82,10 +84,12 @@ struct Targets {
   class Strategy : public BlendedStrategy<S, Count> {
    public:
     Strategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params&)
-        : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {
-      this->make_sources([](std::uint32_t, WideHierarchy<S>& hierarchy, const FlightPlans<S>& plans) {
-        return std::make_unique<Faulty<S, TargetBoxes<S>, fault>>(hierarchy, plans);
-      });
+        : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {}
+
+   private:
+    std::unique_ptr<BlendSource<S>> make_source(std::uint32_t /*body*/, WideHierarchy<S>& hierarchy,
+                                                const FlightPlans<S>& plans) override {
+      return std::make_unique<Faulty<S, TargetBoxes<S>, fault>>(hierarchy, plans);
     }
   };
 };

@@ -1,5 +1,7 @@
 // The program with a list of strategies of its own, as a project out of the tree links it: one honest
 // strategy and some that fail, to see that the program refuses them a time and says so.
+#include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <exception>
 #include <new>
@@ -11,7 +13,25 @@
 namespace kbvh {
 namespace {
 
-enum class Fault { none, loses_a_pair, repeats_a_pair, throws, needs_memory, aborts };
+enum class Fault {
+  none,
+  loses_a_pair,
+  repeats_a_pair,
+  throws,
+  needs_memory,
+  aborts,
+  works_in_reset,
+  works_in_first_query,
+  lazy_when_timed,
+  lazy_unless_judged
+};
+
+/// Works for 30 ms.
+void work() {
+  const auto begin = std::chrono::steady_clock::now();
+  while (std::chrono::steady_clock::now() - begin < std::chrono::milliseconds(30)) {
+  }
+}
 
 /// Every pair of primitives is a candidate, but for the fault.
 template <class S, Fault fault>
@@ -20,8 +40,14 @@ class EveryPair : public Strategy<S> {
   static constexpr Foresight foresight = Foresight::none;
   EveryPair(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies, const Params&)
       : Strategy<S>(scene, motion) {}
-  void reset_to(double) override {}
+  void reset_to(double) override {
+    ++plays_;
+    frame_ = 0;
+    confirmed_ = -2;
+    if (fault == Fault::works_in_reset) work();
+  }
   void advance_to(double) override {
+    ++frame_;
     if (fault == Fault::throws) throw std::runtime_error("out of luck");
     if (fault == Fault::aborts && ++advances_ > number_of("KBVH_TEST_ABORT", 1000)) std::abort();
     if (fault == Fault::needs_memory && ++advances_ > memory_for()) {
@@ -30,6 +56,7 @@ class EveryPair : public Strategy<S> {
     }
   }
   QueryStatus find_candidates(double, PairBuffer& out, const Budget&) override {
+    if (fault == Fault::works_in_first_query && frame_ == 0) work();
     for (const BodyPair& pair : this->scene_.pairs())
       for (std::uint32_t a = 0; a < this->scene_.primitives(pair.first).count(); ++a)
         for (std::uint32_t b = 0; b < this->scene_.primitives(pair.second).count(); ++b)
@@ -39,9 +66,16 @@ class EveryPair : public Strategy<S> {
   }
   void confirm_candidates(double t, PairBuffer& pairs) override {
     Strategy<S>::confirm_candidates(t, pairs);
-    if (fault == Fault::loses_a_pair && !pairs.empty()) pairs.pop_back();
+    const bool loses = fault == Fault::loses_a_pair || (fault == Fault::lazy_when_timed && is_timed()) ||
+                       (fault == Fault::lazy_unless_judged && confirmed_ + 1 == frame_);
+    if (loses && !pairs.empty()) pairs.pop_back();
+    confirmed_ = frame_;
   }
   std::size_t bytes() const override { return 0; }
+
+ protected:
+  /// A timed instance plays several times, others once.
+  bool is_timed() const { return plays_ > 1; }
 
  private:
   /// How often it can advance before there is no memory left; below 0 there is none to throw, either, and it
@@ -51,12 +85,44 @@ class EveryPair : public Strategy<S> {
     const char* said = std::getenv(variable);
     return said == nullptr ? otherwise : std::atoi(said);
   }
-  int advances_ = 0;
+  int advances_ = 0, plays_ = 0;
+  int frame_ = 0, confirmed_ = -2;  ///< the current frame, and the last one whose pairs were confirmed
+};
+
+/// Answers other questions, too: no ray hits anything, and every pair may touch.
+template <class S, Fault fault>
+class EveryAnswer : public EveryPair<S, fault>, public AnswersRays<S>, public AnswersSweeps<S> {
+ public:
+  using EveryPair<S, fault>::EveryPair;
+  void find_hits(double, RayQuery, std::span<const Ray<S>>, std::span<RayHit> hits) override {
+    std::fill(hits.begin(), hits.end(), RayHit{});
+    if (fault == Fault::lazy_when_timed && this->is_timed()) hits[0] = {0, 0, 1};
+  }
+  void find_swept_pairs(double, double, std::span<const S* const>, PairBuffer& out) override {
+    if (fault == Fault::lazy_when_timed && this->is_timed()) return;
+    this->find_candidates(0, out, {});
+  }
 };
 
 template <class S, class Count>
-struct Honest : EveryPair<S, Fault::none> {
-  using EveryPair<S, Fault::none>::EveryPair;
+struct Honest : EveryAnswer<S, Fault::none> {
+  using EveryAnswer<S, Fault::none>::EveryAnswer;
+};
+template <class S, class Count>
+struct LazyWhenTimed : EveryAnswer<S, Fault::lazy_when_timed> {
+  using EveryAnswer<S, Fault::lazy_when_timed>::EveryAnswer;
+};
+template <class S, class Count>
+struct LazyUnlessJudged : EveryPair<S, Fault::lazy_unless_judged> {
+  using EveryPair<S, Fault::lazy_unless_judged>::EveryPair;
+};
+template <class S, class Count>
+struct WorksInReset : EveryPair<S, Fault::works_in_reset> {
+  using EveryPair<S, Fault::works_in_reset>::EveryPair;
+};
+template <class S, class Count>
+struct WorksInFirstQuery : EveryPair<S, Fault::works_in_first_query> {
+  using EveryPair<S, Fault::works_in_first_query>::EveryPair;
 };
 template <class S, class Count>
 struct Loses : EveryPair<S, Fault::loses_a_pair> {
@@ -87,6 +153,7 @@ Info info(const char* id, Guarantee guarantee) {
   info.citation = "nobody";
   info.tightness = Tightness::none;
   info.guarantee = guarantee;
+  info.rays_guarantee = Guarantee::approximate;
   info.topology.own = true;
   return info;
 }
@@ -106,6 +173,10 @@ const std::vector<StrategyEntry>& registry() {
       make_entry<Throws>(info("throws", Guarantee::exact)),
       make_entry<NeedsMemory>(info("needs_memory", Guarantee::exact)),
       make_entry<Aborts>(info("aborts", Guarantee::exact)),
+      make_entry<LazyWhenTimed>(info("lazy_when_timed", Guarantee::exact)),
+      make_entry<LazyUnlessJudged>(info("lazy_unless_judged", Guarantee::exact)),
+      make_entry<WorksInReset>(info("works_in_reset", Guarantee::exact)),
+      make_entry<WorksInFirstQuery>(info("works_in_first_query", Guarantee::exact)),
       make_entry<Honest>(small),
       make_entry<Honest>(near),
       make_entry<Honest, Scalars::double_only>(info("only_double", Guarantee::exact))};

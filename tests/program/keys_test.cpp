@@ -40,7 +40,7 @@ void add_keys(const Study& study, const LoadedScene& loaded, const json& machine
     frames.resize(std::min(frames.size(), most));
     const json about = scene_record(scene, loaded, l, std::span<const double>(frames), script);
     for (const ContestantSpec& spec : contestants)
-      keys.insert(configuration_key(Harness::rounds, "p", about, strategy_record(spec), study, machine));
+      keys.insert(configuration_key("p", about, strategy_record(spec), study, machine));
   }
 }
 
@@ -131,6 +131,8 @@ TEST(Keys, SeeEveryFieldOfAPlan) {
        {"l", {3}},
        {"scalars", {"float"}},
        {"repetitions", 2},
+       {"interval_width", 0.25},
+       {"seconds", 2.0},
        {"frames_limit", 3},
        {"oracle_every", 1},
        {"continuous", false}});
@@ -165,7 +167,7 @@ TEST(Keys, SeeEveryParameterOfEveryStrategy) {
   const auto add = [&](const StrategyRequest& request) {
     std::vector<std::string> notes;
     for (const ContestantSpec& spec : expand({request}, {}, {}, notes)) {
-      keys.insert(configuration_key(Harness::rounds, "p", scene, strategy_record(spec), Study{}, here));
+      keys.insert(configuration_key("p", scene, strategy_record(spec), Study{}, here));
       ++configurations;
     }
   };
@@ -237,36 +239,35 @@ TEST(Keys, SeeEveryNumberOfAScene) {
   EXPECT_GT(scenes_made, 100u);
 }
 
-TEST(Keys, SeeTheMachineTheProgramAndTheHarness) {
+TEST(Keys, SeeTheMachineAndTheProgram) {
   const json scene{{"name", "s"},       {"hash", "1"}, {"scalar", "float"},
                    {"per_keyframe", 1}, {"frames", 2}, {"frame_times", "3"}};
   std::vector<std::string> notes;
   const json strategy = strategy_record(expand({{"bottom_up", {}, {}}}, {}, {}, notes).at(0));
   std::set<std::string> keys;
   std::size_t altered = 0;
-  const auto add = [&](Harness harness, const std::string& program, const json& about, const json& who,
-                       const json& machine, bool continuous = false, std::optional<Answer> changes = {}) {
+  const auto add = [&](const std::string& program, const json& about, const json& who, const json& machine,
+                       bool continuous = false, std::optional<Answer> changes = {}) {
     Study study;
     study.continuous = continuous;
     study.changes = changes;
-    keys.insert(configuration_key(harness, program, about, who, study, machine));
+    keys.insert(configuration_key(program, about, who, study, machine));
     ++altered;
   };
-  add(Harness::rounds, "p", scene, strategy, here);
-  add(Harness::google_benchmark, "p", scene, strategy, here);
-  add(Harness::rounds, "q", scene, strategy, here);
-  add(Harness::rounds, "p", scene, strategy, here, true);
+  add("p", scene, strategy, here);
+  add("q", scene, strategy, here);
+  add("p", scene, strategy, here, true);
   for (const Answer answer : {Answer::candidates, Answer::pairs})
-    add(Harness::rounds, "p", scene, strategy, here, false, answer);
+    add("p", scene, strategy, here, false, answer);
   for (const auto& [name, value] : here.items()) {
     json machine = here;
     machine[name] = "another";
-    add(Harness::rounds, "p", scene, strategy, machine);
+    add("p", scene, strategy, machine);
   }
   for (const auto& [name, value] : scene.items()) {
     json about = scene;
     about[name] = "another";
-    add(Harness::rounds, "p", about, strategy, here);
+    add("p", about, strategy, here);
   }
   EXPECT_EQ(keys.size(), altered);
 }

@@ -15,7 +15,6 @@
 #include "experiments/results/result_file.hpp"
 #include "experiments/results/results.hpp"
 #include "experiments/results/table.hpp"
-#include "experiments/run/bench_harness.hpp"
 #include "experiments/study/contestants.hpp"
 
 namespace kbvh::experiments::loss_test {
@@ -26,7 +25,7 @@ const std::string one = tiny + "--strategies bottom_up ";
 TEST_F(Binary, OutOfMemoryIsNoBrokenGuaranteeAndIsMeasuredAgain) {
   // At the first frame, while it is verified; and when it is played, after it has held.
   for (const std::string memory : {"0", "4"})
-    for (const std::string command : {"run ", "bench "}) {
+    for (const std::string command : {"run "}) {
       SCOPED_TRACE(command + memory);
       const std::string out = command.substr(0, 1) + memory;
       const std::string arguments = command + tiny + "--strategies honest,needs_memory --out " + out;
@@ -142,12 +141,10 @@ TEST_F(Binary, WantOfMemoryIsNeverABrokenGuarantee) {
 }
 
 TEST_F(Binary, ALimitOnTheSizeOfFilesIsAFullDisk) {
-  for (const std::string command : {"run ", "bench "}) {
-    const Outcome run = shell("ulimit -f 8; '" KBVH_PROGRAM "' " + command + tiny +
-                              "--strategies bottom_up,rebuild --l 1,2 --out out");
-    EXPECT_TRUE(run.code == 2 || run.code == 3) << run.code << run.err;
-    EXPECT_NE(run.err.find("File too large"), std::string::npos) << run.err;
-  }
+  const Outcome run = shell("ulimit -f 8; '" KBVH_PROGRAM "' run " + tiny +
+                            "--strategies bottom_up,rebuild --l 1,2 --out out");
+  EXPECT_TRUE(run.code == 2 || run.code == 3) << run.code << run.err;
+  EXPECT_NE(run.err.find("File too large"), std::string::npos) << run.err;
 }
 
 TEST_F(Binary, FoldersThatCannotBeAreNamed) {
@@ -208,6 +205,21 @@ TEST_F(Binary, RecordsThatCannotBeUsedAreNamedAndMeasuredAgain) {
   }
 }
 
+TEST_F(Binary, RecordsOfAnOlderSchemaStayAndAreNeverUsed) {
+  ASSERT_EQ(kbvh("run " + one + "--out out").code, 0);
+  json old = records().at(0);
+  old["schema"] = 1;
+  write_text(folder_ / "out/results.jsonl", old.dump() + "\n");
+  const Outcome run = kbvh("run " + one + "--out out");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.err.find("out/results.jsonl holds 1 record of another schema than 2"), std::string::npos)
+      << run.err;
+  EXPECT_NE(run.err.find("1 configuration measured, 0 were in"), std::string::npos) << run.err;
+  ASSERT_EQ(records().size(), 2u);
+  EXPECT_EQ(records().at(0), old);
+  EXPECT_EQ(records().at(1).at("schema"), 2);
+}
+
 TEST_F(Binary, EveryFieldThatIsTakenOutIsNoticedOrNotNeeded) {
   ASSERT_EQ(kbvh("run " + one + "--out out").code, 0);
   const json whole = records().at(0);
@@ -245,32 +257,25 @@ TEST_F(Binary, TablesArePrintedWhereResultsCannotBeWritten) {
   const std::string room =
       "bash -c 'trap \"\" XFSZ; ulimit -f " + std::to_string(1 + 2 * size / 1024) + "; exec \"$0\" \"$@\"' ";
   const std::string contestants = "--strategies bottom_up,bottom_up_period,rebuild,top_down ";
-  for (const std::string command : {"run ", "bench "}) {
-    const std::string out(1, command[0]);
-    const Outcome run =
-        shell(room + "'" + KBVH_PROGRAM + "' " + command + tiny + contestants + "--out " + out);
-    EXPECT_EQ(run.code, 2) << run.err;
-    // Google Benchmark's file is written first, and the first failure is told.
-    const std::string file = out == "b" ? "benchmark.json" : "results.jsonl";
-    EXPECT_NE(run.err.find(file + ": cannot be written"), std::string::npos) << run.err;
-    for (const char* id : {"bottom_up ", "bottom_up_period ", "rebuild ", "top_down "})
-      EXPECT_NE(run.out.find(std::string("\n") + id), std::string::npos) << run.out;
-  }
+  const Outcome run = shell(room + "'" + KBVH_PROGRAM + "' run " + tiny + contestants + "--out out");
+  EXPECT_EQ(run.code, 2) << run.err;
+  EXPECT_NE(run.err.find("results.jsonl: cannot be written"), std::string::npos) << run.err;
+  for (const char* id : {"bottom_up ", "bottom_up_period ", "rebuild ", "top_down "})
+    EXPECT_NE(run.out.find(std::string("\n") + id), std::string::npos) << run.out;
 }
 
 TEST_F(Binary, FullDisksAndFoldersInTheWayAreNoticedBeforeAnythingIsMeasured) {
   const std::string no_room = "bash -c 'trap \"\" XFSZ; ulimit -f 1; exec \"$0\" \"$@\"' ";
-  for (const std::string& arguments :
-       {"run " + one + "--out out", "bench " + one + "--out out", std::string("stress --scenes 1 --out out"),
-        std::string("theory --sizes 100 --out out")}) {
+  for (const std::string& arguments : {"run " + one + "--out out", std::string("stress --scenes 1 --out out"),
+                                       std::string("theory --sizes 100 --out out")}) {
     const Outcome run = shell(no_room + "'" + KBVH_PROGRAM + "' " + arguments);
     EXPECT_EQ(run.code, 2) << arguments << run.err;
     EXPECT_EQ(run.out, "") << arguments;
     EXPECT_NE(run.err.find("cannot be written"), std::string::npos) << run.err;
   }
-  for (const std::string file : {"benchmark.json", "targets.json", "results.jsonl"}) {
+  for (const std::string file : {"targets.json", "results.jsonl"}) {
     std::filesystem::create_directories(folder_ / "taken" / file);
-    const Outcome run = kbvh("bench " + one + "--out taken");
+    const Outcome run = kbvh("run " + one + "--out taken");
     EXPECT_EQ(run.code, 2) << file;
     EXPECT_EQ(run.out, "") << file;
     EXPECT_NE(run.err.find(file), std::string::npos) << run.err;
@@ -282,51 +287,6 @@ TEST_F(Binary, FullDisksAndFoldersInTheWayAreNoticedBeforeAnythingIsMeasured) {
   for (const auto& entry : std::filesystem::directory_iterator(folder_ / "out"))
     names.insert(entry.path().filename());
   EXPECT_EQ(names, (std::set<std::string>{"results.jsonl", "scenes"}));
-}
-
-TEST_F(Binary, ADamagedBenchmarkFileIsKeptAndNamed) {
-  std::filesystem::create_directories(folder_ / "out");
-  for (const std::string damaged : {"precious", "{\"benchmarks\": 3}"}) {
-    std::filesystem::remove(folder_ / "out/results.jsonl");
-    write_text(folder_ / "out/benchmark.json", damaged);
-    const Outcome run = kbvh("bench " + one + "--out out");
-    EXPECT_EQ(run.code, 0) << run.err;
-    EXPECT_NE(
-        run.err.find("benchmark.json is not a file of Google Benchmark: it is now benchmark.json.damaged"),
-        std::string::npos)
-        << run.err;
-    EXPECT_TRUE(json::parse(text_of_file(folder_ / "out/benchmark.json")).at("benchmarks").is_array());
-  }
-  EXPECT_EQ(text_of_file(folder_ / "out/benchmark.json.damaged"), "precious");
-  EXPECT_EQ(text_of_file(folder_ / "out/benchmark.json.damaged-2"), "{\"benchmarks\": 3}");
-  // An empty file holds nothing that could be lost.
-  write_text(folder_ / "out/benchmark.json", "");
-  std::filesystem::remove(folder_ / "out/results.jsonl");
-  const Outcome run = kbvh("bench " + one + "--out out");
-  EXPECT_EQ(run.code, 0) << run.err;
-  EXPECT_EQ(run.err.find("warning"), std::string::npos) << run.err;
-  EXPECT_EQ(records().size(), 1u);
-}
-
-TEST(BenchmarkFile, ManyProcessesLoseNothing) {
-  const TemporaryFolder folder;
-  constexpr int processes = 6, each = 15;
-  for (int p = 0; p < processes; ++p) {
-    if (::fork() != 0) continue;
-    for (int i = 0; i < each; ++i)
-      add_to_benchmark_file(folder.path(),
-                            {{"context", {{"process", p}}}, {"benchmarks", {{{"name", p * each + i}}}}});
-    ::_exit(0);
-  }
-  for (int p = 0; p < processes; ++p) {
-    int status = -1;
-    ::wait(&status);
-    EXPECT_EQ(status, 0);
-  }
-  const json all = json::parse(text_of_file(folder / "benchmark.json"));
-  std::set<int> names;
-  for (const json& run : all.at("benchmarks")) names.insert(run.at("name").get<int>());
-  EXPECT_EQ(names.size(), std::size_t(processes * each));
 }
 
 TEST_F(Binary, AStressRunThatIsEndedLeavesWhatItFound) {
@@ -406,12 +366,12 @@ TEST_F(Binary, WhatKilledProcessesLeftIsRemoved) {
     if (is_old) std::filesystem::last_write_time(folder_ / "out" / name, old);
   };
   const std::string nobody = ".tmp-2147483647-0";  // above the largest process id
-  left("benchmark.json" + nobody, true);
+  left("stress.json" + nobody, true);
   left("targets.json" + nobody, false);
   left("stress.json.tmp-" + std::to_string(getpid()) + "-0", true);
   left("notes.tmp-mine", true);
   EXPECT_EQ(kbvh("run " + one + "--out out").code, 0);
-  EXPECT_FALSE(std::filesystem::exists(folder_ / ("out/benchmark.json" + nobody)));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / ("out/stress.json" + nobody)));
   EXPECT_TRUE(std::filesystem::exists(folder_ / ("out/targets.json" + nobody)))
       << "it may be of another machine";
   EXPECT_TRUE(std::filesystem::exists(folder_ / ("out/stress.json.tmp-" + std::to_string(getpid()) + "-0")));
@@ -516,10 +476,9 @@ TEST_F(Binary, NothingIsMeasuredTwiceInOneRun) {
   const std::string twice =
       "--scene waving_sheet --triangles 50,51,50 --obstacle 80 --keyframes 2 --l 2,2 --scalar float,float "
       "--repetitions 1 --strategies bottom_up,bottom_up ";
-  const Outcome bench = kbvh("bench " + twice + "--out out");
-  EXPECT_EQ(bench.code, 0) << bench.err;
+  const Outcome kept = kbvh("run " + twice + "--out out");
+  EXPECT_EQ(kept.code, 0) << kept.err;
   EXPECT_EQ(records().size(), 1u);
-  EXPECT_EQ(json::parse(text_of_file(folder_ / "out/benchmark.json")).at("benchmarks").size(), 1u);
   const Outcome run = kbvh("run " + twice);
   EXPECT_EQ(run.code, 0) << run.err;
   const auto first = run.out.find("\nbottom_up"), second = run.out.find("\nbottom_up", first + 1);

@@ -143,10 +143,10 @@ TEST_F(Merge, UnreadableLinesOfKilledStudiesAreSkippedWithANote) {
 TEST_F(Merge, WrongInputIsRefusedBeforeAnythingIsWritten) {
   write("a", {record("k1", "r1", "2026-01-01T00:00:00Z")});
   json newer = record("k2", "r1", "2026-01-01T00:00:00Z");
-  newer["schema"] = 2;
+  newer["schema"] = 3;
   write("newer", {record("k2", "r1", "2026-01-01T00:00:00Z"), newer});
   expect_refused("a newer --out c",
-                 "newer/results.jsonl line 2: has schema 2, but this program merges schema 1");
+                 "newer/results.jsonl line 2: has schema 3, but this program merges schemas 1 to 2");
   json altered = record("k1", "r1", "2026-01-01T00:00:00Z");
   altered["verified"]["missed"] = 1;
   write("altered", {altered});

@@ -125,7 +125,7 @@ TEST(Plan, DefaultsAndSweeps) {
   ASSERT_EQ(plan.studies.size(), 1u);
   EXPECT_EQ(plan.studies[0].scenes.size(), 9u);
   EXPECT_EQ(plan.studies[0].strategies[0].id, "default");
-  EXPECT_EQ(plan.studies[0].repetitions, 3u);
+  EXPECT_EQ(plan.studies[0].repetitions, 5u);
 }
 
 TEST(Plan, StudiesInheritAndOverride) {
@@ -163,12 +163,12 @@ TEST(Plan, WhatIsGivenTwiceIsMeasuredOnce) {
 }
 
 TEST(Plan, ErrorsNameFileKeyAndValue) {
-  EXPECT_EQ(
-      plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
-      "p.json: there is no key 'repetition'; known are builder, changes, continuous, description, "
-      "frames_limit, kernels, l, name, "
-      "oracle_every, params, rays, repetitions, scalars, scenes, strategies, studies, targets; did you mean "
-      "'repetitions'?");
+  EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
+            "p.json: there is no key 'repetition'; known are builder, changes, continuous, description, "
+            "frames_limit, interval_width, kernels, l, name, "
+            "oracle_every, params, rays, repetitions, scalars, scenes, seconds, strategies, studies, "
+            "targets; did you mean "
+            "'repetitions'?");
   EXPECT_TRUE(contains(plan_complaint("{\n  \"scenes\": ]\n}"), "p.json: line 2, column 13"));
   EXPECT_TRUE(contains(plan_complaint("[]"), "p.json: expected an object"));
   EXPECT_TRUE(contains(plan_complaint("{}"), "p.json: scenes: is missing"));

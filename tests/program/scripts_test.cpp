@@ -179,9 +179,7 @@ TEST(Scripts, ArePartOfAConfigurationsKey) {
   std::vector<std::string> notes;
   const auto spec = expand({{"bottom_up", {}, {}}}, {}, {}, notes).at(0);
   const json machine{{"cpu", ""}, {"compiler", ""}, {"flags", ""}, {"build_type", ""}, {"kernels", ""}};
-  const auto key = [&] {
-    return configuration_key(Harness::rounds, "p", about, strategy_record(spec), Study{}, machine);
-  };
+  const auto key = [&] { return configuration_key("p", about, strategy_record(spec), Study{}, machine); };
   const std::string without = key();
   about["script"] = script_record(script_of(scene, loaded), 1);
   EXPECT_NE(key(), without);

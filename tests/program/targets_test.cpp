@@ -338,10 +338,9 @@ TEST(Targets, GeometricMeansAreOverAllScenesThatCount) {
   const json row = row_of(plan, example_groups());
   EXPECT_EQ(row.at("over"), "geometric_mean");
   EXPECT_DOUBLE_EQ(row.at("measured").get<double>(), std::sqrt(3.0 * 2.5));
-  const json &sheet = row.at("per_scene")[0].at("confidence_interval"),
-             &soup = row.at("per_scene")[1].at("confidence_interval");
+  const json &sheet = row.at("per_scene")[0].at("range"), &soup = row.at("per_scene")[1].at("range");
   for (const std::size_t end : {0u, 1u})
-    EXPECT_DOUBLE_EQ(row.at("confidence_interval")[end].get<double>(),
+    EXPECT_DOUBLE_EQ(row.at("range")[end].get<double>(),
                      std::sqrt(sheet[end].get<double>() * soup[end].get<double>()));
   EXPECT_NE(targets_table(json::array({row})).find("mean of 2"), std::string::npos);
   auto groups = example_groups();
@@ -400,13 +399,22 @@ TEST(Targets, Verdicts) {
 }
 
 TEST(Targets, IntervalsAreReproducibleAndHoldTheRatio) {
-  const json row = row_of(example_plan(), example_groups()), again = row_of(example_plan(), example_groups());
-  EXPECT_EQ(row.at("confidence_interval"), again.at("confidence_interval"));
-  // Of soup: medians of 10, 10, 12 over a constant 4.
-  EXPECT_EQ(row.at("confidence_interval"), (json{2.5, 3.0}));
   auto groups = example_groups();
+  groups[1].records[0] = record("bottom_up_period", 1, {10, 10, 12, 10, 12});
+  groups[1].records[1] = record("bottom_up", 1, {4, 4, 4, 4, 4});
+  const json row = row_of(example_plan(), groups), again = row_of(example_plan(), groups);
+  EXPECT_EQ(row.at("confidence_interval"), again.at("confidence_interval"));
+  // Of soup: medians of 10, 10, 12, 10, 12 over a constant 4.
+  EXPECT_EQ(row.at("confidence_interval"), (json{2.5, 3.0}));
+  EXPECT_TRUE(row.at("range").is_null());
+  // Fewer than five repetitions: the range of single ones, and no interval.
+  const json few = row_of(example_plan(), example_groups());
+  EXPECT_TRUE(few.at("confidence_interval").is_null());
+  EXPECT_EQ(few.at("range"), (json{2.5, 3.0}));
+  EXPECT_NE(targets_table(json::array({few})).find("[2.5 to 3]"), std::string::npos);
   groups[1].records[0] = record("bottom_up_period", 1, {10});
   EXPECT_TRUE(row_of(example_plan(), groups).at("confidence_interval").is_null());
+  EXPECT_TRUE(row_of(example_plan(), groups).at("range").is_null());
 }
 
 TEST(Targets, SelectorsSeeBuilderParametersAndPhase) {
@@ -518,15 +526,16 @@ TEST(Targets, TableShowsRowsAndScenes) {
   EXPECT_EQ(
       table,
       "Targets: how many times slower the other is, on the scenes that count\n"
-      "target            measured  95 % interval  at least  aim  verdict    on\n"
-      "flat over period       2.5       2.5 to 3         2    4  reached  soup\n"
+      "target            measured  interval or [range]  at least  aim  verdict    on\n"
+      "flat over period       2.5           [2.5 to 3]         2    4  reached  soup\n"
       "\n"
-      "All scenes (* counts)\n"
+      "All scenes (* counts, ? disturbed)\n"
       "\n"
-      "flat over period  ratio    95 % interval  ms                         of  ms                  of\n"
-      "  sheet *             3  0.2667 to 3.333   9  bottom_up_period [leaf=1]   3  bottom_up [leaf=4]\n"
-      "  soup *            2.5         2.5 to 3  10  bottom_up_period [leaf=1]   4  bottom_up [leaf=1]\n"
-      "  other             0.5       0.5 to 0.5   1  bottom_up_period [leaf=1]   2  bottom_up [leaf=1]\n");
+      "flat over period  ratio  interval or [range]  ms                         of  ms                  of\n"
+      "  sheet *             3        [0.3333 to 3]   9  bottom_up_period [leaf=1]   3  bottom_up [leaf=4]\n"
+      "  soup *            2.5           [2.5 to 3]  10  bottom_up_period [leaf=1]   4  bottom_up [leaf=1]\n"
+      "  other             0.5         [0.5 to 0.5]   1  bottom_up_period [leaf=1]   2  bottom_up "
+      "[leaf=1]\n");
 }
 
 TEST(Targets, RowsOfTheSamePlanAreReplacedAndOthersStay) {

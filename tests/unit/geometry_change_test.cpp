@@ -264,6 +264,7 @@ std::uint64_t expect_growth_keeps_order(std::string_view kind = {}) {
   const auto test = synthetic_scene<double>("soups");
   Playback<double> playback(test.scene);
   EventClock<double> clock({&playback.plans(0), &playback.plans(1)});
+  clock.start();
   Queue queue(clock, 10);
   // As structures do: a choice must not forget this.
   const std::vector<double> cuts{0, 0.25, 0.5, 0.75, 1};

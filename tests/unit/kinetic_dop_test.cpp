@@ -80,7 +80,8 @@ class Play {
         boxes_(view_, ClipMotion<S>(playback_), at_start(builder), count_) {
     for (std::uint32_t body = 0; body < forest_.size(); ++body) {
       dops_.emplace_back(forest_.clock(), body, forest_.tree(body).topology().size());
-      margins_.emplace_back(playback_.plans(body));
+      dops_.back().start_over();
+      margins_.emplace_back().start_over(playback_.plans(body));
       below_.push_back(vertices_below(forest_.tree(body)));
     }
   }

@@ -1,5 +1,5 @@
-// What the conformance suite cannot see of bounds over segments: what they leave out, what they remember, and
-// that work ahead of time is spread.
+// What the conformance suite cannot see of bounds over segments: what they leave out, and that work
+// ahead of time is spread.
 
 #include <gtest/gtest.h>
 
@@ -176,65 +176,6 @@ Scene<float> waves(std::uint32_t n, std::uint32_t keyframes) {
   }
   scene.pairs = all_pairs(scene.bodies);
   return scene;
-}
-
-// ---- Clips that play again
-
-TEST(LinearBounds, AClipThatPlaysAgainFindsItsBoxes) {
-  const Scene<float> scene = waves(24, 6);
-  const std::vector<double> frames = frame_times(scene, 5);
-  for (const char* id : all_linear) {
-    const StrategyEntry& entry = find_strategy(id);
-    Session<float> session(scene, {&entry, {{"remember_mb", "10"}}, entry.info.topology.preferred},
-                           CountingPolicy::counting);
-    EXPECT_EQ(verified(session, scene, frames).first_violation, "") << id;
-    Counters counters = session.strategy().counters();
-    EXPECT_EQ(counters[Counter::bodies_remembered], 0u) << id;
-    EXPECT_GT(counters[Counter::vertex_reads], 0u) << id;
-    std::size_t bytes = 0;
-    for (int again = 0; again < 3; ++again) {
-      EXPECT_EQ(verified(session, scene, frames).first_violation, "") << id;
-      counters = session.strategy().counters();
-      EXPECT_EQ(counters[Counter::bodies_remembered], 8u)
-          << id << ": six knots of two bodies, less the first two, which `reset` finds and nobody counts";
-      EXPECT_EQ(counters[Counter::vertex_reads], 0u) << id;
-      EXPECT_EQ(counters[Counter::nodes_visited], 0u) << id;
-      // Once more: the two joins that work ahead have changed places.
-      if (again == 0) bytes = session.strategy().bytes();
-      EXPECT_EQ(session.strategy().bytes(), bytes) << id;
-    }
-  }
-}
-
-TEST(LinearBounds, WhatFindsNoRoomIsMadeAgain) {
-  const Scene<float> scene = waves(24, 6);
-  const StrategyEntry& entry = find_strategy("linear_bounds");
-  // Room for about half of twelve.
-  Session<float> session(scene, {&entry, {{"remember_mb", "0.03"}}, entry.info.topology.preferred},
-                         CountingPolicy::counting);
-  const std::vector<double> frames = frame_times(scene, 5);
-  for (int play = 0; play < 3; ++play) EXPECT_EQ(verified(session, scene, frames).first_violation, "");
-  const Counters counters = session.strategy().counters();
-  EXPECT_GT(counters[Counter::bodies_remembered], 0u);
-  EXPECT_LT(counters[Counter::bodies_remembered], 8u);
-  EXPECT_GT(counters[Counter::vertex_reads], 0u);
-}
-
-TEST(LinearBounds, NothingIsRememberedOfPlansThatChanged) {
-  const Scene<double> scene = grids<double>(8, 0.2, [](std::uint32_t i) { return 0.1 * std::sin(0.3 * i); });
-  const std::vector<double> frames = frame_times(scene, 6);
-  PlanScript<double> script;
-  PlanChange<double> up{.body = 0, .vertex = 40, .times = {}, .positions = {}, .velocity = {0, 0, 1}};
-  script.steps.push_back({frames[3], {up}, {}});
-  for (const char* id : all_linear) {
-    const StrategyEntry& entry = find_strategy(id);
-    Session<double> session(scene, {&entry, {{"remember_mb", "10"}}, entry.info.topology.preferred},
-                            CountingPolicy::silent);
-    for (const PlanScript<double>* with : {&script, (PlanScript<double>*)nullptr, &script}) {
-      Oracle<double> oracle(scene);
-      EXPECT_EQ(verify(session, std::span<const double>(frames), oracle, with).first_violation, "") << id;
-    }
-  }
 }
 
 // ---- Ahead of time

@@ -15,7 +15,7 @@ export function command(run) {
   const { options, scene, why } = cell.again;
   if (why) return { text: "", why };
   if (options) {
-    const words = ["kbvh", run.kind === "bench" ? "bench" : "run", options, "--strategies", quoted(contestant.id)];
+    const words = ["kbvh", "run", options, "--strategies", quoted(contestant.id)];
     for (const [key, value] of Object.entries(contestant.params)) words.push("--param", quoted(`${key}=${value}`));
     const { builder } = contestant;
     if (builder) words.push("--builder", builder.method, "--width", builder.width, "--leaf-size", builder.leaf_size);
@@ -39,7 +39,7 @@ export function command(run) {
       ...cell.asked,
     };
     lines.push("cat > again.json <<'PLAN'", JSON.stringify(plan, null, 1), "PLAN");
-    lines.push(`kbvh ${run.kind === "bench" ? "bench" : "run"} --plan again.json --out again`);
+    lines.push("kbvh run --plan again.json --out again");
   }
   return { text: lines.join("\n"), why: "" };
 }

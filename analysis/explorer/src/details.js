@@ -51,6 +51,7 @@ export function details(model, state, run, close) {
         : `protrusion ${significant(run.protrusion, 2)}, looseness ${percent(run.looseness)}`,
     ],
     ["Memory", `${bytes(run.bytes)}${run.build_ms === null ? "" : `, built in ${milliseconds(run.build_ms)} ms`}`],
+    ["Machine while measured", run.disturbed ? `disturbed: ${run.disturbed}` : "quiet, as far as recorded"],
     ["Measured", `${run.when.replace("T", " ").replace("Z", " UTC")}, commit ${cell.commit.label}`],
     [
       "Machine",

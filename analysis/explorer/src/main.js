@@ -343,7 +343,7 @@ function build() {
       "footer",
       {},
       make("p", {
-        text: `From ${model.data.source}. Ratios compare repetition with repetition where both ran in one session; intervals are bootstraps over repetitions.`,
+        text: `From ${model.data.source}. Times are of whole clips, by medians of frames; intervals are bootstraps over whole rounds, and ranges where there are fewer than five.`,
       }),
     ),
     host.said,

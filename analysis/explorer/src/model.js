@@ -1,5 +1,5 @@
 // The results as objects, and the choices of the page applied to them.
-import { SCOPES, median, ratio } from "./statistics.js";
+import { SCOPES, ratio, timeOf } from "./statistics.js";
 import { factor, milliseconds, bytes, count } from "./words.js";
 
 /** What can be measured: times with repetitions, times of single frames, and numbers without a clock. */
@@ -88,22 +88,23 @@ export function times(model, run, scope) {
   ));
 }
 
-/** Returns a run's value of a measure: the median of repetitions where there are any; null if unknown. */
+/** Returns a run's value of a measure: by medians over repetitions where there are any; null if unknown. */
 export function value(model, run, measure) {
   const { column } = MEASURES[measure];
   if (column) return run.refused ? null : run[column];
-  return (run.medians[measure] ??= run.times.length ? median(times(model, run, measure)) : null);
+  return (run.medians[measure] ??= run.times.length ? timeOf(run, model.place, measure) : null);
 }
 
-/** Returns how many times better a run is than another in a measure; without an interval where there are no repetitions. */
+/** Returns how many times better a run is than another in a measure; equal ends where there are no repetitions. */
 export function compare(model, run, reference, measure) {
   if (!reference) return null;
   if (measure in SCOPES)
-    return ratio(times(model, run, measure), times(model, reference, measure), run.session === reference.session);
+    return ratio(run, reference, model.place, measure);
   const own = value(model, run, measure);
   const other = value(model, reference, measure);
   if (!(own > 0) || other === null) return null;
-  return { middle: other / own, low: other / own, high: other / own, paired: true, within: null };
+  const middle = other / own;
+  return { middle, low: middle, high: middle, paired: true, isInterval: false, disturbed: false };
 }
 
 /** Returns the values that a facet has, of a run. */
@@ -198,17 +199,16 @@ export function referenceName(model, state) {
   return known ? (known.id === state.against ? known.title : known.label) : state.against;
 }
 
-/** Formats a ratio with its interval. */
+/** Formats a ratio: with its (interval) or its [range over fewer than five repetitions], and ? where the machine was disturbed. */
 export function ratioText(found) {
   if (!found) return "–";
-  const within = found.within ?? (found.low < found.high ? [found.low, found.high] : null);
-  return (
-    (found.paired ? "" : "~ ") + factor(found.middle) + (within ? ` (${factor(within[0])}–${factor(within[1])})` : "")
-  );
+  const ends = `${factor(found.low)}–${factor(found.high)}`;
+  const within = found.low === found.high ? "" : found.isInterval ? ` (${ends})` : ` [${ends}]`;
+  return (found.paired ? "" : "~ ") + factor(found.middle) + (found.disturbed ? "?" : "") + within;
 }
 
-/** Returns 1 if a ratio's interval lies above 1, -1 if below, 0 if it has 1 or there is none. */
+/** Returns 1 if a ratio's interval or range lies above 1, -1 if below, 0 if it has 1, is disturbed, or is of one repetition. */
 export function decided(found) {
-  if (!found?.within) return 0;
-  return found.within[0] > 1 ? 1 : found.within[1] < 1 ? -1 : 0;
+  if (!found || found.low === found.high || found.disturbed) return 0;
+  return found.low > 1 ? 1 : found.high < 1 ? -1 : 0;
 }

@@ -8,8 +8,6 @@ export const SCOPES = {
   query: ["traversal", "triangle_tests"],
 };
 
-const CONFIDENCE = 0.95;
-
 export function median(values) {
   const sorted = [...values].sort((a, b) => a - b);
   const half = sorted.length >> 1;
@@ -27,84 +25,97 @@ export function quantile(sorted, share) {
   return sorted[below] + (at - below) * ((sorted[below + 1] ?? sorted[below]) - sorted[below]);
 }
 
+/** Fewer repetitions have a range and no interval. */
+export const FEWEST_OF_AN_INTERVAL = 5;
+const DRAWS = 200;
+const LEFT_OUT = DRAWS / 40;
+const drawn = new Map();
+
+/** Returns the resampled rounds, the same as in analysis/clip_times.py (Steele, Lea and Flood 2014). */
+function resamples(repetitions) {
+  if (drawn.has(repetitions)) return drawn.get(repetitions);
+  const mask = (1n << 64n) - 1n;
+  let state = 1n;
+  const found = Array.from({ length: DRAWS }, () =>
+    Array.from({ length: repetitions }, () => {
+      let x = (state = (state + 0x9e3779b97f4a7c15n) & mask);
+      x = ((x ^ (x >> 30n)) * 0xbf58476d1ce4e5b9n) & mask;
+      x = ((x ^ (x >> 27n)) * 0x94d049bb133111ebn) & mask;
+      return Number((((x ^ (x >> 31n)) >> 32n) * BigInt(repetitions)) >> 32n);
+    }),
+  );
+  drawn.set(repetitions, found);
+  return found;
+}
+
+/** Returns the time of a scope by clips, over drawn repetitions: medians of sums, of which phases are scaled to the total. */
+function byClips(run, place, scope, draw) {
+  const at = (r, phase) => run.times[r][place[phase]];
+  const parts = SCOPES.without_motion;
+  const total = median(draw.map((r) => parts.reduce((sum, phase) => sum + at(r, phase), 0)));
+  const motion = SCOPES[scope].includes("motion") ? median(draw.map((r) => at(r, "motion"))) : 0;
+  const inner = SCOPES[scope].filter((phase) => phase !== "motion");
+  if (inner.length === parts.length) return total + motion;
+  const middle = parts.map((phase) => median(draw.map((r) => at(r, phase))));
+  const whole = middle.reduce((a, b) => a + b, 0);
+  const part = inner.reduce((sum, phase) => sum + middle[parts.indexOf(phase)], 0);
+  return motion + (whole > 0 ? (total * part) / whole : 0);
+}
+
+const every = (run) => run.times.map((_, r) => r);
+
+/** Returns the time of a run over a scope in ms per frame; `place` numbers the phases. */
+export function timeOf(run, place, scope, clips = run.clips) {
+  if (clips) return byClips(run, place, scope, every(run));
+  return SCOPES[scope].reduce((sum, phase) => sum + run.middle[place[phase]], 0);
+}
+
+/** Returns that time over resampled rounds. */
+function replicates(run, place, scope, clips) {
+  if (clips || !run.draws.length) return resamples(run.times.length).map((draw) => byClips(run, place, scope, draw));
+  const [motion, update, query] = run.draws;
+  const of = {
+    with_motion: (i) => motion[i] + update[i] + query[i],
+    without_motion: (i) => update[i] + query[i],
+    update: (i) => update[i],
+    query: (i) => query[i],
+  }[scope];
+  return motion.map((_, i) => of(i));
+}
+
 /**
- * Returns how many times faster a run is than another, from their times by repetition: the middle, the extremes over
- * repetitions and the bootstrap's interval; null without times. Paired repetitions ran next to each other.
+ * Returns how many times faster a run is than another: the middle, and the ends of the 95 % interval (a bootstrap over whole
+ * rounds) or, with fewer than five repetitions, of their range; null without times. If one counts by clips, both do. Paired
+ * repetitions ran next to each other.
  */
-export function ratio(own, other, sameSession) {
-  if (!own.length || !other.length || Math.min(...own) <= 0) return null;
-  const paired = sameSession && own.length === other.length;
-  const within = interval(own, other, paired);
-  if (paired) {
-    const quotients = other.map((value, i) => value / own[i]);
-    return { middle: median(quotients), low: Math.min(...quotients), high: Math.max(...quotients), paired, within };
-  }
-  return {
-    middle: median(other) / median(own),
-    low: Math.min(...other) / Math.max(...own),
-    high: Math.max(...other) / Math.min(...own),
+export function ratio(own, other, place, scope) {
+  if (!own.times.length || !other.times.length) return null;
+  const clips = own.clips || other.clips;
+  const [bottom, top] = [own, other].map((run) => timeOf(run, place, scope, clips));
+  if (!(bottom > 0 && top > 0)) return null;
+  const [n, m] = [own.times.length, other.times.length];
+  const paired = n === m && own.session === other.session;
+  const middle = top / bottom;
+  const disturbed = Boolean(own.disturbed || other.disturbed);
+  const found = (low, high, isInterval) => ({
+    middle,
+    low: Math.min(low, middle),
+    high: Math.max(high, middle),
     paired,
-    within,
-  };
-}
-
-/** Returns the ends of the exact percentile bootstrap's 95 % interval; null for a single repetition. */
-export function interval(own, other, paired) {
-  if (own.length < 2 || other.length < 2) return null;
-  if (paired) return percentiles(medians(other.map((value, i) => value / own[i])));
-  const mine = medians(own);
-  return percentiles(medians(other).flatMap(([m, p]) => mine.map(([n, q]) => [m / n, p * q])));
-}
-
-function choose(n, k) {
-  let result = 1;
-  for (let i = 1; i <= k; ++i) result = (result * (n - k + i)) / i;
-  return result;
-}
-
-/** Returns the medians of all resamples, each with its probability. */
-function medians(values) {
-  const x = [...values].sort((a, b) => a - b);
-  const n = x.length;
-  const half = (n + 1) >> 1;
-  const atLeast = (k, i) => {
-    let sum = 0;
-    for (let j = k; j <= n; ++j) sum += choose(n, j) * (i / n) ** j * (1 - i / n) ** (n - j);
-    return sum;
-  };
-  const lower = x.map((_, i) => atLeast(half, i + 1) - atLeast(half, i));
-  if (n % 2) return x.map((value, i) => [value, lower[i]]);
-  const result = [];
-  for (let i = 0; i < n; ++i) {
-    let alone = lower[i];
-    for (let j = i + 1; j < n; ++j) {
-      const share =
-        (((i + 1) / n) ** half - (i / n) ** half) *
-        (((n - j) / n) ** half - ((n - j - 1) / n) ** half) *
-        choose(n, half);
-      alone -= share;
-      result.push([(x[i] + x[j]) / 2, share]);
-    }
-    result.push([x[i], alone]);
+    isInterval,
+    disturbed,
+  });
+  if (Math.min(n, m) >= FEWEST_OF_AN_INTERVAL) {
+    const above = replicates(other, place, scope, clips);
+    const below = replicates(own, place, scope, clips);
+    if (!paired) above.reverse();
+    const ends = above.map((value, i) => value / below[i]).sort((a, b) => a - b);
+    return found(ends[LEFT_OUT], ends[DRAWS - 1 - LEFT_OUT], true);
   }
-  return result;
-}
-
-function percentiles(weighted) {
-  const outside = (1 - CONFIDENCE) / 2;
-  weighted.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
-  let below = 0;
-  let low = weighted[0][0];
-  let high = weighted.at(-1)[0];
-  for (const [value, share] of weighted) {
-    if (below <= outside) low = value;
-    below += share;
-    if (below >= 1 - outside) {
-      high = value;
-      break;
-    }
-  }
-  return [low, high];
+  if (Math.min(n, m) < 2) return found(middle, middle, false);
+  const each = [own, other].map((run) => every(run).map((r) => byClips(run, place, scope, [r])));
+  const quotients = paired ? each[1].map((value, i) => value / each[0][i]) : each[1].flatMap((v) => each[0].map((w) => v / w));
+  return found(Math.min(...quotients), Math.max(...quotients), false);
 }
 
 /**

@@ -30,7 +30,7 @@ py::dict run(const std::string& text, const std::string& place, const std::strin
   PrintedText printed;
   {
     const Unlocked unlocked;
-    outcome = run_plan(plan, Harness::rounds, out);
+    outcome = run_plan(plan, out);
   }
   py::dict result;
   result["tables"] = printed.text();

@@ -13,7 +13,7 @@
 
 namespace kbvh {
 
-/// Boxes on demand that are blends of boxes made before the clip began.
+/// Boxes on demand that are blends of boxes made when the clip began.
 template <class S>
 class BlendedRows : public RowsOnDemand<S> {
  public:
@@ -41,9 +41,10 @@ class BlendedRows : public RowsOnDemand<S> {
 };
 
 /// The shared part of strategies whose boxes at any time are blends of stored boxes, known from the whole
-/// clip: a derived class gives each moving body its source. Frames cost O(terms) for each body, and O(terms)
-/// for each node that a query reads. Bodies at rest keep tight boxes; bodies whose vertices get plans of
-/// their own are refitted at every frame from then on, since their motion is no longer that of the clip.
+/// clip: a derived class gives each moving body its source at every `reset`, which is part of the clip.
+/// Frames cost O(terms) for each body, and O(terms) for each node that a query reads. Bodies at rest keep
+/// tight boxes; bodies whose vertices get plans of their own are refitted at every frame from then on, since
+/// their motion is no longer that of the clip.
 template <class S, class Count>
 class BlendedStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>, public TakesPlanChanges<S> {
  public:
@@ -66,10 +67,13 @@ class BlendedStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>,
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
       Body& body = bodies_[index];
       body.rows.start_over();
+      body.source.reset();
       // A body without primitives has no source of blended boxes.
-      body.known = !this->scene_.moving(index)                                ? Known::still
-                   : body.source != nullptr && motion_.as_in_the_scene(index) ? Known::blended
-                                                                              : Known::refitted;
+      if (this->scene_.moving(index) && motion_.as_in_the_scene(index) && !hierarchy(index).empty())
+        body.source = make_source(index, hierarchy(index), motion_.plans(index));
+      body.known = !this->scene_.moving(index) ? Known::still
+                   : body.source != nullptr    ? Known::blended
+                                               : Known::refitted;
       if (body.known == Known::blended)
         new_blend(index, t);
       else
@@ -144,14 +148,9 @@ class BlendedStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>,
     Known known = Known::still;
   };
 
-  /// Calls make(body, hierarchy, plans), which returns a BlendSource<S>, for each body that moves as its
-  /// keyframes say; to be called by the constructor.
-  template <class Make>
-  void make_sources(const Make& make) {
-    for (std::uint32_t index = 0; index < bodies_.size(); ++index)
-      if (this->scene_.moving(index) && motion_.as_in_the_scene(index) && !hierarchy(index).empty())
-        bodies_[index].source = make(index, hierarchy(index), motion_.plans(index));
-  }
+  /// Makes the source of a body that moves as its keyframes say; called by `reset_to`, body by body.
+  virtual std::unique_ptr<BlendSource<S>> make_source(std::uint32_t body, WideHierarchy<S>& hierarchy,
+                                                      const FlightPlans<S>& plans) = 0;
   const WideHierarchy<S>& hierarchy(std::uint32_t index) const { return bodies_[index].rows.hierarchy(); }
   WideHierarchy<S>& hierarchy(std::uint32_t index) { return bodies_[index].rows.hierarchy(); }
 

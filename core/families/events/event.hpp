@@ -81,8 +81,8 @@ class EventClock {
  public:
   using Event = kbvh::Event;
   using Packed = PackedEvent;
-  /// Copies the keyframes of moving bodies along the directions of the sides. Bodies with common keyframes
-  /// share the copy.
+  /// `start` copies the keyframes of moving bodies along the directions of the sides. Bodies with common
+  /// keyframes share the copy.
   explicit EventClock(std::vector<const FlightPlans<S>*> plans,
                       std::span<const SlabDirection> directions = Dop<S, 6>::directions)
       : plans_(std::move(plans)), directions_(directions) {
@@ -90,7 +90,7 @@ class EventClock {
     for (const FlightPlans<S>* body : plans_) {
       const KeyframeRows<S>*& rows = of_keyframes[body->keyframe(0)];
       if (rows == nullptr) {
-        distinct_rows_.push_back(std::make_unique<const KeyframeRows<S>>(*body, directions));
+        distinct_rows_.push_back(std::make_unique<KeyframeRows<S>>(*body, directions));
         rows = distinct_rows_.back().get();
       }
       rows_.push_back(rows);
@@ -357,7 +357,9 @@ class EventClock {
     }
     crossings_[place] = *own_crossing;
   }
-  void clear() {
+  /// Copies the keyframes, and forgets all crossings: a clip begins. No event may be asked for before.
+  void start() {
+    for (const auto& rows : distinct_rows_) rows->copy();
     if (crossings_.empty()) return;
     crossings_.clear();
     free_.clear();
@@ -432,7 +434,7 @@ class EventClock {
   std::vector<const FlightPlans<S>*> plans_;
   std::span<const SlabDirection> directions_;
   std::vector<const KeyframeRows<S>*> rows_;  ///< [body]
-  std::vector<std::unique_ptr<const KeyframeRows<S>>> distinct_rows_;
+  std::vector<std::unique_ptr<KeyframeRows<S>>> distinct_rows_;
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   std::vector<Crossing<S>> crossings_;  ///< crossings of vertices with their own plans
   std::vector<std::uint32_t> place_;    ///< [slot] index in crossings_, or none; none for slots past the end

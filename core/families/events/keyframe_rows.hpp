@@ -9,16 +9,18 @@
 
 namespace kbvh {
 
-/// A copy of a body's keyframes in vertex order: one row of numbers per vertex and direction. The search for
-/// a certificate's failure then reads memory in order, several keyframes at a time. Along an axis the numbers
-/// are the coordinates. Along another direction they are projections, rounded to S (projected_plan.hpp).
-/// Per-vertex plans are not included. Keyframes never change, and neither do the rows.
+/// A copy of a body's keyframes in vertex order, made when a clip begins: one row of numbers per vertex and
+/// direction. The search for a certificate's failure then reads memory in order, several keyframes at a time.
+/// Along an axis the numbers are the coordinates. Along another direction they are projections, rounded to S
+/// (projected_plan.hpp). Per-vertex plans are not included. Keyframes never change, and neither do the rows.
 template <class S>
 class KeyframeRows {
  public:
-  /// Copies the keyframes; O(keyframes x directions) time and memory. Copies nothing for a body with one
-  /// keyframe.
+  /// Copies nothing yet: only the times may be asked for.
   KeyframeRows(const FlightPlans<S>& plans, std::span<const SlabDirection> directions);
+  /// Copies the keyframes, again if they were copied before; O(keyframes x directions) time and memory.
+  /// Copies nothing for a body with one keyframe.
+  void copy();
 
   std::span<const double> times() const { return times_; }
   /// Returns the values of a vertex along a direction, [keyframe]. Requires a body with several keyframes.
@@ -42,6 +44,8 @@ class KeyframeRows {
   std::size_t bytes() const { return values_.capacity() * sizeof(S); }
 
  private:
+  const FlightPlans<S>* plans_;
+  std::span<const SlabDirection> directions_;
   std::span<const double> times_;  ///< of the plans
   std::size_t vertices_;
   double per_second_ = 0;  ///< average number of keyframes per second

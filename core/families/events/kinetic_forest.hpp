@@ -47,7 +47,7 @@ class KineticForest {
   /// Restarts at t.
   void reset(double t) {
     queue_.clear();
-    clock_.clear();
+    clock_.start();
     for (Tree& tree : trees_) tree.initialise(t);
   }
   /// Handles every event up to and including t (Z&W Algorithm 1).

@@ -52,15 +52,12 @@ Piece<S> projected_piece(const FlightPlans<S>& plans, std::uint32_t vertex, cons
 template <class S>
 class ProjectionMargin {
  public:
-  /// Takes R from the keyframes. O(keyframes).
-  explicit ProjectionMargin(const FlightPlans<S>& plans) {
+  /// Takes R from the keyframes alone. O(keyframes). Must precede the other calls.
+  void start_over(const FlightPlans<S>& plans) {
+    keyframed_ = 0;
     for (std::size_t k = 0; k < plans.keyframe_count(); ++k)
       for (std::size_t v = 0; v < plans.keyframed_count(); ++v)
         keyframed_ = std::max(keyframed_, length(plans.keyframe(k) + 3 * v));
-  }
-
-  /// Forgets the vertices' own plans.
-  void start_over() {
     own_reach_ = speed_ = 0;
     since_ = std::numeric_limits<double>::infinity();
   }

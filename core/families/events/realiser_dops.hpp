@@ -35,10 +35,10 @@ template <class S, int K>
 class RealiserDops {
  public:
   RealiserDops(const EventClock<S>& clock, std::uint32_t body, std::uint32_t nodes)
-      : clock_(&clock), body_(body), margin_(clock.plans(body)), cache_(nodes) {}
+      : clock_(&clock), body_(body), cache_(nodes) {}
 
-  /// Forgets the vertices' own plans.
-  void start_over() { margin_.start_over(); }
+  /// Begins a clip: measures the keyframes, and forgets the vertices' own plans.
+  void start_over() { margin_.start_over(clock_->plans(body_)); }
   /// Includes the plan that a vertex follows from t on.
   void include(std::uint32_t vertex, double t) { margin_.include(clock_->plans(body_), vertex, t); }
   void resize(std::uint32_t nodes) { cache_.resize(nodes); }

@@ -90,7 +90,7 @@ class RoundedClock {
   }
 
   void remember(std::uint32_t /*slot*/, const std::optional<Crossing<S>>& /*own_crossing*/) {}
-  void clear() {}
+  void start() {}
 
  private:
   /// Implements `first_failure` with times of type T.

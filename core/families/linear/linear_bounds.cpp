@@ -23,7 +23,6 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
     : scene_(scene),
       motion_(motion),
       cuts_(settings.cuts),
-      memory_(scene.body_count(), settings.remembered_bytes),
       near_bodies_(scene.pairs(), scene.body_count()),
       horizon_(settings.horizon),
       changed_(scene.body_count()),
@@ -93,20 +92,6 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
     ++counts_[index].apart;
     return {};
   }
-  Refit refit{child_bounds.data(), node_bounds.data(), at.positions, std::uint32_t(nodes), nullptr};
-  const bool remembers = memory_.is_used() && motion.as_in_the_scene(index);
-  // A body at rest is at a keyframe at any time.
-  const double knot = !side.at_rest                              ? t
-                      : std::isfinite(motion.lines_begin(index)) ? motion.lines_begin(index)
-                                                                 : motion.lines_end(index);
-  if (remembers) {
-    if (const auto* known = memory_.find(index, knot)) {
-      at.child_bounds = known->child_bounds.data();
-      at.node_bounds = known->node_bounds.data();
-      ++skip_counts(index).remembered;
-      return {};
-    }
-  }
   if (moved) {
     moved->move(side.at[0].child_bounds, side.at[0].node_bounds, body.hierarchy.topology().width, nodes,
                 child_bounds.data(), node_bounds.data());
@@ -114,15 +99,7 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
     ++counts_[index].translated;
     return {};
   }
-  if (remembers) {
-    if (auto* target = memory_.add(index, knot, child_bounds.size(), node_bounds.size())) {
-      at.child_bounds = refit.child_bounds = target->child_bounds.data();
-      at.node_bounds = refit.node_bounds = target->node_bounds.data();
-      make_empty(index, refit.child_bounds, refit.node_bounds);
-      refit.remembered = target;
-    }
-  }
-  return refit;
+  return {child_bounds.data(), node_bounds.data(), at.positions, std::uint32_t(nodes)};
 }
 
 template <class S>
@@ -140,7 +117,6 @@ void LinearBounds<S>::step_refit(std::uint32_t body, Refit& refit, std::uint64_t
   }
   counts_[body].refitted += refit.left - begin;
   refit.left = begin;
-  if (begin == 0 && refit.remembered != nullptr) refit.remembered->complete = true;
 }
 
 /// Returns whether the boxes are finite: a line without end may leave the range of numbers.
@@ -159,6 +135,7 @@ void LinearBounds<S>::start() {
   last_ = motion_.time();
   step_ = 0;
   foreseen_ = 1;
+  came_ahead_ = false;
   horizon_.start_over();
   repairs_ = {};
   near_bodies_.start_over();
@@ -204,10 +181,8 @@ bool LinearBounds<S>::advance() {
   if (came_ahead_) {
     horizon_.next_segment(share_made_anew());
     present_ = 1 - present_;
-    for (std::uint32_t body = 0; body < body_count(); ++body) {
+    for (std::uint32_t body = 0; body < body_count(); ++body)
       counts_[body].at_rest += ahead_counts_[body].at_rest;
-      counts_[body].remembered += ahead_counts_[body].remembered;
-    }
     forget_ahead();
   } else {
     next_segment();
@@ -463,7 +438,7 @@ AuditView LinearBounds<S>::audit_view(std::uint32_t body, double t) const {
 
 template <class S>
 std::size_t LinearBounds<S>::bytes() const {
-  std::size_t total = memory_.bytes() + near_bodies_.bytes() + shared_refit_.bytes() + to_remake_.capacity() +
+  std::size_t total = near_bodies_.bytes() + shared_refit_.bytes() + to_remake_.capacity() +
                       knots_.capacity() * sizeof(Knot) +
                       (middle_lanes_.size() + middle_own_.size() + middle_room_.capacity()) * sizeof(S);
   for (const LinearBody<S>& body : bodies_) total += body.bytes();

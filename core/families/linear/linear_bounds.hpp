@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "core/contract/strategy.hpp"
-#include "core/families/linear/bounds_cache.hpp"
 #include "core/families/linear/change_horizon.hpp"
 #include "core/families/linear/changed_parts.hpp"
 #include "core/families/linear/linear_segment.hpp"
@@ -97,10 +96,10 @@ class LinearBounds {
   AuditView audit_view(std::uint32_t body, double t) const;
 
   /// Counts the work on a body at ends of segments, and the segments for which it was skipped: at rest, apart
-  /// with only one box, translated, or remembered.
+  /// with only one box, or translated.
   struct Counts {
     std::uint64_t refitted = 0;  ///< wide nodes
-    std::uint64_t at_rest = 0, apart = 0, translated = 0, translated_apart = 0, remembered = 0;
+    std::uint64_t at_rest = 0, apart = 0, translated = 0, translated_apart = 0;
   };
   /// Returns the counts since `start`.
   const Counts& counts(std::uint32_t body) const { return counts_[body]; }
@@ -118,7 +117,6 @@ class LinearBounds {
     S *child_bounds = nullptr, *node_bounds = nullptr;
     const S* positions = nullptr;
     std::uint32_t left = 0;  ///< remaining nodes
-    typename BoundsCache<S>::Boxes* remembered = nullptr;
   };
   /// The progress of the work on the next segment.
   struct Ahead {
@@ -171,7 +169,6 @@ class LinearBounds {
   SceneView<S> scene_;
   SegmentMotion<S> motion_;
   SegmentCuts cuts_;
-  BoundsCache<S> memory_;
   NearBodies near_bodies_;
   bool whole_ = false;          ///< segments are not cut
   double last_ = 0, step_ = 0;  ///< time of the last frame, and the step to it
@@ -227,7 +224,6 @@ class LinearCounts {
                                            (now.apart - before.apart) * bounds.vertex_count(body));
       count.add(Counter::bodies_translated,
                 now.translated - before.translated + now.translated_apart - before.translated_apart);
-      count.add(Counter::bodies_remembered, now.remembered - before.remembered);
       const std::uint64_t skipped = now.at_rest - before.at_rest + now.apart - before.apart +
                                     now.translated_apart - before.translated_apart;
       count.add(Counter::bodies_skipped, skipped);

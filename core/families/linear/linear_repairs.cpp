@@ -92,7 +92,7 @@ bool LinearBounds<S>::pass_knots() {
 }
 
 /// Makes a body's positions at both ends its own, so that single ones can be replaced. Returns false if its
-/// boxes are not: those of a body at rest belong to both ends, remembered ones to later plays.
+/// boxes are not: those of a body at rest belong to both ends.
 template <class S>
 bool LinearBounds<S>::take_over(std::uint32_t index) {
   LinearBody<S>& body = bodies_[index];

@@ -16,13 +16,6 @@ std::vector<Parameter> linear_parameters() {
            "the number of pieces doubles while the boxes in the middle of the first piece exceed the surface "
            "of tight boxes by this share; 0: not measured",
            0},
-          {"remember_mb",
-           "0",
-           {},
-           "megabytes for boxes at segment ends that are reused when the clip plays again; a study replays "
-           "the clip for each repetition, so its times are then those of a loop, not of a first play",
-           0,
-           1e6},
           {"horizon",
            "0",
            {},
@@ -32,9 +25,7 @@ std::vector<Parameter> linear_parameters() {
 }
 
 LinearSettings linear_settings(const Params& params) {
-  return {{std::uint32_t(params.number("pieces")), params.number("max_looseness")},
-          std::size_t(params.number("remember_mb") * 1e6),
-          params.number("horizon")};
+  return {{std::uint32_t(params.number("pieces")), params.number("max_looseness")}, params.number("horizon")};
 }
 
 }  // namespace kbvh

@@ -1,5 +1,4 @@
 #pragma once
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -20,7 +19,6 @@ struct SegmentCuts {
 /// The settings of a strategy with linear bounds.
 struct LinearSettings {
   SegmentCuts cuts;
-  std::size_t remembered_bytes = 0;  ///< memory for boxes that are reused when the clip plays again
   /// The frames of a segment within which plans change; 0: chosen.
   double horizon = 0;
 };

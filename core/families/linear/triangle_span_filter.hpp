@@ -61,10 +61,13 @@ class TriangleSpanFilter {
   void use(Workers& workers) { workers_ = &workers; }
 
   /// Return the attempts to decide a pair for a span, and the pairs that frames reported as decided, since
-  /// these counts were cleared.
+  /// `start_over`, which also forgets the step between frames.
   std::uint64_t attempts() const { return attempts_; }
   std::uint64_t decided() const { return decided_; }
-  void clear_counts() { attempts_ = decided_ = 0; }
+  void start_over() {
+    attempts_ = decided_ = 0;
+    step_ = 0;
+  }
   std::size_t bytes() const;
 
  private:

@@ -3,7 +3,7 @@ import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, logAxis, logScale, rowLabels } from "../chart.js";
 import { paintOf } from "../dom.js";
 import { compare, entrants, ratioText, reference, referenceName, seriesOfName, MEASURES } from "../model.js";
-import { geometricMean } from "../statistics.js";
+import { FEWEST_OF_AN_INTERVAL, geometricMean } from "../statistics.js";
 import { factor, plural, sentence } from "../words.js";
 import { empty, profiled } from "./overview.js";
 
@@ -53,14 +53,13 @@ export function pairwise(context) {
       run: own[0].run,
       x: geometricMean(own.map((p) => p.found.middle)),
       of: own.length,
-      low: own.every((p) => p.found.within) ? geometricMean(own.map((p) => p.found.within[0])) : null,
-      high: own.every((p) => p.found.within) ? geometricMean(own.map((p) => p.found.within[1])) : null,
+      low: geometricMean(own.map((p) => p.found.low)),
+      high: geometricMean(own.map((p) => p.found.high)),
     }));
   const clipped = (v) => axis.clip(v)[0];
   const drawn = points.map((p) => {
     const [x, side] = axis.clip(p.found.middle);
-    const ends = p.found.within ?? [p.found.low, p.found.high];
-    return { ...p, x, side, y: p.key, low: clipped(ends[0]), high: clipped(ends[1]), paint: paintOf(p.run.contestant) };
+    return { ...p, x, side, y: p.key, low: clipped(p.found.low), high: clipped(p.found.high), paint: paintOf(p.run.contestant) };
   });
   const label = new Map(order_of.map((cell) => [cell.key, cell.title]));
   label.set("geometric mean", "geometric mean");
@@ -71,13 +70,16 @@ export function pairwise(context) {
     figure({
       title,
       reading:
-        `A point to the right of 1 is faster, and its line is the 95 % interval of the ratio (bootstrap over repetitions; ~ where the two were measured in different sessions). The last row has the geometric means over the cells of each strategy, between those of their intervals' ends.` +
+        `A point to the right of 1 is faster, and its line is the 95 % interval of the ratio (bootstrap over whole rounds) or, with fewer than five repetitions, their range (~ where the two were measured in different sessions). The last row has the geometric means over the cells of each strategy, between those of their intervals' ends.` +
         (state.strategy.length
           ? ""
           : ` Shown are the ${plural(looks.length, "strategy").replace("strategys", "strategies")} with the best profiles; the filter of strategies shows others.`),
       notes: [
-        fewest < 7 && MEASURES[state.measure].column === undefined
-          ? "With fewer than 7 repetitions, an interval is about the whole range of the repetitions: the bootstrap cannot know more."
+        fewest < FEWEST_OF_AN_INTERVAL && MEASURES[state.measure].column === undefined
+          ? "Some have fewer than five repetitions: their lines are ranges, not intervals."
+          : "",
+        points.some((p) => p.found.disturbed)
+          ? "Faint points were measured while the machine was disturbed: see their details."
           : "",
         axis.outside ? `${plural(axis.outside, "point")} beyond the axis: arrows at its edge.` : "",
       ].filter(Boolean),
@@ -111,12 +113,12 @@ export function pairwise(context) {
                   x2: "high",
                   stroke: paintOf(contestant),
                   strokeWidth: 1.6,
-                  strokeOpacity: 0.75,
+                  strokeOpacity: (p) => (p.found.disturbed ? 0.25 : 0.75),
                   dy,
                 }),
                 Plot.dot(
                   each(name, drawn).filter((p) => !p.side),
-                  { x: "x", y: "key", ...dotLook(contestant, 4), dy },
+                  { x: "x", y: "key", ...dotLook(contestant, 4), dy, opacity: (p) => (p.found.disturbed ? 0.35 : 1) },
                 ),
                 Plot.ruleY(each(name, means), {
                   y: "key",

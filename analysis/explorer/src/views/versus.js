@@ -194,7 +194,7 @@ function changes({ model, state, choose }, both) {
   if (!sure.length)
     return empty("Largest changes", "No interval excludes 1: the two do not differ by more than their noise.");
   const axis = logAxis(
-    sure.flatMap((one) => one.ratio.within),
+    sure.flatMap((one) => [one.ratio.low, one.ratio.high]),
     { include: [1], least: 1.3 },
   );
   const rows = sure.map((one, i) => ({
@@ -202,14 +202,14 @@ function changes({ model, state, choose }, both) {
     y: String(i),
     x: axis.clip(one.ratio.middle)[0],
     side: axis.clip(one.ratio.middle)[1],
-    low: axis.clip(one.ratio.within[0])[0],
-    high: axis.clip(one.ratio.within[1])[0],
+    low: axis.clip(one.ratio.low)[0],
+    high: axis.clip(one.ratio.high)[0],
     paint: paintOf(one.b.contestant),
   }));
   const text = (one) => `${one.b.contestant.id}: ${one.b.cell.scene}, ${one.b.cell.size}, l = ${one.b.cell.l}`;
   return figure({
     title: `The ${sure.length === 1 ? "change" : `${sure.length} largest changes`} whose intervals exclude 1`,
-    reading: "The line is the 95 % interval of the ratio, by a bootstrap over the repetitions of both.",
+    reading: "The line is the 95 % interval of the ratio (bootstrap over the rounds of both) or, with fewer than five repetitions, the range. Disturbed ratios are left out.",
     least: 340,
     plot: (width) => {
       const { left, cut } = rowLabels(rows.map(text), width, 0.5);
