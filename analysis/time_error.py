@@ -23,6 +23,8 @@ from load import Study
 
 #: The share of missed pairs below which an approximate contestant counts in the sentence on what exactness costs.
 FEW = 0.01
+#: Contestants that take more than this many times the fastest exact one stand in the table only: the left part would shrink.
+SLOW = 8.0
 #: Colours (Okabe and Ito's, and more) and markers of the approximate strategies, in the order of their ids.
 COLOURS = ("#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9", "#8C7A00", "#CC79A7", "#A8324A", "#5D4A9C", "#117733")
 MARKERS = ("o", "s", "^", "D", "v", "p", "<", "h", ">", "d")
@@ -46,6 +48,7 @@ class Point:
     first: Optional[int]  #: frames before the first with a missed pair; None if there is none, or in older records
     frames: int
     settings: dict[str, str]
+    run: int = -1
     mark: str = ""  #: its number, if it is on a front
 
 
@@ -68,6 +71,12 @@ class Place:
     curves: list[Curve]
     fronts: dict[str, list[Point]]  #: what nobody dominates in time and error, by column; the fastest first
     named: list[Point] = field(default_factory=list)  #: all points on a front, by time
+
+    @property
+    def drawn(self) -> list[Point]:
+        """Returns the points that the panels show."""
+        exact = self.fastest_exact
+        return [one for one in self.points if exact is None or one.time <= SLOW * exact.time]
 
     @property
     def fastest_exact(self) -> Optional[Point]:
@@ -100,13 +109,13 @@ def _point(row: pd.Series) -> Point:
     reported = row["pairs"] - row["missed"] + row["extra"]
     builder = {f"builder {name}": str(value) for name, value in (row["builder"] or {}).items()}
     settings = {**{name: str(value) for name, value in row["params"].items()}, **builder}
-    told = str(row["tag"]).removeprefix(str(row["id"])).strip(" ()").replace("_", " ")
+    told = ", ".join(str(row["tag"]).removeprefix(str(row["id"])).strip(" []").split(" ")).replace("_", " ").replace("=", "\u00a0")
     return Point(
         contestant=row["contestant"], id=row["id"], name=f"{row['title']} ({told})" if told else row["title"], title=row["title"],
         exact=row["guarantee"] != "approximate", foresight=row["foresight"], time=float(row["total_motion"]),
         missed=float(row["missed"] / row["pairs"]), false=float(row["extra"] / reported) if reported > 0 else 0.0,
         depth=float(row["missed_depth_in_edges"]), first=int(row["first_missed"]) if text.known(row["first_missed"]) else None,
-        frames=int(row["frames"]), settings=settings,
+        frames=int(row["frames"]), settings=settings, run=int(row["run"]),
     )  # fmt: skip
 
 
@@ -132,29 +141,30 @@ def _curves(points: Sequence[Point]) -> list[Curve]:
     return result
 
 
-def sentences(place: Place) -> list[str]:
-    """Returns what exactness costs, among contestants that know nothing of the future, and among all, where that differs."""
+def sentences(study: Study, place: Place) -> list[str]:
+    """Returns what exactness costs among contestants that know nothing of the future, and among all where that differs."""
     told: dict[tuple[str, str], str] = {}
-    for known, words in (("none", "without knowledge of the future"), ("", "with any knowledge of the future")):
+    for known, words in (("none", "Without knowledge of the future"), ("", "With any knowledge of the future")):
         usable = [one for one in place.points if one.foresight == known or not known]
         exact = next((one for one in usable if one.exact), None)
         few = next((one for one in usable if not one.exact and one.missed < FEW), None)
-        if exact is None:
+        if exact is None or (exact.contestant, few.contestant if few else "") in told:
             continue
-        pair = (exact.contestant, few.contestant if few else "")
-        if pair in told:
-            continue
+        says = f"{words}, on {place.title}: "
         if few is None:
-            says = f"every approximate contestant missed {text.percent(FEW)} or more"
+            says += f"no approximate contestant missed less than {FEW:.0%}.".replace("%", "\u00a0%")
         else:
-            wrong = f"missed {text.percent(few.missed)}" + (f", {text.percent(few.false)} of its pairs were false" if few.false else "")
-            says = (
-                f"exact ({exact.name}, {text.milliseconds(exact.time)}\u00a0ms a frame) is {text.factor(exact.time / few.time)} times as slow as "
-                f"the fastest that misses less than {text.percent(FEW)} ({few.name}, {text.milliseconds(few.time)}\u00a0ms: {wrong})"
+            found = ratios.ratio(study, few.run, exact.run, "with_motion")
+            range_of = f" ({text.factor(found.low)} to {text.factor(found.high)}{', machine disturbed' if found.disturbed else ''})" if found and found.low < found.high else ""
+            wrong = f"missed {text.percent(few.missed)}" if few.missed else "missed nothing here, but promises nothing"
+            wrong += f"; {text.percent(few.false)} of its pairs are false" if few.false else ""
+            says += (
+                f"exact is {text.factor(exact.time / few.time)}{range_of} times as slow as the fastest that misses less than {FEW:.0%}. ".replace("%", "\u00a0%")
+                + f"The fastest exact one ({exact.name}) takes {text.milliseconds(exact.time)}\u00a0ms a frame, the other ({few.name}) "
+                f"{text.milliseconds(few.time)}\u00a0ms; it {wrong}."
+                + (" So an error buys no time here." if few.time >= exact.time else "")
             )
-            if few.time >= exact.time:
-                says += ", so an error buys no time here"
-        told[pair] = f"{place.title}, {words}: {says}."
+        told[exact.contestant, few.contestant if few else ""] = says
     return list(told.values())
 
 
@@ -168,7 +178,7 @@ def series(found: Sequence[Place]) -> dict[str, tuple[str, str]]:
 class Entry:
     """A line of the legend."""
 
-    symbol: Markup
+    symbol: Markup  #: in the colours of the panels
     name: str
     dials: str  #: what its curves turn, and from where to where
 
@@ -188,7 +198,7 @@ def legend(place: Place, looks: dict[str, tuple[str, str]]) -> list[Entry]:
 
 
 def _symbol(colour: str, marker: str) -> Markup:
-    return Markup(symbol(Look(colour, marker, "-", True)))
+    return Markup(f'<svg class="time-error-key" viewBox="-6.5 -6.5 13 13" aria-hidden="true">{_mark(colour, marker, 0, 0, scale=1.15)}</svg>')
 
 
 def _short(value: float) -> str:
@@ -199,6 +209,7 @@ def _short(value: float) -> str:
 
 WIDTH, HEIGHT = 420, 330
 LEFT, RIGHT, TOP, BOTTOM = 48, 10, 26, 40
+HEAD = 16  #: room for a label above the largest share
 STRIP = 20  #: height of the strip of exact zeros
 FONT = 6.4  #: width of a character, for labels that keep apart
 
@@ -223,7 +234,7 @@ class Scale:
         if share <= 0:
             return bottom - STRIP / 2
         bottom -= STRIP + 4
-        return bottom - (math.log10(share) - self.least) / (self.most - self.least) * (bottom - TOP)
+        return bottom - (math.log10(share) - self.least) / (self.most - self.least) * (bottom - TOP - HEAD)
 
     def decades(self) -> list[float]:
         step = math.ceil((self.most - self.least) / 6)
@@ -233,7 +244,8 @@ class Scale:
 def panel(place: Place, column: str, title: str, looks: dict[str, tuple[str, str]]) -> Markup:
     """Draws one error of a place against time: `missed` or `false`."""
     share: Callable[[Point], float] = lambda one: getattr(one, column)  # noqa: E731
-    scale = Scale([one.time for one in place.points], [share(one) for one in place.points])
+    drawn = place.drawn
+    scale = Scale([one.time for one in drawn], [share(one) for one in drawn])
     bottom, right = HEIGHT - BOTTOM, WIDTH - RIGHT
     made = [f'<text class="head" x="0" y="13">{escape(title)}</text>',
             f'<rect class="strip" x="{LEFT}" y="{bottom - STRIP}" width="{right - LEFT}" height="{STRIP}"/>',
@@ -261,11 +273,11 @@ def panel(place: Place, column: str, title: str, looks: dict[str, tuple[str, str
             way += f"H{scale.x(one.time):.1f}V{scale.y(share(one)):.1f}"
         made.append(f'<path class="front" d="{way}H{right}"/>')
     for curve in place.curves:
-        points = " ".join(f"{scale.x(one.time):.1f},{scale.y(share(one)):.1f}" for one in curve.points)
+        points = " ".join(f"{scale.x(one.time):.1f},{scale.y(share(one)):.1f}" for one in curve.points if one in drawn)
         made.append(f'<polyline class="dial" style="{_paint(looks[curve.id][0])}" points="{points}"/>')
-    for one in sorted(place.points, key=lambda one: (bool(one.mark), not one.exact)):
+    for one in sorted(drawn, key=lambda one: (bool(one.mark), not one.exact)):
         made.append(_drawn(one, scale.x(one.time), scale.y(share(one)), looks))
-    made += _numbers(place, front, scale, share)
+    made += _labels(place, front, scale, share)
     return Markup(
         f'<svg class="time-error" role="img" viewBox="0 0 {WIDTH} {HEIGHT}" aria-label="{escape(_said(place, front, column, title), quote=True)}">'
         + "".join(made) + "</svg>"
@@ -280,31 +292,41 @@ def _drawn(one: Point, x: float, y: float, looks: dict[str, tuple[str, str]]) ->
     says = f"<title>{escape(f'{one.name}: {text.milliseconds(one.time)} ms, missed {text.percent(one.missed)}, false {text.percent(one.false)}')}</title>"
     if one.exact:
         return f'<circle class="exact" style="{_paint(EXACT)}" cx="{x:.1f}" cy="{y:.1f}" r="3.6">{says}</circle>'
-    colour, marker = looks[one.id]
+    return _mark(*looks[one.id], x, y, says)
+
+
+def _mark(colour: str, marker: str, x: float, y: float, says: str = "", scale: float = 0.85) -> str:
     inner = symbol(Look(colour, marker, "-", True))
-    shape = inner[inner.index(">") + 1 : inner.rindex("</svg>")].split(" fill=")[0]
-    return f'<g class="mark" style="{_paint(colour)}" transform="translate({x:.1f} {y:.1f}) scale(.85)">{shape}/>{says}</g>'
+    shape = inner[inner.index(">") + 1 : inner.rindex("</svg>")].split(" fill=")[0]  # in the colours of the scheme instead
+    return f'<g class="mark" style="{_paint(colour)}" transform="translate({x:.1f} {y:.1f}) scale({scale:g})">{shape}/>{says}</g>'
 
 
-def _numbers(place: Place, front: Sequence[Point], scale: Scale, share: Callable[[Point], float]) -> list[str]:
-    """Writes the numbers of the front beside their marks, where they cover neither marks nor each other."""
-    taken = [(scale.x(one.time), scale.y(share(one)), 6.0, 5.0) for one in place.points]
+def _labels(place: Place, front: Sequence[Point], scale: Scale, share: Callable[[Point], float]) -> list[str]:
+    """Writes the numbers of the front, then the values at both ends of each dial, beside their marks, where they cover neither marks nor
+    each other; values without room are left out."""
+    drawn = place.drawn
+    taken = [(scale.x(one.time), scale.y(share(one)), 5.0, 4.0) for one in drawn]
+    ends = [(curve.points[i], _short(float(curve.points[i].settings[curve.dial]))) for curve in place.curves for i in (0, -1)]
+    wanted = [(one, one.mark, "number") for one in front]
+    wanted += [(one, value, "value") for one, value in ends if one in drawn and share(one) > 0]
     made = []
-    for one in front:
-        x, y = scale.x(one.time), scale.y(share(one))
-        half = FONT * len(one.mark) / 2 + 1
-        around = [(reach * math.cos(angle / 57.3), reach * math.sin(angle / 57.3))
-                  for reach in (12, 16, 21, 27, 34) for angle in (135, 180, 225, 90, 270, 45, 315, 0)]  # fmt: skip
+    for one, word, kind in dict.fromkeys((id(one), word, kind) for one, word, kind in wanted):
+        point = next(other for other in drawn if id(other) == one)
+        x, y, half = scale.x(point.time), scale.y(share(point)), FONT * len(word) / 2 + 1
+        around = [(reach * math.cos(angle / 57.3) + math.copysign(half - 3, math.cos(angle / 57.3)) * (abs(math.cos(angle / 57.3)) > 0.1), reach * math.sin(angle / 57.3))
+                  for reach in (10, 14, 19, 25, 33) for angle in (135, 180, 225, 90, 270, 45, 315, 0)]  # fmt: skip
         free = [
             (dx, dy) for dx, dy in around
             if LEFT < x + dx - half and x + dx + half < WIDTH - RIGHT and TOP < y + dy - 5 and y + dy + 5 < HEIGHT - BOTTOM
             and not any(abs(x + dx - cx) < half + w and abs(y + dy - cy) < 5 + h for cx, cy, w, h in taken)
         ]  # fmt: skip
+        if not free and kind == "value":
+            continue
         dx, dy = free[0] if free else around[0]
         taken.append((x + dx, y + dy, half, 5.0))
-        if math.hypot(dx, dy) > 17:
-            made.append(f'<line class="lead" x1="{x:.1f}" y1="{y:.1f}" x2="{x + dx * 0.75:.1f}" y2="{y + dy * 0.75:.1f}"/>')
-        made.append(f'<text class="number" x="{x + dx:.1f}" y="{y + dy + 4:.1f}">{one.mark}</text>')
+        if math.hypot(dx, dy) > 19:
+            made.append(f'<line class="lead" x1="{x:.1f}" y1="{y:.1f}" x2="{x + dx * 0.7:.1f}" y2="{y + dy * 0.7:.1f}"/>')
+        made.append(f'<text class="{kind}" x="{x + dx:.1f}" y="{y + dy + 4:.1f}">{word}</text>')
     return made
 
 
@@ -323,6 +345,7 @@ class Shown:
     legend: list[Entry]
     rows: list[dict[str, str]]  #: of the named points
     all_rows: list[dict[str, str]]
+    left_out: int  #: contestants that are too slow for the panels
 
 
 def shown(study: Study) -> list[Shown]:
@@ -331,9 +354,10 @@ def shown(study: Study) -> list[Shown]:
     looks = series(found)
     return [
         Shown(
-            place, sentences(place),
+            place, sentences(study, place),
             [panel(place, "missed", "True pairs missed", looks), panel(place, "false", "Reported pairs that are false", looks)],
             legend(place, looks), [_row(one) for one in place.named], [_row(one) for one in place.points],
+            len(place.points) - len(place.drawn),
         )
         for place in found
     ]  # fmt: skip

@@ -331,7 +331,7 @@ KBVH_STRATEGY(bottom_up_approximate) {
   using namespace kbvh;
   Info reduced = reduced_info(), rounded = reduced_info();
   reduced.id = "reduced_refit";
-  reduced.title = "rarer refit, stale or inflated boxes";
+  reduced.title = "stale or inflated boxes";
   rounded.id = "bottom_up_approximate";
   rounded.title = "bottom-up refit, rounded";
   rounded.parameters.insert(

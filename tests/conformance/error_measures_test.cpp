@@ -13,6 +13,14 @@
 namespace kbvh::test::error_measures {
 namespace {
 
+/// A scene with the times of its frames.
+template <class S>
+TestScene<S> scene_with_frames(const std::string& name, std::uint32_t l) {
+  TestScene<S> test = synthetic_scene<S>(name, l);
+  if (test.frames.empty()) test.frames = frame_times(test.scene, l);
+  return test;
+}
+
 enum class Error { loses_the_last_from_the_third_frame_on, adds_one_at_every_frame };
 
 /// An exact refit that confirms too few pairs, or one too many.
@@ -61,18 +69,17 @@ Info info() {
           .topology = {.preferred = {.width = 2, .leaf_size = 1}}};
 }
 
-/// Two grids that cross in a line at every frame.
 template <class S>
 Verification verified(const StrategyEntry& entry, const TestScene<S>& test, std::uint64_t every = 1,
                       const std::map<std::string, std::string>& params = {}) {
   Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred}, CountingPolicy::counting);
-  return verify(session, std::span<const double>(test.frames), shared_oracle(test), nullptr,
-                {.every_nth_frame = every, .areas = Areas::left_out});
+  return verify<S>(session, std::span<const double>(test.frames), shared_oracle(test), nullptr,
+                   {.every_nth_frame = every, .areas = Areas::left_out});
 }
 
 template <class S>
 void expect_known_errors() {
-  TestScene<S> test = synthetic_scene<S>("sheets", 3);
+  const TestScene<S> test = scene_with_frames<S>("soups", 3);
   Oracle<S>& oracle = shared_oracle(test);
   // What is lost, from the truth itself: the last pair of every frame with pairs, from the third on.
   Playback<S> playback(test.scene);
@@ -176,7 +183,10 @@ TEST(ErrorMeasures, PenetrationAgreesWithTheExactTest) {
     // No direction leads out on a shorter way.
     for (int direction = 0; direction < 50; ++direction) {
       double way[3], length = 0;
-      for (double& x : way) length += (x = next() - 0.5) * x;
+      for (double& x : way) {
+        x = next() - 0.5;
+        length += x * x;
+      }
       length = std::sqrt(length);
       Triangle moved;
       for (int i = 0; i < 3; ++i)
@@ -211,7 +221,8 @@ void expect_exact(const TestScene<S>& test, const std::string& where) {
     std::string dials;
     for (const auto& [name, value] : params) dials += " " + name + "=" + value;
     const std::string violation = check(exact, test, 3, params, exact.info.topology.preferred);
-    if (violation.rfind("skipped", 0) != 0) EXPECT_EQ(violation, "") << id << dials << " on " << where;
+    if (violation.rfind("skipped", 0) == 0) continue;
+    EXPECT_EQ(violation, "") << id << dials << " on " << where;
   }
 }
 
@@ -230,11 +241,10 @@ INSTANTIATE_TEST_SUITE_P(Registry, DialsAtZero, testing::ValuesIn([] {
 
 // And turned, each dial costs pairs: it does what it says.
 TEST(Dials, CostPairsWhenTurned) {
-  TestScene<double> test = synthetic_scene<double>("sheets", 7);
+  const TestScene<double> test = scene_with_frames<double>("soups", 7);
   const std::vector<std::pair<std::string, std::map<std::string, std::string>>> turned{
       {"reduced_refit", {{"refit_every", "4"}}},
       {"reduced_refit", {{"refit_every", "4"}, {"query", "slabs"}}},
-      {"reduced_refit", {{"boxes", "bfloat16"}}},
       {"bottom_up_approximate", {{"boxes", "bfloat16"}, {"tests", "own"}}},
       {"drift_boxes_approximate", {{"believed", "0"}}},
   };
@@ -242,9 +252,10 @@ TEST(Dials, CostPairsWhenTurned) {
     const Verification found = verified(find_strategy(id), test, 1, params);
     EXPECT_GT(found.missed, 0u) << id;
     EXPECT_TRUE(found.first_missed.has_value()) << id;
-    if (params.count("tests") != 0) EXPECT_GT(found.extra, 0u) << id;
-    if (params.count("tests") == 0) EXPECT_EQ(found.extra, 0u) << id;
+    EXPECT_EQ(found.extra > 0, params.count("tests") != 0) << id;
   }
+  // Boxes of few digits leave vertices outside; whether that costs a pair is chance.
+  EXPECT_GT(verified(find_strategy("reduced_refit"), test, 1, {{"boxes", "bfloat16"}}).audit.protrusion, 0);
   // A margin gives some of them back, and the rarer the refit, the more are missed.
   const auto missed = [&](const char* every, const char* margin) {
     return verified(find_strategy("reduced_refit"), test, 1, {{"refit_every", every}, {"margin", margin}})
