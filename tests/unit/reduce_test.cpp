@@ -71,7 +71,8 @@ void expect_roundings(KernelSet set) {
 
 template <class S>
 void expect_arithmetic(KernelSet set) {
-  const std::vector<S> from = numbers<S>();
+  std::vector<S> from = numbers<S>();
+  std::erase_if(from, [](S x) { return !std::isfinite(x); });
   std::vector<S> to = from, out(from.size(), S(7)), rows = from;
   std::reverse(to.begin(), to.end());
   const std::size_t count = from.size() - 1;
@@ -80,7 +81,7 @@ void expect_arithmetic(KernelSet set) {
   reduce_kernels<S>(set).widen(rows.data(), count, S(0.1));
   EXPECT_EQ(out.back(), S(7));
   EXPECT_EQ(rows.back(), from.back());
-  for (std::size_t i = 1; i < count; ++i) {  // the first meets an infinity
+  for (std::size_t i = 0; i < count; ++i) {
     const S step = u * (to[i] - from[i]);
     EXPECT_EQ(out[i], from[i] + step);
     EXPECT_EQ(rows[i], from[i] - S(0.1));
