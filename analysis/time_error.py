@@ -157,17 +157,18 @@ def sentences(study: Study, place: Place) -> list[str]:
             faster = few.time >= exact.time
             slow, quick = (few, exact) if faster else (exact, few)
             found = ratios.ratio(study, quick.run, slow.run, "with_motion")
-            range_of = ""
-            if found and found.low < found.high:
-                doubt = "; this run does not tell them apart" if found.low <= 1 else ""
-                range_of = f" ({text.factor(found.low)} to {text.factor(found.high)}{', machine disturbed' if found.disturbed else ''}{doubt})"
+            apart = found is None or found.low > 1
+            doubts = [f"{text.factor(found.low)} to {text.factor(found.high)}"] if found and found.low < found.high else []
+            doubts += ["machine disturbed"] if found and found.disturbed else []
+            doubts += [] if apart else ["this run does not tell them apart"]
+            range_of = f" ({'; '.join(doubts)})" if doubts else ""
             wrong = f"missed {text.percent(few.missed)}" if few.missed else "missed nothing here, but promises nothing"
             wrong += f"; {text.percent(few.false)} of its pairs are false" if few.false else ""
             says += (
                 f"exact is {text.factor(slow.time / quick.time)}{range_of} times as {'fast' if faster else 'slow'} as the fastest that misses less than "
                 f"{FEW:.0%}. ".replace("%", "\u00a0%")
                 + f"The fastest exact one, {exact.name}, takes {text.milliseconds(exact.time)}\u00a0ms a frame, the other, {few.name}, "
-                f"{text.milliseconds(few.time)}\u00a0ms; it {wrong}." + (" So an error buys no time here." if faster else "")
+                f"{text.milliseconds(few.time)}\u00a0ms; it {wrong}." + (" So an error buys no time here." if faster and apart else "")
             )
         told[exact.contestant, few.contestant if few else ""] = says
     return list(told.values())
@@ -265,17 +266,18 @@ def panel(place: Place, column: str, title: str, looks: dict[str, tuple[str, str
         made.append(f'<text class="tick middle" x="{x:.1f}" y="{bottom + 15}">{text.tick(value)}</text>')
     made.append(f'<text class="tick middle" x="{(LEFT + right) / 2:.0f}" y="{bottom + 32}">time per frame (ms)</text>')
     exact = place.fastest_exact
-    unknowing = next((one for one in place.points if one.exact and one.foresight == "none"), None)
-    if unknowing is not None and unknowing is not exact and unknowing in drawn:
-        x = scale.x(unknowing.time)
-        made.append(f'<line class="beat unknowing" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{bottom}"/>')
-        made.append(f'<text class="tick" x="{x + 4:.1f}" y="{TOP + 22}">without foresight</text>')
     if exact is not None:
         x = scale.x(exact.time)
         made.append(f'<rect class="slower" x="{x:.1f}" y="{TOP}" width="{right - x:.1f}" height="{bottom - TOP}"/>')
-        made.append(f'<line class="beat" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{bottom}"/>')
+    unknowing = next((one for one in place.points if one.exact and one.foresight == "none"), None)
+    lines = [(exact, "fastest exact", "beat", 9)] + [(unknowing, "without foresight", "beat unknowing", 22)] * (unknowing is not exact)
+    for one, name, kind, down in lines:
+        if one is None or one not in drawn:
+            continue
+        x = scale.x(one.time)
         end = x > WIDTH * 0.6
-        made.append(f'<text class="tick{" end" if end else ""}" x="{x + (-4 if end else 4):.1f}" y="{TOP + 9}">fastest exact</text>')
+        made.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{bottom}"/>')
+        made.append(f'<text class="tick{" end" if end else ""}" x="{x + (-4 if end else 4):.1f}" y="{TOP + down}">{name}</text>')
     front = place.fronts[column]
     if front:
         way = f"M{scale.x(front[0].time):.1f} {TOP}"
