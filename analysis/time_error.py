@@ -7,6 +7,7 @@ below the other. Data and drawing are apart: `places` finds the points, curves a
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -110,6 +111,7 @@ def _point(row: pd.Series) -> Point:
     builder = {f"builder {name}": str(value) for name, value in (row["builder"] or {}).items()}
     settings = {**{name: str(value) for name, value in row["params"].items()}, **builder}
     told = ", ".join(str(row["tag"]).removeprefix(str(row["id"])).strip(" []").split(" ")).replace("_", " ").replace("=", "\u00a0")
+    told = re.sub(r"\d{7,}", lambda found: _short(float(found[0])), told)
     return Point(
         contestant=row["contestant"], id=row["id"], name=f"{row['title']} ({told})" if told else row["title"], title=row["title"],
         exact=row["guarantee"] != "approximate", foresight=row["foresight"], time=float(row["total_motion"]),

@@ -1,9 +1,8 @@
 // Bottom-up refits that are wrong on purpose, and fast at it: the shortcuts that programs take, each with a
 // dial. They show what exactness costs, and what it is worth (Z&W 2006, s.2, takes correctly rounded
 // positions and valid boxes for granted). Refit, query and triangle tests are those of the fastest exact
-// refits
-// (`bottom_up`, and `leaf_slabs` with query = slabs); with every dial at zero (refit_every = 1, margin = 0,
-// boxes = scene or rounding = outward, positions = rounded) the answers are exact.
+// refits (`bottom_up`, and `leaf_slabs` with query = slabs); with every dial at zero (refit_every = 1, margin
+// = 0, boxes = scene or rounding = outward, positions = rounded) the answers are exact.
 //
 // `reduced_refit` makes boxes at every n-th frame only, inflates them by a margin, and rounds them. Between
 // two refits boxes of nodes are stale; those of triangles are current, as in all queries here, and positions
@@ -12,6 +11,11 @@
 // the triangle tests read these positions, too, as programs do that have no others: it then also reports
 // pairs that do not intersect. Boxes with fewer digits are stored in the scalar, so that smaller boxes save
 // no memory here and cost a pass over them: their time is an upper bound.
+//
+// When it wins: hardly ever. Where there are contacts the time is the query's, and a margin costs more tests
+// than rarer refits save: on a tablecloth of 4k triangles (float, l = 10) the refit is 1 to 3 % of a frame,
+// and boxes of every 8th frame miss 0.3 % of the pairs. On passing spheres of 41k triangles boxes of every
+// 8th frame halve the time, positions included, and miss 79 % of the pairs (Intel Xeon, a busy machine).
 
 #include <cmath>
 
