@@ -1,6 +1,7 @@
 #include "core/judge/penetration.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
