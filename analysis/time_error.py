@@ -24,7 +24,7 @@ from load import Study
 
 #: The share of missed pairs below which an approximate contestant counts in the sentence on what exactness costs.
 FEW = 0.01
-#: Contestants that take more than this many times the fastest exact one stand in the table only: the left part would shrink.
+#: Contestants that take more than this many times the fastest exact one are drawn at the right edge: the left part would shrink.
 SLOW = 8.0
 #: Colours (Okabe and Ito's, and more) and markers of the approximate strategies, in the order of their ids.
 COLOURS = ("#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9", "#8C7A00", "#CC79A7", "#A8324A", "#5D4A9C", "#117733")
@@ -74,10 +74,10 @@ class Place:
     named: list[Point] = field(default_factory=list)  #: all points on a front, by time
 
     @property
-    def drawn(self) -> list[Point]:
-        """Returns the points that the panels show."""
+    def slow(self) -> list[Point]:
+        """Returns the points at the right edge."""
         exact = self.fastest_exact
-        return [one for one in self.points if exact is None or one.time <= SLOW * exact.time]
+        return [one for one in self.points if exact is not None and one.time > SLOW * exact.time]
 
     @property
     def fastest_exact(self) -> Optional[Point]:
@@ -235,7 +235,8 @@ class Scale:
         self.times = ticks(10**self.low, 10**self.high, 5)
 
     def x(self, time: float) -> float:
-        return LEFT + (math.log10(time) - self.low) / (self.high - self.low) * (WIDTH - LEFT - RIGHT)
+        """Returns the place of a time; those of slow contestants are at the edge."""
+        return LEFT + min((math.log10(time) - self.low) / (self.high - self.low), 1.0) * (WIDTH - LEFT - RIGHT)
 
     def y(self, share: float) -> float:
         bottom = HEIGHT - BOTTOM
@@ -252,8 +253,8 @@ class Scale:
 def panel(place: Place, column: str, title: str, looks: dict[str, tuple[str, str]]) -> Markup:
     """Draws one error of a place against time: `missed` or `false`."""
     share: Callable[[Point], float] = lambda one: getattr(one, column)  # noqa: E731
-    drawn = place.drawn
-    scale = Scale([one.time for one in drawn], [share(one) for one in drawn])
+    slow = place.slow
+    scale = Scale([one.time for one in place.points if one not in slow], [share(one) for one in place.points])
     bottom, right = HEIGHT - BOTTOM, WIDTH - RIGHT
     made = [f'<text class="head" x="0" y="13">{escape(title)}</text>',
             f'<rect class="strip" x="{LEFT}" y="{bottom - STRIP}" width="{right - LEFT}" height="{STRIP}"/>',
@@ -272,12 +273,12 @@ def panel(place: Place, column: str, title: str, looks: dict[str, tuple[str, str
         x = scale.x(exact.time)
         made.append(f'<rect class="slower" x="{x:.1f}" y="{TOP}" width="{right - x:.1f}" height="{bottom - TOP}"/>')
     unknowing = next((one for one in place.points if one.exact and one.foresight == "none"), None)
-    lines = [(exact, "fastest exact", "beat", 9)] + [(unknowing, "without foresight", "beat unknowing", 22)] * (unknowing is not exact)
+    lines = [(exact, "fastest exact", "beat", 9)] + [(unknowing, "no foresight", "beat unknowing", 22)] * (unknowing is not exact)
     for one, name, kind, down in lines:
-        if one is None or one not in drawn:
+        if one is None:
             continue
         x = scale.x(one.time)
-        end = x > WIDTH * 0.6
+        end = x + 4 + 0.95 * FONT * len(name) > right
         made.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{bottom}"/>')
         made.append(f'<text class="tick{" end" if end else ""}" x="{x + (-4 if end else 4):.1f}" y="{TOP + down}">{name}</text>')
     front = place.fronts[column]
@@ -287,9 +288,9 @@ def panel(place: Place, column: str, title: str, looks: dict[str, tuple[str, str
             way += f"H{scale.x(one.time):.1f}V{scale.y(share(one)):.1f}"
         made.append(f'<path class="front" d="{way}H{right}"/>')
     for curve in place.curves:
-        points = " ".join(f"{scale.x(one.time):.1f},{scale.y(share(one)):.1f}" for one in curve.points if one in drawn)
+        points = " ".join(f"{scale.x(one.time):.1f},{scale.y(share(one)):.1f}" for one in curve.points)
         made.append(f'<polyline class="dial" style="{_paint(looks[curve.id][0])}" points="{points}"/>')
-    for one in sorted(drawn, key=lambda one: (bool(one.mark), not one.exact)):
+    for one in sorted(place.points, key=lambda one: (bool(one.mark), not one.exact)):
         made.append(_drawn(one, scale.x(one.time), scale.y(share(one)), looks))
     made += _labels(place, front, scale, share)
     return Markup(
@@ -318,14 +319,14 @@ def _mark(colour: str, marker: str, x: float, y: float, says: str = "", scale: f
 def _labels(place: Place, front: Sequence[Point], scale: Scale, share: Callable[[Point], float]) -> list[str]:
     """Writes the numbers of the front, then the values at both ends of each dial, beside their marks, where they cover neither marks nor
     each other; values without room are left out."""
-    drawn = place.drawn
-    taken = [(scale.x(one.time), scale.y(share(one)), 5.0, 4.0) for one in drawn]
+    slow = place.slow
+    taken = [(scale.x(one.time), scale.y(share(one)), 5.0, 4.0) for one in place.points]
     ends = [(curve.points[i], _short(float(curve.points[i].settings[curve.dial]))) for curve in place.curves for i in (0, -1)]
     wanted = [(one, one.mark, "number") for one in front]
-    wanted += [(one, value, "value") for one, value in ends if one in drawn and share(one) > 0]
+    wanted += [(one, value, "value") for one, value in ends if one not in slow and share(one) > 0]
     made = []
     for one, word, kind in dict.fromkeys((id(one), word, kind) for one, word, kind in wanted):
-        point = next(other for other in drawn if id(other) == one)
+        point = next(other for other in place.points if id(other) == one)
         x, y, half = scale.x(point.time), scale.y(share(point)), FONT * len(word) / 2 + 1
         around = [(reach * math.cos(angle / 57.3) + math.copysign(half - 3, math.cos(angle / 57.3)) * (abs(math.cos(angle / 57.3)) > 0.1), reach * math.sin(angle / 57.3))
                   for reach in (10, 14, 19, 25, 33) for angle in (135, 180, 225, 90, 270, 45, 315, 0)]  # fmt: skip
@@ -359,7 +360,7 @@ class Shown:
     legend: list[Entry]
     rows: list[dict[str, str]]  #: of the named points
     all_rows: list[dict[str, str]]
-    left_out: int  #: contestants that are too slow for the panels
+    slow: int  #: contestants at the right edge of the panels
 
 
 def shown(study: Study) -> list[Shown]:
@@ -371,7 +372,7 @@ def shown(study: Study) -> list[Shown]:
             place, sentences(study, place),
             [panel(place, "missed", "True pairs missed", looks), panel(place, "false", "Reported pairs that are false", looks)],
             legend(place, looks), [_row(one) for one in place.named], [_row(one) for one in place.points],
-            len(place.points) - len(place.drawn),
+            len(place.slow),
         )
         for place in found
     ]  # fmt: skip

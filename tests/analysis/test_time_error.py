@@ -116,12 +116,14 @@ class TestTimeError(unittest.TestCase):
         self.assertAlmostEqual(scale.y(0.001) - scale.y(0.01), scale.y(0.01) - scale.y(0.1))
         self.assertGreater(scale.y(0.0), scale.y(0.001) + time_error.STRIP / 2, "zero is apart")
 
-    def test_the_panels_draw_every_contestant_that_is_not_too_slow(self) -> None:
+    def test_the_panels_draw_every_contestant_slow_ones_at_the_edge(self) -> None:
         lines = [exact("refit", 2.0), wrong("a", 1.0, 500), wrong("b", 1.5, 100, extra=4), wrong("slow", 40.0, 3)]
         (shown,) = time_error.shown(self.study(lines))
-        self.assertEqual(shown.left_out, 1)
+        self.assertEqual(shown.slow, 1)
         for panel in shown.panels:
-            self.assertEqual(len(re.findall('class="mark"', panel)), 2)
+            places = [float(x) for x in re.findall(r'class="mark"[^>]*translate\(([\d.]+)', panel)]
+            self.assertEqual(len(places), 3)
+            self.assertEqual([x for x in places if x >= time_error.WIDTH - time_error.RIGHT], [time_error.WIDTH - time_error.RIGHT])
             self.assertEqual(len(re.findall('class="exact"', panel)), 1)
             self.assertIn('class="beat"', panel)
             for number in re.findall(r'\b(?:x|y|x1|x2|y1|y2|cx|cy)="([^"]*)"', panel):
