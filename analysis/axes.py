@@ -81,27 +81,6 @@ def fixed_log_axis(axes: Axes, which: str, values: Sequence[float], tick: Format
     axes.grid(True, axis=which)
 
 
-def zero_log_axis(axes: Axes, values: Sequence[float], tick: FormatTick) -> None:
-    """Sets a logarithmic x axis with a grey strip for exact zeros at its left; without zeros, a plain one."""
-    positive = [value for value in values if value > 0]
-    if len(positive) == len(values):
-        log_axis(axes, "x", values, tick)
-        return
-    first = math.floor(math.log10(min(positive)))
-    last = math.ceil(math.log10(max(positive)) + 1e-9)
-    last = max(last, first + 1)
-    threshold = 10.0**first
-    axes.set_xscale("symlog", linthresh=threshold, linscale=max(0.45, (last - first) * 0.22))
-    axes.set_xlim(-threshold * 0.45, max(positive) * max(2.2, 10 ** (0.12 * (last - first))))
-    step = max(1, math.ceil((last - first) / 4))
-    places = [0.0] + [10.0**power for power in range(first, last + 1, step)]
-    axes.xaxis.set_major_locator(FixedLocator([p for p in places if p <= axes.get_xlim()[1]]))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.grid(True, axis="x")
-    axes.axvspan(-threshold * 0.45, threshold * 0.45, color="#F4F4F1", zorder=0, linewidth=0)
-
-
 def mark(axes: Axes, x: float, y: float, look: Look, size: float = 7.5, zorder: float = 3) -> None:
     """Draws one contestant's marker in data coordinates."""
     axes.plot([x], [y], marker=look.drawn, color=look.colour, markerfacecolor=look.face, markersize=size,

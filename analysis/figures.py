@@ -26,19 +26,17 @@ from axes import (
     log_axis,
     mark,
     settle,
-    zero_log_axis,
 )
 from colours import PHASE_NAMES, PHASES, Look
 from ratios import (
     best_refit_line,
     crossings,
     fastest_configurations,
-    pareto_front,
     period_line,
     without_oracles,
 )
 from text import memory as bytes_of
-from text import memory_tick, percent_tick, significant, size, tick
+from text import memory_tick, significant, size, tick
 
 WIDTH = 10.5  #: of every figure, in inches
 #: Bars longer than this many times the fastest are torn off, so that the others stay readable.
@@ -120,121 +118,6 @@ def draw_cost_split(axes: Axes, rows: pd.DataFrame, looks: Looks) -> None:
     ]
     axes.legend(handles=patches, loc="lower left", bbox_to_anchor=(0, 1.0), ncol=len(patches), frameon=False,
                 borderaxespad=0.2, handlelength=1.6, columnspacing=1.6)  # fmt: skip
-
-
-def time_against_error(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
-    """Draws total time against looseness and false candidates, with Pareto fronts; errors of approximate contestants are
-    drawn separately.
-
-    Contestants are numbered by speed. With many contestants only the fastest configuration of each strategy and those on a
-    front have a number; the others are small marks. None if no contestant differs from the others in any error. Boxes that
-    are too small are not tighter than tight: their error is the protrusion.
-    """
-    rows = without_oracles(group[group["total_motion"] > 0]).sort_values("total_motion").reset_index(drop=True)
-    rows["looseness"] = rows["looseness"].clip(lower=0)
-    panels: list[tuple[str, str]] = []
-    if rows["looseness"].nunique() > 1:
-        panels.append(("looseness", "looseness of the boxes"))
-    if rows["false_candidates"].nunique() > 1:
-        panels.append(("false_candidates", "false candidates per true pair"))
-    if (rows["missed"] > 0).any() or (rows["extra"] > 0).any():
-        panels.append(("wrong", "wrong pairs per true pair"))
-    if (rows["protrusion"] > 0).any():
-        panels.append(("protrusion", "protrusion (scene units)"))
-    if len(rows) < 2 or not panels:
-        return None
-    rows["number"] = _numbers(rows, [column for column, _ in panels if column != "wrong"])
-    named = rows[rows["number"] > 0]
-    names = [f"{number}  {label}" for number, label in zip(named["number"], named["label"])]
-    side, tall = key_size(names)
-    deep = 2 if len(panels) > 2 else 1
-    across = min(len(panels), 2)
-    figure = Figure(figsize=(WIDTH, max(3.6 * deep, tall)), layout="constrained")
-    grid = figure.add_gridspec(deep, across + 1, width_ratios=[(WIDTH - side) / across] * across + [side])
-    drawn: list[tuple[Axes, list[tuple[float, float]], list[str]]] = []
-    for place, (column, label) in enumerate(panels):
-        axes = figure.add_subplot(grid[place // 2, place % 2])
-        if column == "wrong":
-            drawn.append((axes, *draw_wrong_pairs(axes, rows, looks)))
-        else:
-            drawn.append((axes, *draw_error_panel(axes, rows, looks, column)))
-        axes.set_xlabel(label)
-        if place % 2 == 0:
-            axes.set_ylabel("total time per frame (ms)")
-    key(figure.add_subplot(grid[:, across]), list(zip(names, (looks[c] for c in named["contestant"]))), KeyLines.hidden)
-    settle(figure)
-    for axes, points, numbers in drawn:
-        keep_labels_apart(axes, points, numbers)
-    return figure
-
-
-def _numbers(rows: pd.DataFrame, errors: Sequence[str]) -> list[int]:
-    """Returns numbers from 1 for the named contestants, 0 for the others."""
-    named = set(rows.index)
-    if len(rows) > CROWD:
-        named = set(fastest_configurations(rows).index)
-        for column in errors:
-            named |= set(pareto_front(list(zip(rows[column].astype(float), rows["total_motion"].astype(float)))))
-    count = 0
-    numbers = []
-    for row in rows.index:
-        count += row in named
-        numbers.append(count if row in named else 0)
-    return numbers
-
-
-def draw_error_panel(
-    axes: Axes, rows: pd.DataFrame, looks: Looks, column: str
-) -> tuple[list[tuple[float, float]], list[str]]:
-    """Draws time against one error that is 0 at best; returns the numbered points, and their numbers."""
-    known = rows[rows[column].notna()]
-    log_axis(axes, "y", list(rows["total_motion"]))
-    zero_log_axis(axes, list(known[column]), percent_tick if column == "looseness" else tick)
-    points = list(zip(known[column].astype(float), known["total_motion"].astype(float)))
-    front = [points[i] for i in pareto_front(points)]
-    right, top = axes.get_xlim()[1], axes.get_ylim()[1]
-    axes.plot([front[0][0], *_stair_x(front, right)], [top, *_stair_y(front)], color="#777777", linewidth=1,
-              linestyle=(0, (4, 2)), zorder=1)  # fmt: skip
-    numbered, numbers = [], []
-    for point, contestant, number in zip(points, known["contestant"], known["number"]):
-        mark(axes, *point, looks[contestant], size=7.5 if number else 4.5, zorder=3 if number else 2)
-        # Where errors are rare, the many that have none need no number, but for the fastest.
-        if number and (column != "protrusion" or point[0] > 0 or point in front):
-            numbered.append(point)
-            numbers.append(str(number))
-    return numbered, numbers
-
-
-def _stair_x(front: Sequence[tuple[float, float]], right: float) -> list[float]:
-    return [front[0][0]] + [x for x, _ in front[1:] for _ in (0, 1)] + [right]
-
-
-def _stair_y(front: Sequence[tuple[float, float]]) -> list[float]:
-    return [y for _, y in front[:-1] for _ in (0, 1)] + [front[-1][1], front[-1][1]]
-
-
-def draw_wrong_pairs(axes: Axes, rows: pd.DataFrame, looks: Looks) -> tuple[list[tuple[float, float]], list[str]]:
-    """Draws time against the share of missed (filled) and extra (open) pairs of contestants with errors."""
-    log_axis(axes, "y", list(rows["total_motion"]))
-    wrong = rows[(rows["missed"] > 0) | (rows["extra"] > 0)]
-    truth = np.maximum(wrong["pairs"], 1)
-    missed, extra = wrong["missed"] / truth, wrong["extra"] / truth
-    zero_log_axis(axes, [*missed, *extra], percent_tick)
-    points: list[tuple[float, float]] = []
-    for m, e, y, contestant in zip(missed, extra, wrong["total_motion"], wrong["contestant"]):
-        look = looks[contestant]
-        axes.plot([m, e], [y, y], color=look.colour, linewidth=1.2, zorder=2)
-        for x, face in ((m, look.colour), (e, "white")):
-            axes.plot([x], [y], marker=look.drawn, color=look.colour, markerfacecolor=face, markersize=7.5,
-                      markeredgewidth=1.5, zorder=3, clip_on=False)  # fmt: skip
-        points.append((max(m, e), y))
-    handles = [
-        Line2D([], [], marker="o", linestyle="none", color="#444444", markerfacecolor=face, label=label)
-        for face, label in (("#444444", "missed"), ("white", "extra"))
-    ]
-    axes.legend(handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncol=2, frameon=False, borderaxespad=0.1)
-    numbered = [(point, str(number)) for point, number in zip(points, wrong["number"]) if number]
-    return [point for point, _ in numbered], [number for _, number in numbered]
 
 
 def _lines(

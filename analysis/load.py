@@ -310,8 +310,8 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "disturbed": record.text("times.disturbed", ""),
         "bytes": record.number("bytes", math.nan),
     }
-    for name in ("frames", "pairs", "candidates", "missed_candidates", "missed", "extra", "repeated", "malformed",
-                 "protrusion", "looseness", "invalid", "not_tight"):  # fmt: skip
+    for name in ("frames", "pairs", "candidates", "missed_candidates", "missed", "extra", "wrong_frames", "first_missed",
+                 "missed_depth", "missed_depth_mean", "missed_depth_in_edges", "repeated", "malformed", "protrusion", "looseness", "invalid", "not_tight"):  # fmt: skip
         row["verified_frames" if name == "frames" else name] = record.number(f"verified.{name}", math.nan)
     if not row["audited"]:  # a hierarchy that cannot be seen has no measured boxes, whatever was recorded
         row["protrusion"] = row["looseness"] = math.nan

@@ -32,6 +32,7 @@ import tables
 import targets_table
 import text
 import theory_figures
+import time_error
 from canvas import Picture, picture
 from claim_points import ClaimError, Table
 from colours import Look, looks, symbol
@@ -141,6 +142,8 @@ def write(
         guide_kinds=guide.kinds(study),
         ageing_scenes=ageing.scenes(study),
         choices=choices.choices(study),
+        time_error=time_error.shown(study),
+        time_error_slow=time_error.SLOW,
         exactness=exactness_rows,
         exactness_says=exactness.paragraph(exactness_rows),
         significant=text.significant,

@@ -34,9 +34,7 @@ class Section:
     sizes: str  #: of the smaller versions of the scene
     groups: list[tables.Group]
     pictures: list[Picture] = field(default_factory=list)
-    errors: list[Picture] = field(default_factory=list)  #: time against error
     over_l: list[Picture] = field(default_factory=list)  #: time against frames per keyframe
-    missing: str = ""  #: reason for a missing figure
 
 
 def sections(
@@ -67,12 +65,6 @@ def sections(
         if len(timed) and of_scenes:
             head = headline(timed)
             section.pictures += _group_pictures(timed[timed["group"] == head], timed, all_looks, folder, slug)
-            section.errors = [one for one in section.pictures if one.name == f"{slug}-error"]
-            section.pictures = [one for one in section.pictures if one.name != f"{slug}-error"]
-            if not section.errors:
-                section.missing = (
-                    "Time against error is not drawn: all contestants have the same errors here (the table has them)."
-                )
             if which == "all":
                 for other in timed["group"].unique():
                     if other != head:
@@ -104,16 +96,14 @@ def _place(row: pd.Series) -> str:
 def _group_pictures(
     group: pd.DataFrame, timed: pd.DataFrame, all_looks: dict[str, Look], folder: Path, slug: str
 ) -> list[Picture]:
-    """Draws cost split, time against error, counters and latency of one group."""
+    """Draws cost split, counters and latency of one group."""
     first = group.iloc[0]
     place = _place(first)
     sizes = ratios.fastest_configurations(
         timed[(timed["scalar"] == first["scalar"]) & (timed["l"] == first["l"]) & (timed["machine"] == first["machine"])]
         .drop_duplicates(["contestant", "primitives"], keep="last")
     ) if len(timed) else timed  # fmt: skip
-    crowd = len(group) > figures.CROWD
-    fastest_only = " Of each strategy only the fastest configuration is drawn." if crowd else ""
-    left_out = _left_out(group)
+    fastest_only = " Of each strategy only the fastest configuration is drawn." if len(group) > figures.CROWD else ""
     several = len(sizes) and sizes["moving"].nunique() > 1
     counted = f"{first['scene']}, {first['scalar']}, l = {first['l']:g}" if several else place
     made = [
@@ -123,14 +113,6 @@ def _group_pictures(
             "top. A bar with a white zigzag at its end exceeds the picture: its number gives the length."
             + fastest_only,
             lambda: figures.cost_split(group, all_looks),
-        ),
-        picture(
-            folder, f"{slug}-error", f"Time against error: {place}",
-            "Lower is faster, further left is more exact, and the grey strip holds contestants without any error. No "
-            "contestant beats "
-            "those on the dashed line in both at once; one of them beats each contestant above and to the right of the line."
-            + (" Small marks are further configurations of a strategy." if crowd else "") + left_out,
-            lambda: figures.time_against_error(group, all_looks),
         ),
         picture(
             folder, f"{slug}-counters", f"Machine-independent work: {counted}",

@@ -7,7 +7,8 @@
 // frame and no boxes below it.
 //
 // The displacements are found by reading each vertex twice (then and now, in memory order), or, in the
-// variant with a bound on steps, by one addition per body.
+// variant with a bound on steps, by one addition per body. `drift_boxes_approximate` believes in a share of
+// that bound only, so that its lists last longer than they are right.
 
 #include <algorithm>
 #include <cmath>
@@ -163,6 +164,9 @@ class DriftStrategy : public CountedStrategy<S, Count>,
            near_pairs_.capacity() * sizeof(std::uint32_t);
   }
 
+ protected:
+  double believed_ = 1;  ///< share of the bound on steps that is taken for the whole
+
  private:
   enum class Lists : std::uint8_t { tuned, never };
 
@@ -177,7 +181,7 @@ class DriftStrategy : public CountedStrategy<S, Count>,
     body.read = body.remade = false;
     if (body.watch == Watch::nothing) return;
     if constexpr (bounded) {
-      const double way = motion_.displacement_bound(index, last, t);
+      const double way = believed_ * motion_.displacement_bound(index, last, t);
       if (way > 0) body.moved_by_at_most(way);
     } else if (listed() || plain_left_ <= 1 || !body.near) {
       if (body.watch == Watch::box) {
@@ -477,6 +481,20 @@ class DriftBoxesBounded final : public DriftStrategy<S, Count, SteppedMotion<S>>
   using DriftStrategy<S, Count, SteppedMotion<S>>::DriftStrategy;
 };
 
+/// Believes in less motion than there is.
+template <class S, class Count>
+class DriftBoxesApproximate final : public DriftStrategy<S, Count, SteppedMotion<S>> {
+  using Base = DriftStrategy<S, Count, SteppedMotion<S>>;
+
+ public:
+  static constexpr Foresight foresight = Foresight::step_bound;
+  DriftBoxesApproximate(const SceneView<S>& scene, const SteppedMotion<S>& motion, Topologies topologies,
+                        const Params& params)
+      : Base(scene, motion, std::move(topologies), params) {
+    this->believed_ = params.number("believed");
+  }
+};
+
 Info drift_info() {
   return {.family = "lazy",
           .citation = "kbvh; lists of neighbours after Verlet 1967",
@@ -499,10 +517,24 @@ Info drift_info() {
 
 KBVH_STRATEGY(drift_boxes) {
   using namespace kbvh;
-  Info read = drift_info(), bounded = drift_info();
+  Info read = drift_info(), bounded = drift_info(), approximate = drift_info();
   read.id = "drift_boxes";
   read.title = "drifting boxes";
   bounded.id = "drift_boxes_bounded";
   bounded.title = "drifting boxes, bounded steps";
-  return {make_entry<DriftBoxes>(std::move(read)), make_entry<DriftBoxesBounded>(std::move(bounded))};
+  approximate.id = "drift_boxes_approximate";
+  approximate.title = "drifting boxes, bound too small";
+  approximate.family = "approximate";
+  approximate.guarantee = approximate.rays_guarantee = Guarantee::approximate;
+  approximate.tightness = Tightness::none;
+  approximate.parameters.push_back(
+      {"believed",
+       "0.5",
+       {},
+       "share of the bound on the motion of a step that is taken for all of it; 1: "
+       "drift_boxes_bounded",
+       0,
+       1});
+  return {make_entry<DriftBoxes>(std::move(read)), make_entry<DriftBoxesBounded>(std::move(bounded)),
+          make_entry<DriftBoxesApproximate>(std::move(approximate))};
 }

@@ -46,8 +46,10 @@ class FrameChecker {
   FrameChecker(Session<S>& session, Verification& result, Areas areas)
       : session_(session), result_(result), areas_(areas), sound_(session.scene().bodies.size()) {}
 
-  /// Takes the answers by value: sorting must not disturb the warm buffers of strategies.
-  void check_pairs(PairBuffer candidates, PairBuffer confirmed, const PairBuffer& truth) {
+  /// Takes the answers by value: sorting must not disturb the warm buffers of strategies. `frame` counts all
+  /// frames, from 0.
+  void check_pairs(std::uint64_t frame, PairBuffer candidates, PairBuffer confirmed,
+                   const PairBuffer& truth) {
     const Info& info = session_.info();
     ++result_.frames;
     result_.pairs += truth.size();
@@ -66,6 +68,14 @@ class FrameChecker {
     result_.missed_candidates += lost.size();
     result_.missed += missed.size();
     result_.extra += extra.size();
+    if (!missed.empty() || !extra.empty()) ++result_.wrong_frames;
+    if (!missed.empty() && !result_.first_missed) result_.first_missed = frame;
+    for (const PrimitivePair& pair : missed) {
+      const Penetration found = penetration(session_.scene(), session_.playback(), pair);
+      result_.missed_depth_sum += found.depth;
+      result_.missed_deepest = {std::max(result_.missed_deepest.depth, found.depth),
+                                std::max(result_.missed_deepest.in_edges, found.in_edges)};
+    }
     if (info.guarantee == Guarantee::approximate) return;
     if (!lost.empty()) violate("pair " + text(lost[0]) + " is not among the candidates");
     if (!missed.empty()) violate("pair " + text(missed[0]) + " is missed");
@@ -148,7 +158,7 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
       options.quality_samples > 0 ? (compared_frames + options.quality_samples - 1) / options.quality_samples
                                   : 0;
   std::uint64_t compared_before = 0;
-  const auto query = [&](bool compared) {
+  const auto query = [&](std::size_t frame, bool compared) {
     const double t = session.playback().time();
     pairs.clear();
     session.strategy().candidates_at(t, pairs, Budget{});
@@ -157,7 +167,7 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
     session.strategy().confirm(t, pairs);
     // Positions may be completed for the oracle and the audit only after the answer.
     session.playback().evaluate_all();
-    checker.check_pairs(candidates, pairs,
+    checker.check_pairs(frame, candidates, pairs,
                         known_truth ? oracle.pairs(session.playback(), session.scene(), geometry_changes)
                                     : sweep_pairs(session.scene(), session.playback()));
     checker.check_bounds(judged_every > 0 && compared_before++ % judged_every == 0);
@@ -168,7 +178,7 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
     else
       session.advance(frames[f], ignored);
     const bool compared = f % options.every_nth_frame == 0 || f + 1 == frames.size();
-    query(compared);
+    query(f, compared);
     const auto* step = cursor.at(frames[f]);
     if (step == nullptr) continue;
     if (!step->changes.empty()) session.change_plans(step->changes, ignored);
@@ -176,7 +186,7 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
     session.change_geometry(step->geometry, ignored);
     checker.geometry_changed();
     ++geometry_changes;
-    query(compared);  // bounds must be valid immediately after a change
+    query(f, compared);  // bounds must be valid immediately after a change
   }
   return result;
 }

@@ -1,6 +1,9 @@
 #pragma once
+#include <optional>
+
 #include "core/judge/audit.hpp"
 #include "core/judge/oracle.hpp"
+#include "core/judge/penetration.hpp"
 #include "core/judge/plan_script.hpp"
 #include "core/judge/session.hpp"
 
@@ -23,11 +26,16 @@ struct Verification {
   std::uint64_t candidates = 0;         ///< pairs before confirmation, summed
   std::uint64_t missed_candidates = 0;  ///< true pairs that were not candidates
   std::uint64_t missed = 0, extra = 0;  ///< confirmed pairs against the oracle
-  std::uint64_t repeated = 0;           ///< pairs reported more than once in a frame
-  std::uint64_t malformed = 0;          ///< ids out of range or not canonical
-  Audit audit;                          ///< summed over frames and bodies
-  bool audited = false;                 ///< false for invisible hierarchies
-  std::vector<Quality> over_time;       ///< of a sample of the audited frames
+  std::uint64_t wrong_frames = 0;       ///< compared frames with a missed or an extra pair
+  /// The number of frames before the first compared one with a missed pair; nothing if there is none.
+  std::optional<std::uint64_t> first_missed;
+  Penetration missed_deepest;      ///< the largest of all missed pairs, of depth and of depth in edges
+  double missed_depth_sum = 0;     ///< of their depths
+  std::uint64_t repeated = 0;      ///< pairs reported more than once in a frame
+  std::uint64_t malformed = 0;     ///< ids out of range or not canonical
+  Audit audit;                     ///< summed over frames and bodies
+  bool audited = false;            ///< false for invisible hierarchies
+  std::vector<Quality> over_time;  ///< of a sample of the audited frames
   std::string
       first_violation;  ///< violation of the declared guarantee or tightness: frame, kind, value; or empty
 

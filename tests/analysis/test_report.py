@@ -109,7 +109,7 @@ class TestPage(ReportCase):
             self.assertNotRegex(page, r"@import|url\(")
         with self.subTest("figures are PNG and PDF"):
             names = {file.name for file in (self.folder / "figures").iterdir()}
-            for figure in ("cost", "error", "counters", "depth", "quality", "pace", "latency", "l"):
+            for figure in ("cost", "counters", "depth", "quality", "pace", "latency", "l"):
                 self.assertIn(f"tablecloth-{figure}.png", names)
                 self.assertIn(f"tablecloth-{figure}.pdf", names)
             self.assertNotIn("tablecloth-n.png", names, "one size only: no figure over sizes")
