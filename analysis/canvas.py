@@ -12,6 +12,7 @@ from typing import Optional
 import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 import files
 from axes import settle
@@ -50,15 +51,26 @@ class Picture:
     name: str
     title: str
     reading: str  #: how to read it, two sentences
-    uri: str  #: the picture itself, as a data URI
+    uri: str  #: the picture itself, as a data URI; "" of one that the page only leads to
     width: int  #: in CSS pixels
     height: int
 
+    @property
+    def file(self) -> str:
+        """Returns the link to its file, from the page."""
+        return f"figures/{self.name}.png"
+
+
+#: Dots per inch and colours of embedded figures: sharp enough on a screen, a tenth of the bytes of their SVG.
+EMBEDDED_DPI, EMBEDDED_COLOURS = 120, 64
+
 
 def picture(
-    folder: Path, name: str, title: str, reading: str, draw: Callable[[], Optional[Figure]]
+    folder: Path, name: str, title: str, reading: str, draw: Callable[[], Optional[Figure]], embedded: bool = True
 ) -> Optional[Picture]:
-    """Draws a figure, writes it as PNG and PDF to `folder`, and embeds it as SVG; None if there is nothing to draw."""
+    """Draws a figure and writes it as PNG and PDF to `folder`; None if there is nothing to draw. The page has it as a small PNG, or
+    only a link to its file.
+    """
     with matplotlib.rc_context(STYLE):
         figure = draw()
         if figure is None:
@@ -71,7 +83,10 @@ def picture(
             figure.savefig(drawn, format=kind, **said)
             files.write_whole(folder / f"{name}.{kind}", drawn.getvalue())
         buffer = io.BytesIO()
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+        if embedded:
+            drawn = io.BytesIO()
+            figure.savefig(drawn, format="png", dpi=EMBEDDED_DPI)
+            Image.open(drawn).convert("RGB").quantize(EMBEDDED_COLOURS, dither=Image.Dither.NONE).save(buffer, format="png", optimize=True)
     width, height = figure.get_size_inches()
-    uri = "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+    uri = "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii") if embedded else ""
     return Picture(name, title, reading, uri, round(width * 96), round(height * 96))

@@ -2,7 +2,7 @@
 
 A cell is one scene at one size, scalar and l, measured by one commit on one machine. In each cell, a strategy counts with its
 fastest setting, and its factor is that time over the fastest time of the cell. Contestants without a guarantee, with several
-threads, brute force and limits take no part; the rules are those of guide.py.
+threads, brute force and limits take no part; the rules are those of advice.py.
 """
 
 from __future__ import annotations

@@ -60,8 +60,13 @@ def ratio(study: Study, run: int, reference: int, scope: str, steady: bool = Fal
     found = clip_times.ratio_of(other, own, SCOPES[scope], steady)
     if found is None:
         return None
-    disturbed = bool(own.disturbed or other.disturbed)
+    disturbed = is_disturbed(study, run, reference)
     return Ratio(found.middle, found.low, found.high, found.paired, found.is_interval, reference, disturbed)
+
+
+def is_disturbed(study: Study, *runs: int) -> bool:
+    """Returns whether the machine was disturbed while one of these runs was timed."""
+    return any(study.raw[run].disturbed for run in runs)
 
 
 def ratios(study: Study, scope: str) -> dict[int, Ratio]:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import argparse
 import sys
+import textwrap
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Optional, Sequence
 
@@ -14,20 +16,18 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+import advice
 import ageing
-import choices
 import break_even
+import choices
 import claim_pictures
-import claim_tables
 import claims as paper_claims
-import exactness
 import explore
 import files
-import guide
-import overview_figures
 import paper_figures
 import robustness
 import sections
+import summary
 import tables
 import targets_table
 import text
@@ -35,7 +35,7 @@ import theory_figures
 import time_error
 from canvas import Picture, picture
 from claim_points import ClaimError, Table
-from colours import Look, looks, symbol
+from colours import Look, looks
 from limits import limits, threads_said
 from load import ONE_OF_EACH_COMMIT, ResultError, Study, load
 
@@ -52,8 +52,9 @@ def main(arguments: Optional[list[str]] = None) -> int:
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
     parser.add_argument("--title", default=explore.TITLE, help="heading of the report")
     parser.add_argument(
-        "--figures", choices=("main", "all", "paper", "none"), default="main",
-        help="figures of one group per scene (default), of every group, only those of the paper and its claims, or none",
+        "--figures", choices=("paper", "main", "all", "none"), default="paper",
+        help="figures of the paper and its claims in the page (default); beside it also those of one group per scene (main) or of every "
+        "group (all); or none",
     )  # fmt: skip
     parser.add_argument("--print", dest="printed", action="store_true", help="also print the tables as text")
     options = parser.parse_args(arguments)
@@ -72,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
         explorer = explore.PAGE if explore.program() else ""
     except explore.NotBuilt as reason:
         explorer, hint = "", f"{explore.PAGE} is not written: {reason}"
-    page = write(study, options.folder, options.title, options.figures, targets, claims, explorer)
+    made = write(study, options.folder, options.title, options.figures, targets, claims, explorer)
     if explorer:
         title = "" if options.title == explore.TITLE else options.title  # else the plan's question
         explore.write(load(options.folder, ONE_OF_EACH_COMMIT), options.folder, title, claims)
@@ -84,8 +85,18 @@ def run(options: argparse.Namespace) -> int:
         if targets:
             print(targets_table.markdown(targets))
         print(paper_claims.plain(claims) + "\n")
-    print(page)
+    for said in made.sentences:
+        print("\n".join(textwrap.wrap(said, 100, subsequent_indent="  ")) + "\n")
+    print(made.page)
     return 0
+
+
+@dataclass(frozen=True)
+class Made:
+    """The page, and what stands on its top."""
+
+    page: Path
+    sentences: list[str]
 
 
 def plain_groups(study: Study) -> list[tuple[str, tables.Group]]:
@@ -97,64 +108,58 @@ def plain_groups(study: Study) -> list[tuple[str, tables.Group]]:
 def write(
     study: Study, folder: Path, title: str, which: str, targets: Sequence[targets_table.Target], claims: paper_claims.Claims,
     explorer: str = "",
-) -> Path:
-    """Writes the report and its figures, with a link to the explorer if there is one; returns the page's path."""
-    all_ratios = tables.Ratios(study)
-    groups = tables.groups(study, all_ratios)
+) -> Made:
+    """Writes the report and its figures, with a link to the explorer if there is one."""
+    groups = tables.groups(study, tables.Ratios(study))
     unique = study.runs.drop_duplicates("contestant")
     all_looks = looks(zip(unique["contestant"], unique["id"], unique["family"]))
-    of_scenes = sections.sections(study, groups, all_looks, folder / "figures", which)
-    theory = _theory(folder, which)
-    paper = _paper(study, claims, all_looks, folder / "figures", which)
-    exactness_rows = exactness.comparisons(study)
-    drawn = {one.name for one in theory} | {paper_figures.anchor(figure.number) for figure, *_ in paper}
-    glance = tables.glance(study, all_ratios, groups)
+    cells = advice.cells(study)
+    situations = advice.situations(study, cells)
+    errors = time_error.shown(study)
+    known = summary.paper(claims, folder)
+    sentences = summary.sentences(study, situations, errors, known)
+    anchors = {rows["group"].iloc[0]: group.anchor for rows, group in zip(study.groups(), groups)}
     page = render(
+        title=title,
         explorer=explorer,
         questions=_questions(study),
-        overview=overview_figures.pictures(study, glance, all_looks, folder / "figures") if which in ("main", "all") else [],
-        title=title,
         study=study,
-        machine=_machine(study),
-        made=_made(study),
-        glance=glance,
+        sentences=sentences,
+        chart=summary.chart(situations),
+        lines=summary.lines(study, cells),
+        anchors=anchors,
+        foresight=list(advice.FORESIGHT),
+        time_error=errors,
+        time_error_slow=time_error.SLOW,
+        paper=known,
+        claim_pictures={row.id: Markup(claim_pictures.picture(row.looked, row.checks)) for row in claims.rows},
+        several_checks={row.id: len({corner.check for corner in row.corners}) > 1 for row in claims.rows},
+        paper_figures=_paper(study, claims, all_looks, folder / "figures", which),
+        theory=_theory(folder, which),
+        break_even=_break_even(study, claims, all_looks, folder / "figures", which),
         targets=targets,
         targets_facts=targets_table.facts(list(targets)) if targets else "",
         verdicts=targets_table.VERDICTS,
         times=targets_table.times,
         wanted=targets_table.wanted,
         within=targets_table.within,
+        significant=text.significant,
         milliseconds=text.milliseconds,
         size=text.size,
-        claims=claims,
-        tally=_tally(claims),
-        claims_decided=any(row.verdict != paper_claims.OPEN for row in claims.rows),
-        claim_links=_claim_links(claims, study, groups, drawn),
-        **_claim_parts(claims),
-        **_break_even(study, claims, all_looks, folder / "figures", which),
-        theory=theory,
-        paper=paper,
-        sections=[section for section in of_scenes if not section.own],
-        own_sections=[section for section in of_scenes if section.own],
-        every_section=of_scenes,
-        strategies=_strategies(study),
-        descriptions=_descriptions(study),
-        guide_kinds=guide.kinds(study),
+        sections=sections.sections(study, groups, all_looks, folder / "figures", which),
+        most=tables.MOST,
         ageing_scenes=ageing.scenes(study),
         choices=choices.choices(study),
-        time_error=time_error.shown(study),
-        time_error_slow=time_error.SLOW,
-        exactness=exactness_rows,
-        exactness_says=exactness.paragraph(exactness_rows),
-        significant=text.significant,
         stress=robustness.stress(folder),
         ccd=robustness.ccd(folder),
+        strategies=_strategies(study),
+        machine=_machine(study),
+        made=_made(study),
         limits=limits(study),
-        symbols={contestant: Markup(symbol(look)) for contestant, look in all_looks.items()},
     )
     path = folder / "report.html"
     files.write_whole(path, page)
-    return path
+    return Made(path, [f"{one.subject}: {one.says}" for one in sentences])
 
 
 def _questions(study: Study) -> list[tuple[str, str]]:
@@ -163,60 +168,23 @@ def _questions(study: Study) -> list[tuple[str, str]]:
     return [plan for plan in dict.fromkeys(plans) if plan[1]]
 
 
-def _tally(claims: paper_claims.Claims) -> list[tuple[str, int]]:
-    """Counts the claims by verdict."""
-    verdicts = (paper_claims.HOLDS, paper_claims.CONDITION, paper_claims.FAILS, paper_claims.OPEN)
-    return [(verdict, sum(row.verdict == verdict for row in claims.rows)) for verdict in verdicts]
-
-
 def _break_even(
     study: Study, claims: paper_claims.Claims, all_looks: dict[str, Look], folder: Path, which: str
-) -> dict[str, object]:
-    """Returns the break-even points: a figure and tables."""
-    names, places, single = break_even.places(Table(study, "float"), claims.baselines)
+) -> Optional[Picture]:
+    """Draws the break-even points; None without any."""
+    names, places, _ = break_even.places(Table(study, "float"), claims.baselines)
+    if which == "none" or not places:
+        return None
     reading = (
         "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. An open arrow "
-        "marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown. A name has only "
-        "the setting that tells it from the others of its strategy; the tables have all."
+        "marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown. Between measured l "
+        "the ratio is interpolated on logarithmic axes, outside them nothing is. A name has only the setting that tells it from the others "
+        "of its strategy."
     )
-    made = picture(
+    return picture(
         folder, "break-even", "From which l on kinetic contestants are faster", reading,
         lambda: break_even.figure(places, names, all_looks),
-    ) if which != "none" else None  # fmt: skip
-    return {
-        "break_even_baselines": names, "break_even_places": places, "break_even_single": single, "break_even_picture": made,
-    }  # fmt: skip
-
-
-def _claim_parts(claims: paper_claims.Claims) -> dict[str, object]:
-    """Returns pictures and tables of the claims, by id."""
-    return {
-        "theory_ids": {row.id for row in claims.rows if not row.looked},
-        "several_checks": {row.id: len({corner.check for corner in row.corners}) > 1 for row in claims.rows},
-        "claim_pictures": {row.id: Markup(claim_pictures.picture(row.looked, row.checks)) for row in claims.rows},
-        "claim_tables": {row.id: claim_tables.tables(row.looked) for row in claims.rows},
-        "claim_criteria": {row.id: claim_tables.criteria(row.checks) if not row.looked else [] for row in claims.rows},
-    }
-
-
-def _claim_links(
-    claims: paper_claims.Claims, study: Study, groups: list[tables.Group], drawn: set[str]
-) -> dict[str, list[tuple[str, str]]]:
-    """Returns, for each claim, the fragments of its existing figures and tables, with their texts."""
-    names = {rows["group"].iloc[0]: (rows["scene"].iloc[0], group) for rows, group in zip(study.groups(), groups)}
-    links: dict[str, list[tuple[str, str]]] = {}
-    for row in claims.rows:
-        of_figures: dict[str, list[str]] = {}
-        for panel in row.figures:
-            number, _, place = panel.partition("-")
-            of_figures.setdefault(number, []).append(place)
-        mine = [(paper_figures.anchor(n), f"fig. {n} {text.listing(places)}") for n, places in of_figures.items()]
-        mine += [(name, "figure") for name, _, _, _, ids in theory_figures.FIGURES if row.id in ids]
-        mine = [one for one in mine if one[0] in drawn]
-        known = [names[group] for group in row.groups if group in names]
-        mine += [(group.anchor, f"{scene}, {group.title}") for scene, group in known]
-        links[row.id] = mine
-    return links
+    )  # fmt: skip
 
 
 def _theory(folder: Path, which: str) -> list[Picture]:
@@ -292,37 +260,17 @@ def _made(study: Study) -> list[tuple[str, str]]:
 
 
 def _strategies(study: Study) -> list[dict[str, object]]:
-    """Describes each contestant, once."""
-    unique = study.runs.drop_duplicates("contestant").sort_values(["family", "label"])
-    result = []
-    for row in unique.itertuples():
-        facts = {**row.params, **(row.builder or {})}
-        result.append(
-            {
-                "contestant": row.contestant,
-                "label": row.label,
-                "id": row.id,
-                "family": row.family,
-                "guarantee": tables.GUARANTEE_NAMES[row.guarantee],
-                "tightness": row.tightness or text.MISSING,
-                "foresight": row.foresight.replace("_", " ") or text.MISSING,
-                "settings": ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in facts.items()) or text.MISSING,
-                "citation": row.citation or text.MISSING,
-            }
-        )
-    return result
-
-
-def _descriptions(study: Study) -> list[dict[str, object]]:
-    """Describes each strategy in its own words, with what it did in this study."""
-    records = guide.records(study)
-    unique = study.runs.sort_values(["family", "id"]).drop_duplicates("id")
-    result = []
-    for row in unique.itertuples():
-        own = [part for part in str(row.about).split("\n") if part]
-        result.append({"id": row.id, "title": row.title, "contestant": row.contestant, "family": row.family,
-                       "citation": row.citation or text.MISSING, "paragraphs": own, "record": records.get(str(row.id))})  # fmt: skip
-    return result
+    """Describes each strategy, once, with the number of its settings that took part."""
+    rows = study.runs.sort_values(["family", "title"])
+    settings = rows.groupby("id")["contestant"].nunique()
+    return [
+        {
+            "id": row.id, "title": row.title, "family": row.family, "guarantee": tables.GUARANTEE_NAMES[row.guarantee],
+            "tightness": row.tightness or text.MISSING, "foresight": row.foresight.replace("_", " ") or text.MISSING,
+            "settings": int(settings[row.id]), "citation": row.citation or text.MISSING,
+        }
+        for row in rows.drop_duplicates("id").itertuples()
+    ]  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import re
 from pathlib import Path
 
@@ -69,14 +68,13 @@ def violence(folder: Path) -> list[tuple[str, str]]:
 
 
 def view(folder: Path, figures_folder: Path, scene: str) -> Picture:
-    """Returns the picture of the scene at a few keyframes."""
+    """Writes the picture of the scene at a few keyframes."""
     # By the folder, whose name ends with the scene's hash: what was drawn of another scene of this name is not shown.
     slug = re.sub(r"[^a-z0-9]+", "-", folder.name.lower()).strip("-") or "scene"
     file = figures_folder / f"{slug}-scene.png"
     width, height = scene_pictures.write(folder, file)
-    uri = "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode("ascii")
     reading = (
         "Some keyframes from the first to the last, with z upwards; each body has its own colour. "
         f"Drawn from the meshes in scenes/{folder.name}, which other programs can also open."
     )
-    return Picture(file.stem, f"Picture of the scene: {scene}", reading, uri, width // 2, height // 2)
+    return Picture(file.stem, f"Picture of the scene: {scene}", reading, "", width // 2, height // 2)

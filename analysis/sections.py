@@ -33,8 +33,7 @@ class Section:
     own: bool  #: from files that the user brought
     sizes: str  #: of the smaller versions of the scene
     groups: list[tables.Group]
-    pictures: list[Picture] = field(default_factory=list)
-    over_l: list[Picture] = field(default_factory=list)  #: time against frames per keyframe
+    pictures: list[Picture] = field(default_factory=list)  #: files beside the page
 
 
 def sections(
@@ -72,9 +71,7 @@ def sections(
                         section.pictures += _group_pictures(
                             timed[timed["group"] == other], timed[:0], all_looks, folder, name
                         )
-            over = _trends(timed, head, all_looks, folder, slug)
-            section.over_l = [one for one in over if one.name == f"{slug}-l"]
-            section.pictures += [one for one in over if one.name != f"{slug}-l"]
+            section.pictures += _trends(timed, head, all_looks, folder, slug)
         result.append(section)
     return result
 
@@ -112,20 +109,20 @@ def _group_pictures(
             "Each bar is the mean time of one frame, split into its phases; shorter is better, and the fastest is on "
             "top. A bar with a white zigzag at its end exceeds the picture: its number gives the length."
             + fastest_only,
-            lambda: figures.cost_split(group, all_looks),
+            lambda: figures.cost_split(group, all_looks), embedded=False,
         ),
         picture(
             folder, f"{slug}-counters", f"Machine-independent work: {counted}",
             "An event-driven strategy writes a bound only when an event changes it, while a refit writes all of them in every "
             "frame. This is the work that it saves. Its price is the events, each of which costs more time than writing a value.",
-            lambda: figures.counters(group, sizes, all_looks),
+            lambda: figures.counters(group, sizes, all_looks), embedded=False,
         ),
         picture(
             folder, f"{slug}-depth", f"Where in the tree events happen: {place}",
             "Each mark counts the events per frame that begin at nodes of one depth. A line that rises to the right means that "
             "most events are near the leaves, where an event changes few boxes above it and is therefore cheap."
             + fastest_only,
-            lambda: tree_figures.events_by_depth(group, all_looks),
+            lambda: tree_figures.events_by_depth(group, all_looks), embedded=False,
         ),
         picture(
             folder, f"{slug}-quality", f"Does the tree age? {place}",
@@ -133,13 +130,13 @@ def _group_pictures(
             "that the motion has degraded. The cost is that of a random query by the surface-area heuristic, over that of a "
             "tree built with this heuristic at that time (1), so a line that starts above 1 has fuller leaves, or was split "
             "at medians, from the start." + fastest_only,
-            lambda: tree_figures.over_time(group, all_looks),
+            lambda: tree_figures.over_time(group, all_looks), embedded=False,
         ),
         picture(
             folder, f"{slug}-pace", f"Does the query slow down? {place}",
             "Mean times of equal parts of the clip. A rising line is a tree whose age costs time, or a clip with more to find."
             + fastest_only,
-            lambda: tree_figures.times_over_time(group, all_looks),
+            lambda: tree_figures.times_over_time(group, all_looks), embedded=False,
         ),
         picture(
             folder, f"{slug}-latency", f"Distribution of frame times: {place}",
@@ -147,14 +144,14 @@ def _group_pictures(
             "evaluation is not included. A long line means that work is concentrated in a few frames, which is visible as a "
             "stutter even if the mean is good."
             + fastest_only,
-            lambda: figures.latency(group, all_looks),
+            lambda: figures.latency(group, all_looks), embedded=False,
         ),
         picture(
             folder, f"{slug}-memory", f"Memory: {place}",
             "The memory of a strategy's own structures after the clip, without the shared meshes and their motion. Left "
             "and low is small and fast; a strategy to the right of another is worth its memory only if it lies below."
             + fastest_only,
-            lambda: figures.memory(group, all_looks),
+            lambda: figures.memory(group, all_looks), embedded=False,
         ),
     ]  # fmt: skip
     return [one for one in made if one is not None]
@@ -188,14 +185,14 @@ def _trends(
             "interpolated between two of them, while a refit (broad bands: blue is the best, grey the one of 2006) pays for every "
             "frame. A ring marks a break-even point with one of them; beyond it the falling line wins."
             + left_out,
-            lambda: figures.over_frames_per_keyframe(depths, all_looks),
+            lambda: figures.over_frames_per_keyframe(depths, all_looks), embedded=False,
         ),
         picture(
             folder, f"{slug}-n", f"Size: {where}, l = {depth:g}",
             "Both axes are logarithmic, so a cost proportional to n is a straight line with the slope of the thin grey line. A "
             "steeper line grows faster than the scene; parallel lines differ by a constant factor at every size."
             + left_out,
-            lambda: figures.over_size(sizes, all_looks),
+            lambda: figures.over_size(sizes, all_looks), embedded=False,
         ),
     ]  # fmt: skip
     return [one for one in made if one is not None]

@@ -34,6 +34,7 @@ class Shown:
 class Row:
     """One contestant of one group."""
 
+    id: str
     contestant: str
     label: str
     note: str
@@ -69,29 +70,15 @@ class Group:
     refused: list[tuple[str, str, str]]  #: contestant, label, reason
     notes: list[str] = field(default_factory=list)
 
+    def first(self) -> list[Row]:
+        """Returns the rows of the page: each strategy at its fastest, of these the MOST fastest, the best refit, and what is wrong."""
+        fastest = {row.id: row for row in reversed(self.rows)}
+        kept = [row for row in self.rows if fastest[row.id] is row][:MOST]
+        return [row for row in self.rows if row in kept or row.reference or (row.wrong and fastest[row.id] is row)]
 
-@dataclass(frozen=True)
-class Glance:
-    """One group in a line: the best refit, and the fastest other contestants."""
 
-    anchor: str
-    scene: str
-    primitives: str
-    scalar: str
-    l: str
-    refit: str
-    refit_contestant: str
-    refit_time: str
-    exact: str
-    exact_contestant: str
-    exact_ratio: Shown
-    exact_faster: Optional[bool]
-    approximate: str
-    approximate_contestant: str
-    approximate_ratio: Shown
-    refit_run: int
-    exact_run: Optional[int]
-
+#: Strategies of a table in the page; the explorer, results.jsonl and --print have all of them.
+MOST = 10
 
 class Ratios:
     """Ratios to the best refit of a study, computed once."""
@@ -155,6 +142,7 @@ def _row(row: object, all_ratios: Ratios) -> Row:
     with_motion, without = all_ratios.with_motion.get(run), all_ratios.without_motion.get(run)
     own = row.own_scalar
     return Row(
+        id=row.id,
         contestant=row.contestant,
         label=row.label,
         note=text.listing(
@@ -230,49 +218,6 @@ def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
     for row in timed[timed["remark"] != ""].drop_duplicates("id")[["title", "remark"]].itertuples():
         notes.append(f"{row.title}: {row.remark}.")
     return notes
-
-
-def glance(study: Study, all_ratios: Ratios, shown: list[Group]) -> list[Glance]:
-    """Summarises the whole study, a line per group; groups without a refit are left out."""
-    result = []
-    for group, rows in zip(shown, study.groups()):
-        timed = rows[rows["refused"] == ""].sort_values("total_motion")
-        references = [r for r in timed["run"] if getattr(all_ratios.with_motion.get(r), "reference", None) == r]
-        if not references:
-            continue
-        reference = timed[timed["run"] == references[-1]].iloc[0]
-        others = timed[~timed["baseline"]]
-        exact = _first(others[others["guarantee"] != "approximate"])
-        # Limits (moved bytes, plain interpolation) answer nothing: they are no contestants.
-        loose = _first(others[(others["guarantee"] == "approximate") & (others["family"] != "limit")])
-        exact_ratio = all_ratios.with_motion.get(exact["run"]) if exact is not None else None
-        loose_ratio = all_ratios.with_motion.get(loose["run"]) if loose is not None else None
-        result.append(
-            Glance(
-                anchor=group.anchor,
-                scene=reference["scene"],
-                primitives=text.size(reference["primitives"]),
-                scalar=reference["scalar"],
-                l=f"{reference['l']:g}",
-                refit=reference["label"],
-                refit_contestant=reference["contestant"],
-                refit_time=text.milliseconds(reference["total_motion"]),
-                exact="" if exact is None else exact["label"],
-                exact_contestant="" if exact is None else exact["contestant"],
-                exact_ratio=shown_ratio(exact_ratio),
-                exact_faster=None if exact_ratio is None else _faster(exact_ratio),
-                approximate="" if loose is None else loose["label"],
-                approximate_contestant="" if loose is None else loose["contestant"],
-                approximate_ratio=shown_ratio(loose_ratio),
-                refit_run=int(reference["run"]),
-                exact_run=None if exact is None else int(exact["run"]),
-            )
-        )
-    return result
-
-
-def _first(rows: pd.DataFrame) -> Optional[pd.Series]:
-    return rows.iloc[0] if len(rows) else None
 
 
 PLAIN_COLUMNS = ("strategy", "guarantee", "code", "motion", "update", "query", "total", "ratio", "w/o motion", "steady", "paid from", "missed",

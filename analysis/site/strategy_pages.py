@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-import guide
+import advice
 import load
 
 #: Cells shown on a page: so many of the best, and of the worst.
@@ -76,12 +76,12 @@ def settings(label: str) -> str:
     return found.group(1) if found else "as preferred"
 
 
-def measured(id: str, cells: list[guide.Cell], record: guide.Record | None, labels: dict[str, str]) -> list[str]:
+def measured(id: str, cells: list[advice.Cell], record: advice.Record | None, labels: dict[str, str]) -> list[str]:
     """Returns the part on results."""
-    own = [one for one in cells if id in one.shares]
+    own = [one for one in cells if id in one.speeds]
     if not own or record is None:
         return ["The study behind this site has no time for it, as a strategy with a guarantee on one thread.", ""]
-    ratios = sorted(((one.title, one.shares[id] / one.refit, one) for one in own), key=lambda row: -row[1])
+    ratios = sorted(((one.title, one.speeds[id], one) for one in own), key=lambda row: -row[1])
     lines = [
         f"In {record.cells} combinations of scene, size, l and scalar: update and query as fast as anything in "
         f"{len(record.fastest)}, within a tenth of the fastest in {record.near}. Each mark is one of them: how much faster "
@@ -93,13 +93,13 @@ def measured(id: str, cells: list[guide.Cell], record: guide.Record | None, labe
     if len(shown) < len(ratios):
         lines += [f"The {SHOWN} best and the {SHOWN} worst:", ""]
     rows: list[list[object]] = [
-        [title, settings(labels[one.contestant[id]]), f"{ratio:.2g}x", f"{one.shares[id]:.0%}"] for title, ratio, one in shown
+        [title, settings(labels[one.contestants[id]]), f"{ratio:.2g}x", f"{one.share(id):.0%}"] for title, ratio, one in shown
     ]
     return lines + table(["scene", "settings", "over the best refit", "of the fastest"], rows)
 
 
 def page(
-    info: dict[str, Any], root: Path, cells: list[guide.Cell], record: guide.Record | None, labels: dict[str, str]
+    info: dict[str, Any], root: Path, cells: list[advice.Cell], record: advice.Record | None, labels: dict[str, str]
 ) -> str:
     lines = [f"# `{info['id']}`: {info['title']}", "", info["about"] or "Its file has no description.", ""]
     rows: list[list[object]] = [
@@ -145,7 +145,8 @@ def page(
 def write(listed: dict[str, Any], results: Path, root: Path, pages: Path) -> None:
     """Writes a page for each strategy, and the list of all."""
     study = load.load(results)
-    cells, records = guide.cells(study), guide.records(study)
+    cells = advice.cells(study)
+    records = advice.records(cells)
     labels = dict(zip(study.runs["contestant"], study.runs["label"]))
     folder = pages / "strategies"
     folder.mkdir(parents=True, exist_ok=True)

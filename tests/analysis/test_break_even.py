@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tempfile
 import unittest
 from pathlib import Path
@@ -115,19 +114,16 @@ class TestStudies(unittest.TestCase):
         _, found, single = self.places(lines)
         self.assertEqual((found, single), ([], ["tablecloth 2k (l = 10)"]))
 
-    def test_page_has_figure_and_tables(self) -> None:
+    def test_page_has_the_figure(self) -> None:
         lines = self.lines({"bottom_up": {1: 1.0, 10: 1.0}, "bottom_up_period": {1: 1.0, 10: 1.0}, "kinetic_aabb": {1: 4.0, 10: 0.25}})
         synthetic.write(self.folder, lines)
         self.assertEqual(report.main([str(self.folder)]), 0)
         page = (self.folder / "report.html").read_text(encoding="utf-8")
-        part = page[page.index('<section id="break-even">') :]
-        part = part[: part.index("</section>")]
-        self.assertIn("l ≈ 3.2", part)
-        self.assertRegex(part, r"<summary>tablecloth, 16k polygons, measured at l = 1, 10</summary>")
-        self.assertIn("at the largest measured l", part, "what lies beyond the measured l is said to be unknown")
-        self.assertEqual(len(re.findall("<figure>", part)), 1)
+        part = page[page.index('id="break-even"') :]
+        part = part[: part.index("</details>")]
+        self.assertIn("largest measured l", part, "what lies beyond the measured l is said to be unknown")
+        self.assertEqual(part.count("<figure>"), 1)
         self.assertTrue((self.folder / "figures" / "break-even.pdf").exists())
-
 
 
 class TestNames(unittest.TestCase):

@@ -102,10 +102,12 @@ class TestPage(ReportCase):
     def test_pages_with_figures_are_self_contained_and_the_same_again(self) -> None:
         page = self.page(small(), figures="main")
         with self.subTest("self-contained"):
-            self.assertIn("data:image/svg+xml;base64,", page)
-            for attribute in re.findall(r'(?:src|href)="([^"]*)"', page):
+            for attribute in re.findall(r'src="([^"]*)"', page):
+                self.assertTrue(attribute.startswith("data:image/png;base64,"), attribute[:60])
+            for attribute in re.findall(r'href="([^"]*)"', page):
                 # The explorer lies beside the report where its program is built; the report needs nothing of it.
-                self.assertTrue(attribute.startswith(("data:", "#")) or attribute == "explorer.html", attribute[:60])
+                beside = attribute == "explorer.html" or (self.folder / attribute).is_file()
+                self.assertTrue(attribute.startswith("#") or beside, attribute[:60])
             self.assertNotRegex(page, r"@import|url\(")
         with self.subTest("figures are PNG and PDF"):
             names = {file.name for file in (self.folder / "figures").iterdir()}
@@ -115,6 +117,23 @@ class TestPage(ReportCase):
             self.assertNotIn("tablecloth-n.png", names, "one size only: no figure over sizes")
         with self.subTest("a second run gives the same page"):
             self.assertEqual(self.page(small(), figures="main"), page)
+
+    def test_all_but_answers_and_errors_is_folded(self) -> None:
+        page = self.page(synthetic.study())
+        self.assertEqual(re.findall(r'<section id="([^"]*)"', page), ["answers", "errors"])
+        self.assertNotRegex(page, r"<details[^>]* open")
+        rest = re.sub(r'(?s)<section id="errors">.*?</section>', "", page)
+        self.assertNotIn("<table", re.sub(r"(?s)<details.*</details>", "", rest), "before the first part that is folded, and after the last")
+        self.assertEqual(page.count('<details class="part"'), page.count("<summary><h2>"))
+
+    def test_long_tables_have_the_fastest_settings_and_the_refit(self) -> None:
+        lines = [synthetic.line(f"tree_{i}", 1.0 + i, params={"a": str(k)}) for i in range(20) for k in (1, 2)]
+        for one in lines:
+            one["strategy"].update(baseline=one["strategy"]["id"] == "tree_15", title=one["strategy"]["id"])
+        page = self.page(lines)
+        rows = re.findall(r"<td>(tree_\d+)", page[page.index('id="group-1"') : page.index("more are not in this table")])
+        self.assertEqual(rows, [f"tree_{i}" for i in range(10)] + ["tree_15"])
+        self.assertIn("29 more are not in this table", page)
 
     def test_results_are_never_written(self) -> None:
         synthetic.write(self.folder, small(), '{"schema": 1, "ki')

@@ -175,7 +175,7 @@ class TestReport(TargetsCase):
         self.file.write_text(json.dumps(rows()), encoding="utf-8")
         code, page = self.page()
         self.assertEqual(code, 0)
-        self.assertIn('<section id="targets">', page)
+        self.assertIn('id="targets"', page)
         self.assertIn("aim reached", page)
         self.assertIn("not measured: cloth 65k: no peer", page)
         self.assertIn("peer | &lt;b&gt;", page)

@@ -1,0 +1,145 @@
+"""Which strategy for what, and the ageing table: what counts, and what does not."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Any
+
+import paths
+
+import advice
+import ageing
+import synthetic
+from load import ResultError, Study, load
+from synthetic import line
+
+
+def other(identity: str, total: float, scene: str = "cloth", foresight: str = "none", **changes: Any) -> dict[str, Any]:
+    """A contestant that is no baseline."""
+    made = line(identity, total, scene, **changes)
+    made["strategy"].update(family="kinetic", foresight=foresight)
+    return made
+
+
+def study(lines: list[dict[str, Any]]) -> Study:
+    with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
+        return load(synthetic.write(Path(name), lines))
+
+
+def taken(lines: list[dict[str, Any]], number: int = 0) -> list[advice.Advice]:
+    """The advice of one situation, from the least knowledge to the most."""
+    found = [best for _, best in advice.situations(study(lines))[number].advice]
+    assert all(found)
+    return found
+
+
+class TestRule(unittest.TestCase):
+    def test_a_strategy_is_recommended_only_to_those_who_know_what_it_must_know(self) -> None:
+        found = taken([line("refit", 2.0), other("clip", 0.5, foresight="whole_clip"), other("keyframe", 1.0, foresight="next_keyframe")])
+        self.assertEqual([one.id for one in found], ["refit", "keyframe", "clip"])
+        self.assertEqual([round(one.speed, 6) for one in found], [1, 2, 4])
+
+    def test_the_geometric_mean_decides_and_the_worst_cell_is_named(self) -> None:
+        lines = [line("refit", 2.0, "cloth"), line("refit", 2.0, "ball"), other("moody", 0.5, "cloth"), other("moody", 10.0, "ball"),
+                 other("steady", 1.5, "cloth"), other("steady", 1.9, "ball")]  # fmt: skip
+        best = taken(lines)[0]
+        self.assertEqual(best.id, "steady")
+        self.assertAlmostEqual(best.speed, math.sqrt(2 / 1.5 * 2 / 1.9))
+        self.assertEqual((round(best.low, 3), round(best.high, 3)), (round(2 / 1.9, 3), round(2 / 1.5, 3)))
+        self.assertTrue(best.worst.startswith("ball"), best.worst)
+        self.assertIn("in 2 cells", best.says)
+
+    def test_a_missing_cell_counts_as_the_slowest(self) -> None:
+        cloths = [f"cloth {i}" for i in range(4)]
+        lines = [line("refit", 1.0, scene) for scene in cloths] + [other("slow", 9.0, scene) for scene in cloths]
+        picky = [other("picky", total, scene) for total, scene in zip((0.5, 0.5, 4.0), cloths)]
+        self.assertEqual(taken([*lines, *picky])[0].id, "refit")  # picky: 2, 2, 1/4, and 1/4 for the cell that it left out
+        self.assertEqual(taken([*lines, *picky[:2]])[0].id, "picky", "measured in half of the cells")
+        self.assertIn("measured in 2", taken([*lines, *picky[:2]])[0].says)
+        self.assertEqual(taken([*lines, other("picky", 0.1, cloths[0])])[0].id, "refit")
+
+    def test_wrong_threaded_and_refused_contestants_take_no_part(self) -> None:
+        lines = [line("refit", 2.0), other("fine", 1.5), other("wrong", 0.1, guarantee="approximate"),
+                 other("threaded", 0.1, params={"threads": "2"}), synthetic.refused(other("lost", 0.1), "", "a pair is lost")]  # fmt: skip
+        self.assertEqual(taken(lines)[0].id, "fine")
+        self.assertEqual(set(advice.records(advice.cells(study(lines)))), {"refit", "fine"})
+
+    def test_a_refit_is_held_against_the_best_one_and_says_so(self) -> None:
+        lines = [line("refit", 1.0, "a"), line("refit", 1.0, "b"), line("refit", 2.0, "c"),
+                 line("lazy", 1.1, "a"), line("lazy", 1.1, "b"), line("lazy", 1.0, "c")]  # fmt: skip
+        for one in lines:
+            one["strategy"].update(baseline=True)
+        best = taken(lines)[0]
+        self.assertEqual(best.id, "lazy")
+        self.assertEqual(best.says, "the best refit in 1 of 3 cells; at worst 0.91 times as fast as that one")
+
+    def test_cells_without_a_refit_count_nowhere(self) -> None:
+        alone = [other("one", 1.0, "ball"), other("two", 2.0, "ball")]
+        self.assertEqual(len(advice.cells(study([*alone, line("refit", 2.0), other("one", 1.0)]))), 1)
+        self.assertEqual(advice.situations(study(alone)), [])
+
+    def test_situations_follow_from_what_was_recorded(self) -> None:
+        def both(scene: str, **changes: Any) -> list[dict[str, Any]]:
+            made = [line("refit", 2.0, scene), other("fine", 1.0, scene)]
+            for one in made:
+                one["scene"].update(changes)
+            return made
+
+        self_pairs = both("self")
+        for one in self_pairs:
+            one["scene"]["bodies"][0]["self"] = True
+        lines = both("rays", rays="coherent:64") + self_pairs + both("few", per_keyframe=1) + both("more", per_keyframe=9) + both("many", per_keyframe=10)
+        found = [(one.asks, one.frames) for one in advice.situations(study(lines))]
+        frames = list(advice.FRAMES)
+        self.assertEqual(found[:3], [(advice.PAIRS, name) for name in frames])
+        self.assertEqual([asks for asks, _ in found[3:]], [advice.SELF, "rays"])
+
+    def test_the_record_counts_cells(self) -> None:
+        lines = [line("refit", 2.0, "cloth"), other("fine", 1.9, "cloth"), line("refit", 1.0, "ball"), other("fine", 4.0, "ball")]
+        record = advice.records(advice.cells(study(lines)))["fine"]
+        self.assertEqual((record.cells, len(record.fastest), record.near), (2, 1, 1))
+        self.assertAlmostEqual(record.worst, 0.25)
+        self.assertAlmostEqual(record.share, 0.5)
+
+
+class TestGuide(unittest.TestCase):
+    def test_the_guide_has_what_the_reference_run_recommends(self) -> None:
+        root = paths.HERE.parents[1]
+        page = (root / "analysis" / "guides" / "choosing.md").read_text(encoding="utf-8")
+        self.assertEqual(advice.inserted(page, advice.markdown(load(root / "analysis" / "reference")), "choosing.md"), page)
+
+    def test_a_page_without_a_place_is_refused(self) -> None:
+        with self.assertRaises(ResultError):
+            advice.inserted("no place", "table", "page.md")
+
+
+class TestAgeing(unittest.TestCase):
+    def test_the_most_aged_comes_first_with_the_fastest_of_each_family(self) -> None:
+        lines = []
+        for scene, last in (("calm", 60.0), ("swarm", 600.0)):
+            for identity, family, total in (("refit", "refit", 4.0), ("slow", "restructuring", 3.0), ("quick", "restructuring", 2.0)):
+                one = line(identity, total, scene)
+                one["strategy"]["family"] = family
+                one["verified"]["over_time"] = [
+                    {"t": 0.0, "looseness": 0, "sah": 60.0, "sah_rebuilt": 50.0},
+                    {"t": 1.0, "looseness": 0, "sah": last, "sah_rebuilt": 50.0},
+                ]
+                lines.append(one)
+        first, second = ageing.scenes(study(lines))
+        self.assertTrue(first.title.startswith("swarm"), first.title)
+        self.assertAlmostEqual(first.growth, 10.0)
+        self.assertEqual((first.ages_much, second.ages_much), (True, False))
+        self.assertEqual([age.family for age in first.ages], ["refit", "restructuring"])
+        self.assertIn("quick", first.ages[1].label)
+        self.assertAlmostEqual(first.ages[1].over_refit, 2.0)
+        self.assertEqual(first.ages[0].quality, (1.2, 12.0))
+
+    def test_a_refit_alone_is_no_comparison(self) -> None:
+        self.assertEqual(ageing.scenes(study([line("refit", 1.0)])), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
