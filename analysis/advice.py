@@ -113,10 +113,10 @@ class Advice:
             where = "in the only cell" if self.cells == 1 else f"in {self.best_in} of {text.plural(self.cells, 'cell')}"
             worst = f"; at worst {text.factor(self.low)} times as fast as that one" if self.best_in < self.cells else ""
             return f"the best refit {where}{worst}{missing}"
-        span = f"{text.factor(self.low)} to {text.factor(self.high)} " if self.low < self.high else ""
-        of = "95\u00a0% interval" if span and self.cells == 1 else f"in {text.plural(self.cells, 'cell')}"
+        span = f"{text.factor(self.low)} to {text.factor(self.high)}" if self.low < self.high else ""
+        of = f"95\u00a0% interval {span}" if span and self.cells == 1 else f"{span} in {text.plural(self.cells, 'cell')}".lstrip()
         doubt = "; the machine was disturbed" if self.disturbed else ""
-        return f"{text.factor(self.speed)} times as fast as the best refit ({span}{of}{missing}{doubt})"
+        return f"{text.factor(self.speed)} times as fast as the best refit ({of}{missing}{doubt})"
 
 
 @dataclass

@@ -148,6 +148,7 @@ def write(
         size=text.size,
         sections=sections.sections(study, groups, all_looks, folder / "figures", which),
         most=tables.MOST,
+        remarks=tables.remarks(study),
         ageing_scenes=ageing.scenes(study),
         choices=choices.choices(study),
         stress=robustness.stress(folder),

@@ -215,9 +215,13 @@ def _notes(study: Study, timed: pd.DataFrame, all_ratios: Ratios) -> list[str]:
         fewest, most = int(compared.min()), int(compared.max())
         frames = f"{fewest} to {most} frames" if fewest < most else text.plural(most, "frame")
         notes.append(f"Missed and extra pairs are those of {frames} that were compared with the oracle.")
-    for row in timed[timed["remark"] != ""].drop_duplicates("id")[["title", "remark"]].itertuples():
-        notes.append(f"{row.title}: {row.remark}.")
     return notes
+
+
+def remarks(study: Study) -> list[str]:
+    """Returns what strategies say of their times, each once."""
+    rows = study.timed[study.timed["remark"] != ""].drop_duplicates("id")
+    return [f"{row.title}: {row.remark}." for row in rows[["title", "remark"]].itertuples()]
 
 
 PLAIN_COLUMNS = ("strategy", "guarantee", "code", "motion", "update", "query", "total", "ratio", "w/o motion", "steady", "paid from", "missed",
