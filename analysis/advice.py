@@ -109,6 +109,9 @@ class Advice:
     def says(self) -> str:
         """Tells the speed, as in "1.6 times as fast as the best refit (0.9 to 2.1 in 8 cells)"."""
         missing = f", measured in {self.measured}" if self.measured < self.cells else ""
+        if self.baseline and not self.best_in:
+            span = text.factor(self.low) + (f" to {text.factor(self.high)}" if self.low < self.high else "")
+            return f"a refit, {span} times as fast as the best one of the {'cell' if self.cells == 1 else 'cells'}{missing}"
         if self.baseline:
             where = "in the only cell" if self.cells == 1 else f"in {self.best_in} of {text.plural(self.cells, 'cell')}"
             worst = f"; at worst {text.factor(self.low)} times as fast as that one" if self.best_in < self.cells else ""

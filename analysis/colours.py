@@ -203,3 +203,16 @@ def for_page(look: Look) -> dict[str, object]:
         "dashes": [] if isinstance(look.line, str) else list(look.line[1]),  # type: ignore[index]
         "filled": look.filled,
     }
+
+
+def palette() -> dict[str, object]:
+    """Returns what a page needs to choose looks for contestants that it was not made with."""
+    return {
+        "families": FAMILIES,
+        "free": FREE,
+        "shades": SHADES,
+        "dashes": [[] if isinstance(line, str) else list(line[1]) for line in LINE_STYLES],  # type: ignore[index]
+        "corners": {name: [[float(c) for c in corner.split(",")] for corner in text.split()] for name, text in _POLYGONS.items()},
+        "dark": DARK_PAGE,
+        "contrast": DARK_CONTRAST,
+    }

@@ -13,11 +13,13 @@ from typing import Any, Optional
 
 import pandas as pd
 
+import advice
 import claim_pictures
 import claims as paper_claims
 import clip_times
 import colours
 import profiles
+import summary
 import text
 from load import PHASES, Study
 
@@ -100,6 +102,7 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
         columns["quality"].append(
             [[number(p["t"], 5), number(p["sah"] / p["sah_rebuilt"], 4), number(p["looseness"], 4)] for p in row["over_time"]]
         )
+    known = None if claims is None else summary.paper(claims, folder)
     taking_part = set(profiles.contestants(runs)["contestant"])
     machines, commits = _machines(cell_rows), _commits(runs)
     return {
@@ -114,7 +117,9 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
         "contestants": [_contestant(row, looks[row["contestant"]], row["contestant"] in taking_part) for row in contestant_rows],
         "cells": [_cell(row, dict((m, i) for i, (_, m) in enumerate(machines)), commits) for row in cell_rows],
         "runs": columns,
-        "claims": _claims(claims),
+        "palette": colours.palette(),
+        "claims": _claims(known),
+        "reference": known.reference if known else "",
         "report": "report.html" if (folder / "report.html").exists() else "",
     }
 
@@ -191,6 +196,7 @@ def _cell(row: pd.Series, machines: dict[str, int], commits: list[dict[str, Any]
         "frames": number(row["frames"]),
         "keyframes": number(row["keyframes"]),
         "continuous": bool(row["continuous"]),
+        "asks": advice.asked(row),
         "asked": _asked(row),
         "machine": machines[row["machine"]],
         "commit": commit,
@@ -250,12 +256,12 @@ def _reconstructed(row: pd.Series) -> dict[str, Any]:
     return {"options": " ".join(words)}
 
 
-def _claims(claims: Optional[paper_claims.Claims]) -> list[dict[str, Any]]:
-    """Returns the claims of the paper that these results decide, each with its picture."""
-    if claims is None:
+def _claims(known: Optional[summary.Paper]) -> list[dict[str, Any]]:
+    """Returns the claims of the paper, each with its verdict, whose it is, and its picture of these results."""
+    if known is None:
         return []
     return [
-        {"id": row.id, "claim": row.claim, "paper": row.paper, "verdict": row.verdict, "brief": row.brief,
-         "picture": str(claim_pictures.picture(row.looked, row.checks))}
-        for row in claims.rows if row.verdict != paper_claims.OPEN
+        {"id": one.row.id, "claim": one.row.claim, "paper": one.row.paper, "verdict": one.verdict, "source": one.source, "brief": one.brief,
+         "picture": str(claim_pictures.picture(one.row.looked, one.row.checks)) if one.source == summary.HERE else ""}
+        for one in known.verdicts if one.source
     ]  # fmt: skip

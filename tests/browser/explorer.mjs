@@ -19,7 +19,7 @@ const browser = await puppeteer.launch({
   ],
   protocolTimeout: 300_000,
 });
-const VIEWS = ["overview", "pairwise", "errors", "scaling", "frames", "versus", "claims", "runs"];
+const VIEWS = ["answer", "overview", "pairwise", "errors", "scaling", "frames", "versus", "claims", "runs"];
 const complaints = [];
 let checks = 0;
 
@@ -153,7 +153,7 @@ await check("merged: an outlier stretches no axis", async () => {
 // --- filters, links and history -------------------------------------------------------------------------------
 
 await check("filters choose runs, and the link keeps them", async () => {
-  const page = await open("reference");
+  const page = await open("reference", "#view=overview");
   const scenes = expected.reference.scenes;
   const [first, second] = Object.keys(scenes);
   await page.click(`input[name="scene"][value="${first}"]`);
@@ -171,7 +171,7 @@ await check("filters choose runs, and the link keeps them", async () => {
   assert.equal(await other.$eval(`input[name="scene"][value="${first}"]`, (box) => box.checked), true);
   await other.click(".filters-head button");
   assert.equal(await other.evaluate(() => window.explorer.selected().length), expected.reference.usual);
-  assert.equal(await other.evaluate(() => location.hash), "");
+  assert.equal(await other.evaluate(() => location.hash), "#view=overview");
   await other.close();
   await page.close();
 });
@@ -207,7 +207,7 @@ await check("states survive their links, strange names included", async () => {
 });
 
 await check("a study's question is the title, and its text stays text", async () => {
-  const page = await open("merged");
+  const page = await open("merged", "#view=overview");
   assert.equal(await page.title(), "is it faster?");
   assert.equal(await page.$eval("h1", (one) => one.textContent), "is it faster?");
   assert.match(await page.$eval(".question", (one) => one.textContent), /<script>alert\(1\)<\/script>/);
@@ -219,28 +219,172 @@ await check("a study's question is the title, and its text stays text", async ()
   await page.close();
 });
 
-await check("claims appear only where they are decided", async () => {
-  const decided = await open("reference", "#view=claims");
-  assert.equal(
-    (await decided.$$(".claim")).length,
-    await decided.evaluate(() => window.explorer.model.data.claims.length),
+await check("claims have verdicts, say whose they are, and add up", async () => {
+  for (const [which, source] of [
+    ["reference", "this study"],
+    ["merged", "the reference run"],
+  ]) {
+    const page = await open(which, "#view=claims");
+    const claims = await page.evaluate(() => window.explorer.model.data.claims);
+    assert.ok(claims.length > 20);
+    assert.equal((await page.$$(".claim")).length, claims.length);
+    assert.ok(claims.every((claim) => claim.verdict !== "not decided here"));
+    assert.ok(claims.some((claim) => claim.source === source), source);
+    const tally = await page.$eval(".tally", (one) => one.textContent);
+    const counted = [...tally.matchAll(/(?:holds|condition|hold) (\d+)/g)].reduce((sum, [, count]) => sum + Number(count), 0);
+    assert.equal(counted, claims.length, tally);
+    await page.close();
+  }
+});
+
+// --- three questions, one answer --------------------------------------------------------------------------------
+
+for (const which of ["reference", "merged"])
+  await check(`${which}: the rule takes what the report takes`, async () => {
+    const page = await open(which);
+    const own = await page.evaluate(() =>
+      window.explorer
+        .situations()
+        .map(({ asks, frames, cells, advice }) => [
+          asks,
+          frames,
+          cells,
+          advice.map((one) => one && [one.id, one.speed, one.low, one.high, one.own.length, one.bestIn]),
+        ]),
+    );
+    const python = expected[which].situations;
+    assert.deepEqual(own.map(([asks, frames]) => [asks, frames]).sort(), python.map(([asks, frames]) => [asks, frames]).sort());
+    assert.ok(python.length > 1);
+    for (const [asks, frames, cells, advice] of python) {
+      const found = own.find((one) => one[0] === asks && one[1] === frames);
+      assert.equal(found[2], cells, asks);
+      advice.forEach((one, i) => {
+        assert.equal(found[3][i][0], one[0], `${asks}, ${frames}`);
+        found[3][i].slice(1).forEach((value, k) => assert.ok(Math.abs(value - one[k + 1]) <= 1e-4 * Math.abs(value), `${one[0]}: ${value} and ${one[k + 1]}`));
+      });
+    }
+    await page.close();
+  });
+
+await check("three questions are answered by a name, an interval and a curve", async () => {
+  const page = await open("reference");
+  const said = () => page.$eval(".answer", (one) => one.textContent);
+  const press = (text) =>
+    page.evaluate((text) => [...document.querySelectorAll(".segments button")].find((one) => one.textContent === text).click(), text);
+  const rule = (known) =>
+    page.evaluate((known) => {
+      const one = window.explorer.situations().find(({ asks, frames }) => asks === "pairs of two bodies" && /^10/.test(frames));
+      return one.advice[known].contestant.title;
+    }, known);
+  assert.match(await said(), new RegExp(`^Take ${await rule(0)}`));
+  await press("The next keyframe");
+  assert.match(await said(), new RegExp(`^Take ${await rule(1)}.* times as fast as the best refit \\([\\d.]+ to [\\d.]+ in \\d+ cells\\).* ms a frame`));
+  await press("10k to 100k");
+  assert.match(await page.evaluate(() => location.hash), /know=next&large=medium/);
+  assert.equal((await page.$$(".beside-legend svg.chart")).length, 1);
+  assert.equal((await page.$$(".beside-legend .legend li")).length, 6);
+  await press("1");
+  assert.match(await said(), /^Take .*the best refit in \d+ of \d+ cells/);
+  await page.close();
+});
+
+await check("six lines, and the others on demand", async () => {
+  for (const view of ["answer", "overview", "scaling"]) {
+    const page = await open("reference", `#view=${view}&know=clip`);
+    const lines = () => page.$eval("#view svg.chart", (svg) => svg.querySelectorAll('g[aria-label="line"]').length);
+    const few = await lines();
+    assert.ok(few >= 2 && few <= 6 + 3, `${view}: ${few} lines`); // and three guides of slope
+    assert.ok((await page.$$eval("#view .legend li, #view .ranking tbody tr", (list) => list.length)) <= 6, view);
+    await page.click("button.others");
+    assert.ok((await lines()) > few, view);
+    await page.close();
+  }
+});
+
+await check("legends are beside the plot, or right above it in a narrow window", async () => {
+  for (const [width, beside] of [
+    [1440, true],
+    [390, false],
+  ]) {
+    const page = await open("reference", "#view=answer", { width });
+    const [plot, legend] = await page.evaluate(() =>
+      [".beside-legend figure", ".beside-legend .legend"].map((one) => document.querySelector(one).getBoundingClientRect().toJSON()),
+    );
+    if (beside) assert.ok(legend.left >= plot.right && Math.abs(legend.top - plot.top) < 120);
+    else assert.ok(legend.bottom <= plot.top);
+    await page.close();
+  }
+});
+
+await check("in a narrow window the answer comes before the menus", async () => {
+  const page = await open("reference", "", { width: 390 });
+  const tops = await page.evaluate(() =>
+    [".take", ".views", "#open-filters"].map((one) => document.querySelector(one).getBoundingClientRect().top),
   );
-  assert.ok((await decided.$$(".claim")).length > 20);
-  const none = await open("merged", "#view=claims");
-  const [tabs, claims] = await none.evaluate(() => [
-    [...document.querySelectorAll('[role="tab"]')].map((tab) => tab.dataset.view),
-    window.explorer.model.data.claims,
-  ]);
-  assert.equal(tabs.includes("claims"), claims.length > 0);
-  assert.ok(claims.every((claim) => claim.verdict !== "not decided here"));
-  await decided.close();
-  await none.close();
+  assert.ok(tops[0] > 0 && tops[0] < 844, "in the first screen");
+  assert.ok(tops[0] < tops[1]);
+  await page.close();
+});
+
+await check("filters name strategies by their titles", async () => {
+  const page = await open("reference", "#view=overview");
+  const pairs = await page.$$eval('input[name="strategy"]', (list) =>
+    list.map((box) => [box.value, box.parentElement.querySelector(".value").textContent]),
+  );
+  const titles = await page.evaluate(() => Object.fromEntries(window.explorer.model.contestants.map((one) => [one.id, one.title])));
+  assert.ok(pairs.length > 10);
+  for (const [id, text] of pairs) assert.equal(text, titles[id]);
+  await page.close();
+});
+
+// --- files that are opened in the page --------------------------------------------------------------------------
+
+for (const which of ["reference", "merged"])
+  await check(`${which}: a file of results gives the data that Python makes of it`, async () => {
+    const page = await open(which);
+    const differences = await page.evaluate((text) => {
+      const { dataOf, given } = window.explorer;
+      const own = dataOf(text, "results.jsonl", given.palette);
+      own.runs.draws = own.runs.draws.map((one) => (typeof one === "function" ? one() : one));
+      const found = [];
+      // Five digits and fewer are rounded in other ways where a number lies just between two.
+      const near = (path) => (/pace|quality/.test(path) ? 1e-3 : /draws|values_|nodes_|_tests|certificates/.test(path) ? 1e-4 : 1e-9);
+      const compare = (a, b, path) => {
+        if (typeof a === "number" && typeof b === "number") {
+          if (Math.abs(a - b) > near(path) * Math.max(Math.abs(a), Math.abs(b))) found.push(`${path}: ${a}, ${b}`);
+        } else if (a && b && typeof a === "object" && typeof b === "object")
+          for (const key of new Set([...Object.keys(a), ...Object.keys(b)])) compare(a[key], b[key], `${path}.${key}`);
+        else if (a !== b) found.push(`${path}: ${JSON.stringify(a)}, ${JSON.stringify(b)}`);
+      };
+      for (const part of ["plans", "phases", "machines", "commits", "contestants", "cells", "runs"]) compare(own[part], given[part], part);
+      return found.slice(0, 5);
+    }, readFileSync(expected[which].results, "utf8"));
+    assert.deepEqual(differences, []);
+    await page.close();
+  });
+
+await check("files are opened, and what is no file of results is refused in one sentence", async () => {
+  const page = await open("reference", "#view=overview&l=10", { scheme: "dark" });
+  const picker = await page.$('input[type="file"]');
+  await picker.uploadFile(expected.merged.results);
+  await page.waitForFunction((count) => window.explorer.model.runs.length === count, {}, expected.merged.runs);
+  assert.equal(await page.$eval("h1", (one) => one.textContent), "is it faster?");
+  assert.match(await page.$eval(".answer", (one) => one.textContent), /^Take /);
+  assert.equal((await page.$$("header.page")).length, 1);
+  assert.equal(await page.evaluate(() => document.documentElement.dataset.scheme), "dark");
+  await page.click('[data-view="pairwise"]');
+  assert.ok((await page.$$("#view svg.chart")).length > 0);
+  await (await page.$('input[type="file"]')).uploadFile(expected.merged.page);
+  await page.waitForFunction(() => !document.querySelector(".problem").hidden);
+  assert.match(await page.$eval(".problem", (one) => one.textContent), /explorer.html cannot be shown: .* no result that can be used/);
+  assert.equal(await page.evaluate(() => window.explorer.model.runs.length), expected.merged.runs);
+  await page.close();
 });
 
 // --- points lead to commands, by pointer and by keyboard ----------------------------------------------------
 
 await check("a number of the matrix leads to its command", async () => {
-  const page = await open("reference");
+  const page = await open("reference", "#view=overview");
   const cell = await page.$(".matrix td[data-run]");
   await cell.click();
   const run = await cell.evaluate((td) => Number(td.dataset.run));
@@ -259,7 +403,7 @@ await check("a number of the matrix leads to its command", async () => {
 });
 
 await check("arrow keys and Enter reach every kind of figure", async () => {
-  for (const view of ["overview", "pairwise", "errors", "scaling", "frames"]) {
+  for (const view of ["answer", "overview", "pairwise", "errors", "scaling", "frames"]) {
     const page = await open("reference", `#view=${view}`);
     await page.focus('.plot[role="application"]');
     for (const key of ["ArrowRight", "ArrowDown", "ArrowRight", "Enter"]) await page.keyboard.press(key);
@@ -267,7 +411,7 @@ await check("arrow keys and Enter reach every kind of figure", async () => {
     assert.ok(await page.evaluate(() => document.activeElement.id === "details"), view);
     await page.close();
   }
-  const page = await open("reference");
+  const page = await open("reference", "#view=overview");
   await page.focus('.matrix td[tabindex="0"]');
   await page.keyboard.press("ArrowDown");
   const run = await page.evaluate(() => Number(document.activeElement.dataset.run));
@@ -327,13 +471,14 @@ await check("the program accepts the commands", async () => {
 
 for (const [which, views] of [
   ["reference", VIEWS],
-  ["merged", ["overview", "versus"]],
+  ["merged", ["answer", "overview", "versus"]],
 ])
   for (const view of views)
     for (const [width, scheme] of [
       [1440, "light"],
       [1024, "dark"],
       [390, "light"],
+      [390, "dark"],
     ])
       await check(`${which}: ${view} at ${width}, ${scheme}`, async () => {
         const page = await open(which, `#view=${view}`, { width, scheme });
@@ -356,7 +501,7 @@ for (const [which, views] of [
       });
 
 await check("the filters of a narrow window are a drawer", async () => {
-  const page = await open("reference", "", { width: 390 });
+  const page = await open("reference", "#view=overview", { width: 390 });
   const shown = () => page.$eval("#filters", (one) => getComputedStyle(one).display !== "none");
   assert.equal(await shown(), false);
   await page.click("#open-filters");

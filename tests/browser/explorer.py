@@ -77,8 +77,10 @@ def described(found: Any) -> Optional[list[Any]]:
 
 def expectations(folder: Path, study: Any) -> dict[str, Any]:
     """Returns what the page should compute."""
+    import advice
     import profiles
     import ratios
+    from load import load
 
     runs = study.runs
     usual = set(profiles.contestants(runs)["run"])
@@ -101,6 +103,11 @@ def expectations(folder: Path, study: Any) -> dict[str, Any]:
             pairwise[place[run]] = described(found)
     return {
         "page": str(folder / "explorer.html"),
+        "results": str(folder / "results.jsonl"),
+        "situations": [
+            [one.asks, one.frames, one.cells, [best and [best.id, best.speed, best.low, best.high, best.measured, best.best_in] for _, best in one.advice]]
+            for one in advice.situations(load(folder))
+        ],
         "runs": len(runs),
         "usual": len(usual),
         "scenes": {scene: int(rows["run"].isin(usual).sum()) for scene, rows in runs.groupby("scene")},
@@ -141,11 +148,11 @@ def merged(place: Path, program: str) -> dict[str, Any]:
                     line["machine"] = {**synthetic.MACHINE, "cpu": cpu}
                     line["plan"] = {"name": "is it faster?", "description": "Two commits and two machines, <script>alert(1)</script> included."}
                     line["again"] = {"scenes": [{"bodies": [{"shape": "sphere", "triangles": size}]}], "repetitions": 8}
-                    if scene == "cloth":  # of schema 2, with times of frames; the others count by clips
-                        synthetic.add_frames(line, seed)
                     if contestant["id"] == "rebuild":  # an outlier that no axis should be stretched by
                         for repetition in line["times"]["repetitions"]:
                             repetition["update"] *= 1e5 if seed == 1 and (scene, size, l) == ("cloth", 8000, 10) else 1
+                    if scene == "cloth":  # of schema 2, with times of frames; the others count by clips
+                        synthetic.add_frames(line, seed)
                     lines.append(line)
         synthetic.write(place / name, lines)
     folder = place / "merged"
@@ -173,7 +180,7 @@ def large(place: Path) -> dict[str, Any]:
     lines = [text.replace(commit, letter * 40) for letter in "abc"]
     (folder / "results.jsonl").write_text("".join(lines))
     study = write(folder, with_claims=False)
-    return {"page": str(folder / "explorer.html"), "runs": len(study.runs), "megabytes": (folder / "results.jsonl").stat().st_size / 1e6}
+    return {"page": str(folder / "explorer.html"), "results": str(folder / "results.jsonl"), "runs": len(study.runs), "megabytes": (folder / "results.jsonl").stat().st_size / 1e6}
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ function group(model, state, set, facet) {
   let values = [...counts.keys()];
   if (NUMERIC.includes(facet)) values.sort((a, b) => a - b);
   if (facet === "strategy")
-    values.sort((a, b) => family(model, a).localeCompare(family(model, b)) || a.localeCompare(b));
+    values.sort((a, b) => family(model, a).localeCompare(family(model, b)) || title(model, a).localeCompare(title(model, b)));
   const chosen = new Set(state[facet]);
   const toggle = (value, on) => {
     const next = new Set(chosen);
@@ -59,7 +59,7 @@ function group(model, state, set, facet) {
     const contestant = facet === "strategy" && model.contestants.find((one) => one.id === value);
     return make(
       "label",
-      { class: counts.get(value) ? null : "absent", title: contestant ? contestant.title : null },
+      { class: counts.get(value) ? null : "absent", title: contestant ? contestant.id : null },
       make("input", {
         type: "checkbox",
         name: facet,
@@ -70,7 +70,11 @@ function group(model, state, set, facet) {
       contestant && symbol(contestant),
       make("span", {
         class: "value",
-        text: NUMERIC.includes(facet) ? Number(value).toLocaleString("en").replaceAll(",", "\u202f") : value,
+        text: NUMERIC.includes(facet)
+          ? Number(value).toLocaleString("en").replaceAll(",", "\u202f")
+          : contestant
+            ? contestant.title
+            : value,
       }),
       make("span", { class: "count", text: counts.get(value) }),
     );
@@ -88,6 +92,10 @@ function group(model, state, set, facet) {
         make("button", { type: "button", class: "quiet", text: "Clear", click: () => set({ [facet]: [] }) }),
     ),
   );
+}
+
+function title(model, id) {
+  return model.contestants.find((one) => one.id === id)?.title ?? id;
 }
 
 function family(model, id) {

@@ -6,8 +6,11 @@ import { details } from "./details.js";
 import { choice, copy, hintScrolling, make, paints, symbol } from "./dom.js";
 import { filters } from "./filters.js";
 import { MEASURES, compare, entrants, model as modelOf, reference, seriesOfName, selected } from "./model.js";
+import { dataOf } from "./records.js";
 import { FACETS, decode, encode, initial } from "./state.js";
 import * as statistics from "./statistics.js";
+import { situations } from "./advice.js";
+import { answer } from "./views/answer.js";
 import { claims } from "./views/claims.js";
 import { errors } from "./views/errors.js";
 import { frames } from "./views/frames.js";
@@ -19,10 +22,12 @@ import { pairs, sources, versus } from "./views/versus.js";
 import { plural } from "./words.js";
 
 const begun = performance.now();
-const model = modelOf(JSON.parse(document.getElementById("data").textContent));
+const given = JSON.parse(document.getElementById("data").textContent);
+let model = modelOf(given);
 let state = decode(location.hash);
 
 const VIEWS = {
+  answer: { name: "Answer", draw: answer, uses: [] },
   overview: { name: "Overview", draw: overview, uses: ["measure", "against", "per", "contestants", "cells"] },
   pairwise: { name: "Ratios", draw: pairwise, uses: ["measure", "against", "per", "contestants"] },
   errors: { name: "Time and error", draw: errors, uses: ["measure", "cell"] },
@@ -32,7 +37,7 @@ const VIEWS = {
   claims: { name: "The paper's claims", draw: claims, uses: [], shown: () => model.data.claims.length > 0 },
   runs: { name: "All runs", draw: runs, uses: ["measure", "against", "contestants"] },
 };
-const views = Object.entries(VIEWS).filter(([, { shown }]) => !shown || shown());
+let views = [];
 
 const host = {
   filters: make("aside", { id: "filters", "aria-label": "Filters" }),
@@ -41,6 +46,7 @@ const host = {
   view: make("div", { id: "view", role: "tabpanel", tabindex: -1 }),
   panel: make("aside", { id: "details", "aria-labelledby": "details-name", tabindex: -1, hidden: true }),
   said: make("p", { class: "hidden", role: "status" }),
+  problem: make("p", { class: "refused problem", role: "alert", hidden: true }),
 };
 
 /** Changes the state, the link and the page. */
@@ -120,11 +126,12 @@ function tools(uses, current) {
   host.tools.replaceChildren(...uses.map((name) => all[name]()).filter(Boolean));
 }
 
-/** A legend of series or strategies, or of runs. */
-function legend(names) {
+/** A legend of series or strategies, with a button for lines that are not drawn; or of runs; or of entries. */
+function legend(names, others = 0) {
   const named = (name) =>
     seriesOfName(model, { per: model.contestants.some((one) => one.id === name) ? "best" : "each" }, name);
-  return legendList(names.map(named).map(({ contestant, label }) => [contestant, label]));
+  const list = legendList(names.map(named).map(({ contestant, label }) => [contestant, label]));
+  return list && make("div", { class: "legend-box" }, list, others > 0 && othersButton(others));
 }
 function legendOf(list) {
   return legendList([
@@ -137,9 +144,29 @@ function legendList(entries) {
     make(
       "ul",
       { class: "legend", "aria-label": "Legend" },
-      entries.map(([contestant, label]) => make("li", {}, symbol(contestant), label)),
+      entries.map(([contestant, label, told]) =>
+        make("li", {}, symbol(contestant), make("span", {}, label, told && make("small", { text: told }))),
+      ),
     )
   );
+}
+
+/** Shows or hides the lines beyond the best six. */
+function othersButton(count) {
+  const all = state.lines === "all";
+  return make("button", {
+    type: "button",
+    class: "others",
+    text: all ? "Only the best six" : `The other ${count}, too`,
+    click: () => set({ lines: all ? "six" : "all" }),
+  });
+}
+
+/** Puts a view's legend beside its figures. */
+function besideLegend(parts) {
+  const legend = parts.find((one) => one.classList.contains("legend") || one.classList.contains("legend-box"));
+  if (!legend) return parts;
+  return [make("div", { class: "beside-legend" }, make("div", {}, parts.filter((one) => one !== legend)), legend)];
 }
 
 function drawView() {
@@ -152,13 +179,14 @@ function drawView() {
   }
   tools(view.uses, current);
   host.view.setAttribute("aria-label", view.name);
-  const context = { model, state, set, choose, legend, legendOf, cell: current?.cell };
+  const context = { model, state, set, choose, legend, legendList, legendOf, othersButton, cell: current?.cell };
   const count = selected(model, state).length;
-  const nothing = count === 0 && name !== "claims";
+  const nothing = count === 0 && !["answer", "claims"].includes(name);
+  document.body.classList.toggle("answering", name === "answer");
   host.view.replaceChildren(
     ...(nothing
       ? [make("p", { class: "lead", text: "No run passes these filters." })]
-      : view.draw(context).filter(Boolean)),
+      : besideLegend(view.draw(context).filter(Boolean))),
   );
   hintScrolling(host.view);
   host.said.textContent = `${view.name}: ${plural(count, "run")}`;
@@ -236,6 +264,15 @@ function header() {
     model.commits.length === 1 ? `commit ${model.commits[0].label}` : plural(model.commits.length, "commit"),
     model.machines.length === 1 ? model.machines[0].label : plural(model.machines.length, "machine"),
   ];
+  const picker = make("input", {
+    type: "file",
+    class: "hidden",
+    accept: ".jsonl,.json",
+    multiple: true,
+    tabindex: -1,
+    "aria-label": "files of results",
+    change: () => read(picker.files),
+  });
   const share = make("button", {
     type: "button",
     text: "Copy the link",
@@ -258,13 +295,25 @@ function header() {
       make(
         "div",
         { class: "actions" },
-        data.report && make("a", { href: data.report, text: "Report for print" }),
+        data.report && make("a", { href: data.report, text: "Report" }),
+        make("button", {
+          type: "button",
+          text: "Open results…",
+          title: "Reads results.jsonl files in this page, without sending them anywhere; they can be dropped on it, too",
+          click: () => picker.click(),
+        }),
+        picker,
         share,
         theme,
       ),
     ),
-    about.length > 3 ? make("details", { class: "notes" }, make("summary", { text: "What they ask" }), about) : about,
-    make("p", { class: "facts", text: facts.join(" · ") }),
+    make(
+      "details",
+      { class: "notes" },
+      make("summary", { text: facts.slice(0, 4).join(" · ") }),
+      about,
+      make("p", { class: "facts", text: facts.slice(4).join(" · ") }),
+    ),
     data.notes.length > 0 &&
       make(
         "details",
@@ -286,9 +335,34 @@ function scheme(name) {
   host.theme.setAttribute("aria-label", `switch to the ${name === "dark" ? "light" : "dark"} scheme`);
 }
 
+/** Makes the page anew from files of results. */
+async function read(files) {
+  if (!files.length) return;
+  const names = [...files].map((file) => file.name).join(", ");
+  host.said.textContent = `Reading ${names}`;
+  try {
+    const texts = await Promise.all([...files].map((file) => file.text()));
+    model = modelOf(dataOf(texts.join("\n"), names, given.palette));
+  } catch (problem) {
+    host.problem.textContent = `${names} cannot be shown: ${problem.message}`;
+    host.problem.hidden = false;
+    return;
+  }
+  state = initial();
+  history.replaceState(null, "", location.pathname + location.search);
+  for (const old of document.querySelectorAll("body > :not(script), head > style.contestants")) old.remove();
+  build();
+  draw();
+  host.said.textContent = `${names}: ${plural(model.runs.length, "run")}`;
+}
+
 function build() {
+  views = Object.entries(VIEWS).filter(([, { shown }]) => !shown || shown());
+  host.tabs.replaceChildren();
+  host.problem.hidden = true;
   document.head.append(
     make("style", {
+      class: "contestants",
       text: `:root{${paints(model.contestants, "light")}}:root[data-scheme=dark]{${paints(model.contestants, "dark")}}`,
     }),
   );
@@ -299,7 +373,6 @@ function build() {
     "aria-expanded": "false",
     click: () => showFilters(!document.body.classList.contains("filters-open")),
   });
-  host.filters.addEventListener("keydown", (event) => event.key === "Escape" && showFilters(false));
   host.tabs.append(
     ...views.map(([key, { name }]) =>
       make("button", {
@@ -312,15 +385,6 @@ function build() {
       }),
     ),
   );
-  host.tabs.addEventListener("keydown", (event) => {
-    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-    if (!step) return;
-    const at = views.findIndex(([key]) => key === document.activeElement.dataset.view);
-    const next = host.tabs.children[(at + step + views.length) % views.length];
-    next.focus();
-    next.click();
-  });
-  host.panel.addEventListener("keydown", (event) => event.key === "Escape" && close());
   document.body.prepend(
     make("a", {
       class: "skip",
@@ -332,6 +396,7 @@ function build() {
       },
     }),
     header(),
+    host.problem,
     make(
       "div",
       { class: "layout" },
@@ -348,11 +413,31 @@ function build() {
     ),
     host.said,
   );
-  const dark = matchMedia("(prefers-color-scheme: dark)");
-  scheme(dark.matches ? "dark" : "light");
-  dark.addEventListener("change", () => scheme(dark.matches ? "dark" : "light"));
+  scheme(document.documentElement.dataset.scheme ?? (dark.matches ? "dark" : "light"));
 }
 
+/** Listens to what outlives a change of the results. */
+function listen() {
+  host.filters.addEventListener("keydown", (event) => event.key === "Escape" && showFilters(false));
+  host.tabs.addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step) return;
+    const at = views.findIndex(([key]) => key === document.activeElement.dataset.view);
+    const next = host.tabs.children[(at + step + views.length) % views.length];
+    next.focus();
+    next.click();
+  });
+  host.panel.addEventListener("keydown", (event) => event.key === "Escape" && close());
+  dark.addEventListener("change", () => scheme(dark.matches ? "dark" : "light"));
+  addEventListener("dragover", (event) => event.preventDefault());
+  addEventListener("drop", (event) => {
+    event.preventDefault();
+    read(event.dataTransfer.files);
+  });
+}
+
+const dark = matchMedia("(prefers-color-scheme: dark)");
+listen();
 build();
 draw();
 addEventListener("hashchange", () => {
@@ -366,7 +451,11 @@ addEventListener("popstate", () => {
 
 // For the console, and for tests: what the page computes.
 window.explorer = {
-  model,
+  get model() {
+    return model;
+  },
+  given,
+  dataOf,
   set,
   statistics,
   sources: () => sources(model),
@@ -377,6 +466,7 @@ window.explorer = {
   state: () => state,
   command,
   profiles: () => profiled({ model, state }),
+  situations: () => situations(model),
   ratio: (run, base, measure) => compare(model, run, base, measure),
   reference: (run) => reference(model, state, run.cell, run),
   selected: () => selected(model, state),

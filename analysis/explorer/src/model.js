@@ -18,6 +18,9 @@ export const MEASURES = {
   triangle_tests: { name: "triangle tests per frame", unit: "", format: count, column: "triangle_tests" },
 };
 
+/** Lines of a figure before the others, which are drawn pale on demand. */
+export const SIX = 6;
+
 /** Turns the data of the page into cells, contestants and runs that refer to each other. */
 export function model(data) {
   const machines = data.machines.map((machine, index) => ({ ...machine, index }));
@@ -42,6 +45,7 @@ export function model(data) {
   const runs = columns.cell.map((cell, index) => {
     const run = { index, cell: cells[cell], contestant: contestants[columns.contestant[index]], medians: {}, sums: {} };
     for (const name of names) run[name] = columns[name][index];
+    if (typeof run.draws === "function") makeOnce(run, "draws", run.draws);
     run.plan = data.plans[run.plan];
     run.key = `${run.cell.key}~${run.contestant.key}`;
     cells[cell].runs.push(run);
@@ -65,6 +69,18 @@ export function model(data) {
   );
   order.forEach((cell, place) => (cell.place = place));
   return { data, machines, commits, contestants, cells, runs, place, several };
+}
+
+/** Makes a property that is computed when it is first read. */
+function makeOnce(object, name, make) {
+  Object.defineProperty(object, name, {
+    configurable: true,
+    get: () => {
+      const value = make();
+      Object.defineProperty(object, name, { value });
+      return value;
+    },
+  });
 }
 
 /** Names a contestant in links: its id and non-default settings, and its tree. */

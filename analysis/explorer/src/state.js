@@ -5,7 +5,13 @@ export const FACETS = ["plan", "scene", "size", "l", "scalar", "machine", "commi
 
 const DEFAULTS = {
   ...Object.fromEntries(FACETS.map((name) => [name, []])),
-  view: "overview",
+  view: "answer",
+  know: "none", // of the future: or "next", "clip"
+  frames: "", // a keyframe: a class of l
+  large: "any", // or a class of sizes
+  asks: "", // what is asked of a cell
+  of: "", // a scene of the answer
+  lines: "six", // of a figure, or "all": the others pale
   contestants: "usual", // or "all"
   per: "best", // each strategy with its fastest setting, or "each" setting
   measure: "with_motion",

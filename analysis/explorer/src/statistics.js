@@ -27,12 +27,12 @@ export function quantile(sorted, share) {
 
 /** Fewer repetitions have a range and no interval. */
 export const FEWEST_OF_AN_INTERVAL = 5;
-const DRAWS = 200;
+export const DRAWS = 200;
 const LEFT_OUT = DRAWS / 40;
 const drawn = new Map();
 
 /** Returns the resampled rounds, the same as in analysis/clip_times.py (Steele, Lea and Flood 2014). */
-function resamples(repetitions) {
+export function resamples(repetitions) {
   if (drawn.has(repetitions)) return drawn.get(repetitions);
   const mask = (1n << 64n) - 1n;
   let state = 1n;
@@ -68,6 +68,12 @@ const every = (run) => run.times.map((_, r) => r);
 export function timeOf(run, place, scope, clips = run.clips) {
   if (clips) return byClips(run, place, scope, every(run));
   return SCOPES[scope].reduce((sum, phase) => sum + run.middle[place[phase]], 0);
+}
+
+/** Returns the middle of `ratio`, without its ends. */
+export function quotient(own, other, place, scope) {
+  const clips = own.clips || other.clips;
+  return timeOf(other, place, scope, clips) / timeOf(own, place, scope, clips);
 }
 
 /** Returns that time over resampled rounds. */

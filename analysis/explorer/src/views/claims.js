@@ -2,12 +2,29 @@
 import { make } from "../dom.js";
 import { plural } from "../words.js";
 
+const HERE = "this study";
+
 export function claims({ model }) {
-  const { claims: decided, report } = model.data;
+  const { claims: decided, report, reference } = model.data;
   return [
+    make(
+      "p",
+      { class: "lead tally" },
+      "Does the paper hold? ",
+      ["holds", "holds with a condition", "does not hold"].map((verdict) => {
+        const mine = decided.filter((one) => one.verdict === verdict);
+        const by = mine.filter((one) => one.source !== HERE).length;
+        return (
+          mine.length > 0 && [
+            make("span", { class: `verdict ${verdict.replaceAll(" ", "-")}`, text: verdict }),
+            ` ${mine.length}${by ? ` (${by} by the reference run)` : ""}  `,
+          ]
+        );
+      }),
+    ),
     make("p", {
-      class: "lead",
-      text: `${plural(decided.length, "claim")} of Zachmann and Weller (2006), theory (T) and experiments (E), that these results decide. Verdicts follow from thresholds in analysis/claims.json.`,
+      class: "note",
+      text: `${plural(decided.length, "claim")} of Zachmann and Weller (2006), theory (T) and experiments (E), judged by thresholds in analysis/claims.json: by these results where they decide, else by the reference run that comes with the project${reference ? ` (${reference})` : ""}.`,
     }),
     ...decided.map((one) => {
       const picture = make("div", { class: "drawn" });
@@ -25,14 +42,14 @@ export function claims({ model }) {
             "p",
             {},
             make("span", { class: `verdict ${one.verdict.replaceAll(" ", "-")}`, text: one.verdict }),
-            " ",
+            one.source === HERE ? " " : make("span", { class: "note", text: " by the reference run " }),
             one.brief,
           ),
           report &&
             make(
               "p",
               { class: "note" },
-              make("a", { href: `${report}#claim-${one.id}`, text: "points, conditions and figures in the report" }),
+              make("a", { href: `${report}#claim-${one.id}`, text: "corners and conditions in the report" }),
             ),
         ),
         one.picture && picture,

@@ -2,12 +2,11 @@
 import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, lineLook, logAxis, logScale, meanLook, rowLabels } from "../chart.js";
 import { make, paintOf } from "../dom.js";
-import { entrants, seriesOfName } from "../model.js";
+import { SIX, entrants, seriesOfName } from "../model.js";
 import { median } from "../statistics.js";
 import { factor, milliseconds, plural, significant } from "../words.js";
 import { empty } from "./overview.js";
 
-const MOST = 8; // lines in one figure
 
 export function frames(context) {
   const { model, state } = context;
@@ -17,7 +16,7 @@ export function frames(context) {
   if (!series) return [empty("Frames", "No cell of this selection has a time.")];
   const runs = [...series.values()].filter((run) => run.worst !== null).sort((a, b) => a.worst - b.worst);
   const fast = [...series.values()].filter((run) => run.pace.length > 1).sort((a, b) => total(a) - total(b));
-  const shown = state.strategy.length ? fast : fast.slice(0, MOST);
+  const shown = state.strategy.length ? fast : fast.slice(0, SIX);
   const parts = [];
   if (runs.length) parts.push(worst(context, cell, runs));
   if (shown.length)

@@ -4,6 +4,7 @@ import { dotLook, figure, lineLook, logScale } from "../chart.js";
 import { make, symbol } from "../dom.js";
 import {
   MEASURES,
+  SIX,
   compare,
   decided,
   entrants,
@@ -17,8 +18,6 @@ import { geometricMean, median, profiles, quantile, within } from "../statistics
 import { factor, percent, plural, sentence } from "../words.js";
 
 const SHARES = [1, 1.25, 2];
-const STRONG = 8; // lines of a profile that are drawn thick
-const NAMED = 16; // rows of the ranking before "show all", and lines with markers
 
 export function overview(context) {
   const cells = entrants(context.model, context.state);
@@ -59,10 +58,11 @@ function profileFigure({ model, state, choose }, found) {
         : "No cell of this selection has two contestants with a time.",
     );
   const cells = found[0].cells;
-  const all = found.flatMap((one) => one.factors).sort((a, b) => a - b);
+  const kept = state.lines === "all" ? found : found.slice(0, SIX);
+  const all = kept.flatMap((one) => one.factors).sort((a, b) => a - b);
   const top = [2, 3, 5, 10, 20, 50, 100].find((t) => t >= quantile(all, 0.85)) ?? 100;
   const points = [];
-  const lines = found.map((one, index) => {
+  const lines = kept.map((one, index) => {
     const share = (x) => 100 * within(one, x);
     const steps = [{ x: 1, y: share(1) }];
     for (const f of one.factors) if (f > 1 && f <= top) steps.push({ x: f, y: share(f) });
@@ -83,10 +83,10 @@ function profileFigure({ model, state, choose }, found) {
         });
     });
     const marks = [0, 1, 2]
-      .map((k) => top ** ((k + ((index * 7) % found.length) / found.length) / 3))
+      .map((k) => top ** ((k + ((index * 7) % kept.length) / kept.length) / 3))
       .map((x) => ({ x, y: share(x) }))
       .filter((mark) => mark.y > 0);
-    return { one, steps, marks, strong: index < STRONG, named: index < NAMED || found.length <= NAMED + 4 };
+    return { one, steps, marks, strong: index < SIX };
   });
   return figure({
     title,
@@ -103,15 +103,15 @@ function profileFigure({ model, state, choose }, found) {
       y: { domain: [0, 100], label: "↑ share of cells, %", grid: true, ticks: 5 },
       marks: [
         Plot.ruleY([0], { stroke: "var(--soft)" }),
-        ...lines.toReversed().flatMap(({ one, steps, marks, strong, named }) => [
+        ...lines.toReversed().flatMap(({ one, steps, marks, strong }) => [
           Plot.line(steps, {
             x: "x",
             y: "y",
             curve: "step-after",
             ...lineLook(one.series.contestant, strong ? 2 : 1.1),
-            strokeOpacity: strong ? 1 : named ? 0.55 : 0.3,
+            strokeOpacity: strong ? 1 : 0.35,
           }),
-          Plot.dot(named ? marks : [], { x: "x", y: "y", ...dotLook(one.series.contestant, strong ? 4.5 : 3.5) }),
+          Plot.dot(strong ? marks : [], { x: "x", y: "y", ...dotLook(one.series.contestant, 4.5) }),
         ]),
       ],
     }),
@@ -134,7 +134,7 @@ function row(one) {
 }
 
 /** The legend of the profile, in order: who is it, and what do the lines say in numbers. */
-function ranking({ state, set }, found) {
+function ranking({ state, set, othersButton }, found) {
   if (!found.length) return null;
   const bar = (share) => make("td", { class: "n bar", style: `--share:${share}`, text: percent(share) });
   const line = (one) =>
@@ -160,18 +160,8 @@ function ranking({ state, set }, found) {
       make("td", { class: "n", text: factor(median(one.factors)) }),
       make("td", { class: "n", text: `${one.factors.length}` }),
     );
-  const first = found.length > NAMED + 4 ? NAMED : found.length;
-  const body = make("tbody", {}, found.slice(0, first).map(line));
-  const more =
-    first < found.length &&
-    make("button", {
-      type: "button",
-      text: `Show all ${found.length}`,
-      click: () => {
-        body.append(...found.slice(first).map(line));
-        more.remove();
-      },
-    });
+  const body = make("tbody", {}, (state.lines === "all" ? found : found.slice(0, SIX)).map(line));
+  const more = found.length > SIX && othersButton(found.length - SIX);
   return make(
     "section",
     { class: "ranking" },

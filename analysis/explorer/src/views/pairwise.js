@@ -2,19 +2,17 @@
 import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, logAxis, logScale, rowLabels } from "../chart.js";
 import { paintOf } from "../dom.js";
-import { compare, entrants, ratioText, reference, referenceName, seriesOfName, MEASURES } from "../model.js";
+import { compare, entrants, ratioText, reference, referenceName, seriesOfName, MEASURES, SIX } from "../model.js";
 import { FEWEST_OF_AN_INTERVAL, geometricMean } from "../statistics.js";
 import { factor, plural, sentence } from "../words.js";
 import { empty, profiled } from "./overview.js";
-
-const MOST = 6; // series in one figure, unless strategies are chosen
 
 export function pairwise(context) {
   const { model, state } = context;
   const cells = entrants(model, state);
   const against = referenceName(model, state);
   const order = profiled(context, cells).map((one) => one.name);
-  const names = state.strategy.length ? order : order.filter((name) => name !== state.against).slice(0, MOST);
+  const names = state.strategy.length ? order : order.filter((name) => name !== state.against).slice(0, SIX);
   const points = [];
   const rows = [];
   const order_of = [];

@@ -2,10 +2,10 @@
 import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, lineLook, logAxis, logScale } from "../chart.js";
 import { make, paintOf } from "../dom.js";
-import { MEASURES, entrants, seriesOfName, times, value } from "../model.js";
+import { MEASURES, SIX, entrants, seriesOfName, times, value } from "../model.js";
 import { SCOPES } from "../statistics.js";
 import { plural, tick } from "../words.js";
-import { empty } from "./overview.js";
+import { empty, profiled } from "./overview.js";
 
 export function scaling(context) {
   const cells = entrants(context.model, context.state);
@@ -14,6 +14,8 @@ export function scaling(context) {
   if (!over_l.length && !over_n.length)
     return [empty("Over l and over n", "No scene of this selection has two sizes or two values of l.")];
   const names = new Set([...over_l, ...over_n].flatMap((sweep) => [...sweep.lines.keys()]));
+  const order = profiled(context, cells).map((one) => one.name).filter((name) => names.has(name));
+  const strong = new Set(order.slice(0, SIX));
   return [
     over_l.length &&
       make(
@@ -24,7 +26,7 @@ export function scaling(context) {
           class: "lead",
           text: "Event-driven work depends on keyframes only: such a line falls as more frames share it, while a refit pays for every frame and stays level.",
         }),
-        figures(context, over_l, "l"),
+        figures(context, over_l, "l", strong),
       ),
     over_n.length &&
       make(
@@ -35,14 +37,14 @@ export function scaling(context) {
           class: "lead",
           text: "Both axes are logarithmic: work proportional to n is as steep as the thin grey lines.",
         }),
-        figures(context, over_n, "primitives"),
+        figures(context, over_n, "primitives", strong),
       ),
-    context.legend([...names]),
+    context.legend([...strong], names.size - strong.size),
   ].filter(Boolean);
 }
 
 /** Returns the sweeps of cells that differ in one field only, with at least two values of it. */
-function sweeps(cells, field, fixed) {
+export function sweeps(cells, field, fixed) {
   const found = new Map();
   for (const [cell, series] of cells) {
     const key = [
@@ -66,12 +68,12 @@ function sweeps(cells, field, fixed) {
 }
 
 /** Figures of the sweeps: those with two values only are folded where there are others. */
-function figures(context, sweeps, field) {
+function figures(context, sweeps, field, strong) {
   const draw = (list) =>
     make(
       "div",
       { class: "pair" },
-      list.map((sweep) => one(context, sweep, field)),
+      list.map((sweep) => sweepFigure(context, sweep, field, strong)),
     );
   const [long, short] = [sweeps.filter((s) => s.cells.size > 2), sweeps.filter((s) => s.cells.size === 2)];
   if (!long.length || !short.length) return draw(sweeps);
@@ -80,7 +82,8 @@ function figures(context, sweeps, field) {
   return [draw(long), more];
 }
 
-function one({ model, state, choose }, sweep, field) {
+/** Draws a sweep: strong lines, and the others pale if they are wanted. */
+export function sweepFigure({ model, state, choose }, sweep, field, strong) {
   const measure = MEASURES[state.measure];
   const { first } = sweep;
   const place = [
@@ -92,12 +95,13 @@ function one({ model, state, choose }, sweep, field) {
   ]
     .filter(Boolean)
     .join(", ");
-  const all = [...sweep.lines.values()].flat().map(({ run }) => value(model, run, state.measure));
+  const kept = [...sweep.lines].filter(([name]) => strong.has(name) || state.lines === "all");
+  const all = kept.flatMap(([, line]) => line.map(({ run }) => value(model, run, state.measure)));
   const axis = logAxis(all);
   const at = [...sweep.cells.keys()].sort((a, b) => a - b);
   const points = [];
   const rows = [];
-  const lines = [...sweep.lines].map(([name, line]) => {
+  const lines = kept.map(([name, line]) => {
     const series = seriesOfName(model, state, name);
     const own = line.map(({ at: x, run }) => {
       const time = value(model, run, state.measure);
@@ -129,7 +133,7 @@ function one({ model, state, choose }, sweep, field) {
         return hit ? measure.format(value(model, hit.run, state.measure)) : "–";
       }),
     ]);
-    return { series, own };
+    return { series, own, pale: !strong.has(name) };
   });
   const guides =
     field === "l"
@@ -164,7 +168,12 @@ function one({ model, state, choose }, sweep, field) {
           .map((guide) =>
             Plot.line(guide, { x: "x", y: "y", stroke: "var(--soft)", strokeWidth: 0.7, strokeOpacity: 0.6 }),
           ),
-        ...lines.flatMap(({ series, own }) => [
+        ...lines
+          .filter((line) => line.pale)
+          .map(({ series, own }) =>
+            Plot.line(own, { x: "x", y: "y", ...lineLook(series.contestant, 1), strokeOpacity: 0.35 }),
+          ),
+        ...lines.filter((line) => !line.pale).flatMap(({ series, own }) => [
           Plot.ruleX(own, {
             x: "x",
             y1: "low",
@@ -180,7 +189,7 @@ function one({ model, state, choose }, sweep, field) {
           ),
         ]),
         clippedMarks(
-          lines.flatMap(({ own }) => own),
+          lines.filter((line) => !line.pale).flatMap(({ own }) => own),
           "y",
         ),
       ],

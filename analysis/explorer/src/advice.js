@@ -1,0 +1,102 @@
+// Which strategy for what: the rule of analysis/advice.py, which words it; a test compares both.
+import { bestRefit, compare, value } from "./model.js";
+import { geometricMean, quotient } from "./statistics.js";
+
+/** What may be known of the future, and the foresight of strategies that need to know no more. */
+export const KNOWN = {
+  none: { name: "Nothing", words: "nothing is known", allowed: ["", "none"] },
+  next: {
+    name: "The next keyframe",
+    words: "the next keyframe is known",
+    allowed: ["", "none", "step bound", "next keyframe"],
+  },
+  clip: {
+    name: "The whole clip",
+    words: "the whole clip is known",
+    allowed: ["", "none", "step bound", "next keyframe", "whole clip"],
+  },
+};
+
+/** Classes of l, with their first l and the first beyond. */
+export const FRAMES = {
+  1: { name: "1", words: "a keyframe at every frame", from: 0, to: 2 },
+  2: { name: "2 to 9", words: "2 to 9 frames a keyframe", from: 2, to: 10 },
+  10: { name: "10 and more", words: "10 frames a keyframe and more", from: 10, to: Infinity },
+};
+
+/** Classes of sizes, in primitives. */
+export const SIZES = {
+  any: { name: "Any size", from: 0, to: Infinity },
+  small: { name: "below 10k", from: 0, to: 1e4 },
+  medium: { name: "10k to 100k", from: 1e4, to: 1e5 },
+  large: { name: "100k and more", from: 1e5, to: Infinity },
+};
+
+export const PAIRS = "pairs of two bodies";
+
+export const classOf = (classes, number) =>
+  Object.keys(classes).find((key) => key !== "any" && classes[key].from <= number && number < classes[key].to);
+
+/** Returns the cells that count, each with its best refit and, by strategy, its fastest run and its speed over that refit. */
+export function countedCells(model) {
+  if (model.counted) return model.counted;
+  const newest = new Map(); // of cells that several commits measured
+  for (const cell of model.cells) {
+    const key = `${cell.problem}~${cell.machine.index}~${cell.asks}`;
+    if (!newest.has(key) || newest.get(key).commit.index <= cell.commit.index) newest.set(key, cell);
+  }
+  model.counted = [...newest.values()].flatMap((cell) => {
+    const runs = new Map();
+    const usual = cell.runs.filter((run) => run.contestant.usual);
+    for (const run of usual) {
+      const time = value(model, run, "with_motion");
+      const known = runs.get(run.contestant.id);
+      if (time !== null && (!known || time < value(model, known, "with_motion"))) runs.set(run.contestant.id, run);
+    }
+    const refit = bestRefit(model, usual);
+    if (!refit || runs.size < 2) return [];
+    const speeds = new Map([...runs].map(([id, run]) => [id, quotient(run, refit, model.place, "with_motion")]));
+    return [{ cell, refit, runs, speeds }];
+  });
+  return model.counted;
+}
+
+/** Ranks the strategies that need to know no more than `known`, the best first: the rule takes the first. */
+export function ranked(model, cells, known) {
+  const found = [];
+  for (const id of [...new Set(model.contestants.map((one) => one.id))].sort()) {
+    const contestant = model.contestants.find((one) => one.id === id);
+    if (!KNOWN[known].allowed.includes(contestant.foresight)) continue;
+    const own = cells.filter((one) => one.speeds.has(id));
+    if (!own.length || 2 * own.length < cells.length) continue;
+    const speeds = own.map((one) => one.speeds.get(id));
+    const low = Math.min(...speeds);
+    const speed = geometricMean([...speeds, ...Array(cells.length - own.length).fill(low)]);
+    found.push({ id, contestant, speed, low, high: Math.max(...speeds), own, cells: cells.length });
+  }
+  found.sort((a, b) => b.speed - a.speed); // stable: equal ones by id
+  if (cells.length === 1)
+    for (const one of found) {
+      const ratio = compare(model, cells[0].runs.get(one.id), cells[0].refit, "with_motion");
+      if (ratio) Object.assign(one, { low: ratio.low, high: ratio.high });
+    }
+  for (const one of found) {
+    one.bestIn = one.own.filter(({ refit, runs }) => runs.get(one.id) === refit).length;
+    one.disturbed = one.own.some(({ refit, runs }) => runs.get(one.id).disturbed || refit.disturbed);
+  }
+  return found;
+}
+
+/** Returns what the rule takes in every situation, as analysis/advice.py lists them. */
+export function situations(model) {
+  const cells = countedCells(model);
+  const kinds = [...new Set(cells.map(({ cell }) => cell.asks))];
+  return kinds.flatMap((asks) =>
+    Object.keys(FRAMES).flatMap((frames) => {
+      const own = cells.filter(({ cell }) => cell.asks === asks && classOf(FRAMES, cell.l) === frames);
+      if (!own.length) return [];
+      const advice = Object.keys(KNOWN).map((known) => ranked(model, own, known)[0] ?? null);
+      return [{ asks, frames: FRAMES[frames].words, cells: own.length, advice }];
+    }),
+  );
+}

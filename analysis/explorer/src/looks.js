@@ -1,0 +1,59 @@
+// Colours and markers of contestants that the page was not made with, as analysis/colours.py chooses them.
+
+const channels = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
+
+function mix(colour, shade) {
+  const towards = shade > 0 ? 255 : 0;
+  const half = (value) => (value % 1 === 0.5 ? 2 * Math.round(value / 2) : Math.round(value)); // as Python rounds
+  return `#${channels(colour).map((c) => half(c + (towards - c) * Math.abs(shade)).toString(16).padStart(2, "0")).join("").toUpperCase()}`;
+}
+
+function luminance(colour) {
+  const [r, g, b] = channels(colour).map((c) => (c / 255 <= 0.03928 ? c / 255 / 12.92 : ((c / 255 + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+}
+
+function onDark(colour, { dark, contrast }) {
+  const ground = luminance(dark) + 0.05;
+  for (let share = 0; share <= 20; share += 1) {
+    const shade = mix(colour, share / 20);
+    const own = luminance(shade) + 0.05;
+    if (Math.max(own, ground) / Math.min(own, ground) >= contrast) return shade;
+  }
+  return "#FFFFFF";
+}
+
+/** Returns the looks of rows' contestants. Families that the palette does not know take its free ones in turn. */
+export function looks(rows, palette) {
+  const unique = [...new Map(rows.map((row) => [row.contestant, row])).values()];
+  const unknown = [...new Set(unique.map((row) => row.family))].filter((family) => !(family in palette.families)).sort();
+  const of = (family) => palette.families[family] ?? palette.free[unknown.indexOf(family) % palette.free.length];
+  const members = new Map();
+  const variants = new Map();
+  const push = (map, key, value) => {
+    if (!map.has(key)) map.set(key, []);
+    if (!map.get(key).includes(value)) map.get(key).push(value);
+  };
+  for (const row of unique.toSorted((a, b) => (a.contestant < b.contestant ? -1 : 1))) {
+    push(members, row.family, row.strategy.id);
+    push(variants, row.strategy.id, row.contestant);
+  }
+  return new Map(
+    unique.map((row) => {
+      const [colour, marker] = of(row.family);
+      const member = members.get(row.family).indexOf(row.strategy.id);
+      const variant = variants.get(row.strategy.id).indexOf(row.contestant);
+      const light = mix(colour, palette.shades[member % palette.shades.length]);
+      return [
+        row.contestant,
+        {
+          light,
+          dark: onDark(light, palette),
+          corners: palette.corners[marker] ?? [],
+          dashes: palette.dashes[(member + variant) % palette.dashes.length],
+          filled: (member + variant) % 2 === 0,
+        },
+      ];
+    }),
+  );
+}
