@@ -1,7 +1,7 @@
 // Looks at the pages that explorer.py made, in a headless Chromium.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
-import { readFileSync } from "node:fs";
+import { readFileSync, statSync } from "node:fs";
 import { createRequire } from "node:module";
 
 const require = createRequire(`${process.env.KBVH_EXPLORER}/package.json`);
@@ -34,7 +34,7 @@ function check(what, work) {
 }
 
 /** Opens a page; errors of its console, and requests to a network, are complaints. */
-async function open(which, link = "", { width = 1440, scheme = "light" } = {}) {
+async function open(which, link = "", { width = 1440, scheme = "light", file = "page" } = {}) {
   const page = await browser.newPage();
   const complain = (text) => {
     console.log(`FAILED: ${which}${link} (${width}, ${scheme}): ${text}`);
@@ -42,11 +42,12 @@ async function open(which, link = "", { width = 1440, scheme = "light" } = {}) {
   };
   page.on("console", (message) => ["error", "warn"].includes(message.type()) && complain(message.text()));
   page.on("pageerror", (error) => complain(error.message));
+  page.on("requestfailed", (request) => complain(`${request.url()} is missing`));
   page.on("request", (request) => /^https?:/.test(request.url()) && complain(`a request to ${request.url()}`));
   await page.setViewport({ width, height: 900 });
   await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
-  await page.goto(`file://${expected[which].page}${link}`);
-  await page.waitForFunction(() => window.explorer?.shown);
+  await page.goto(`file://${expected[which][file]}${link}`);
+  if (file === "page") await page.waitForFunction(() => window.explorer?.shown);
   return page;
 }
 
@@ -520,6 +521,56 @@ await check("the switch changes the scheme", async () => {
   const before = await colour();
   await page.click("#theme");
   assert.notEqual(await colour(), before);
+  await page.close();
+});
+
+// --- the report -------------------------------------------------------------------------------------------------
+
+/** Returns what reaches beyond the window without being in a part that scrolls. */
+const beyond = (page) =>
+  page.evaluate(() => {
+    const scrolls = (one) => one && (getComputedStyle(one).overflowX === "auto" || scrolls(one.parentElement));
+    return [...document.querySelectorAll("body *")]
+      .filter((one) => one.getBoundingClientRect().right > innerWidth + 1 && one.getBoundingClientRect().width && !scrolls(one))
+      .map((one) => one.outerHTML.slice(0, 80));
+  });
+
+for (const which of ["reference", "merged"])
+  for (const [width, scheme] of [
+    [1280, "light"],
+    [1280, "dark"],
+    [390, "light"],
+    [390, "dark"],
+  ])
+    await check(`the report of ${which} at ${width}, ${scheme}: short, nothing cut`, async () => {
+      assert.ok(statSync(expected[which].report).size < 2e6);
+      const page = await open(which, "", { width, scheme, file: "report" });
+      const tall = await page.evaluate(() => document.documentElement.scrollHeight);
+      if (width === 1280) assert.ok(tall <= 5 * 900, `${tall} pixels`);
+      assert.deepEqual(await beyond(page), []);
+      const contrast = await page.evaluate(() => getComputedStyle(document.documentElement).color);
+      assert.equal(contrast === "rgb(29, 33, 41)", scheme === "light");
+      await page.evaluate(() => document.querySelectorAll("details").forEach((one) => (one.open = true)));
+      assert.deepEqual(await beyond(page), [], "unfolded");
+      await page.close();
+    });
+
+await check("the report's top answers, and its links unfold what they lead to", async () => {
+  const page = await open("reference", "", { file: "report", width: 1280 });
+  assert.deepEqual(await page.$$eval(".sentences a", (list) => list.map((one) => one.textContent)), [
+    "What to take",
+    "Other questions",
+    "Time against error",
+    "The paper",
+    "This run",
+  ]);
+  const rule = expected.reference.situations.map(([, , , advice]) => [...new Set(advice.filter(Boolean).map(([id]) => id))].length);
+  assert.equal((await page.$$(".situation:not(.scale)")).length, rule.reduce((a, b) => a + b));
+  await page.click('.sentences a[href="#claims"]');
+  await page.waitForFunction(() => document.querySelector("#claims").open);
+  const claim = await open("reference", "#claim-E1", { file: "report" });
+  assert.equal(await claim.$eval("#claim-E1", (one) => one.open && one.closest("#claims").open), true);
+  await claim.close();
   await page.close();
 });
 

@@ -1,4 +1,4 @@
-"""Tests of explorer.html in a headless Chromium, against values of the Python analysis.
+"""Tests of explorer.html and report.html in a headless Chromium, against values of the Python analysis.
 
 usage: explorer.py KBVH_PROGRAM [--keep FOLDER]
 
@@ -8,6 +8,8 @@ explorer.mjs look. Exit code 77 (skipped) where a tool is missing.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
 import shutil
@@ -53,14 +55,16 @@ def main() -> int:
 
 
 def write(folder: Path, with_claims: bool = True) -> Any:
-    """Writes the page of a folder; returns its study."""
+    """Writes the pages of a folder, its report included unless without claims; returns its study."""
     import explore
     import explorer_data
+    import report
     from load import ONE_OF_EACH_COMMIT, load
 
     study = load(folder, ONE_OF_EACH_COMMIT)
     if with_claims:
-        explore.write(study, folder, "")
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            report.main([str(folder)])
     else:  # judging claims takes longer than the page
         (folder / explore.PAGE).write_text(explore.page(explorer_data.data(study, "", None, folder), *explore.program()), encoding="utf-8")
     return study
@@ -103,6 +107,7 @@ def expectations(folder: Path, study: Any) -> dict[str, Any]:
             pairwise[place[run]] = described(found)
     return {
         "page": str(folder / "explorer.html"),
+        "report": str(folder / "report.html"),
         "results": str(folder / "results.jsonl"),
         "situations": [
             [one.asks, one.frames, one.cells, [best and [best.id, best.speed, best.low, best.high, best.measured, best.best_in] for _, best in one.advice]]
