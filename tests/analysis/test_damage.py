@@ -140,15 +140,16 @@ class TestScenes(Case):
 
     def sections(self) -> dict[str, str]:
         """Each scene's part of the page."""
-        parts = re.split(r'<h3 class="scene" id="[^"]*">', self.page())[1:]
-        return {part.split("<")[0]: part for part in parts}
+        parts = re.split(r'<details id="scene-\d+">\n<summary><h3>', self.page())[1:]
+        return {part.split("<")[0].strip(): part for part in parts}
 
-    def picture_of(self, scene: str) -> str:
+    def picture_of(self, scene: str) -> bytes:
         """What is drawn of a scene."""
         runs = load.load(self.folder).runs
         folder = scene_pictures.written_out(self.folder).of(runs[runs["scene"] == scene])
         assert folder is not None
-        return scene_cards.view(folder, self.folder / "figures", scene).uri
+        figure = scene_cards.view(folder, self.folder / "figures", scene)
+        return (self.folder / figure.file).read_bytes()
 
     def test_of_one_name_have_cards_and_pictures_of_their_own(self) -> None:
         self.write_scene("mine", "aaaaaaaaaaaaaaaa", 0.25)

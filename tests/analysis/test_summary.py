@@ -1,0 +1,134 @@
+"""The top of the report: whose verdict a claim has, what the sentences say, and where the bars of the chart are."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Any
+
+import paths  # noqa: F401  (finds the modules under test)
+import synthetic
+from synthetic import line
+from test_advice import other
+
+import advice
+import claims
+import summary
+import time_error
+from load import Study, load
+
+
+def row(id: str, verdict: str) -> claims.Row:
+    return claims.Row(id, f"Claim {id}", "", "", {"": "1"}, verdict, "", "", brief=f"{id} here.")
+
+
+class TestPaper(unittest.TestCase):
+    def setUp(self) -> None:
+        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
+        self.addCleanup(temporary.cleanup)
+        self.reference, self.folder = Path(temporary.name) / "reference", Path(temporary.name) / "results"
+        for folder in (self.reference, self.folder):
+            folder.mkdir()
+        known = {"E1": claims.HOLDS, "E2": claims.FAILS, "E3": claims.CONDITION, "E4": claims.OPEN}
+        corners = [{"id": "a:b", "name": "a against b"}]
+        self.write([{"id": id, "verdict": verdict, "brief": f"{id} there.", "corners": corners, "ours": {"a:b": "2 to 3, 4 (with motion)"}}
+                    for id, verdict in known.items()])  # fmt: skip
+        first = {"machine": {"cpu": "Some CPU"}, "when": "2026-01-02T03:04:05Z", "commit": "0123456789"}
+        (self.reference / "results.jsonl").write_text(json.dumps(first) + "\n")
+
+    def write(self, rows: list[dict[str, Any]]) -> None:
+        (self.reference / "claims.json").write_text(json.dumps({"schema": "kbvh-claims-1", "claims": rows}))
+
+    def paper(self, *rows: claims.Row, folder: str = "folder") -> summary.Paper:
+        return summary.paper(claims.Claims(list(rows), []), getattr(self, folder), self.reference)
+
+    def test_this_study_decides_where_it_can_and_else_the_reference_run(self) -> None:
+        found = self.paper(row("E1", claims.OPEN), row("E2", claims.HOLDS), row("E3", claims.OPEN), row("E4", claims.OPEN))
+        self.assertEqual([(one.verdict, one.source) for one in found.verdicts],
+                         [(claims.HOLDS, summary.BY_REFERENCE), (claims.HOLDS, summary.HERE),
+                          (claims.CONDITION, summary.BY_REFERENCE), (claims.OPEN, "")])  # fmt: skip
+        self.assertEqual([one.brief for one in found.verdicts[:2]], ["E1 there.", "E2 here."])
+        self.assertEqual([one.row.id for one in found.verdicts if one.differs], ["E2"])
+        self.assertEqual(found.tally, [(claims.HOLDS, 1, 1), (claims.CONDITION, 0, 1), (claims.FAILS, 0, 0), (claims.OPEN, 1, 0)])
+        says = summary.on_the_paper(found)
+        for words in ("Of its 4 claims 2 hold, 1 hold with a condition, 0 do not hold and 1 are open", "1 decided by this study and 2 by the "
+                      "reference run that comes with the project (Some CPU, 2026-01-02, commit 01234567)", "judges E2 otherwise",
+                      "(E3) holds with a condition (the reference run): a against b 2 to 3 times"):  # fmt: skip
+            self.assertIn(words, says)
+
+    def test_the_reference_run_does_not_stand_in_for_itself(self) -> None:
+        found = self.paper(row("E1", claims.OPEN), folder="reference")
+        self.assertEqual([(one.verdict, one.source) for one in found.verdicts], [(claims.OPEN, "")])
+        self.assertEqual(found.reference, "")
+
+    def test_without_a_reference_run_only_this_study_speaks(self) -> None:
+        (self.reference / "claims.json").unlink()
+        self.assertIn("decide none", summary.on_the_paper(self.paper(row("E1", claims.OPEN))))
+        says = summary.on_the_paper(self.paper(row("E1", claims.HOLDS)))
+        self.assertIn("1 decided by this study.", says)
+        self.assertNotIn("reference", says)
+
+    def test_the_reference_run_that_comes_with_the_project_decides_all(self) -> None:
+        every = [row(one["id"], claims.OPEN) for one in json.loads((summary.REFERENCE / "claims.json").read_text())["claims"]]
+        found = summary.paper(claims.Claims(every, []), self.folder)
+        self.assertEqual({one.source for one in found.verdicts}, {summary.BY_REFERENCE})
+
+
+class TestSentences(unittest.TestCase):
+    def study(self, lines: list[dict[str, Any]]) -> Study:
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
+            return load(synthetic.write(Path(name), lines))
+
+    def said(self, lines: list[dict[str, Any]]) -> dict[str, str]:
+        study = self.study(lines)
+        known = summary.Paper([], "")
+        found = summary.sentences(study, advice.situations(study), time_error.shown(study), known)
+        return {one.subject: one.says for one in found}
+
+    def test_what_to_take_follows_the_rule(self) -> None:
+        said = self.said([line("refit", 2.0), other("join", 1.0, foresight="next_keyframe")])
+        self.assertEqual(
+            said["What to take"],
+            "With 10 frames a keyframe and more, take refit where nothing is known: the best refit in the only cell; join if the next keyframe "
+            "is known: 2.00 times as fast as the best refit (in 1 cell).",
+        )
+        self.assertIn("Pairs within a body and rays were not asked for", said["Other questions"])
+        self.assertIn("answers wrongly", said["Time against error"])
+
+    def test_disturbed_runs_are_counted_and_old_ones_unknown(self) -> None:
+        lines = [synthetic.add_frames(line(f"refit_{i}", 1.0)) for i in range(4)]
+        self.assertIn("quiet: none of 4", self.said(lines)["This run"])
+        lines[2]["times"]["disturbed"] = "9 involuntary switches"
+        self.assertIn("1 of 4 timed contestants are doubtful", self.said(lines)["This run"])
+        self.assertIn("9 involuntary switches", self.said(lines)["This run"])
+        self.assertIn("is unknown", self.said([line("refit", 1.0)])["This run"])
+
+    def test_the_table_of_scenes_says_what_it_costs_by_what_is_known(self) -> None:
+        study = self.study([line("refit", 2.0), line("slower", 4.0), other("join", 1.0, foresight="next_keyframe")])
+        (one,) = summary.lines(study, advice.cells(study))
+        nothing, keyframe, clip = one.by_knowledge
+        self.assertEqual((nothing.title, nothing.ms, nothing.ratio), ("refit", "2.00", "the best refit"))
+        self.assertEqual((keyframe.title, keyframe.ms, keyframe.ratio.split(" ")[0]), ("join", "1.00", "2.00"))
+        self.assertIsNone(clip, "knowing more gains nothing")
+
+
+class TestChart(unittest.TestCase):
+    def test_places_are_on_one_logarithmic_axis(self) -> None:
+        def best(id: str, low: float, speed: float, high: float) -> advice.Advice:
+            return advice.Advice(id, id, False, speed, low, high, 3, 3, "", 0)
+
+        a, b = best("a", 1.0, 2.0, 4.0), best("b", 2.0, 4.0, 8.0)
+        known = list(advice.FORESIGHT)
+        found = summary.chart([advice.Situation("x", "y", 3, [(known[0], a), (known[1], b), (known[2], b)])])
+        ((_, bars),) = found.groups
+        self.assertEqual([bar.best.id for bar in bars], ["a", "b"], "what more knowledge does not change has no line")
+        ticks = {label: place for place, label in found.ticks}
+        self.assertEqual((bars[0].low, bars[0].at), (ticks["1"], ticks["2"]))
+        self.assertAlmostEqual(bars[1].high - bars[1].at, ticks["2"] - ticks["1"], places=1)
+        self.assertTrue(all(0 <= place <= 100 for bar in bars for place in (bar.low, bar.at, bar.high)))
+
+
+if __name__ == "__main__":
+    unittest.main()
