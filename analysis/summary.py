@@ -234,18 +234,17 @@ class Line:
     primitives: str
     l: str
     group: str  #: of the study
-    refit: str
-    refit_ms: str
     by_knowledge: list[Optional[Fastest]]  #: in the order of FORESIGHT; None where less knowledge does as well
 
 
 def lines(study: Study, every: Sequence[Cell]) -> list[Line]:
-    """Returns a line for each cell: what is the fastest in it, by what is known, in ms and over the best refit."""
+    """Returns a line for each cell, in the order of the tables: what is the fastest in it, by what is known, in ms and over the best refit."""
+    order = {rows["group"].iloc[0]: place for place, rows in enumerate(study.groups())}
     total = dict(zip(map(int, study.runs["run"]), study.runs["total_motion"]))
     titles = dict(zip(study.runs["id"], study.runs["title"]))
     allowed = {known: advice.allowed(study, known) for known in advice.FORESIGHT}
     found = []
-    for cell in every:
+    for cell in sorted(every, key=lambda cell: order[cell.row["group"]]):
         by_knowledge: list[Optional[Fastest]] = []
         last = None
         for known in advice.FORESIGHT:
@@ -268,7 +267,7 @@ def lines(study: Study, every: Sequence[Cell]) -> list[Line]:
         found.append(
             Line(
                 str(row["scene"]) + scalar, "" if cell.asks == advice.PAIRS else cell.asks, text.size(row["primitives"]), f"{row['l']:g}",
-                str(row["group"]), str(row["title"]), text.milliseconds(total[cell.refit]), by_knowledge,
+                str(row["group"]), by_knowledge,
             )  # fmt: skip
         )
     return found

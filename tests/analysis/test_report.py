@@ -66,7 +66,8 @@ class TestPage(ReportCase):
         page = self.page(lines)
         glance = page[page.index('id="glance"') : page.index("</table>", page.index('id="glance"'))]
         self.assertIn("My own refit", glance, "the fastest that is no baseline stands in the summary")
-        self.assertIn("Bottom-up refit", glance)
+        self.assertRegex(page, r'<tr class="reference"><td>Bottom-up refit[^\n]*best refit</span>', "the denominator")
+        self.assertNotRegex(page, r'<tr class="reference"><td>My own refit')
 
     def test_figures_without_data_are_left_out(self) -> None:
         lines = [line for line in small() if line["strategy"]["id"] == "bottom_up" and line["scene"]["per_keyframe"] == 1]
