@@ -1,6 +1,7 @@
 import {createEngine} from '../engine/client.js';
 import {Tree} from '../math/hierarchy.js';
 import {difference, nothingLit} from './lit.js';
+import {titleOf} from '../text/words.js';
 
 /** The counters that the comparison draws, with their meaning, in the order of the menu. */
 export const workMetrics = [
@@ -10,7 +11,7 @@ export const workMetrics = [
   {id: 'triangle_tests', title: 'Primitive tests', about: 'exact tests of primitives'},
   {id: 'certificates_failed', title: 'Events', about: 'certificates that failed'},
   {id: 'queue_operations', title: 'Queue operations', about: 'insert, erase, pop and re-key on the event queue'},
-  {id: 'milliseconds', title: 'Time in the engine', about: 'milliseconds in WebAssembly; depends on this machine and its load'},
+  {id: 'milliseconds', title: 'Time in the engine, ms', about: 'milliseconds in WebAssembly; depends on this machine and its load'},
 ];
 
 /**
@@ -42,7 +43,7 @@ export class Comparison {
     const {compare, scene, precision, at} = this.lab.state;
     ++this.measuring;
     if (!compare) return;
-    await this.lab.enqueue(quiet ? null : 'loading', `Loading the second strategy, ${compare.strategy}`, async () => {
+    await this.lab.enqueue(quiet ? null : 'loading', `Loading the second strategy, ${titleOf(this.lab.state.strategies, compare.strategy)}`, async () => {
       this.engine ??= await createEngine();
       const info = await this.engine.load({scene: this.lab.sceneFor(scene, compare.strategy), strategy: compare.strategy, params: compare.params, topology: compare.topology, precision});
       this.lab.store.set({compare: {...this.lab.state.compare, info, at: null, trees: [], lit: nothingLit}});

@@ -2,7 +2,7 @@
  * The value-time diagram of one side of one node: every vertex below the node as a line, the envelope that the bound must
  * follow, the present certificate, and the events where lines cross. Wheel or + and - zoom, dragging moves.
  */
-import {html, Canvas, font, haloText, pointerAt, ticks, tickText, useMemo, usePinch, useRef, useState} from './dom.js';
+import {html, Canvas, font, haloText, pointerAt, ticks, tickText, Unfilled, useMemo, usePinch, useRef, useState} from './dom.js';
 import {envelope} from '../math/envelope.js';
 import {axisNames, axisOf, isUpper, sideName, valueAt} from '../math/plans.js';
 import {linesBelow} from '../text/tenure.js';
@@ -25,7 +25,8 @@ export function Diagram({lab, state}) {
   const lines = useMemo(() => known ? linesBelow(scene, tree, node, side, precision, few ? Infinity : manyLines / 2, always) : [], [scene, known && tree.childStart, node, side, precision, always.join()]);
   const pieces = useMemo(() => few && info ? envelope(lines, isUpper(side), info.begin, info.end) : [], [lines, info]);
   const whole = useMemo(() => extent(lines, info), [lines, info]);
-  if (!known || !at) return html`<div class="empty">Choose a node that has a box.</div>`;
+  if (!known || !at) return at && !tree ? html`<${Unfilled} lab=${lab} why="This strategy keeps no tree, so there is no box whose side could be drawn." would="With one, each vertex below the chosen node is a line here, and the bound follows the outermost of them." />`
+    : html`<div class="empty">Choose a node that has a box.</div>`;
   const view = zoom ?? whole;
   const axis = axisNames[axisOf(side)];
   const realiser = tree.realiser(node, side);
@@ -99,7 +100,7 @@ export function Diagram({lab, state}) {
     c.fillText('t, s', 6, height - bottom + 16);
     c.fillStyle = colours.ink;
     font(c, 12, 600);
-    c.fillText(axis, 6, 2);
+    c.fillText(`${axis}, units`, 6, 2);
     c.strokeStyle = colours.muted; c.setLineDash([1, 3]);
     for (const t of info.keyframes) if (t > view.t0 && t < view.t1) line(c, X(t), top, X(t), height - bottom);
     c.setLineDash([]);

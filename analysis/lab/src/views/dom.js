@@ -143,6 +143,11 @@ export function Ref({lab, part}) {
   return html`<button class="ref ref-time" onClick=${() => lab.seek(part.time)}>${part.text}</button>`;
 }
 
+/** What a panel would show under a kinetic strategy, where the chosen one gives it nothing to show. */
+export function Unfilled({lab, why, would}) {
+  return html`<div class="empty unfilled"><p>${why} ${would}</p><button onClick=${() => lab.choose('kinetic_aabb')}>Show it for the kinetic AABB tree</button></div>`;
+}
+
 /** A panel with a heading. */
 export function Panel({id, title, tools, children, className = ''}) {
   return html`<section class="panel panel-${id} ${className}" aria-label=${title}>

@@ -1,8 +1,10 @@
 /** The head of the page: scene, strategy and its parameters, second strategy, files, links, theme, help. */
 import {html, useRef, useState} from './dom.js';
+import {Share} from './share.js';
 import {builtIn} from '../state/scenes.js';
 import {encodeState} from '../state/permalink.js';
 import {openFiles, openStudyScene} from '../state/files.js';
+import {heading, words} from '../text/words.js';
 
 /** Strategies named first in the menus, in the order of the course. */
 const first = ['bottom_up', 'kinetic_aabb', 'kinetic_boxtree', 'kinetic_separation_list', 'linear_bounds', 'interval_join', 'kinetic_envelope'];
@@ -13,9 +15,10 @@ export function ordered(strategies) {
   return [...strategies].sort((a, b) => rank(a) - rank(b) || a.family.localeCompare(b.family) || a.title.localeCompare(b.title));
 }
 
-export function Header({lab, state, compact, onHelp}) {
+/** `page`: the address of the lab's own page, to which links lead; without it there are no links. */
+export function Header({lab, state, compact, page, onHelp, onTour}) {
   const {sceneId, scene, strategy, strategies, compare, view, precision} = state;
-  const [open, setOpen] = useState(false), file = useRef(null);
+  const [open, setOpen] = useState(false), [sharing, setSharing] = useState(false), file = useRef(null);
   const about = strategies.find((s) => s.id === strategy);
   const load = (choice) => lab.load(choice, choice.scene ? {} : {time: state.at?.time});
   return html`<header class="lab-head">
@@ -34,9 +37,11 @@ export function Header({lab, state, compact, onHelp}) {
     ${!compact && html`<button onClick=${() => file.current.click()} title="Open OBJ, OBJ with PC2, glTF, or a scene or state of the lab">Open…</button>
     <input ref=${file} type="file" class="sr" tabIndex="-1" multiple aria-label="Open files" onChange=${(event) => { openFiles(lab, event.currentTarget.files); event.currentTarget.value = ''; }} />`}
     <button onClick=${() => save(lab)} title="Save the whole state as a file">Save</button>
-    ${!compact && html`<button onClick=${() => copyLink(lab)} title="Copy a link that keeps the whole state" data-action="link">Link</button>`}
+    ${page && html`<button aria-expanded=${sharing} onClick=${() => { if (!compact) copyLink(lab); setSharing(!sharing); }} title="A link that keeps the whole state, and the code to embed it" data-action="link">Link</button>`}
     <button onClick=${() => lab.view({theme: {auto: 'dark', dark: 'light', light: 'auto'}[view.theme]})} title="Colours: automatic, dark, light" aria-label=${`Colours: ${view.theme}`}>${{auto: '◐ auto', dark: '● dark', light: '○ light'}[view.theme]}</button>
+    ${!compact && html`<button onClick=${onTour} title="Eight cards, about a minute">Tour</button>`}
     <button onClick=${onHelp} title="Keys and help (?)" aria-label="Keys and help">?</button>
+    ${sharing && html`<${Share} lab=${lab} page=${page} onClose=${() => setSharing(false)} />`}
     ${open && html`<${Settings} lab=${lab} state=${state} about=${about} precision=${precision} />`}
   </header>`;
 }
@@ -55,10 +60,12 @@ function Settings({lab, state, about, precision}) {
       <label>Precision <select value=${precision} onChange=${(event) => lab.load({precision: event.currentTarget.value}, {time: state.at?.time})}><option value="float64">double</option><option value="float32">float</option></select></label>
       <label>Children per node <select value=${String(topology.width ?? '')} onChange=${(event) => retree(lab, state, 'width', event.currentTarget.value)}><option value="">as the strategy likes</option>${widths.map((w) => html`<option value=${String(w)}>${w}</option>`)}</select></label>
       <label>Primitives per leaf <select value=${String(topology.leaf_size ?? '')} onChange=${(event) => retree(lab, state, 'leaf_size', event.currentTarget.value)}><option value="">as the strategy likes</option>${[1, 2, 4, 8].map((w) => html`<option value=${String(w)}>${w}</option>`)}</select></label>
-      ${about?.parameters?.map((p) => html`<label title=${`${p.meaning ?? ''} ${p.admissible ?? ''}`}>${p.name} ${Array.isArray(p.allowed) && p.allowed.length
-        ? html`<select value=${params[p.name] ?? p.default} onChange=${(event) => set(p.name, event.currentTarget.value)}>${p.allowed.map((x) => html`<option value=${x}>${x}</option>`)}</select>`
-        : html`<input size="8" value=${params[p.name] ?? p.default} onChange=${(event) => set(p.name, event.currentTarget.value)} />`}</label>`)}
-    </div></div>`;
+    </div>
+    ${about?.parameters?.map((p) => html`<div class="parameter"><label title=${p.name}>${heading(p.name)} ${Array.isArray(p.allowed) && p.allowed.length
+      ? html`<select value=${params[p.name] ?? p.default} onChange=${(event) => set(p.name, event.currentTarget.value)}>${p.allowed.map((x) => html`<option value=${x}>${words(x)}</option>`)}</select>`
+      : html`<input size="8" value=${params[p.name] ?? p.default} onChange=${(event) => set(p.name, event.currentTarget.value)} />`}</label>
+      <span class="hint">${[p.meaning, p.allowed?.length ? '' : p.admissible].filter(Boolean).join('; ')}</span></div>`)}
+    </div>`;
 }
 
 function retree(lab, state, key, value) {
