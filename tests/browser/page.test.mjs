@@ -126,6 +126,32 @@ test('at 1280 pixels no select of the bars is cut', () => withPage({ hash: '#sce
   }
 }));
 
+test('no panel lies over another one, and none is cut, at 1280 pixels and on a phone', async () => {
+  for (const [width, height] of [[1280, 800], [820, 1100], [390, 844]])
+    await withPage({ hash: '#scene=cloth-on-box', width, height }, async ({ page, lab, settle }) => {
+      for (const compare of [null, { strategy: 'bottom_up' }]) {
+        await lab((lab, compare) => { lab.view({ panel: 'box' }); return lab.comparison.set(compare); }, compare);
+        await settle();
+        const wrong = await page.evaluate(() => {
+          const panels = [...document.querySelectorAll('.panel')].map((panel) => ({ name: panel.getAttribute('aria-label'), box: panel.getBoundingClientRect(), panel }));
+          const over = panels.flatMap((a, i) => panels.slice(0, i).filter((b) => Math.min(a.box.right, b.box.right) - Math.max(a.box.left, b.box.left) > 1 && Math.min(a.box.bottom, b.box.bottom) - Math.max(a.box.top, b.box.top) > 1).map((b) => `${a.name} over ${b.name}`));
+          const canvases = panels.flatMap(({ name, panel, box }) => [...panel.querySelectorAll('canvas')].filter((canvas) => !canvas.closest('.multiple') && canvas.getBoundingClientRect().bottom > box.bottom + 1).map(() => `a canvas of ${name} sticks out`));
+          const table = document.querySelector('.sides').parentElement;
+          return [...over, ...canvases, ...(table.scrollWidth > table.clientWidth + 1 ? [`the table of sides is cut: ${table.scrollWidth} in ${table.clientWidth}`] : [])];
+        });
+        assert.deepEqual(wrong, [], `${width}, ${compare?.strategy}`);
+      }
+    });
+});
+
+test('the gauge of locality has no number where a tree inherits sides', () => withPage({ hash: '#scene=overtake-8' }, async ({ page, lab, settle }) => {
+  const local = () => page.$eval('.gauge-local .gauge-value b', (value) => value.textContent);
+  assert.equal(await local(), '14');
+  await lab((lab) => lab.choose('kinetic_boxtree'));
+  await settle();
+  assert.equal(await local(), '–');
+}));
+
 test('on a phone the transport stays in sight and takes little of it', () => withPage({ hash: '#scene=overtake-8', width: 390, height: 844 }, async ({ page }) => {
   for (const share of [0, 0.3, 0.6, 1]) {
     const { top, bottom, play } = await page.evaluate(async (share) => {

@@ -116,3 +116,19 @@ test('states survive a link; damaged ones are refused with the reason', async ()
   assert.throws(() => checkState(scene([{ name: 'b', vertices: 1, times: [0], positions: [[0, 0, null]], indices: [0] }])), /vertex 0: null/);
   assert.throws(() => checkState(scene([{ name: 'b', vertices: 1, times: [0], positions: [[0, 0, 0]], indices: [4] }])), /index 4 with 1 vertices/);
 });
+
+test('names beside points do not cover each other, and those that must be seen are drawn', async () => {
+  const { drawNames } = await import('../../analysis/lab/src/views/dom.js');
+  const context = { measureText: (text) => ({ width: 7 * text.length }), strokeText() {}, fillText() {} };
+  let state = 5, left = 0;
+  const random = (n) => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0, (state >>> 8) % n);
+  for (let round = 0; round < 200; ++round) {
+    const labels = Array.from({ length: 24 }, (_, i) => ({ x: random(160), y: random(120), text: String(random(300)), colour: 'black', must: i === 23 }));
+    const taken = drawNames(context, labels, 'white');
+    for (const [i, a] of taken.entries()) for (const b of taken.slice(0, i)) assert.ok(a[2] < b[0] || b[2] < a[0] || a[3] < b[1] || b[3] < a[1], `${a} and ${b}`);
+    const { x, y } = labels[23];
+    assert.ok(Math.abs(taken[0][0] - (x + 7)) < 1 && taken[0][3] < y, 'the one that must be seen is first');
+    left += labels.length - taken.length;
+  }
+  assert.ok(left > 0 && left < 200 * 16, `${left} left out`);
+});

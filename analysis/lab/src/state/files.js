@@ -53,7 +53,7 @@ export async function openFiles(lab, list) {
 /** Shows why something could not be opened. The reader's messages often begin with the file's name: it is said once. */
 function refuse(lab, names, error) {
   const message = plain(error.message);
-  lab.store.set({notice: '', error: message.startsWith(names) ? message : `${names}: ${message}`});
+  lab.store.set({notice: '', error: message.includes(names) ? message : `${names}: ${message}`});
 }
 
 /** The animations that the reader names when it asks for one: "choose a clip of: 0 'Walk', 1 'Run'"; else null. */

@@ -116,6 +116,26 @@ export function haloText(context, text, x, y, colour, halo) {
   context.fillText(text, x, y);
 }
 
+/**
+ * Draws names beside points so that none covers another: each takes the first free one of four corners. A name that finds none is left
+ * out, unless it `must` be seen. `labels`: {x, y, text, colour, must}. Returns the rectangles taken, as [x0, y0, x1, y1].
+ */
+export function drawNames(context, labels, halo, size = 12) {
+  const taken = [];
+  context.textAlign = 'left';
+  context.textBaseline = 'middle';
+  for (const {x, y, text, colour, must} of [...labels].sort((a, b) => Boolean(b.must) - Boolean(a.must))) {
+    const w = context.measureText(text).width, h = size;
+    const corners = [[x + 7, y - 10], [x - 7 - w, y - 10], [x + 7, y + 10], [x - 7 - w, y + 10]].map(([left, middle]) => [left, middle - h / 2, left + w, middle + h / 2]);
+    const free = corners.find(([x0, y0, x1, y1]) => taken.every((other) => x1 < other[0] || other[2] < x0 || y1 < other[1] || other[3] < y0));
+    const at = free ?? (must ? corners[0] : null);
+    if (!at) continue;
+    taken.push(at);
+    haloText(context, text, at[0], (at[1] + at[3]) / 2, colour, halo);
+  }
+  return taken;
+}
+
 /** Round numbers for an axis between two values: about `count` of them. */
 export function ticks(from, to, count) {
   const span = to - from;

@@ -15,10 +15,14 @@ export function ordered(strategies) {
   return [...strategies].sort((a, b) => rank(a) - rank(b) || a.family.localeCompare(b.family) || a.title.localeCompare(b.title));
 }
 
+/** The menu of strategies: those with events, then those that work at each frame. */
+const grouped = (strategies) => [['With events', true], ['Frame by frame', false]].map(([label, events]) => html`<optgroup label=${label}>
+  ${ordered(strategies).filter((s) => Boolean(s.events) === events).map((s) => html`<option value=${s.id}>${s.title}</option>`)}</optgroup>`);
+
 /** `page`: the address of the lab's own page, to which links lead; without it there are no links. */
 export function Header({lab, state, compact, page, onHelp, onTour}) {
   const {sceneId, scene, strategy, strategies, compare, view, precision} = state;
-  const [open, setOpen] = useState(false), [sharing, setSharing] = useState(false), file = useRef(null);
+  const [open, setOpen] = useState(null), file = useRef(null);  // 'settings' or 'share': what lies below the head
   const about = strategies.find((s) => s.id === strategy);
   const load = (choice) => lab.load(choice, choice.scene ? {} : {time: state.at?.time});
   return html`<header class="lab-head">
@@ -28,21 +32,21 @@ export function Header({lab, state, compact, page, onHelp, onTour}) {
       ${Object.entries(builtIn).map(([id, each]) => html`<option value=${id}>${each.name}</option>`)}
       ${state.study.length > 0 && html`<optgroup label="Scenes of the study">${state.study.map((each, i) => html`<option value=${`study ${i}`}>${each.name}</option>`)}</optgroup>`}</select></label>`}
     <label>Strategy <select value=${strategy} onChange=${(event) => lab.choose(event.currentTarget.value)}>
-      ${ordered(strategies).map((s) => html`<option value=${s.id}>${s.title}${s.events ? ' (events)' : ''}</option>`)}</select></label>
+      ${grouped(strategies)}</select></label>
     <label>Compare with <select value=${compare?.strategy ?? ''} onChange=${(event) => { const id = event.currentTarget.value; lab.comparison.set(id ? {strategy: id} : null); if (id) lab.view({panel: 'work'}); }}>
-      <option value="">nothing</option>${ordered(strategies).map((s) => html`<option value=${s.id}>${s.title}</option>`)}</select></label>
-    <button aria-expanded=${open} onClick=${() => setOpen(!open)} title="Parameters of the strategy, precision">Settings</button>
+      <option value="">nothing</option>${grouped(strategies)}</select></label>
+    <button aria-expanded=${open === 'settings'} onClick=${() => setOpen(open === 'settings' ? null : 'settings')} title="Parameters of the strategy, precision">Settings</button>
     <span class="spring"></span>
     ${!compact && html`<a href="lessons/index.html">Course</a>`}
     ${!compact && html`<button onClick=${() => file.current.click()} title="Open OBJ, OBJ with PC2, glTF, or a scene or state of the lab">Open…</button>
     <input ref=${file} type="file" class="sr" tabIndex="-1" multiple aria-label="Open files" onChange=${(event) => { openFiles(lab, event.currentTarget.files); event.currentTarget.value = ''; }} />`}
     <button onClick=${() => save(lab)} title="Save the whole state as a file">Save</button>
-    ${page && html`<button aria-expanded=${sharing} onClick=${() => { if (!compact) copyLink(lab); setSharing(!sharing); }} title="A link that keeps the whole state, and the code to embed it" data-action="link">Link</button>`}
-    <button onClick=${() => lab.view({theme: {auto: 'dark', dark: 'light', light: 'auto'}[view.theme]})} title="Colours: automatic, dark, light" aria-label=${`Colours: ${view.theme}`}>${{auto: '◐ auto', dark: '● dark', light: '○ light'}[view.theme]}</button>
+    ${page && html`<button aria-expanded=${open === 'share'} onClick=${() => { if (!compact) copyLink(lab); setOpen(open === 'share' ? null : 'share'); }} title="A link that keeps the whole state, and the code to embed it" data-action="link">Link</button>`}
+    <button onClick=${() => lab.view({theme: {auto: 'dark', dark: 'light', light: 'auto'}[view.theme]})} title="Colours: automatic, dark, light" aria-label=${`Colours: ${view.theme}`}>${{auto: '◐', dark: '●', light: '○'}[view.theme]}</button>
     ${!compact && html`<button onClick=${onTour} title="Eight cards, about a minute">Tour</button>`}
     <button onClick=${onHelp} title="Keys and help (?)" aria-label="Keys and help">?</button>
-    ${sharing && html`<${Share} lab=${lab} page=${page} onClose=${() => setSharing(false)} />`}
-    ${open && html`<${Settings} lab=${lab} state=${state} about=${about} precision=${precision} />`}
+    ${open === 'share' && html`<${Share} lab=${lab} page=${page} onClose=${() => setOpen(null)} />`}
+    ${open === 'settings' && html`<${Settings} lab=${lab} state=${state} about=${about} precision=${precision} />`}
   </header>`;
 }
 

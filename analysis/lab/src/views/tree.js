@@ -69,7 +69,8 @@ export function TreeView({lab, state, which = 'main'}) {
       const v = tree.realiser(node, selection.side);
       font(c, 11, chosen ? 700 : 400);
       c.fillStyle = colours.ink;
-      c.fillText(two || v === null ? String(node) : `${node}`, x, two ? y - 7 : y);
+      const one = !two && tree.realisers && v !== null && w >= 44;  // no room for two lines
+      c.fillText(one ? `${node}  v${v}` : String(node), x, two ? y - 7 : y);
       if (two) {
         font(c, 11, 600);
         c.fillStyle = v !== null && v === selection.vertex ? colours.challenger : colours.realiser;
