@@ -36,10 +36,10 @@ export function BoxPanel({lab, state}) {
       <thead><tr><th scope="col">Side</th><th scope="col" class="number" title="in the units of the scene">Value, units</th><th scope="col">Realised by</th><th scope="col" class="number">Since, s</th><th scope="col" class="number">Until, s</th></tr></thead>
       <tbody>${rows.map((row) => html`<tr class=${[selection.side === row.side && 'chosen', isLit(lit, selection.body, node, row.side) && 'lit'].filter(Boolean).join(' ')}>
         <th scope="row"><button class="side-button" aria-pressed=${selection.side === row.side} onClick=${() => lab.select({side: row.side})}>${sideName(row.side)}</button></th>
-        <td class="number">${short(row.bound)}</td>
+        <td class="number">${short(row.bound, 5)}</td>
         <td>${row.vertex === null ? html`<span class="muted">${tree.realisers ? 'inherited from above' : 'not kept'}</span>` : html`<button class="ref ref-vertex" onClick=${() => lab.select({vertex: row.vertex})}>vertex ${row.vertex}</button>`}</td>
-        <td class="number">${row.vertex === null || !info.hasEvents ? '–' : row.sinceStep === null ? 'the start' : html`<button class="ref" onClick=${() => lab.goToEvent(row.sinceStep)}>${short(row.since, 5)}</button>`}</td>
-        <td class="number">${row.vertex === null ? '–' : row.until === Infinity || row.until >= info.end ? 'the end' : html`<button class="ref" onClick=${() => lab.seek(row.until)}>${short(row.until, 5)}</button>`}</td>
+        <td class="number">${row.vertex === null || !info.hasEvents ? '–' : row.sinceStep === null ? 'start' : html`<button class="ref" onClick=${() => lab.goToEvent(row.sinceStep)}>${short(row.since, 5)}</button>`}</td>
+        <td class="number">${row.vertex === null ? '–' : row.until === Infinity || row.until >= info.end ? 'end' : html`<button class="ref" onClick=${() => lab.seek(row.until)}>${short(row.until, 5)}</button>`}</td>
       </tr>`)}</tbody></table></div>
     <div class="row"><button onClick=${() => lab.runTo({body: selection.body, node})} disabled=${!info.hasEvents}>Run to this node’s next event</button></div>
     ${!tree.realisers && html`<p class="hint">This strategy stores numbers, not realisers: after every frame it has written the bounds again.</p>`}
