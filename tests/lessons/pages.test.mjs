@@ -95,6 +95,24 @@ test("each lab of a lesson has a link and an embed that open its state", needsLa
   assert.ok(labs >= 30, `${labs} labs`);
 });
 
+test("on a phone the transport of an opened lab stays in sight, below the bar of lessons", needsLab, async () => {
+  const { page, wrong } = await open("3-certificates.html");
+  await page.setViewport({ width: 390, height: 844 });
+  await page.evaluate(() => { document.querySelectorAll("article > [hidden], .result[hidden]").forEach((element) => (element.hidden = false)); document.querySelector('[data-lab="race4"] .open-lab').click(); });
+  await page.waitForFunction(() => document.querySelector('[data-lab="race4"] .kbvh-lab[data-phase=ready]'), { timeout: 60000 });
+  for (const view of ["stage", "tree", "diagram"]) {
+    const hit = await page.evaluate(async (view) => {
+      document.querySelector(`[data-lab="race4"] .panel-${view}`).scrollIntoView({ block: "center" });
+      await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+      const { x, y, width, height } = document.querySelector('[data-lab="race4"] .transport .play').getBoundingClientRect();
+      return document.elementFromPoint(x + width / 2, y + height / 2)?.className;
+    }, view);
+    assert.equal(hit, "play", view);
+  }
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
 test("at a width of 390 pixels no page scrolls sideways", async () => {
   for (const name of names) {
     const { page } = await open(name);

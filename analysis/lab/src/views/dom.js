@@ -118,20 +118,22 @@ export function haloText(context, text, x, y, colour, halo) {
 
 /**
  * Draws names beside points so that none covers another: each takes the first free one of four corners. A name that finds none is left
- * out, unless it `must` be seen. `labels`: {x, y, text, colour, must}. Returns the rectangles taken, as [x0, y0, x1, y1].
+ * out, unless it `must` be seen. `labels`: {x, y, text, colour, must}; `frame`: {width, height, colours} of the canvas, which no name leaves.
+ * Returns the rectangles taken, as [x0, y0, x1, y1].
  */
-export function drawNames(context, labels, halo, size = 12) {
+export function drawNames(context, labels, {width, height, colours}, size = 12) {
   const taken = [];
   context.textAlign = 'left';
   context.textBaseline = 'middle';
   for (const {x, y, text, colour, must} of [...labels].sort((a, b) => Boolean(b.must) - Boolean(a.must))) {
     const w = context.measureText(text).width, h = size;
     const corners = [[x + 7, y - 10], [x - 7 - w, y - 10], [x + 7, y + 10], [x - 7 - w, y + 10]].map(([left, middle]) => [left, middle - h / 2, left + w, middle + h / 2]);
-    const free = corners.find(([x0, y0, x1, y1]) => taken.every((other) => x1 < other[0] || other[2] < x0 || y1 < other[1] || other[3] < y0));
-    const at = free ?? (must ? corners[0] : null);
+    const inside = corners.filter(([x0, y0, x1, y1]) => x0 >= 0 && y0 >= 0 && x1 <= width && y1 <= height);
+    const free = inside.find(([x0, y0, x1, y1]) => taken.every((other) => x1 < other[0] || other[2] < x0 || y1 < other[1] || other[3] < y0));
+    const at = free ?? (must ? inside[0] ?? corners[0] : null);
     if (!at) continue;
     taken.push(at);
-    haloText(context, text, at[0], (at[1] + at[3]) / 2, colour, halo);
+    haloText(context, text, at[0], (at[1] + at[3]) / 2, colour, colours.panel);
   }
   return taken;
 }

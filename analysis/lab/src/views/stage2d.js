@@ -118,7 +118,8 @@ export function Stage2d({lab, state, source, which}) {
     });
   };
 
-  const drawPoints = (c, {X, Y}, colours) => {
+  const drawPoints = (c, f, colours) => {
+    const {X, Y} = f;
     const tree = trees[selection.body];
     const realiser = tree && selection.node < tree.size ? tree.realiser(selection.node, selection.side) : null;
     const certificate = at.queue.find((e) => e.kind === 'bound' && e.body === selection.body && e.node === selection.node && e.side === selection.side);
@@ -137,7 +138,7 @@ export function Stage2d({lab, state, source, which}) {
         if (labels || must) names.push({x, y, text: String(v), colour: role ?? colours.ink, must});
       }
     });
-    drawNames(c, names, colours.panel);
+    drawNames(c, names, f);
   };
 
   const pinch = usePinch((middle, factor) => zoomAt(middle, factor));

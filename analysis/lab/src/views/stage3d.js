@@ -27,7 +27,8 @@ export function Stage3d({lab, state, source, which}) {
   const {selection, view, scene, precision} = state, {at, trees, lit} = source;
   const vertices = scene.bodies.reduce((sum, body) => sum + body.vertices, 0);
 
-  const drawOverlay = (c, {colours}) => {
+  const drawOverlay = (c, size) => {
+    const {colours} = size;
     const s = space.current;
     if (!s?.info || s.info !== source.info) return;
     const tree = trees[selection.body];
@@ -46,7 +47,7 @@ export function Stage3d({lab, state, source, which}) {
     for (const [v, colour] of special) put(selection.body, v, colour, colour === colours.ink ? 4 : 6);
     if (view.labels && vertices <= 80)
       scene.bodies.forEach((body, b) => { for (let v = 0; v < body.vertices; ++v) if (b !== selection.body || special.every(([other]) => other !== v)) put(b, v, colours.muted, 0); });
-    drawNames(c, names, colours.panel);
+    drawNames(c, names, size);
   };
   const pickVertex = ([px, py]) => {
     let best = null;
