@@ -37,7 +37,7 @@
   async function start() {
     await load("link", { rel: "stylesheet", href: "lab/lab.css" }, document.head);
     await load("script", { src: "lab/lab.js" }, document.head);
-    const lab = await globalThis.kbvhLab.mountLab(target, state, { compact: true, views: ["transport", "stage", "panels"], panels: ["work"] });
+    const lab = await globalThis.kbvhLab.mountLab(target, state, { compact: true, page: "lab/index.html", views: ["transport", "stage", "panels"], panels: ["work"] });
     follow(lab);
     // Playing would disturb the measurement.
     const look = () => {
