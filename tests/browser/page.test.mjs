@@ -494,9 +494,11 @@ test('a box knows who realises its sides, since when and until when', () => with
 test('comparing: one clock, work of every frame', () => withPage({ hash: '#scene=strip-4' }, async ({ page, lab, settle }) => {
   await lab(async (lab) => { await lab.comparison.set({ strategy: 'bottom_up' }); await lab.seek(1.25); });
   await settle();
-  await page.waitForFunction(() => { const { lab } = document.querySelector('[data-kbvh-lab-page]'); return lab.state.work?.series.every((s) => s.done === lab.state.frames.length); });
+  await page.waitForFunction(() => { const { lab } = document.querySelector('[data-kbvh-lab-page]'); return lab.state.work?.timed; });
   const result = await lab(({ state }) => ({ time: [state.at.time, state.compare.at.time], pairs: [state.at.pairs.join(), state.compare.at.pairs.join()],
+    done: state.work.series.every((s) => s.done === state.frames.length && s.counters.milliseconds.length === state.frames.length && s.counters.milliseconds.every((x) => x >= 0)),
     boxes: [state.trees[0].bounds.join(), state.compare.trees[0].bounds.join()], written: state.work.series.map((s) => s.counters.values_written.reduce((a, b) => a + b, 0)), nodes: state.compare.trees[0].size, frames: state.frames.length }));
+  assert.ok(result.done);
   assert.equal(result.time[0], result.time[1]);
   assert.equal(result.pairs[0], result.pairs[1]);
   assert.equal(result.boxes[0], result.boxes[1]);

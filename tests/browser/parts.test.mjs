@@ -3,6 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
+import { medianClip } from '../../analysis/lab/src/math/clips.js';
 import { envelope } from '../../analysis/lab/src/math/envelope.js';
 import { compare, crossingTime, exact, spell, toNumber } from '../../analysis/lab/src/math/exact.js';
 import { Tree } from '../../analysis/lab/src/math/hierarchy.js';
@@ -132,4 +133,9 @@ test('names beside points do not cover each other, and those that must be seen a
     left += labels.length - taken.length;
   }
   assert.ok(left > 0 && left < 200 * 16, `${left} left out`);
+});
+
+test('the clip of median time is shown, whatever the frames of the others', () => {
+  assert.deepEqual(medianClip([[9, 9], [1, 2], [0, 100], [3, 1], [0, 0]]), [3, 1]);
+  assert.deepEqual(medianClip([[5], [7]]), [5]);
 });

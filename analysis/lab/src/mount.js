@@ -32,7 +32,7 @@ export const allViews = ['header', 'transport', 'timeline', 'stage', 'tree', 'di
  * @param state    a page state ({format: 'kbvh-lab', ...}), or null for the first built-in scene
  * @param options  {compact: true}: without the menu of scenes and files; {views: [...]} shows only these (see allViews); {theme: 'auto'|'light'|'dark'};
  *                 {page: 'lab/index.html'}: address of the lab's page, for links (without compact: this page);
- *                 {panels: ['why', ...]} tabs to offer
+ *                 {panels: ['why', ...]} tabs to offer; {metrics: ['values_written', ...]} counters of the panel Compare (see workMetrics)
  * @returns {Promise} of a lab: on(name, listener), getState(), setState(state), engine, store, destroy(), and the moves of `Lab`
  */
 export async function mountLab(element, state = null, options = {}) {
@@ -81,7 +81,7 @@ function Page({lab, views, options}) {
         ${has('tree') && html`<${Panel} id="tree" title="Tree" tools=${html`<${TreeTools} lab=${lab} state=${state} />`}><${TreeView} lab=${lab} state=${state} /><//>`}
         ${has('diagram') && html`<${Panel} id="diagram" title="Value over time" tools=${html`<${SideTools} lab=${lab} state=${state} />`}><${Diagram} key=${`${state.selection.body} ${state.selection.node} ${state.selection.side} ${state.scene?.name}`} lab=${lab} state=${state} /><//>`}
         ${has('gauges') && state.info?.hasEvents && html`<${Panel} id="gauges" title="Quality of the structure"><${Gauges} state=${state} /><//>`}
-        ${has('panels') && html`<${Tabs} lab=${lab} state=${state} shown=${options.panels} />`}
+        ${has('panels') && html`<${Tabs} lab=${lab} state=${state} shown=${options.panels} metrics=${options.metrics} />`}
       </main>
       ${stop !== null && state.info && html`<${Tour} lab=${lab} root=${root} number=${stop} onGo=${setStop} onClose=${() => setStop(null)} />`}
       <div class="status" role="status" aria-live="polite">${phase === 'loading' || phase === 'working' ? html`<span class="spinner" aria-hidden="true"></span> ${task} …` : notice}</div>
@@ -91,7 +91,7 @@ function Page({lab, views, options}) {
   </div>`;
 }
 
-function Tabs({lab, state, shown}) {
+function Tabs({lab, state, shown, metrics}) {
   const offered = tabs.filter(([id]) => !shown || shown.includes(id));
   const panel = offered.some(([id]) => id === state.view.panel) ? state.view.panel : offered[0][0];
   const content = {why: WhyPanel, box: BoxPanel, pairs: PairsPanel, counters: CountersPanel, edit: EditPanel, work: WorkPanel}[panel];
@@ -106,7 +106,7 @@ function Tabs({lab, state, shown}) {
   };
   return html`<section class="panel panel-tabs" aria-label="Details">
     <div class="tabs" role="tablist" aria-label="Details" onKeyDown=${onKeyDown}>${offered.map(([id, title]) => html`<button role="tab" data-tab=${id} aria-selected=${id === panel} tabIndex=${id === panel ? 0 : -1} onClick=${() => lab.view({panel: id})}>${title}</button>`)}</div>
-    <div class="panel-body" role="tabpanel" aria-label=${offered.find(([id]) => id === panel)[1]}>${html`<${content} lab=${lab} state=${state} />`}</div>
+    <div class="panel-body" role="tabpanel" aria-label=${offered.find(([id]) => id === panel)[1]}>${html`<${content} lab=${lab} state=${state} metrics=${metrics} />`}</div>
   </section>`;
 }
 
