@@ -71,7 +71,8 @@ export class Comparison {
 
   /**
    * Plays the clip with each strategy in the background and keeps the counters of every frame. The first round counts, and lets the browser
-   * compile what it has only translated so far. Then the strategies are timed by turns; the clip of median time of each is shown.
+   * compile what it has only translated so far. Then the strategies are timed by turns, without a log of events; the clip of median time of
+   * each is shown.
    */
   async measure() {
     const {compare, scene, precision, strategy, params, topology, frames} = this.lab.state;
@@ -81,8 +82,9 @@ export class Comparison {
     const series = chosen.map(({strategy}) => ({strategy, frames, done: 0, counters: {}}));
     let timed = false;
     const show = () => { if (number === this.measuring) this.lab.store.set({work: {timed, series: series.map((s) => ({...s}))}}); };
+    const load = (choice) => this.meter.load({scene: this.lab.sceneFor(scene, choice.strategy), precision, ...choice});
     const play = async (choice, visit) => {
-      await this.meter.load({scene: this.lab.sceneFor(scene, choice.strategy), precision, ...choice});
+      await load(choice);
       for (let f = 0; f < frames.length; ++f) {
         if (number !== this.measuring) return;
         visit(f, await this.meter.frame(frames[f], {positions: false, nodes: false, flat: false, pairs: true, queue: false, counters: true, pairsLimit: 0}));
@@ -104,8 +106,8 @@ export class Comparison {
       const clips = chosen.map(() => []), began = performance.now();
       for (let round = 0; round < mostRounds && (round === 0 || performance.now() - began < timingBudget); ++round)
         for (const [k, choice] of chosen.entries()) {
-          const times = new Float64Array(frames.length);
-          await play(choice, (f, at) => { times[f] = 1000 * at.seconds; });
+          await load(choice);
+          const times = await this.meter.time();
           if (number !== this.measuring) return;
           clips[k].push(times);
         }
