@@ -73,7 +73,7 @@ COMPARISON = """<section class="comparison" data-comparison>
 <p class="finding" aria-live="polite">A kinetic tree and a refit, on one cloth. Your browser is measuring both …</p>
 <div class="comparison-lab"></div>
 <p class="what">The project's own C++ runs here, compiled to WebAssembly: a kinetic AABB tree and a bottom-up refit, each a binary tree with one
-triangle in a leaf. Time is update and query together, on your machine. <a href="lab/index.html#scene=cloth-on-box">Open it in the lab.</a></p>
+triangle in a leaf. Time is update and query together, of the median of several clips played by turns, on your machine. <a href="lab/index.html#scene=cloth-on-box">Open it in the lab.</a></p>
 </section>"""
 #: The ways on from the first page: page, question, answer.
 WAYS = [

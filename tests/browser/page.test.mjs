@@ -34,6 +34,137 @@ test('a choice that is made while another one loads adds to it', () => withPage(
   assert.deepEqual(await lab(({ state }) => [state.strategy, state.sceneId, state.phase]), ['bottom_up', 'ties-6', 'ready']);
 }));
 
+test('a first visitor gets a hint and a tour, once', () => withPage({ hash: '#scene=overtake-8' }, async ({ page, lab, settle }) => {
+  const press = async (text) => {
+    await page.evaluate((text) => [...document.querySelectorAll('.first-hint button, .tour button, .lab-head button')].find((button) => button.textContent === text).click(), text);
+    await settle();
+  };
+  assert.ok(await page.$('.first-hint'));
+  await press('Take the tour');
+  assert.equal(await page.$('.first-hint'), null);
+  const cards = [];
+  for (;;) {
+    cards.push(await page.evaluate(() => {
+      const card = document.querySelector('.tour'), view = document.querySelector('.kbvh-lab').dataset.tour;
+      const place = document.querySelector(view === 'transport' ? '.transport' : `.panel-${view}`), a = place.getBoundingClientRect(), b = card.getBoundingClientRect();
+      return { view, focus: card.contains(document.activeElement), framed: parseFloat(getComputedStyle(place).outlineWidth) >= 2,
+        hidden: Math.max(0, Math.min(a.right, b.right) - Math.max(a.left, b.left)) * Math.max(0, Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top)) / (a.width * a.height),
+        seen: a.top >= -1 && b.bottom <= innerHeight + 1, words: card.querySelector('p').textContent.split(/\s+/).length };
+    }));
+    if (await page.evaluate(() => !document.querySelector('.tour .next') || document.querySelector('.tour .next').textContent === 'Done')) break;
+    await press('Next');
+  }
+  assert.equal(cards.length, 8);
+  for (const { view, focus, framed, hidden, seen } of cards) assert.ok(focus && framed && seen && hidden < 0.1, `${view}: ${JSON.stringify(cards)}`);
+  assert.ok(cards.reduce((sum, { words }) => sum + words, 0) < 240, 'readable in a minute');
+  assert.deepEqual(await lab(({ state }) => [state.at.eventsDone > 0, state.compare.strategy]), [true, 'bottom_up']);
+  await press('Done');
+  assert.equal(await page.$('.tour'), null);
+  await page.reload();
+  await page.waitForFunction(() => document.querySelector('[data-kbvh-lab-page]')?.lab?.state.at);
+  assert.equal(await page.$('.first-hint'), null);
+  await press('Tour');
+  await page.keyboard.press('Escape');
+  await settle();
+  assert.equal(await page.$('.tour'), null);
+}));
+
+test('panels that a strategy without events, or without a tree, cannot fill say what they would show', () => withPage({ hash: '#scene=overtake-8' }, async ({ page, lab, settle }) => {
+  const unfilled = () => page.evaluate(() => [...document.querySelectorAll('.unfilled')].map((element) => element.closest('.panel').className.match(/panel-(\w+)/)[1]).sort());
+  await lab((lab) => lab.choose('bottom_up'));
+  await settle();
+  assert.deepEqual(await unfilled(), ['tabs', 'timeline']);
+  assert.equal(await page.$('.gauge'), null, 'gauges of a kinetic structure go');
+  assert.equal(await page.$('[aria-label="One event forwards"]'), null);
+  await lab((lab) => lab.choose('brute_force'));
+  await settle();
+  assert.deepEqual(await unfilled(), ['diagram', 'tabs', 'timeline', 'tree']);
+  for (const text of await page.$$eval('.unfilled', (all) => all.map((element) => element.textContent))) assert.match(text, /here/);
+  await page.click('.panel-timeline .unfilled button');
+  await settle();
+  assert.deepEqual([await unfilled(), await lab(({ state }) => state.strategy)], [[], 'kinetic_aabb']);
+  assert.ok(await page.$('.gauge'));
+}));
+
+test('settings, messages and captions have words, no ids; headings have units', () => withPage({ hash: '#scene=overtake-8' }, async ({ page, lab, settle }) => {
+  await page.evaluate(() => [...document.querySelectorAll('.lab-head button')].find((button) => button.textContent === 'Settings').click());
+  for (const strategy of await lab(({ state }) => state.strategies.map(({ id }) => id))) {
+    const tasks = await lab(async (lab, strategy) => {
+      const seen = new Set(), end = lab.on('state', ({ task }) => seen.add(task));
+      await lab.choose(strategy);
+      await lab.comparison.set({ strategy });
+      await lab.comparison.set(null);
+      end();
+      return [...seen];
+    }, strategy);
+    await settle();
+    const text = await page.$eval('.settings', (settings) => [...settings.querySelectorAll('label')].map((label) => label.textContent).join(' '));
+    assert.doesNotMatch(`${text} ${tasks.join(' ')}`, /\w_\w/, strategy);
+  }
+  await lab(async (lab) => { await lab.choose('kinetic_aabb'); lab.view({ panel: 'box' }); });
+  await settle();
+  assert.deepEqual(await page.$$eval('.sides thead th', (heads) => heads.map((head) => head.textContent)), ['Side', 'Value, units', 'Realised by', 'Since, s', 'Until, s']);
+  await lab(async (lab) => { lab.view({ panel: 'work' }); await lab.comparison.set({ strategy: 'bottom_up' }); });
+  await page.waitForFunction(() => /Time in the engine, ms/.test(document.querySelector('.multiples')?.textContent ?? ''));
+}));
+
+test('at 1280 pixels no select of the bars is cut', () => withPage({ hash: '#scene=cloth-on-box', width: 1280, height: 800 }, async ({ page, lab, settle }) => {
+  for (const strategy of ['kinetic_aabb', 'kinetic_separation_list', 'bottom_up']) {
+    await lab((lab, strategy) => lab.choose(strategy), strategy);
+    await lab((lab) => lab.select({ vertex: 123, node: 1234 }));
+    await settle();
+    const cut = await page.evaluate(() => [...document.querySelectorAll('.lab-head select, .transport select, .panel-tools select')].map((select) => {
+      const probe = document.createElement('span'), style = getComputedStyle(select);
+      probe.style.cssText = `position: absolute; visibility: hidden; white-space: nowrap; font: ${style.font}`;
+      probe.textContent = select.selectedOptions[0].textContent;
+      document.body.append(probe);
+      const needed = probe.getBoundingClientRect().width + parseFloat(style.paddingLeft) + 18;
+      probe.remove();
+      return { text: probe.textContent, needed, has: select.getBoundingClientRect().width };
+    }).filter(({ needed, has }) => needed > has + 0.5));
+    assert.deepEqual(cut, [], strategy);
+  }
+}));
+
+test('no panel lies over another one, and none is cut, at 1280 pixels and on a phone', async () => {
+  for (const [width, height] of [[1280, 800], [820, 1100], [390, 844]])
+    await withPage({ hash: '#scene=cloth-on-box', width, height }, async ({ page, lab, settle }) => {
+      for (const compare of [null, { strategy: 'bottom_up' }]) {
+        await lab((lab, compare) => { lab.view({ panel: 'box' }); return lab.comparison.set(compare); }, compare);
+        await settle();
+        const wrong = await page.evaluate(() => {
+          const panels = [...document.querySelectorAll('.panel')].map((panel) => ({ name: panel.getAttribute('aria-label'), box: panel.getBoundingClientRect(), panel }));
+          const over = panels.flatMap((a, i) => panels.slice(0, i).filter((b) => Math.min(a.box.right, b.box.right) - Math.max(a.box.left, b.box.left) > 1 && Math.min(a.box.bottom, b.box.bottom) - Math.max(a.box.top, b.box.top) > 1).map((b) => `${a.name} over ${b.name}`));
+          const canvases = panels.flatMap(({ name, panel, box }) => [...panel.querySelectorAll('canvas')].filter((canvas) => !canvas.closest('.multiple') && canvas.getBoundingClientRect().bottom > box.bottom + 1).map(() => `a canvas of ${name} sticks out`));
+          const table = document.querySelector('.sides').parentElement;
+          return [...over, ...canvases, ...(table.scrollWidth > table.clientWidth + 1 ? [`the table of sides is cut: ${table.scrollWidth} in ${table.clientWidth}`] : [])];
+        });
+        assert.deepEqual(wrong, [], `${width}, ${compare?.strategy}`);
+      }
+    });
+});
+
+test('the gauge of locality has no number where a tree inherits sides', () => withPage({ hash: '#scene=overtake-8' }, async ({ page, lab, settle }) => {
+  const local = () => page.$eval('.gauge-local .gauge-value b', (value) => value.textContent);
+  assert.equal(await local(), '14');
+  await lab((lab) => lab.choose('kinetic_boxtree'));
+  await settle();
+  assert.equal(await local(), '–');
+}));
+
+test('on a phone the transport stays in sight and takes little of it', () => withPage({ hash: '#scene=overtake-8', width: 390, height: 844 }, async ({ page }) => {
+  for (const share of [0, 0.3, 0.6, 1]) {
+    const { top, bottom, play } = await page.evaluate(async (share) => {
+      scrollTo(0, share * (document.documentElement.scrollHeight - innerHeight));
+      await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+      const box = document.querySelector('.transport').getBoundingClientRect(), play = document.querySelector('.transport .play').getBoundingClientRect();
+      return { top: box.top, bottom: box.bottom, play: document.elementFromPoint(play.x + play.width / 2, play.y + play.height / 2)?.className };
+    }, share);
+    assert.ok(top >= -0.5 && bottom <= 844 && play === 'play', `${share}: ${top} to ${bottom}, ${play}`);
+    assert.ok(bottom - top < 110, `it is ${bottom - top} high`);
+  }
+}));
+
 test('keys alone: frames, events, break points, tree, timeline, panels', () => withPage({ hash: '#scene=overtake-8' }, async (opened) => {
   const { page, lab } = opened;
   await page.focus('[data-view=tree]');
@@ -164,6 +295,15 @@ test('a link keeps the whole state', () => withPage({ hash: '#scene=overtake-8' 
   const again = await second.lab(async (lab) => ({ state: lab.getState(), hash: await lab.engine.checkpoint() }));
   assert.deepEqual(again.state, given.state);
   assert.equal(again.hash, given.hash);
+  // The same state, compact, in a frame of another page.
+  const code = await page.$eval('.share-code', (field) => field.value);
+  assert.match(code, /^<iframe src="[^"]+#embed=/);
+  const third = await browser.open({ hash: /(#embed=[^"]+)"/.exec(code)[1] });
+  await third.settle();
+  const { view, ...rest } = await third.lab((lab) => lab.getState()), { view: _, ...wanted } = given.state;
+  assert.deepEqual(rest, wanted);
+  assert.deepEqual(await third.page.evaluate(() => [document.querySelector('.kbvh-lab.compact') !== null, document.querySelector('.lab-head h1')]), [true, null]);
+  await third.page.close();
   assert.deepEqual(second.problems, []);
   await second.page.close();
 }));
@@ -184,7 +324,7 @@ test('a saved file keeps the whole state, and the page in one file reads it', ()
 }));
 
 test('damaged links and wrong files are refused in words, and nothing is lost', () => withPage({ hash: '#s=abcdefg' }, async ({ page, lab, settle }) => {
-  assert.match(await page.$eval('.banner', (banner) => banner.textContent), /damaged/);
+  assert.match(await page.$eval('.banner.error', (banner) => banner.textContent), /damaged/);
   const drop = (name, text) => page.evaluate(async (name, text) => {
     const data = new DataTransfer();
     data.items.add(new File([text], name));
@@ -195,7 +335,10 @@ test('damaged links and wrong files are refused in words, and nothing is lost', 
   for (const [name, text, pattern] of [['bad.obj', 'v 0 0\nf 1 2 3\n', /bad\.obj/], ['bad.json', '{"format": "kbvh-scene"}', /bodies/], ['x.json', '{', /not JSON/], ['notes.txt', 'hello', /notes\.txt/]]) {
     await drop(name, text);
     await settle();
-    assert.match(await page.$eval('.banner', (banner) => banner.textContent), pattern, name);
+    const message = await page.$eval('.banner.error', (banner) => banner.textContent);
+    assert.match(message, pattern, name);
+    assert.equal(message.split(name).length, 2, `'${message}' names ${name} once`);
+    assert.doesNotMatch(await page.$eval('.status', (status) => status.textContent), /Reading/, name);
     assert.equal(await lab(({ state }) => state.scene.name), scene, name);
   }
   await drop('two.obj', 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nf 1 2 3\nf 2 3 4\n');
@@ -351,9 +494,11 @@ test('a box knows who realises its sides, since when and until when', () => with
 test('comparing: one clock, work of every frame', () => withPage({ hash: '#scene=strip-4' }, async ({ page, lab, settle }) => {
   await lab(async (lab) => { await lab.comparison.set({ strategy: 'bottom_up' }); await lab.seek(1.25); });
   await settle();
-  await page.waitForFunction(() => { const { lab } = document.querySelector('[data-kbvh-lab-page]'); return lab.state.work?.series.every((s) => s.done === lab.state.frames.length); });
+  await page.waitForFunction(() => { const { lab } = document.querySelector('[data-kbvh-lab-page]'); return lab.state.work?.timed; });
   const result = await lab(({ state }) => ({ time: [state.at.time, state.compare.at.time], pairs: [state.at.pairs.join(), state.compare.at.pairs.join()],
+    done: state.work.series.every((s) => s.done === state.frames.length && s.counters.milliseconds.length === state.frames.length && s.counters.milliseconds.every((x) => x >= 0)),
     boxes: [state.trees[0].bounds.join(), state.compare.trees[0].bounds.join()], written: state.work.series.map((s) => s.counters.values_written.reduce((a, b) => a + b, 0)), nodes: state.compare.trees[0].size, frames: state.frames.length }));
+  assert.ok(result.done);
   assert.equal(result.time[0], result.time[1]);
   assert.equal(result.pairs[0], result.pairs[1]);
   assert.equal(result.boxes[0], result.boxes[1]);

@@ -3,6 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
+import { medianClip } from '../../analysis/lab/src/math/clips.js';
 import { envelope } from '../../analysis/lab/src/math/envelope.js';
 import { compare, crossingTime, exact, spell, toNumber } from '../../analysis/lab/src/math/exact.js';
 import { Tree } from '../../analysis/lab/src/math/hierarchy.js';
@@ -115,4 +116,26 @@ test('states survive a link; damaged ones are refused with the reason', async ()
   assert.throws(() => checkState(scene([{ name: 'b', vertices: 1, times: [0, 0], positions: [[0, 0, 0], [0, 0, 0]], indices: [0] }])), /must increase, but 0 follows 0/);
   assert.throws(() => checkState(scene([{ name: 'b', vertices: 1, times: [0], positions: [[0, 0, null]], indices: [0] }])), /vertex 0: null/);
   assert.throws(() => checkState(scene([{ name: 'b', vertices: 1, times: [0], positions: [[0, 0, 0]], indices: [4] }])), /index 4 with 1 vertices/);
+});
+
+test('names beside points do not cover each other, and those that must be seen are drawn', async () => {
+  const { drawNames } = await import('../../analysis/lab/src/views/dom.js');
+  const context = { measureText: (text) => ({ width: 7 * text.length }), strokeText() {}, fillText() {} };
+  let state = 5, left = 0;
+  const random = (n) => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0, (state >>> 8) % n);
+  for (let round = 0; round < 200; ++round) {
+    const labels = Array.from({ length: 24 }, (_, i) => ({ x: random(160), y: random(120), text: String(random(300)), colour: 'black', must: i === 23 }));
+    const taken = drawNames(context, labels, { width: 180, height: 140, colours: { panel: 'white' } });
+    for (const [i, a] of taken.entries()) for (const b of taken.slice(0, i)) assert.ok(a[2] < b[0] || b[2] < a[0] || a[3] < b[1] || b[3] < a[1], `${a} and ${b}`);
+    const { x } = labels[23];
+    assert.ok(Math.min(Math.abs(taken[0][0] - x), Math.abs(taken[0][2] - x)) < 8, 'the one that must be seen is first');
+    for (const [x0, y0, x1, y1] of taken) assert.ok(x0 >= 0 && y0 >= 0 && x1 <= 180 && y1 <= 140, 'no name leaves the canvas');
+    left += labels.length - taken.length;
+  }
+  assert.ok(left > 0 && left < 200 * 16, `${left} left out`);
+});
+
+test('the clip of median time is shown, whatever the frames of the others', () => {
+  assert.deepEqual(medianClip([[9, 9], [1, 2], [0, 100], [3, 1], [0, 0]]), [3, 1]);
+  assert.deepEqual(medianClip([[5], [7]]), [5]);
 });

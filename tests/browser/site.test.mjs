@@ -103,6 +103,25 @@ test('the first page compares two strategies and says what it found', async () =
   }
 });
 
+test('the first page is short, and on a phone the comparison keeps its transport in sight', async () => {
+  const told = (page) => page.waitForFunction(() => document.querySelector('[data-comparison]')?.dataset.told, { timeout: 240000 });
+  const wide = await open('index.html', 'light');
+  await told(wide.page);
+  const ways = await wide.page.$eval('.ways', (list) => list.getBoundingClientRect().bottom + scrollY);
+  assert.ok(ways < 1300, `the ways on end at ${ways} of a window of 900 pixels`);
+  await wide.page.close();
+  const { page } = await open('index.html', 'light', 390);
+  await told(page);
+  const hit = await page.evaluate(async () => {
+    document.querySelector('.panel-tabs').scrollIntoView({ block: 'center' });
+    await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+    const { x, y, width, height } = document.querySelector('.transport .play').getBoundingClientRect();
+    return document.elementFromPoint(x + width / 2, y + height / 2)?.className;
+  });
+  assert.equal(hit, 'play');
+  await page.close();
+});
+
 test('lab, course, report, explorer, Python and C++ are part of the site', () => {
   for (const name of ['lab/index.html', 'lab/lessons/index.html', 'report/report.html', 'report/explorer.html', 'python.html', 'notebooks.html', 'cpp.html', 'api/index.html'])
     assert.ok(existsSync(join(site, name)), name);

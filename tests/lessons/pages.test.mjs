@@ -45,7 +45,7 @@ for (const name of names)
     assert.deepEqual(wrong, []);
     if (seconds > 2) console.log(`${name} took ${seconds.toFixed(1)} s to be readable`);
     const { links, ids, text, headings, untitled, wide } = await page.evaluate(() => ({
-      links: [...document.querySelectorAll("a[href]")].map((a) => a.getAttribute("href")),
+      links: [...document.querySelectorAll("a[href]:not(.lab-link)")].map((a) => a.getAttribute("href")),
       ids: [...document.querySelectorAll("[id]")].map((element) => element.id),
       text: document.body.innerText,
       headings: document.querySelectorAll("h1").length,
@@ -66,6 +66,52 @@ for (const name of names)
     }
     await page.close();
   });
+
+test("each lab of a lesson has a link and an embed that open its state", needsLab, async () => {
+  let labs = 0;
+  for (const { name } of lessons()) {
+    const { page, wrong } = await open(name + ".html");
+    await page.waitForFunction(() => [...document.querySelectorAll(".copy-embed")].every((button) => button.dataset.code));
+    const found = await page.evaluate(() => [...document.querySelectorAll(".lab")].map((place) => ({ lab: place.dataset.lab, link: place.querySelector(".lab-link")?.href,
+      code: place.querySelector(".copy-embed")?.dataset.code, strategy: globalThis.kbvhLessons.states[place.dataset.lab].state.strategy })));
+    assert.deepEqual(wrong, []);
+    for (const { lab, link, code } of found) {
+      assert.match(link ?? "", /lab\/index\.html#s=[\w-]{50,}$/, lab);
+      assert.match(code ?? "", /^<iframe src="[^"]+lab\/index\.html#embed=[\w-]{50,}" title="[^"]+"/, lab);
+    }
+    labs += found.length;
+    // One of them in full: the whole lab behind the link, a compact one in the frame.
+    const [{ link, code, strategy }] = found;
+    for (const [address, compact] of [[link, false], [/src="([^"]+)"/.exec(code)[1], true]]) {
+      const tab = await browser.newPage();
+      await tab.goto(address);
+      await tab.waitForFunction(() => document.querySelector("[data-kbvh-lab-page]")?.lab?.state.at, { timeout: 60000 });
+      assert.deepEqual(await tab.evaluate(() => [document.querySelector("[data-kbvh-lab-page]").lab.state.strategy, document.querySelector(".kbvh-lab.compact") !== null,
+        document.querySelector(".lab-head h1") === null]), [strategy, compact, compact], name);
+      await tab.close();
+    }
+    await page.close();
+  }
+  assert.ok(labs >= 30, `${labs} labs`);
+});
+
+test("on a phone the transport of an opened lab stays in sight, below the bar of lessons", needsLab, async () => {
+  const { page, wrong } = await open("3-certificates.html");
+  await page.setViewport({ width: 390, height: 844 });
+  await page.evaluate(() => { document.querySelectorAll("article > [hidden], .result[hidden]").forEach((element) => (element.hidden = false)); document.querySelector('[data-lab="race4"] .open-lab').click(); });
+  await page.waitForFunction(() => document.querySelector('[data-lab="race4"] .kbvh-lab[data-phase=ready]'), { timeout: 60000 });
+  for (const view of ["stage", "tree", "diagram"]) {
+    const hit = await page.evaluate(async (view) => {
+      document.querySelector(`[data-lab="race4"] .panel-${view}`).scrollIntoView({ block: "center" });
+      await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+      const { x, y, width, height } = document.querySelector('[data-lab="race4"] .transport .play').getBoundingClientRect();
+      return document.elementFromPoint(x + width / 2, y + height / 2)?.className;
+    }, view);
+    assert.equal(hit, "play", view);
+  }
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
 
 test("at a width of 390 pixels no page scrolls sideways", async () => {
   for (const name of names) {

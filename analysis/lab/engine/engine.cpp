@@ -5,11 +5,13 @@
 #include <emscripten/emscripten.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <span>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include "analysis/lab/engine/pack.hpp"
 #include "experiments/io/load.hpp"
@@ -28,6 +30,7 @@ class Engine {
     if (name == "body") return add_body(request);
     if (name == "start") return start(request);
     if (name == "advance") return advance(request.at("t").get<double>());
+    if (name == "time") return time_frames(request.at("times"));
     if (name == "step") return step(request.at("until").get<double>());
     if (name == "next") return next_time();
     if (name == "log") return log(answer);
@@ -78,6 +81,20 @@ class Engine {
     world_->advance(t);
     answer_frame();
     return {{"events", log_.size()}};
+  }
+  /// Plays frames as a program does, without a log of events, and returns the milliseconds of each: update
+  /// and query.
+  json time_frames(const json& times) {
+    using Clock = std::chrono::steady_clock;
+    json milliseconds = json::array();
+    for (const double t : times.get<std::vector<double>>()) {
+      const Clock::time_point begin = Clock::now();
+      world_->advance(t);
+      world_->pairs(pairs_);
+      milliseconds.push_back(std::chrono::duration<double, std::milli>(Clock::now() - begin).count());
+    }
+    keep_frame();
+    return milliseconds;
   }
   json step(double until) {
     if (!world_->step_event(until, step_)) return {{"done", false}, {"next", next_time()}};
@@ -169,8 +186,12 @@ class Engine {
 
   /// Answers once at every time, for the answer costs work that the counters show.
   void answer_frame() {
-    moment_ = {world_->time(), false};
     world_->pairs(pairs_);
+    keep_frame();
+  }
+  /// Keeps the present frame, whose pairs have been asked for, as what is shown.
+  void keep_frame() {
+    moment_ = {world_->time(), false};
     std::sort(pairs_.begin(), pairs_.end(), [](const WorldPair& a, const WorldPair& b) {
       return std::tie(a.body_a, a.body_b, a.primitive_a, a.primitive_b) <
              std::tie(b.body_a, b.body_b, b.primitive_a, b.primitive_b);

@@ -12,6 +12,7 @@ import {EditPanel} from './views/editor.js';
 import {Gauges} from './views/gauges.js';
 import {Header} from './views/header.js';
 import {Help, labKey} from './views/help.js';
+import {Hint, Tour, stops} from './views/tour.js';
 import {PairsPanel} from './views/pairs.js';
 import {StageTools, StageView} from './views/stage.js';
 import {Timeline} from './views/timeline.js';
@@ -30,7 +31,8 @@ export const allViews = ['header', 'transport', 'timeline', 'stage', 'tree', 'di
  * @param element  gets the lab as its content
  * @param state    a page state ({format: 'kbvh-lab', ...}), or null for the first built-in scene
  * @param options  {compact: true}: without the menu of scenes and files; {views: [...]} shows only these (see allViews); {theme: 'auto'|'light'|'dark'};
- *                 {panels: ['why', ...]} tabs to offer
+ *                 {page: 'lab/index.html'}: address of the lab's page, for links (without compact: this page);
+ *                 {panels: ['why', ...]} tabs to offer; {metrics: ['values_written', ...]} counters of the panel Compare (see workMetrics)
  * @returns {Promise} of a lab: on(name, listener), getState(), setState(state), engine, store, destroy(), and the moves of `Lab`
  */
 export async function mountLab(element, state = null, options = {}) {
@@ -47,7 +49,7 @@ export async function mountLab(element, state = null, options = {}) {
 
 function Page({lab, views, options}) {
   const state = useLab(lab), root = useRef(null);
-  const [help, setHelp] = useState(false), [over, setOver] = useState(false);
+  const [help, setHelp] = useState(false), [over, setOver] = useState(false), [stop, setStop] = useState(null);
   const {phase, task, error, notice, view} = state;
   const has = (name) => views.has(name);
   const onKeyDown = (event) => {
@@ -62,24 +64,26 @@ function Page({lab, views, options}) {
     document.addEventListener('keydown', onBody);
     return () => document.removeEventListener('keydown', onBody);
   }, []);
-  return html`<div ref=${root} class=${`kbvh-lab ${options.compact ? 'compact' : 'page'} ${allViews.slice(2).every(has) ? 'whole' : ''} ${over ? 'dropping' : ''} ${state.compare ? 'comparing' : ''}`} data-theme=${view.theme} data-phase=${phase} onKeyDown=${onKeyDown}
+  return html`<div ref=${root} class=${`kbvh-lab ${options.compact ? 'compact' : 'page'} ${allViews.slice(2).every(has) ? 'whole' : ''} ${over ? 'dropping' : ''} ${state.compare ? 'comparing' : ''}`} data-theme=${view.theme} data-phase=${phase} data-tour=${stop === null ? null : stops[stop].view} onKeyDown=${onKeyDown}
       onDragOver=${(event) => { event.preventDefault(); setOver(true); }} onDragLeave=${() => setOver(false)}
       onDrop=${(event) => { event.preventDefault(); setOver(false); openFiles(lab, event.dataTransfer.files); }}>
     <div class="lab-inner">
-      ${has('header') && html`<${Header} lab=${lab} state=${state} compact=${options.compact} onHelp=${() => setHelp(true)} />`}
+      ${has('header') && html`<${Header} lab=${lab} state=${state} compact=${options.compact} page=${options.page ?? (options.compact ? null : location.href)} onHelp=${() => setHelp(true)} onTour=${() => setStop(0)} />`}
+      ${!options.compact && stop === null && html`<${Hint} onTour=${() => setStop(0)} />`}
       ${error && html`<div class="banner error" role="alert"><span>${error}</span><button onClick=${() => lab.store.set({error: ''})} aria-label="Dismiss">✕</button></div>`}
       ${state.choice && html`<div class="banner choice" role="group" aria-label=${state.choice.text}><span>${state.choice.text}</span>
         <span class="row">${state.choice.options.map(({title, act}) => html`<button onClick=${act}>${title}</button>`)}</span><button onClick=${() => lab.store.set({choice: null})} aria-label="Dismiss">✕</button></div>`}
       ${has('transport') && html`<${Transport} lab=${lab} state=${state} />`}
       <main class="lab-grid">
-        ${has('timeline') && html`<${Panel} id="timeline" title="Event queue" tools=${html`<span class="hint wide-only">◆ a bound changes hands ● boxes meet ○ boxes part</span>
+        ${has('timeline') && html`<${Panel} id="timeline" title="Event queue" tools=${state.info?.hasEvents && html`<span class="hint wide-only">◆ a bound changes hands ● boxes meet ○ boxes part</span>
           <label class="check" title="Each event that is performed becomes the chosen node and side"><input type="checkbox" checked=${view.follow} onChange=${() => lab.view({follow: !view.follow})} /> follow events</label>`}><${Timeline} lab=${lab} state=${state} /><//>`}
         ${has('stage') && html`<${Panel} id="stage" title="Scene" tools=${html`<${StageTools} lab=${lab} state=${state} />`}><${StageView} lab=${lab} state=${state} /><//>`}
         ${has('tree') && html`<${Panel} id="tree" title="Tree" tools=${html`<${TreeTools} lab=${lab} state=${state} />`}><${TreeView} lab=${lab} state=${state} /><//>`}
         ${has('diagram') && html`<${Panel} id="diagram" title="Value over time" tools=${html`<${SideTools} lab=${lab} state=${state} />`}><${Diagram} key=${`${state.selection.body} ${state.selection.node} ${state.selection.side} ${state.scene?.name}`} lab=${lab} state=${state} /><//>`}
-        ${has('gauges') && html`<${Panel} id="gauges" title="Quality of the structure"><${Gauges} state=${state} /><//>`}
-        ${has('panels') && html`<${Tabs} lab=${lab} state=${state} shown=${options.panels} />`}
+        ${has('gauges') && state.info?.hasEvents && html`<${Panel} id="gauges" title="Quality of the structure"><${Gauges} state=${state} /><//>`}
+        ${has('panels') && html`<${Tabs} lab=${lab} state=${state} shown=${options.panels} metrics=${options.metrics} />`}
       </main>
+      ${stop !== null && state.info && html`<${Tour} lab=${lab} root=${root} number=${stop} onGo=${setStop} onClose=${() => setStop(null)} />`}
       <div class="status" role="status" aria-live="polite">${phase === 'loading' || phase === 'working' ? html`<span class="spinner" aria-hidden="true"></span> ${task} …` : notice}</div>
       ${(phase === 'loading' || phase === 'failed') && !state.at && html`<div class="cover">${phase === 'failed' ? html`<p role="alert">The lab could not start: ${error}</p>` : html`<p><span class="spinner" aria-hidden="true"></span> ${task} …</p>`}</div>`}
     </div>
@@ -87,7 +91,7 @@ function Page({lab, views, options}) {
   </div>`;
 }
 
-function Tabs({lab, state, shown}) {
+function Tabs({lab, state, shown, metrics}) {
   const offered = tabs.filter(([id]) => !shown || shown.includes(id));
   const panel = offered.some(([id]) => id === state.view.panel) ? state.view.panel : offered[0][0];
   const content = {why: WhyPanel, box: BoxPanel, pairs: PairsPanel, counters: CountersPanel, edit: EditPanel, work: WorkPanel}[panel];
@@ -102,7 +106,7 @@ function Tabs({lab, state, shown}) {
   };
   return html`<section class="panel panel-tabs" aria-label="Details">
     <div class="tabs" role="tablist" aria-label="Details" onKeyDown=${onKeyDown}>${offered.map(([id, title]) => html`<button role="tab" data-tab=${id} aria-selected=${id === panel} tabIndex=${id === panel ? 0 : -1} onClick=${() => lab.view({panel: id})}>${title}</button>`)}</div>
-    <div class="panel-body" role="tabpanel" aria-label=${offered.find(([id]) => id === panel)[1]}>${html`<${content} lab=${lab} state=${state} />`}</div>
+    <div class="panel-body" role="tabpanel" aria-label=${offered.find(([id]) => id === panel)[1]}>${html`<${content} lab=${lab} state=${state} metrics=${metrics} />`}</div>
   </section>`;
 }
 

@@ -1,4 +1,5 @@
 // The lab in a lesson's page, which is loaded when it is first opened, and the exercises that it checks.
+import { addressOf, embedCode, encodeState } from "../../lab/src/state/permalink.js";
 import { checkers } from "../checkers/index.mjs";
 import { exerciseStates, states } from "../states.mjs";
 import { trace } from "./api.mjs";
@@ -27,6 +28,24 @@ function loadLab() {
   return loading;
 }
 
+const labPage = "../index.html";
+
+/// Fills the link of a lab's bar, and its button that copies what embeds the prepared state into another page.
+async function setUpSharing(place) {
+  const { state } = all[place.dataset.lab], text = await encodeState(state), button = place.querySelector(".copy-embed");
+  place.querySelector(".lab-link").href = addressOf(labPage, text);
+  button.dataset.code = embedCode(addressOf(labPage, text, { embed: true }), state.scene.name);
+  button.addEventListener("click", async () => {
+    const note = place.querySelector(".lab-note");
+    try {
+      await navigator.clipboard.writeText(button.dataset.code);
+      note.textContent = "The code that embeds this lab is in the clipboard.";
+    } catch {
+      note.textContent = "The clipboard is closed to this page: the button Link inside the lab shows the code.";
+    }
+  });
+}
+
 /// Mounts the lab into its place, or gives the mounted one the state.
 export async function open(place, state) {
   const bar = place.querySelector(".open-lab"), note = place.querySelector(".lab-note"), target = place.querySelector(".lab-place");
@@ -37,7 +56,7 @@ export async function open(place, state) {
     target.hidden = false;
     const before = mounted.get(place);
     if (before) await before.setState(structuredClone(state));
-    else mounted.set(place, await mountLab(target, structuredClone(state), { compact: true }));
+    else mounted.set(place, await mountLab(target, structuredClone(state), { compact: true, page: labPage }));
     bar.textContent = "Back to the prepared state";
     note.textContent = all[place.dataset.lab].note;
   } catch (error) {
@@ -99,7 +118,9 @@ function setUpExercise(section) {
 }
 
 export function setUpExercises() {
-  for (const place of document.querySelectorAll(".lab"))
+  for (const place of document.querySelectorAll(".lab")) {
     place.querySelector(".open-lab").addEventListener("click", () => open(place, all[place.dataset.lab].state));
+    setUpSharing(place);
+  }
   document.querySelectorAll(".exercise").forEach(setUpExercise);
 }

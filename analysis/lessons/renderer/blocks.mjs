@@ -20,6 +20,8 @@ export function blocks({ figures, states, checkers, numbers }) {
   const lab = (name, label) => {
     if (!(name in states)) throw new Error(`no lab state '${name}' in states.mjs`);
     return `<div class="lab" data-lab="${name}"><p class="lab-bar"><button type="button" class="open-lab">${label}</button>
+<a class="lab-link" href="../index.html" target="_blank" rel="noopener">In a tab of its own</a>
+<button type="button" class="copy-embed" title="Copies the element that shows this lab in another page">Copy the code to embed it</button>
 <span class="lab-note">${escape(states[name].note ?? "")}</span></p><div class="lab-place" hidden></div></div>\n`;
   };
   /// The buttons of the open exercise, once: before its solution, or at its end.

@@ -17,7 +17,7 @@
   /// Writes the sentence when both strategies have been played to the end.
   function tell({ work, frames }) {
     const [kinetic, refit] = work?.series ?? [];
-    if (!kinetic || !frames || kinetic.done < frames.length || refit.done < frames.length) return false;
+    if (!kinetic || !frames || !work.timed) return false;
     const total = (series, id) => (series.counters[id] ?? []).reduce((sum, value) => sum + value, 0);
     const values = [kinetic, refit].map((series) => total(series, "values_written")), clock = [kinetic, refit].map((series) => total(series, "milliseconds"));
     if (!(values[0] > 0 && clock[1] > 0)) return false;
@@ -37,7 +37,7 @@
   async function start() {
     await load("link", { rel: "stylesheet", href: "lab/lab.css" }, document.head);
     await load("script", { src: "lab/lab.js" }, document.head);
-    const lab = await globalThis.kbvhLab.mountLab(target, state, { compact: true, views: ["transport", "stage", "panels"], panels: ["work"] });
+    const lab = await globalThis.kbvhLab.mountLab(target, state, { compact: true, page: "lab/index.html", views: ["transport", "stage", "panels"], panels: ["work"], metrics: ["values_written", "milliseconds"] });
     follow(lab);
     // Playing would disturb the measurement.
     const look = () => {

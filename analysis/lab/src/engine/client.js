@@ -49,6 +49,7 @@ export function engineOver(call, close) {
     readScene: (files, options) => call('readScene', [files, options]),
     frame: async (t, want) => decodedState(await call('frame', [t, want])),
     state: async (want) => decodedState(await call('state', [want])),
+    time: () => call('time', []),
     event: async (until, want) => {
       const { step, state } = await call('event', [until, want]);
       return { step: stepOrNull(step), state: decodedState(state) };

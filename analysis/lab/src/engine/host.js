@@ -35,6 +35,9 @@ export class Host {
   state(want) {
     return this.#line.state(want);
   }
+  time() {
+    return this.#line.time();
+  }
   event(until, want) {
     const step = this.#line.event(until);
     return { step, state: this.#line.state(want) };

@@ -173,6 +173,14 @@ export class Timeline {
     this.#snapshot();
   }
 
+  /**
+   * Plays all frames of a scene just loaded, without a log of events and without snapshots. Returns the milliseconds of each: of the
+   * first one, the start. Load anew before anything else is asked but the state.
+   */
+  time() {
+    return [1000 * this.#seconds, ...this.#module.call('time', { times: this.#stops.slice(1).map(({ t }) => t) })];
+  }
+
   /** The state at the current place. `want` says which parts; without it, all of them. */
   state(want) {
     const parts = wanted(want);

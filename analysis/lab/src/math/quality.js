@@ -17,6 +17,13 @@ export function certificatesPerVertex(tree, vertices) {
   return count;
 }
 
+/** Whether each node of a tree keeps a realiser for all of its sides: only then are the candidates of certificates those of the children. */
+function knowsAllSides(tree) {
+  if (!tree.realisers) return false;
+  for (let node = 0; node < tree.size; ++node) for (let side = 0; side < 6; ++side) if (tree.realiser(node, side) === null) return false;
+  return true;
+}
+
 /** The largest number of leaves that one vertex occurs in. */
 export function mostLeaves(tree, info) {
   const last = new Int32Array(info.vertices).fill(-1), leaves = new Uint32Array(info.vertices);
@@ -49,12 +56,12 @@ export function gauges({trees, at, info, step, history}) {
   const work = steps ? ((counters.values_written ?? 0) + (counters.queue_steps ?? 0)) / steps : null;
   const latest = step ? `; the last one changed ${step.touched.length} ${step.touched.length === 1 ? 'side' : 'sides'} and scheduled ${step.rescheduled.length}` : '';
   result.push(gauge('responsive', 'Responsive', kinetic ? work : null, responsiveBound(log), 'sides changed and queue steps per event',
-      `mean of ${steps} events${latest}`, `O(log² m); drawn is 6 log₂² m + 6 with m = ${m}`));
+      `mean of ${steps} events${latest}`, `O(log² m); drawn is 6 log₂² m + 6 with m = ${m}`, 'no event has happened yet'));
 
   let most = 0, total = 0, vertices = 0, leaves = 1, levels = 1, haveRealisers = false;
   if (kinetic && boxes <= 6000)
     for (const tree of known) {
-      if (!tree.realisers) continue;
+      if (!knowsAllSides(tree)) continue;
       haveRealisers = true;
       const body = info.bodies[tree.body];
       const counts = certificatesPerVertex(tree, body.vertices);
@@ -75,6 +82,7 @@ export function gauges({trees, at, info, step, history}) {
 
 const responsiveBound = (log) => 6 * log * log + 6;
 
-function gauge(id, title, value, bound, unit, about, formula) {
-  return {id, title, value, bound, unit, about, formula, ok: value === null ? null : value <= bound};
+/** `unknown`: why there is no value. */
+function gauge(id, title, value, bound, unit, about, formula, unknown = 'not known for this strategy') {
+  return {id, title, value, bound, unit, about, formula, unknown, ok: value === null ? null : value <= bound};
 }

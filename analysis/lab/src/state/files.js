@@ -25,7 +25,7 @@ export async function openStudyScene(lab, {name, framesPerSecond, files}) {
     }));
     await show(lab, name, contents, {framesPerSecond});
   } catch (error) {
-    lab.store.set({error: `${name}: ${error.message}`});
+    refuse(lab, name, error);
   }
 }
 
@@ -46,8 +46,14 @@ export async function openFiles(lab, list) {
     const contents = await Promise.all(files.map(async (file) => ({name: file.name, bytes: await file.arrayBuffer()})));
     await show(lab, names, contents);
   } catch (error) {
-    lab.store.set({error: `${names}: ${plain(error.message)}`});
+    refuse(lab, names, error);
   }
+}
+
+/** Shows why something could not be opened. The reader's messages often begin with the file's name: it is said once. */
+function refuse(lab, names, error) {
+  const message = plain(error.message);
+  lab.store.set({notice: '', error: message.includes(names) ? message : `${names}: ${message}`});
 }
 
 /** The animations that the reader names when it asks for one: "choose a clip of: 0 'Walk', 1 'Run'"; else null. */
@@ -69,7 +75,7 @@ async function show(lab, names, contents, options = {}) {
   if (clips) {
     lab.store.set({choice: {text: `${names} has ${clips.length} animations. Which one?`, options: clips.map(({id, title}) => ({title, act: () => {
       lab.store.set({choice: null});
-      return show(lab, names, contents, {...options, clip: id}).catch((error) => lab.store.set({error: `${names}: ${plain(error.message)}`}));
+      return show(lab, names, contents, {...options, clip: id}).catch((error) => refuse(lab, names, error));
     }}))}});
     return;
   }

@@ -5,6 +5,7 @@ import {Comparison} from './compare.js';
 import {Editing} from './editing.js';
 import {difference, nothingLit, touched} from './lit.js';
 import {title, when} from '../text/why.js';
+import {titleOf} from '../text/words.js';
 import {checkScene, checkState} from './permalink.js';
 import {createStore, defaultView} from './store.js';
 import {sceneById} from './scenes.js';
@@ -132,7 +133,7 @@ export class Lab {
     const wanted = this.wanted = {...this.asked, ...choice};
     const {scene: given, sceneId, strategy, params, topology, precision} = wanted;
     this.pause();
-    const loaded = await this.enqueue(quiet ? null : 'loading', `Loading '${given?.name}' with ${strategy}`, async () => {
+    const loaded = await this.enqueue(quiet ? null : 'loading', `Loading ‘${given?.name}’: ${titleOf(s.strategies, strategy)}`, async () => {
       const scene = checkScene(given);
       const info = await this.engine.load({scene: this.sceneFor(scene, strategy), strategy, params, topology, precision});
       const range = clip(scene);

@@ -8,6 +8,13 @@ export async function encodeState(state) {
   return btoa(text).replaceAll('+', '-').replaceAll('/', '_').replaceAll('=', '');
 }
 
+/** The address of a page of the lab with a state: the whole lab, or with `embed` a compact one. */
+export const addressOf = (page, text, {embed = false} = {}) => `${new URL(page, location.href).href.replace(/#.*$/, '')}#${embed ? 'embed' : 's'}=${text}`;
+
+/** The element that shows a state inside another page. */
+export const embedCode = (address, name) =>
+  `<iframe src="${address}" title="kbvh lab: ${name.replaceAll('&', '&amp;').replaceAll('"', '&quot;')}" width="100%" height="720" loading="lazy"></iframe>`;
+
 /** Reads what `encodeState` wrote. Throws an Error that says what is wrong. */
 export async function decodeState(text) {
   let json;

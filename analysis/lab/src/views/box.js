@@ -1,5 +1,5 @@
 /** The chosen box: who realises each side since when, until when. */
-import {html, useMemo} from './dom.js';
+import {html, Unfilled, useMemo} from './dom.js';
 import {sideName} from '../math/plans.js';
 import {short} from '../math/exact.js';
 import {tenure} from '../text/tenure.js';
@@ -24,7 +24,7 @@ export function BoxPanel({lab, state}) {
     const context = {scene, tree, history, queue: at.queue, at, info, precision};
     return sides.map((side) => ({side, bound: tree.bound(node, side), ...tenure(context, node, side)}));
   }, [tree, node, history, at]);
-  if (!tree) return html`<p class="hint">This strategy keeps no tree that can be shown.</p>`;
+  if (!tree) return html`<${Unfilled} lab=${lab} why="This strategy keeps no tree." would="With one, the sides of the chosen box stand here: their values, and who realises them since when." />`;
   const primitives = tree.isLeaf(node) ? tree.primitivesBelow(node) : null;
   return html`<div class="box-panel">
     <p class="lead"><strong>${tree.isLeaf(node) ? 'Leaf' : 'Node'} ${node}</strong> of ${info.bodies[selection.body].name}, level ${tree.depth[node]},
@@ -33,13 +33,13 @@ export function BoxPanel({lab, state}) {
       ${node !== 0 && html` below <button class="ref ref-node" onClick=${() => lab.select({node: tree.parent[node]})}>node ${tree.parent[node]}</button>`}.
       ${tree.stale[node] ? ' This box is stale: no query has read it at this time.' : ''}</p>
     <div class="scroll-x"><table class="sides">
-      <thead><tr><th scope="col">Side</th><th scope="col">Value</th><th scope="col">Realised by</th><th scope="col">Since</th><th scope="col">Until</th></tr></thead>
+      <thead><tr><th scope="col">Side</th><th scope="col" class="number" title="in the units of the scene">Value, units</th><th scope="col">Realised by</th><th scope="col" class="number">Since, s</th><th scope="col" class="number">Until, s</th></tr></thead>
       <tbody>${rows.map((row) => html`<tr class=${[selection.side === row.side && 'chosen', isLit(lit, selection.body, node, row.side) && 'lit'].filter(Boolean).join(' ')}>
         <th scope="row"><button class="side-button" aria-pressed=${selection.side === row.side} onClick=${() => lab.select({side: row.side})}>${sideName(row.side)}</button></th>
-        <td class="number">${short(row.bound)}</td>
+        <td class="number">${short(row.bound, 5)}</td>
         <td>${row.vertex === null ? html`<span class="muted">${tree.realisers ? 'inherited from above' : 'not kept'}</span>` : html`<button class="ref ref-vertex" onClick=${() => lab.select({vertex: row.vertex})}>vertex ${row.vertex}</button>`}</td>
-        <td class="number">${row.vertex === null || !info.hasEvents ? '–' : row.sinceStep === null ? 'the start' : html`<button class="ref" onClick=${() => lab.goToEvent(row.sinceStep)}>${short(row.since, 5)} s</button>`}</td>
-        <td class="number">${row.vertex === null ? '–' : row.until === Infinity || row.until >= info.end ? 'the end' : html`<button class="ref" onClick=${() => lab.seek(row.until)}>${short(row.until, 5)} s</button>`}</td>
+        <td class="number">${row.vertex === null || !info.hasEvents ? '–' : row.sinceStep === null ? 'start' : html`<button class="ref" onClick=${() => lab.goToEvent(row.sinceStep)}>${short(row.since, 5)}</button>`}</td>
+        <td class="number">${row.vertex === null ? '–' : row.until === Infinity || row.until >= info.end ? 'end' : html`<button class="ref" onClick=${() => lab.seek(row.until)}>${short(row.until, 5)}</button>`}</td>
       </tr>`)}</tbody></table></div>
     <div class="row"><button onClick=${() => lab.runTo({body: selection.body, node})} disabled=${!info.hasEvents}>Run to this node’s next event</button></div>
     ${!tree.realisers && html`<p class="hint">This strategy stores numbers, not realisers: after every frame it has written the bounds again.</p>`}

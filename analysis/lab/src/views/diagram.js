@@ -2,7 +2,7 @@
  * The value-time diagram of one side of one node: every vertex below the node as a line, the envelope that the bound must
  * follow, the present certificate, and the events where lines cross. Wheel or + and - zoom, dragging moves.
  */
-import {html, Canvas, font, haloText, pointerAt, ticks, tickText, useMemo, usePinch, useRef, useState} from './dom.js';
+import {html, Canvas, font, haloText, pointerAt, ticks, tickText, Unfilled, useMemo, usePinch, useRef, useState} from './dom.js';
 import {envelope} from '../math/envelope.js';
 import {axisNames, axisOf, isUpper, sideName, valueAt} from '../math/plans.js';
 import {linesBelow} from '../text/tenure.js';
@@ -25,7 +25,8 @@ export function Diagram({lab, state}) {
   const lines = useMemo(() => known ? linesBelow(scene, tree, node, side, precision, few ? Infinity : manyLines / 2, always) : [], [scene, known && tree.childStart, node, side, precision, always.join()]);
   const pieces = useMemo(() => few && info ? envelope(lines, isUpper(side), info.begin, info.end) : [], [lines, info]);
   const whole = useMemo(() => extent(lines, info), [lines, info]);
-  if (!known || !at) return html`<div class="empty">Choose a node that has a box.</div>`;
+  if (!known || !at) return at && !tree ? html`<${Unfilled} lab=${lab} why="This strategy keeps no tree, so there is no box whose side could be drawn." would="With one, each vertex below the chosen node is a line here, and the bound follows the outermost of them." />`
+    : html`<div class="empty">Choose a node that has a box.</div>`;
   const view = zoom ?? whole;
   const axis = axisNames[axisOf(side)];
   const realiser = tree.realiser(node, side);
@@ -94,12 +95,12 @@ export function Diagram({lab, state}) {
     c.textAlign = 'center'; c.textBaseline = 'top';
     for (const t of times) { line(c, X(t), top, X(t), height - bottom); c.fillText(tickText(t, dt), X(t), height - bottom + 16); }
     c.textAlign = 'right'; c.textBaseline = 'middle';
-    for (const v of values) { line(c, left, Y(v), width - right, Y(v)); c.fillText(tickText(v, dv), left - 6, Y(v)); }
+    for (const v of values) { line(c, left, Y(v), width - right, Y(v)); if (Y(v) > top + 7) c.fillText(tickText(v, dv), left - 6, Y(v)); }
     c.textAlign = 'left'; c.textBaseline = 'top';
     c.fillText('t, s', 6, height - bottom + 16);
     c.fillStyle = colours.ink;
     font(c, 12, 600);
-    c.fillText(axis, 6, 2);
+    c.fillText(`${axis}, units`, 6, 1);
     c.strokeStyle = colours.muted; c.setLineDash([1, 3]);
     for (const t of info.keyframes) if (t > view.t0 && t < view.t1) line(c, X(t), top, X(t), height - bottom);
     c.setLineDash([]);
@@ -162,13 +163,14 @@ export function Diagram({lab, state}) {
     font(c, 11);
     c.textAlign = 'left';
     if (certificate && X(certificate.time) > left && X(certificate.time) < width - right) {
-      const text = `v${certificate.loser} overtakes v${certificate.winner}: ${when(certificate).text}`;
-      const x = Math.min(X(certificate.time) + 6, width - right - c.measureText(text).width);
+      const text = fitting(c, width - left - right - 10, `v${certificate.loser} overtakes v${certificate.winner}: ${when(certificate).text}`, `v${certificate.loser} overtakes v${certificate.winner}`);
+      const x = Math.min(X(certificate.time) + 6, width - right - 8 - c.measureText(text).width);
       haloText(c, text, Math.max(left + 2, x), height - bottom - 8, colours.challenger, colours.panel);
     }
     if (fromBelow && X(fromBelow.time) > left && X(fromBelow.time) < width - right) {
-      const text = `${certificate ? 'before that' : 'next'}, from below: v${fromBelow.loser} takes over in node ${fromBelow.node}`;
-      const x = Math.min(X(fromBelow.time) + 6, width - right - c.measureText(text).width);
+      const first = certificate ? 'before that' : 'next', short = `v${fromBelow.loser} takes over in node ${fromBelow.node}`;
+      const text = fitting(c, width - left - right - 10, `${first}, from below: ${short}`, `${first}: ${short}`, short);
+      const x = Math.min(X(fromBelow.time) + 6, width - right - 8 - c.measureText(text).width);
       haloText(c, text, Math.max(left + 2, x), height - bottom - 24, colours.ink, colours.panel);
     }
   };
@@ -293,5 +295,8 @@ function extent(lines, info) {
   const dv = (v1 - v0) * 0.07, {begin = 0, end = 1} = info ?? {}, dt = (end - begin || 1) * 0.015;
   return {t0: begin - dt, t1: end + dt, v0: v0 - dv, v1: v1 + dv};
 }
+
+/** The first of the texts that is not wider than `width`; the last one, if all are. */
+const fitting = (c, width, ...texts) => texts.find((text) => c.measureText(text).width <= width) ?? texts.at(-1);
 
 function line(c, x0, y0, x1, y1) { c.beginPath(); c.moveTo(x0, y0); c.lineTo(x1, y1); c.stroke(); }

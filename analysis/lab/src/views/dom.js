@@ -116,6 +116,28 @@ export function haloText(context, text, x, y, colour, halo) {
   context.fillText(text, x, y);
 }
 
+/**
+ * Draws names beside points so that none covers another: each takes the first free one of four corners. A name that finds none is left
+ * out, unless it `must` be seen. `labels`: {x, y, text, colour, must}; `frame`: {width, height, colours} of the canvas, which no name leaves.
+ * Returns the rectangles taken, as [x0, y0, x1, y1].
+ */
+export function drawNames(context, labels, {width, height, colours}, size = 12) {
+  const taken = [];
+  context.textAlign = 'left';
+  context.textBaseline = 'middle';
+  for (const {x, y, text, colour, must} of [...labels].sort((a, b) => Boolean(b.must) - Boolean(a.must))) {
+    const w = context.measureText(text).width, h = size;
+    const corners = [[x + 7, y - 10], [x - 7 - w, y - 10], [x + 7, y + 10], [x - 7 - w, y + 10]].map(([left, middle]) => [left, middle - h / 2, left + w, middle + h / 2]);
+    const inside = corners.filter(([x0, y0, x1, y1]) => x0 >= 0 && y0 >= 0 && x1 <= width && y1 <= height);
+    const free = inside.find(([x0, y0, x1, y1]) => taken.every((other) => x1 < other[0] || other[2] < x0 || y1 < other[1] || other[3] < y0));
+    const at = free ?? (must ? inside[0] ?? corners[0] : null);
+    if (!at) continue;
+    taken.push(at);
+    haloText(context, text, at[0], (at[1] + at[3]) / 2, colour, colours.panel);
+  }
+  return taken;
+}
+
 /** Round numbers for an axis between two values: about `count` of them. */
 export function ticks(from, to, count) {
   const span = to - from;
@@ -141,6 +163,11 @@ export function Ref({lab, part}) {
   if (part.node !== undefined)
     return html`<button class="ref ref-node" onClick=${() => lab.select({body: part.body, node: part.node})}>node ${part.node}</button>`;
   return html`<button class="ref ref-time" onClick=${() => lab.seek(part.time)}>${part.text}</button>`;
+}
+
+/** What a panel would show under a kinetic strategy, where the chosen one gives it nothing to show. */
+export function Unfilled({lab, why, would}) {
+  return html`<div class="empty unfilled"><p>${why} ${would}</p><button onClick=${() => lab.choose('kinetic_aabb')}>Show it for the kinetic AABB tree</button></div>`;
 }
 
 /** A panel with a heading. */

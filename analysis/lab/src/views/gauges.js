@@ -13,16 +13,16 @@ export function Gauges({state}) {
 }
 
 function Gauge({gauge}) {
-  const {id, title, value, bound, unit, about, formula, ok} = gauge;
+  const {id, title, value, bound, unit, about, formula, unknown, ok} = gauge;
   const full = bound > 0 ? bound * 1.25 : 1, share = value === null ? 0 : Math.min(1, value / full);
   const text = value === null ? '–' : Number.isInteger(value) ? String(value) : value.toFixed(2);
   return html`<div class=${`gauge gauge-${id} ${ok === null ? 'unknown' : ok ? 'ok' : 'over'}`} role="meter" aria-label=${`${title}: ${unit}`} aria-valuenow=${value ?? 0} aria-valuemin="0" aria-valuemax=${bound}
-      aria-valuetext=${value === null ? 'not known for this strategy' : `${text} ${unit}; bound ${bound.toFixed(0)}; ${ok ? 'within' : 'above'} the bound`} title=${`${about}. Bound: ${formula}.`}>
+      aria-valuetext=${value === null ? unknown : `${text} ${unit}; bound ${bound.toFixed(0)}; ${ok ? 'within' : 'above'} the bound`} title=${`${about}. Bound: ${formula}.`}>
     <div class="gauge-head"><span class="gauge-title">${title}</span><span class="gauge-mark" aria-hidden="true">${ok === null ? '' : ok ? '✓' : '!'}</span></div>
     <div class="gauge-value"><b>${text}</b> <span>${unit}</span></div>
     <svg class="gauge-bar" viewBox="0 0 100 8" preserveAspectRatio="none" aria-hidden="true">
       <rect x="0" y="2.5" width="100" height="3" class="track" /><rect x="0" y="1.5" width=${100 * share} height="5" class="fill" />
       <rect x=${bound > 0 ? 100 * bound / full - 0.5 : 0} y="0" width="1.2" height="8" class="limit" /></svg>
-    <div class="gauge-about">${value === null ? 'not known for this strategy' : html`bound ${bound > 0 ? Math.round(bound) : 0}: ${formula}`}</div>
+    <div class="gauge-about">${value === null ? unknown : html`bound ${bound > 0 ? Math.round(bound) : 0}: ${formula}`}</div>
   </div>`;
 }

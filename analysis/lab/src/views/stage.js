@@ -3,6 +3,7 @@ import {html} from './dom.js';
 import {Stage2d} from './stage2d.js';
 import {Stage3d} from './stage3d.js';
 import {boxChoices, hasLevel} from './shown.js';
+import {titleOf} from '../text/words.js';
 
 export function StageView({lab, state}) {
   const {info, at, scene, compare} = state;
@@ -10,12 +11,10 @@ export function StageView({lab, state}) {
   const View = scene.dimension === 2 ? Stage2d : Stage3d;
   if (!compare?.at) return html`<div class="stage-one"><${View} key="main" lab=${lab} state=${state} source=${state} which="main" /></div>`;
   return html`<div class="stage-two">
-    <figure><${View} key="main" lab=${lab} state=${state} source=${state} which="main" /><figcaption>${title(state, state.strategy)}: <b>${state.lit.count}</b> changed</figcaption></figure>
-    <figure><${View} key="second" lab=${lab} state=${state} source=${compare} which="second" /><figcaption>${title(state, compare.strategy)}: <b>${compare.lit.count}</b> changed</figcaption></figure>
+    <figure><${View} key="main" lab=${lab} state=${state} source=${state} which="main" /><figcaption>${titleOf(state.strategies, state.strategy)}: <b>${state.lit.count}</b> changed</figcaption></figure>
+    <figure><${View} key="second" lab=${lab} state=${state} source=${compare} which="second" /><figcaption>${titleOf(state.strategies, compare.strategy)}: <b>${compare.lit.count}</b> changed</figcaption></figure>
   </div>`;
 }
-
-const title = (state, id) => state.strategies.find((s) => s.id === id)?.title ?? id;
 
 export function StageTools({lab, state}) {
   const {view, trees, selection, scene} = state;

@@ -1,5 +1,5 @@
 /** The scene in the plane: primitives, boxes, flight plans; points can be picked, and dragged while editing. */
-import {html, Canvas, font, haloText, pointerAt, ticks, tickText, usePinch, useRef, useState} from './dom.js';
+import {html, Canvas, drawNames, font, pointerAt, ticks, tickText, usePinch, useRef, useState} from './dom.js';
 import {isLit} from '../state/lit.js';
 import {shownNodes} from './shown.js';
 import {positionAt} from '../math/plans.js';
@@ -118,11 +118,13 @@ export function Stage2d({lab, state, source, which}) {
     });
   };
 
-  const drawPoints = (c, {X, Y}, colours) => {
+  const drawPoints = (c, f, colours) => {
+    const {X, Y} = f;
     const tree = trees[selection.body];
     const realiser = tree && selection.node < tree.size ? tree.realiser(selection.node, selection.side) : null;
     const certificate = at.queue.find((e) => e.kind === 'bound' && e.body === selection.body && e.node === selection.node && e.side === selection.side);
     font(c, 12, 600);
+    const names = [];
     info.bodies.forEach((body, b) => {
       const p = at.positions[b];
       for (let v = 0; v < body.vertices; ++v) {
@@ -132,12 +134,11 @@ export function Stage2d({lab, state, source, which}) {
         c.beginPath(); c.arc(x, y, role ? 6 : body.shape === 'points' ? 4.5 : 2.6, 0, 7); c.fill();
         c.strokeStyle = colours.panel; c.lineWidth = 1.5; c.stroke();
         if (mine && v === selection.vertex) { c.strokeStyle = colours.ink; c.lineWidth = 2.5; c.beginPath(); c.arc(x, y, 10, 0, 7); c.stroke(); }
-        if (labels || role || (mine && v === selection.vertex)) {
-          c.textAlign = 'left'; c.textBaseline = 'bottom';
-          haloText(c, String(v), x + 6, y - 4, role ?? colours.ink, colours.panel);
-        }
+        const must = role !== null || (mine && v === selection.vertex);
+        if (labels || must) names.push({x, y, text: String(v), colour: role ?? colours.ink, must});
       }
     });
+    drawNames(c, names, f);
   };
 
   const pinch = usePinch((middle, factor) => zoomAt(middle, factor));

@@ -1,5 +1,5 @@
 /** The stage in space: three.js for meshes and boxes, a transparent canvas above it for names, pointer and keys. */
-import {html, Canvas, coloursOf, font, haloText, pointerAt, useEffect, useRef, useState} from './dom.js';
+import {html, Canvas, coloursOf, drawNames, font, pointerAt, useEffect, useRef, useState} from './dom.js';
 import {Space} from './space.js';
 import {shownNodes} from './shown.js';
 import {dragVertex, nudge} from './stage2d.js';
@@ -27,25 +27,27 @@ export function Stage3d({lab, state, source, which}) {
   const {selection, view, scene, precision} = state, {at, trees, lit} = source;
   const vertices = scene.bodies.reduce((sum, body) => sum + body.vertices, 0);
 
-  const drawNames = (c, {colours}) => {
+  const drawOverlay = (c, size) => {
+    const {colours} = size;
     const s = space.current;
     if (!s?.info || s.info !== source.info) return;
     const tree = trees[selection.body];
     const realiser = tree && selection.node < tree.size ? tree.realiser(selection.node, selection.side) : null;
     const certificate = at.queue.find((e) => e.kind === 'bound' && e.body === selection.body && e.node === selection.node && e.side === selection.side);
-    const put = (b, v, colour, text, r) => {
+    const names = [];
+    const put = (b, v, colour, r) => {
       const p = at.positions[b], [x, y, depth] = s.project(p[3 * v], p[3 * v + 1], p[3 * v + 2]);
       if (depth > 1) return;
       if (r) { c.beginPath(); c.arc(x, y, r, 0, 7); c.fillStyle = colour; c.fill(); c.strokeStyle = colours.panel; c.lineWidth = 1.5; c.stroke(); }
       if (b === selection.body && v === selection.vertex) { c.strokeStyle = colours.ink; c.lineWidth = 2.5; c.beginPath(); c.arc(x, y, 10, 0, 7); c.stroke(); }
-      haloText(c, text, x + 7, y - 5, colour, colours.panel);
+      names.push({x, y, text: String(v), colour, must: r > 0});
     };
-    font(c, 11);
-    if (view.labels && vertices <= 80) scene.bodies.forEach((body, b) => { for (let v = 0; v < body.vertices; ++v) put(b, v, colours.muted, String(v), 0); });
     font(c, 12, 600);
-    if (realiser !== null) put(selection.body, realiser, colours.realiser, String(realiser), 6);
-    if (certificate) put(selection.body, certificate.loser, colours.challenger, String(certificate.loser), 6);
-    if (selection.vertex !== null && selection.vertex !== realiser && selection.vertex !== certificate?.loser) put(selection.body, selection.vertex, colours.ink, String(selection.vertex), 4);
+    const special = [[realiser, colours.realiser], [certificate?.loser ?? null, colours.challenger], [selection.vertex, colours.ink]].filter(([v], i, all) => v !== null && all.findIndex(([other]) => other === v) === i);
+    for (const [v, colour] of special) put(selection.body, v, colour, colour === colours.ink ? 4 : 6);
+    if (view.labels && vertices <= 80)
+      scene.bodies.forEach((body, b) => { for (let v = 0; v < body.vertices; ++v) if (b !== selection.body || special.every(([other]) => other !== v)) put(b, v, colours.muted, 0); });
+    drawNames(c, names, size);
   };
   const pickVertex = ([px, py]) => {
     let best = null;
@@ -117,6 +119,6 @@ export function Stage3d({lab, state, source, which}) {
   return html`<div class="space" ref=${holder} role="img" tabIndex="0" data-view="stage" onKeyDown=${onKeyDown}
       aria-label=${`${scene.name} in space at ${at.time.toFixed(4)} seconds. Arrow keys turn, plus and minus zoom, 0 shows all, v and Shift v choose a vertex.`}
       onPointerDownCapture=${onPointerDown} onPointerMove=${onPointerMove} onPointerUp=${onPointerUp} onDblClick=${() => space.current?.fit()}>
-    <div class="overlay"><${Canvas} draw=${drawNames} aria-hidden="true" /></div>
+    <div class="overlay"><${Canvas} draw=${drawOverlay} aria-hidden="true" /></div>
   </div>`;
 }

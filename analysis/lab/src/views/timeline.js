@@ -1,5 +1,5 @@
 /** The event queue as a timeline: performed events left of now, scheduled ones right of it, a row for each side. */
-import {html, Canvas, font, pointerAt, ticks, tickText, useRef, useState} from './dom.js';
+import {html, Canvas, font, pointerAt, ticks, tickText, Unfilled, useRef, useState} from './dom.js';
 import {sideName} from '../math/plans.js';
 import {isSame, title, when} from '../text/why.js';
 import {short} from '../math/exact.js';
@@ -18,6 +18,7 @@ export function Timeline({lab, state}) {
   const hits = useRef([]), dragging = useRef(false), size = useRef([1, 1]);
   const [zoom, setZoom] = useState(null);  // {t0, t1}; null: the whole clip
   if (!info || !at) return html`<div class="empty">…</div>`;
+  if (!info.hasEvents) return html`<${Unfilled} lab=${lab} why="This strategy works at each frame and has no event queue." would="A kinetic strategy shows here which events have happened, and which are computed for later." />`;
   const shown = zoom && zoom.t1 <= info.end + 1e-9 && zoom.t0 >= info.begin - 1e-9 ? follow(zoom, at.time, info) : {t0: info.begin, t1: info.end};
   const span = Math.max(1e-300, shown.t1 - shown.t0);
   const x = (t) => left + (t - shown.t0) / span * (size.current[0] - left - right);

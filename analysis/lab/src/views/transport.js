@@ -4,24 +4,26 @@ import {frameAt} from '../math/plans.js';
 import {short} from '../math/exact.js';
 
 export function Transport({lab, state}) {
+  const [more, setMore] = useState(false);  // on a phone: whether speed and break points are shown
   const {phase, at, info, frames, selection, speed} = state;
   const off = !at || phase === 'loading', noEvents = off || !info?.hasEvents;
   const frame = at ? frameAt(frames, at.time) : 0;
   const exactly = at && frames[frame] === at.time && !at.betweenFrames;
-  return html`<div class="transport" role="toolbar" aria-label="Time">
+  return html`<div class=${`transport ${more ? 'more' : ''}`} role="toolbar" aria-label="Time">
     <div class="group">
       <button disabled=${off} onClick=${() => { lab.pause(); lab.seek(info.begin); }} title="To the start (Home)" aria-label="To the start">❙◂</button>
       <button disabled=${off} onClick=${() => lab.frame(-1)} title="One frame back (,)" aria-label="One frame back">◂ frame</button>
       <button class="play" disabled=${off} onClick=${() => lab.toggle()} title="Play or pause (space)" aria-label=${phase === 'playing' ? 'Pause' : 'Play'}>${phase === 'playing' ? '❚❚' : '▶'}</button>
       <button disabled=${off} onClick=${() => lab.frame(1)} title="One frame forwards (.)" aria-label="One frame forwards">frame ▸</button>
     </div>
-    <div class="group events">
+    ${(off || info?.hasEvents) && html`<div class="group events">
       <button disabled=${noEvents} onClick=${() => lab.event(-1)} title="Take back one event (p)" aria-label="One event back">◂ event</button>
       <button disabled=${noEvents} onClick=${() => lab.event(1)} title="Perform the next event (n)" aria-label="One event forwards">event ▸</button>
-    </div>
+    </div>`}
+    <button class="narrow-only" aria-expanded=${more} onClick=${() => setMore(!more)} title="Speed and break points" aria-label="Speed and break points">⋯</button>
     <output class="clock" aria-live="off"><b>t = ${at ? short(at.time) : '–'} s</b>
       <span>${at ? exactly ? `frame ${frame} of ${frames.length - 1}` : at.betweenFrames ? `after frame ${frame}, between events` : `between frames ${frame} and ${frame + 1}` : ''}</span></output>
-    <${Stops} lab=${lab} state=${state} off=${noEvents} selection=${selection} />
+    ${(off || info?.hasEvents) && html`<${Stops} lab=${lab} state=${state} off=${noEvents} selection=${selection} />`}
     <label class="speed">Speed <select value=${String(speed)} onChange=${(event) => lab.store.set({speed: Number(event.currentTarget.value)})}>
       ${[0.1, 0.25, 0.5, 1, 2, 4].map((x) => html`<option value=${String(x)}>${x}×</option>`)}</select></label>
     <input class="scrub" type="range" aria-label="Time in the clip" min=${info?.begin ?? 0} max=${info?.end ?? 1} step="any" value=${at?.time ?? 0} disabled=${off}

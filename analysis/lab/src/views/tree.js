@@ -2,7 +2,7 @@
  * The hierarchy. Small trees are drawn as boxes with lines, large ones as strips whose width is the number of primitives.
  * Each node names the realiser of the chosen side; nodes that just changed are lit.
  */
-import {html, Canvas, font, haloText, pointerAt, useRef} from './dom.js';
+import {html, Canvas, font, haloText, pointerAt, Unfilled, useRef} from './dom.js';
 import {isLit} from '../state/lit.js';
 import {sideName} from '../math/plans.js';
 import {plainNode} from './box.js';
@@ -35,7 +35,7 @@ export function TreeView({lab, state, which = 'main'}) {
   const {selection, scene} = state, lit = source?.lit;
   const hits = useRef([]);
   const tree = source?.trees?.[selection.body];
-  if (!tree) return html`<div class="empty">${source?.at ? 'This strategy keeps no tree that can be shown.' : '…'}</div>`;
+  if (!tree) return source?.at ? html`<${Unfilled} lab=${lab} why="This strategy keeps no tree." would="With one, each node stands here with the vertex that holds the chosen side of its box." />` : html`<div class="empty">…</div>`;
   const plan = layout(tree);
 
   const draw = (c, {width, height, colours}) => {
@@ -69,7 +69,8 @@ export function TreeView({lab, state, which = 'main'}) {
       const v = tree.realiser(node, selection.side);
       font(c, 11, chosen ? 700 : 400);
       c.fillStyle = colours.ink;
-      c.fillText(two || v === null ? String(node) : `${node}`, x, two ? y - 7 : y);
+      const one = !two && tree.realisers && v !== null && w >= 44;  // no room for two lines
+      c.fillText(one ? `${node}  v${v}` : String(node), x, two ? y - 7 : y);
       if (two) {
         font(c, 11, 600);
         c.fillStyle = v !== null && v === selection.vertex ? colours.challenger : colours.realiser;

@@ -1,5 +1,5 @@
 /** The event panel: the story of the chosen event, and the list of events around now. */
-import {html, Ref, useEffect, useRef} from './dom.js';
+import {html, Ref, Unfilled, useEffect, useRef} from './dom.js';
 import {clock, isSame, kindNames, story, title} from '../text/why.js';
 import {chooseEvent} from './timeline.js';
 import {count} from './box.js';
@@ -10,7 +10,7 @@ const before = 12, after = 24;
 export function WhyPanel({lab, state}) {
   const {selection, history, at, info} = state;
   if (!info || !at) return null;
-  if (!info.hasEvents) return html`<p class="hint">This strategy has no events. It works at each frame; choose a kinetic strategy to ask why a bound changes.</p>`;
+  if (!info.hasEvents) return html`<${Unfilled} lab=${lab} why="This strategy works at each frame and has no events." would="A kinetic strategy tells here, for each event, which certificate failed and which bounds were written." />`;
   const chosen = selection.event;
   const step = chosen?.done !== undefined ? history[chosen.done] : null;
   const due = chosen?.due ? at.queue.find((event) => isSame(event, chosen.due)) ?? chosen.due : null;

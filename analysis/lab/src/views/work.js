@@ -2,22 +2,25 @@
 import {html, Canvas, font, pointerAt, ticks} from './dom.js';
 import {workMetrics} from '../state/compare.js';
 import {frameAt} from '../math/plans.js';
+import {titleOf} from '../text/words.js';
 
-export function WorkPanel({lab, state}) {
+/** `metrics`: the ids of those to show; without it all. */
+export function WorkPanel({lab, state, metrics}) {
   const {compare, work, strategies, strategy} = state;
-  const title = (id) => strategies.find((s) => s.id === id)?.title ?? id;
+  const title = (id) => titleOf(strategies, id);
   if (!compare) return html`<div class="work"><p class="hint">Choose a second strategy above (“Compare with”) to see both on one clock, with their work in each frame.</p>
     <div class="row">${['bottom_up', 'kinetic_aabb', 'kinetic_boxtree', 'kinetic_separation_list', 'interval_join', 'kinetic_envelope'].filter((id) => id !== strategy && strategies.some((s) => s.id === id)).map((id) =>
       html`<button onClick=${() => lab.comparison.set({strategy: id})}>${title(id)}</button> `)}</div></div>`;
   if (!work) return html`<p class="hint">Measuring …</p>`;
   const [a, b] = work.series, frames = a.frames.length;
-  const measuring = a.done < frames || b.done < frames;
-  const shown = workMetrics.filter(({id}) => work.series.some((s) => s.counters[id]?.some((x) => x > 0)));
+  const counting = a.done < frames || b.done < frames;
+  const shown = workMetrics.filter(({id}) => (!metrics || metrics.includes(id)) && work.series.some((s) => s.counters[id]?.some((x) => x > 0)));
   return html`<div class="work">
     <p class="key"><span class="swatch first"></span> ${title(a.strategy)} <span class="swatch second"></span> ${title(b.strategy)}
-      ${measuring && html`<span class="muted"> measuring: ${Math.min(a.done, frames) + Math.min(b.done, frames)} of ${2 * frames} frames</span>`}</p>
+      ${counting ? html`<span class="muted"> counting: ${Math.min(a.done, frames) + Math.min(b.done, frames)} of ${2 * frames} frames</span>` : !work.timed && html`<span class="muted"> timing …</span>`}</p>
+    <p class="hint">Work in each frame over the clip; the numbers on the right are totals of the clip, first : second.</p>
     <div class="multiples">${shown.map((metric) => html`<${Multiple} key=${metric.id} lab=${lab} state=${state} metric=${metric} a=${a} b=${b} />`)}</div>
-    <p class="hint">Counts come from the strategies’ own counters, frame by frame, the query included. Milliseconds depend on this machine and on WebAssembly; the project’s report measures natively.</p>
+    <p class="hint">Counts come from the strategies’ own counters, frame by frame, the query included. Milliseconds are of the median clip of several, played by turns; they depend on this machine and on WebAssembly; the project’s report measures natively.</p>
   </div>`;
 }
 
