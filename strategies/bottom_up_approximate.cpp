@@ -19,9 +19,9 @@ double with_digits(double x, int digits, bool down) {
   return std::ldexp(down ? std::floor(scaled) : std::nearbyint(scaled), exponent - digits);
 }
 
-template <class S, class Count>
-class BottomUpApproximate final : public FixedPlansHierarchyStrategy<S, Count> {
-  using Base = FixedPlansHierarchyStrategy<S, Count>;
+template <class S>
+class BottomUpApproximate final : public FixedPlansHierarchyStrategy<S> {
+  using Base = FixedPlansHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;

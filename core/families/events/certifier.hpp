@@ -14,12 +14,12 @@ namespace kbvh {
 /// Computes and schedules the failures of certificates for a kinetic tree. A certificate states that one
 /// vertex, its winner, is not behind any of its candidates on one side of a body. The certificate fails when
 /// the first candidate gets ahead. Certificates are passed as events with winner, slot, body, side and depth.
-template <class S, class Queue, class Count>
+template <class S, class Queue>
 class Certifier {
   using Clock = typename Queue::ClockType;
 
  public:
-  Certifier(Clock& clock, Queue& queue, Count& count) : clock_(&clock), queue_(&queue), count_(&count) {}
+  Certifier(Clock& clock, Queue& queue, Counters& count) : clock_(&clock), queue_(&queue), count_(&count) {}
 
   /// Returns the instant at which an event happens. Computes the exact time, into `crossing`, if `exact` is
   /// set, if the event lies in no segment, or if the body has per-vertex plans. Otherwise the segment
@@ -152,14 +152,11 @@ class Certifier {
   /// Writes the earliest failure of a certificate to `event`. Returns whether there is one.
   template <class Search>
   bool find_failure(Event& event, const Search& search, std::span<const std::uint32_t> candidates) {
-    std::size_t limit = search.end, next = 0;
+    std::size_t limit = search.end, next = 0, same = 0;
     bool found = false;
-    if constexpr (Count::enabled)
-      count_->add(
-          Counter::certificates_made,
-          candidates.size() - std::size_t(std::count(candidates.begin(), candidates.end(), event.winner)));
     for (;;) {
       const RowAhead ahead = search.next_ahead(candidates, next, event.winner, limit);
+      same += ahead.same;
       if (ahead.index == candidates.size()) break;
       next = ahead.index + 1;
       const std::uint32_t challenger = candidates[ahead.index];
@@ -168,6 +165,7 @@ class Certifier {
       event.loser = challenger;
       limit = ahead.at + 1;
     }
+    count_->add(Counter::certificates_made, candidates.size() - same);
     if (found) clock_->set_failure(event, limit - 1);
     return found;
   }
@@ -201,7 +199,7 @@ class Certifier {
 
   Clock* clock_;
   Queue* queue_;
-  Count* count_;
+  Counters* count_;
 };
 
 }  // namespace kbvh

@@ -41,7 +41,7 @@ namespace kbvh {
 /// Primitives can be inserted and removed at any time (as the paper claims). The topology is edited locally.
 /// Certificates are recomputed for the few nodes whose candidates changed, and for their ancestors as long as
 /// realisers change.
-template <class S, class Queue, class Count, class Observer, int K>
+template <class S, class Queue, class Observer, int K>
 class KineticTree {
   /// One bit for each side, and one more.
   using SideBits = std::conditional_t<K <= 7, std::uint8_t, std::uint32_t>;
@@ -52,7 +52,7 @@ class KineticTree {
   static constexpr const auto& directions = Dop<S, K>::directions;
 
   KineticTree(Topology topology, const Primitives& primitives, std::uint32_t body, std::uint32_t first_slot,
-              typename Queue::ClockType& clock, Queue& queue, Count& count, Observer observer = {})
+              typename Queue::ClockType& clock, Queue& queue, Counters& count, Observer observer = {})
       : topology_(std::move(topology)),
         leaf_vertices_(topology_, primitives),
         body_(body),
@@ -382,9 +382,9 @@ class KineticTree {
   CertificateSlots slots_;
   typename Queue::ClockType* clock_;
   Queue* queue_;
-  Count* count_;
+  Counters* count_;
   Observer observer_;
-  Certifier<S, Queue, Count> certifier_;
+  Certifier<S, Queue> certifier_;
   std::vector<std::uint32_t> realisers_;  ///< [node][side]
   // Allocated at the first change of plans.
   std::vector<std::uint32_t> touched_, marked_, affected_;
@@ -397,14 +397,14 @@ class KineticTree {
 };
 
 /// The kinetic AABB tree of the paper.
-template <class S, class Queue, class Count, class Observer = NoObserver>
-using KineticAabbTree = KineticTree<S, Queue, Count, Observer, 6>;
+template <class S, class Queue, class Observer = NoObserver>
+using KineticAabbTree = KineticTree<S, Queue, Observer, 6>;
 
 /// The kinetic k-DOP tree, as a template argument of KineticForest: KineticDop<18>::Tree.
 template <int K>
 struct KineticDop {
-  template <class S, class Queue, class Count, class Observer = NoObserver>
-  using Tree = KineticTree<S, Queue, Count, Observer, K>;
+  template <class S, class Queue, class Observer = NoObserver>
+  using Tree = KineticTree<S, Queue, Observer, K>;
 };
 
 }  // namespace kbvh

@@ -17,8 +17,9 @@ struct RowTable {
 
 /// The first vertex of a list whose row gets ahead of another row, and where.
 struct RowAhead {
-  std::size_t index;  ///< in the list; the list's length if there is none
-  std::size_t at;     ///< the first column at which that row is ahead
+  std::size_t index;   ///< in the list; the list's length if there is none
+  std::uint32_t at;    ///< the first column at which that row is ahead
+  std::uint32_t same;  ///< number of vertices before it whose row is that other row
 };
 
 template <class S>
