@@ -60,7 +60,8 @@ class LeafPairs {
     }
     *tests_ += tests;
   }
-  LaneBox<S> box(std::uint32_t body, const Primitives& primitives, std::uint32_t primitive) const {
+  [[gnu::always_inline]] LaneBox<S> box(std::uint32_t body, const Primitives& primitives,
+                                        std::uint32_t primitive) const {
     const auto vertices = primitives[primitive];
     motion_->fetch(body, vertices);
     return LaneBox<S>::of(vertices, motion_->positions(body));

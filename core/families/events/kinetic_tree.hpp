@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <type_traits>
 #include <vector>
@@ -282,10 +283,18 @@ class KineticTree {
     event.side = side & 31U;
     event.depth = topology_.depths[node];
     const TopologyNode n = topology_.nodes[node];
-    if (n.is_leaf()) return certifier_.certify(event, now, leaf_vertices_[node]);
-    std::uint32_t candidates[8];  // children
-    for (std::uint32_t i = 0; i < n.count(); ++i) candidates[i] = realiser(n.first() + i, side);
-    certifier_.certify(event, now, {candidates, n.count()});
+    if (n.is_leaf()) {
+      const std::span<const std::uint32_t> vertices = leaf_vertices_[node];
+      KBVH_ASSERT(std::binary_search(vertices.begin(), vertices.end(), event.winner));
+      return certifier_.certify(event, now, vertices, vertices.size() - 1);
+    }
+    std::uint32_t candidates[8];  // of the children, without the winner: it may realise several
+    std::size_t others = 0;
+    for (std::uint32_t i = 0; i < n.count(); ++i) {
+      candidates[others] = realiser(n.first() + i, side);
+      if (candidates[others] != event.winner) ++others;
+    }
+    certifier_.certify(event, now, {candidates, others}, others);
   }
 
   std::uint32_t vertex_count() const { return clock_->plans(body_).vertex_count(); }

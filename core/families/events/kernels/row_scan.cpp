@@ -29,23 +29,24 @@ template <class S, int upper>
 RowAhead next_ahead(RowTable<S> rows, const std::uint32_t* vertices, std::size_t first, std::size_t count,
                     const S* winner, std::size_t from, std::size_t end) {
   constexpr std::size_t fetched_ahead = 6;
-  std::uint32_t same = 0;
   for (std::size_t i = first; i < count; ++i) {
     if (i + fetched_ahead < count)
       __builtin_prefetch(rows.values + vertices[i + fetched_ahead] * rows.stride + from);
     const S* const row = rows.values + vertices[i] * rows.stride;
-    if (row == winner) {
-      ++same;
-      continue;
-    }
     const std::size_t at = upper == 1 ? scan(row, winner, from, end) : scan(winner, row, from, end);
-    if (at < end) return {i, std::uint32_t(at), same};
+    if (at < end) return {i, at};
   }
-  return {count, std::uint32_t(end), same};
+  return {count, end};
+}
+
+std::uint32_t occurrences(const std::uint32_t* vertices, std::size_t count, std::uint32_t vertex) {
+  std::uint32_t found = 0;
+  for (std::size_t i = 0; i < count; ++i) found += vertices[i] == vertex ? 1U : 0U;
+  return found;
 }
 
 template <class S>
-constexpr RowScanKernels<S> table{&first_above<S>, {&next_ahead<S, 0>, &next_ahead<S, 1>}};
+constexpr RowScanKernels<S> table{&first_above<S>, {&next_ahead<S, 0>, &next_ahead<S, 1>}, &occurrences};
 
 }  // namespace
 

@@ -17,9 +17,8 @@ struct RowTable {
 
 /// The first vertex of a list whose row gets ahead of another row, and where.
 struct RowAhead {
-  std::size_t index;   ///< in the list; the list's length if there is none
-  std::uint32_t at;    ///< the first column at which that row is ahead
-  std::uint32_t same;  ///< number of vertices before it whose row is that other row
+  std::size_t index;  ///< in the list; the list's length if there is none
+  std::size_t at;     ///< the first column at which that row is ahead
 };
 
 template <class S>
@@ -31,6 +30,8 @@ struct RowScanKernels {
   /// [1] above it, [0] below it. May read `row_padding` numbers past `end`.
   RowAhead (*next_ahead[2])(RowTable<S> rows, const std::uint32_t* vertices, std::size_t first,
                             std::size_t count, const S* winner, std::size_t from, std::size_t end);
+  /// Returns how often `vertex` is in a list of `count`.
+  std::uint32_t (*occurrences)(const std::uint32_t* vertices, std::size_t count, std::uint32_t vertex);
 };
 /// The largest number of values of a row that are read at once.
 inline constexpr std::size_t row_padding = 16;
