@@ -76,8 +76,9 @@ class BottomUpPeriod final : public CountedStrategy<S>, public AnswersRays<S>, p
     };
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
-      if (roots_[pair.first] != nullptr && roots_[pair.second] != nullptr)
-        check(*roots_[pair.first], *roots_[pair.second], pair, out);
+      if (roots_[pair.first] == nullptr || roots_[pair.second] == nullptr) continue;
+      ++tests;
+      check(*roots_[pair.first], *roots_[pair.second], pair, out);
     }
     this->count_.add(Counter::box_tests, tests);
     return {};
@@ -160,17 +161,19 @@ class BottomUpPeriod final : public CountedStrategy<S>, public AnswersRays<S>, p
 
   /// Implements Algorithm 2 of the paper, with the missing case of a leaf against an inner node.
   void check(const Node& a, const Node& b, const BodyPair& pair, PairBuffer& out) {
-    this->count_.add(Counter::box_tests);
     if (!overlap(a.box, b.box)) return;
     if (a.is_leaf() && b.is_leaf()) {
       out.push_back({pair.first, a.primitive, pair.second, b.primitive});
     } else if (a.is_leaf()) {
+      this->count_.add(Counter::box_tests, 2);
       check(a, *b.left, pair, out);
       check(a, *b.right, pair, out);
     } else if (b.is_leaf()) {
+      this->count_.add(Counter::box_tests, 2);
       check(*a.left, b, pair, out);
       check(*a.right, b, pair, out);
     } else {
+      this->count_.add(Counter::box_tests, 4);
       check(*a.left, *b.left, pair, out);
       check(*a.left, *b.right, pair, out);
       check(*a.right, *b.left, pair, out);

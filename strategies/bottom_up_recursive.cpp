@@ -60,7 +60,9 @@ class BottomUpRecursive final : public CountedStrategy<S>, public AnswersRays<S>
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
       const Body &a = bodies_[pair.first], &b = bodies_[pair.second];
-      if (!a.topology.empty() && !b.topology.empty()) check(pair, a, 0, b, 0, out);
+      if (a.topology.empty() || b.topology.empty()) continue;
+      ++tests;
+      check(pair, a, 0, b, 0, out);
     }
     this->count_.add(Counter::box_tests, tests);
     return {};
@@ -132,16 +134,18 @@ class BottomUpRecursive final : public CountedStrategy<S>, public AnswersRays<S>
   /// Implements Z&W Algorithm 2 for any width, with the missing case of a leaf against an inner node.
   void check(const BodyPair& pair, const Body& a, std::uint32_t id_a, const Body& b, std::uint32_t id_b,
              PairBuffer& out) {
-    this->count_.add(Counter::box_tests);
     if (!overlap(a.boxes[id_a], b.boxes[id_b])) return;
     const TopologyNode node_a = a.topology.nodes[id_a], node_b = b.topology.nodes[id_b];
     if (node_a.is_leaf() && node_b.is_leaf()) {
       compare(pair, a, node_a, b, node_b, out);
     } else if (node_a.is_leaf()) {
+      this->count_.add(Counter::box_tests, node_b.count());
       for (std::uint32_t j = 0; j < node_b.count(); ++j) check(pair, a, id_a, b, node_b.first() + j, out);
     } else if (node_b.is_leaf()) {
+      this->count_.add(Counter::box_tests, node_a.count());
       for (std::uint32_t i = 0; i < node_a.count(); ++i) check(pair, a, node_a.first() + i, b, id_b, out);
     } else {
+      this->count_.add(Counter::box_tests, std::uint64_t(node_a.count()) * node_b.count());
       for (std::uint32_t i = 0; i < node_a.count(); ++i)
         for (std::uint32_t j = 0; j < node_b.count(); ++j)
           check(pair, a, node_a.first() + i, b, node_b.first() + j, out);
@@ -152,14 +156,12 @@ class BottomUpRecursive final : public CountedStrategy<S>, public AnswersRays<S>
   void compare(const BodyPair& pair, const Body& a, TopologyNode leaf_a, const Body& b, TopologyNode leaf_b,
                PairBuffer& out) {
     const bool single = leaf_a.count() == 1 && leaf_b.count() == 1;
+    if (!single) this->count_.add(Counter::box_tests, std::uint64_t(leaf_a.count()) * leaf_b.count());
     for (std::uint32_t i = 0; i < leaf_a.count(); ++i)
       for (std::uint32_t j = 0; j < leaf_b.count(); ++j) {
         const std::uint32_t primitive_a = a.topology.primitives[leaf_a.first() + i];
         const std::uint32_t primitive_b = b.topology.primitives[leaf_b.first() + j];
-        if (!single) {
-          this->count_.add(Counter::box_tests);
-          if (!overlap(a.box_of(primitive_a), b.box_of(primitive_b))) continue;
-        }
+        if (!single && !overlap(a.box_of(primitive_a), b.box_of(primitive_b))) continue;
         out.push_back({pair.first, primitive_a, pair.second, primitive_b});
       }
   }
