@@ -31,7 +31,7 @@ NUMBERS = ("p50", "p99", "worst", "bytes", "build_ms", "pairs", "candidates", "m
            "looseness", "verified_frames")  # fmt: skip
 #: Counters that the page has, per frame.
 COUNTERS = ("certificates_failed", "values_written", "nodes_visited", "box_tests", "triangle_tests")
-COLUMNS = ("cell", "contestant", "session", "plan", "when", "kind", "repetitions", "limit", "every", *NUMBERS, *COUNTERS, "refused",
+COLUMNS = ("cell", "contestant", "session", "plan", "when", "kind", "repetitions", "limit", "every", "rounds", *NUMBERS, *COUNTERS, "refused",
            "disturbed", "clips", "times", "middle", "draws", "pace", "quality")  # fmt: skip
 #: The sums of phases that the page has for each resample of the rounds.
 DRAWN = (("motion",), ("update", "plan_changes"), ("traversal", "triangle_tests"))
@@ -94,6 +94,7 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
         columns["draws"].append([] if raw is None else _draws(raw))
         again = row["again"]
         columns["limit"].append(again.get("frames_limit", _limit(row)))
+        columns["rounds"].append({key: again[key] for key in ("repetitions", "interval_width", "seconds") if key in again})
         columns["every"].append(number(again.get("oracle_every", row["sampled_every"])))
         columns["pace"].append([[number(p["begin"], 4), number(p["update"], 4), number(p["query"], 4)] for p in row["times_over_time"]])
         columns["quality"].append(

@@ -12,7 +12,7 @@ import pandas as pd
 
 from .scenes import PathLike
 
-_SHARED = ("files", "scene_names", "load", "ratios", "profiles")
+_SHARED = ("files", "scene_names", "clip_times", "load", "ratios", "profiles")
 
 
 def _shared(name: str) -> ModuleType:

@@ -113,8 +113,8 @@ std::vector<Job> jobs_of(const Plan& plan, std::vector<std::string>& notes) {
                               : study.rays  ? "-rays"
                                             : "") +
                              (study.kernels ? "-" + std::string(name(*study.kernels)) : ""),
-                         {job.scene, scalar, l, study.repetitions, study.frames_limit, study.oracle_every,
-                          asked_of(study), content_of(contestants)});
+                         {job.scene, scalar, l, study.repetitions, study.interval_width, study.seconds,
+                          study.frames_limit, study.oracle_every, asked_of(study), content_of(contestants)});
           if (known.insert(job.id).second) jobs.push_back(std::move(job));
         }
     }

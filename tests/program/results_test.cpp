@@ -348,14 +348,17 @@ TEST(Table, SaysHowManyPairsThereAre) {
   records[0]["verified"].update({{"frames", 1u}, {"pairs", 2u}});
   records[1]["verified"].update({{"frames", 4u}, {"pairs", 35u}});
   const auto title = [&] { return results_table(records).substr(0, results_table(records).find('\n')); };
-  EXPECT_EQ(title(), "s, l = 10, float: 5 frames, 7 primitives, 35 true pairs in 4 compared frames");
+  EXPECT_EQ(title(),
+            "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions, 35 true pairs in 4 compared frames");
   records[1]["verified"].update({{"frames", 1u}, {"pairs", 1u}});
   records[0]["verified"]["pairs"] = 1u;
-  EXPECT_EQ(title(), "s, l = 10, float: 5 frames, 7 primitives, 1 true pair in 1 compared frame");
+  EXPECT_EQ(title(),
+            "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions, 1 true pair in 1 compared frame");
   for (json& record : records) record["scene"]["rays"] = "coherent:4:closest";
-  EXPECT_EQ(title(), "s, l = 10, float: 5 frames, 7 primitives, 1 true hit in 1 compared frame");
+  EXPECT_EQ(title(),
+            "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions, 1 true hit in 1 compared frame");
   for (json& record : records) record["verified"]["frames"] = "damaged";
-  EXPECT_EQ(title(), "s, l = 10, float: 5 frames, 7 primitives");
+  EXPECT_EQ(title(), "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions");
 }
 
 TEST(Table, DisturbedRatiosLookDifferent) {

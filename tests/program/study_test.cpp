@@ -468,7 +468,7 @@ TEST_F(Binary, BrokenGuaranteesAreRefusedATime) {
     const std::string out = std::string(1, command[0]) + "-out";
     const std::string arguments =
         command + tiny +
-        "--strategies honest,loses,admits_to_lose,repeats,throws,needs_memory,only_small,"
+        "--strategies honest,loses,admits_to_lose,repeats,throws,needs_memory,aborts,only_near,only_small,"
         "only_double --out " +
         out;
     const Outcome run = kbvh(arguments, "", KBVH_FAULTY_PROGRAM);

@@ -219,7 +219,9 @@ class Crashes(unittest.TestCase):
         for what, work in works.items():
             with self.subTest(what):
                 code = f"import kbvh, numpy as np\nprint('begun', flush=True)\ntry:\n    {work}\nexcept KeyboardInterrupt:\n    print('ended', flush=True)\nprint('after')"
+                # A process that was started in the background ignores interruptions, and so would its children.
                 with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True,
+                                      preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
                                       env={**os.environ, "KBVH_CACHE": os.devnull}) as run:  # fmt: skip
                     self.assertEqual(run.stdout.readline(), "begun\n")
                     try:

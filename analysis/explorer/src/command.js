@@ -13,6 +13,8 @@ export function command(run) {
     `# kbvh at commit ${cell.commit.commit || "unknown"}${cell.commit.dirty ? ", with uncommitted changes" : ""}`,
   ];
   const { options, scene, why } = cell.again;
+  // How many rounds were asked for; older records say only how many were played.
+  const rounds = { repetitions: Math.max(run.repetitions, 1), ...run.rounds };
   if (why) return { text: "", why };
   if (options) {
     const words = ["kbvh", "run", options, "--strategies", quoted(contestant.id)];
@@ -22,7 +24,8 @@ export function command(run) {
     words.push("--scalar", cell.scalar);
     if (!cell.continuous) words.push("--l", cell.l);
     for (const [key, value] of Object.entries(cell.asked)) words.push(`--${key}`, ...(value === true ? [] : [quoted(value)]));
-    words.push("--repetitions", Math.max(run.repetitions, 1), "--oracle-every", run.every ?? 1);
+    for (const [key, value] of Object.entries(rounds)) words.push(`--${key.replace("_", "-")}`, value);
+    words.push("--oracle-every", run.every ?? 1);
     if (run.limit) words.push("--frames-limit", run.limit);
     lines.push(`${words.join(" ")} --out again`);
   } else {
@@ -33,7 +36,7 @@ export function command(run) {
       ],
       scalars: [cell.scalar],
       l: [cell.l],
-      repetitions: Math.max(run.repetitions, 1),
+      ...rounds,
       oracle_every: run.every ?? 1,
       ...(run.limit && { frames_limit: run.limit }),
       ...cell.asked,
